@@ -1,0 +1,1 @@
+"""The one place that speaks to Zenoh: sessions, publishers, subscriptions, the mailbox."""

@@ -1,0 +1,1 @@
+"""The command line: fasaco-edge and its commands, one file each."""

@@ -1,0 +1,1 @@
+"""The machine around the mission: configuration, loop, service notification."""

@@ -1,0 +1,1 @@
+"""Values to pictures: maps, walks and pheromone as PNG."""

@@ -1,0 +1,95 @@
+"""Errors named by the domain, and the one table that gives each its code.
+
+The code is what travels: in a status message, in an error reply, in the
+command line's ``--json``. The text says what was wrong and where, the hint
+what to do about it.
+"""
+
+
+class FasacoError(Exception):
+    """Base of all errors a user of this package is meant to see."""
+
+    code = "error"
+    hint = ""
+
+    def __init__(self, message: str, *, hint: str | None = None) -> None:
+        super().__init__(message)
+        if hint is not None:
+            self.hint = hint
+
+
+class MalformedMessage(FasacoError):
+    """A payload is not the message it claims to be."""
+
+    code = "malformed_message"
+    hint = "check the publisher's message type and encoding (CDR, little endian)"
+
+
+class WrongFrame(FasacoError):
+    """A pose or map is given in another frame than the mission's."""
+
+    code = "wrong_frame"
+    hint = "publish map and pose in the same frame"
+
+
+class MapTooLarge(FasacoError):
+    """The map, or the lattice over it, is beyond the configured limit."""
+
+    code = "map_too_large"
+    hint = "check resolution and origin, or raise limits.max_lattice_cells"
+
+
+class MapFileError(FasacoError):
+    """A map file is missing or cannot be read as a map."""
+
+    code = "map_file"
+    hint = "give a map_server .yaml, a coverage grid .npy, or the name of a built-in map"
+
+
+class PatchWithoutBase(FasacoError):
+    """A map update came before any map, or does not fit the one there is."""
+
+    code = "patch_without_base"
+    hint = "publish the full map once; updates refer to it"
+
+
+class StartOutsideMap(FasacoError):
+    """The start is not on the lattice at all."""
+
+    code = "start_outside_map"
+    hint = "choose a start inside the map"
+
+
+class StartBlocked(FasacoError):
+    """The robot does not fit at the start, or the start is unknown."""
+
+    code = "start_blocked"
+    hint = "choose a free start, or check the robot radius"
+
+
+class NothingToCover(FasacoError):
+    """No cell is left that is coverable, uncovered and reachable."""
+
+    code = "nothing_to_cover"
+    hint = "check cell size and robot radius against the map"
+
+
+class BadConfiguration(FasacoError):
+    """A configuration key is unknown or its value impossible."""
+
+    code = "bad_configuration"
+    hint = "correct the named key"
+
+
+class BusUnavailable(FasacoError):
+    """No session could be opened on the Zenoh bus."""
+
+    code = "bus_unavailable"
+    hint = "start the daemon or router first, or check the endpoint"
+
+
+class MissingExtra(FasacoError):
+    """An optional part of the package is not installed."""
+
+    code = "missing_extra"
+    hint = "pip install 'fasaco-edge[record]'"

@@ -1,0 +1,1 @@
+"""Values with meaning: geometry, occupancy grids, the coverage lattice, map files."""

@@ -1,0 +1,185 @@
+"""The coverage lattice: the planning grid, anchored to the map frame.
+
+Cells are as wide as the tool. Cell (row, col) is the square
+``[col * cell_m, (col + 1) * cell_m) x [row * cell_m, (row + 1) * cell_m)`` of
+the map frame, whatever the origin, size or yaw of the map message: a cell
+keeps its index for the whole mission. Indices may be negative.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import MapTooLarge
+from fasaco_edge.grid.geometry import GridGeometry, Window
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.directions import ALL_STEPS, EAST, NORTH, SOUTH, WEST
+from fasaco_edge.kernels.footprint import (
+    BLOCKED,
+    COVERABLE,
+    UNKNOWN,
+    Placement,
+    Thresholds,
+    classify_cells,
+)
+
+__all__ = ["BLOCKED", "COVERABLE", "UNKNOWN", "Cell", "CoverageLattice", "Footprint"]
+
+Cell = tuple[int, int]
+
+MAX_LATTICE_CELLS = 4_000_000
+
+# A robot exactly as wide as a corridor fits; float32 resolutions on the wire
+# must not decide otherwise.
+TOUCH_TOLERANCE_PX = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """What the lattice is made for.
+
+    Attributes:
+        cell_m: edge of a lattice cell, the width of the tool [m].
+        robot_radius_m: radius of the robot's disc [m].
+        free_at_most: occupancy values up to this are free [percent].
+        occupied_at_least: occupancy values from this on are occupied [percent];
+            what lies between the two counts as unknown.
+    """
+
+    cell_m: float
+    robot_radius_m: float
+    free_at_most: int = 25
+    occupied_at_least: int = 65
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoverageLattice:
+    """What can be covered, cell by cell.
+
+    Attributes:
+        window: which cells of the unbounded lattice the arrays span.
+        cell_m: edge of a cell [m].
+        states: uint8 (rows, cols), read-only: UNKNOWN, BLOCKED or COVERABLE. A cell
+            is coverable if the robot's disc fits at its centre and all it covers is
+            known free.
+        steps: uint8 (rows, cols), read-only: bit ``1 << direction`` where the robot
+            can drive to the neighbour in that direction; only between coverable cells.
+    """
+
+    window: Window
+    cell_m: float
+    states: NDArray[np.uint8]
+    steps: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        for array in (self.states, self.steps):
+            array.flags.writeable = False
+
+    @classmethod
+    def from_map(
+        cls, grid: OccupancyGrid, footprint: Footprint, max_cells: int = MAX_LATTICE_CELLS
+    ) -> CoverageLattice:
+        """Return the lattice over all of ``grid``.
+
+        Raises:
+            MapTooLarge: it would have more than ``max_cells`` cells.
+        """
+        cell_m = footprint.cell_m
+        window = _window_over(grid.geometry, cell_m, max_cells)
+        states = np.empty((window.rows, window.cols), np.uint8)
+        steps = np.empty_like(states)
+        classify_cells(
+            grid.cells,
+            _placement(grid.geometry, window, footprint),
+            Thresholds(footprint.free_at_most, footprint.occupied_at_least),
+            states,
+            steps,
+        )
+        return cls(window, cell_m, states, steps)
+
+    @classmethod
+    def from_free(cls, free: NDArray[np.bool_], cell_m: float = 1.0) -> CoverageLattice:
+        """Return a lattice from a coverage grid, bool (rows, cols), True = coverable."""
+        rows, cols = free.shape
+        steps = np.zeros((rows, cols), np.uint8)
+        east, north = free[:, :-1] & free[:, 1:], free[:-1] & free[1:]
+        steps[:, :-1] |= east.astype(np.uint8) << EAST
+        steps[:, 1:] |= east.astype(np.uint8) << WEST
+        steps[:-1] |= north.astype(np.uint8) << NORTH
+        steps[1:] |= north.astype(np.uint8) << SOUTH
+        states = np.where(free, COVERABLE, BLOCKED).astype(np.uint8)
+        assert int(steps.max(initial=0)) <= ALL_STEPS
+        return cls(Window(0, 0, rows, cols), cell_m, states, steps)
+
+    @property
+    def coverable(self) -> NDArray[np.bool_]:
+        """Which cells are coverable, bool (rows, cols)."""
+        return self.states == COVERABLE
+
+    def contains(self, cell: Cell) -> bool:
+        """Tell whether the arrays span ``cell``."""
+        row, col = cell
+        window = self.window
+        return window.row0 <= row < window.row1 and window.col0 <= col < window.col1
+
+    def local(self, cell: Cell) -> Cell:
+        """Return the index of ``cell`` in the arrays."""
+        return cell[0] - self.window.row0, cell[1] - self.window.col0
+
+    def cell_at(self, x: float, y: float) -> Cell:
+        """Return the cell that holds the point (x, y) [m], inside the arrays or not."""
+        return math.floor(y / self.cell_m), math.floor(x / self.cell_m)
+
+    def centres(self, cells: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Return the centres (x, y) [m], float64 (n, 2), of cells (row, col), (n, 2)."""
+        return (cells[:, ::-1].astype(np.float64) + 0.5) * self.cell_m
+
+    def same_plan(self, other: CoverageLattice) -> bool:
+        """Tell whether both lattices allow exactly the same walks."""
+        common = self.window.intersection(other.window)
+        if self.cell_m != other.cell_m:
+            return False
+        if common is None:
+            return not (self.steps.any() or other.steps.any())
+        for array in ("states", "steps"):
+            mine, theirs = getattr(self, array), getattr(other, array)
+            if array == "states":
+                mine, theirs = mine == COVERABLE, theirs == COVERABLE
+            ours = mine[common.slices_in(self.window)]
+            if not np.array_equal(ours, theirs[common.slices_in(other.window)]):
+                return False
+            inside = np.count_nonzero(ours)
+            if np.count_nonzero(mine) != inside or np.count_nonzero(theirs) != inside:
+                return False
+        return True
+
+
+def _window_over(geometry: GridGeometry, cell_m: float, max_cells: int) -> Window:
+    x0, y0, x1, y1 = geometry.bounds()
+    rows, cols = (y1 - y0) / cell_m + 2, (x1 - x0) / cell_m + 2
+    # A negated comparison, so that NaN is caught too.
+    if not rows * cols <= max_cells:
+        raise MapTooLarge(
+            f"a lattice of {rows:.0f} x {cols:.0f} cells of {cell_m} m over a map of "
+            f"{x1 - x0:.0f} x {y1 - y0:.0f} m exceeds {max_cells} cells"
+        )
+    return Window(
+        math.floor(y0 / cell_m),
+        math.floor(x0 / cell_m),
+        math.ceil(y1 / cell_m),
+        math.ceil(x1 / cell_m),
+    )
+
+
+def _placement(geometry: GridGeometry, window: Window, footprint: Footprint) -> Placement:
+    cell_m = footprint.cell_m
+    x0, y0 = geometry.to_pixels((window.col0 + 0.5) * cell_m, (window.row0 + 0.5) * cell_m)
+    scale = cell_m / geometry.resolution
+    # The lattice's x axis, seen from the pixel grid, is turned by -yaw.
+    ux, uy = scale * math.cos(geometry.origin.yaw), -scale * math.sin(geometry.origin.yaw)
+    radius = footprint.robot_radius_m / geometry.resolution - TOUCH_TOLERANCE_PX
+    return Placement(x0, y0, ux, uy, max(radius, TOUCH_TOLERANCE_PX))

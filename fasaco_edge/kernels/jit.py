@@ -1,0 +1,64 @@
+"""How kernels are compiled, and where the compiled code is kept.
+
+numba keys its cache by the source file of the outermost function, so a caller
+keeps the old code of a callee that changed in another file. The cache folder
+is therefore named after a hash of all kernel sources: changed kernels never
+meet old code.
+"""
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+Kernel = TypeVar("Kernel", bound=Callable[..., object])
+
+KERNEL_SOURCES = sorted(Path(__file__).parent.glob("*.py"))
+
+
+def sources_digest() -> str:
+    """Return a hash of every kernel source file, 12 hex digits."""
+    digest = hashlib.sha256()
+    for source in KERNEL_SOURCES:
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def cache_folder() -> Path:
+    """Return the folder for compiled kernels: the user's cache, or a temporary one.
+
+    ``NUMBA_CACHE_DIR``, where set (a systemd CacheDirectory, say), takes the
+    place of the user's cache folder.
+    """
+    name = f"kernels-{sources_digest()}"
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    base = Path(given) if given else Path(home) / "fasaco-edge"
+    for folder in (base / name, Path(tempfile.gettempdir()) / f"fasaco-edge-{os.getuid()}" / name):
+        try:
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return folder
+    return base / name
+
+
+CACHE_FOLDER = cache_folder()
+if "numba" not in sys.modules:
+    os.environ["NUMBA_CACHE_DIR"] = str(CACHE_FOLDER)
+
+import numba  # noqa: E402  (reads NUMBA_CACHE_DIR once, at import)
+
+numba.config.CACHE_DIR = str(CACHE_FOLDER)  # where numba was imported before us
+
+_compile = numba.njit(cache=True, nogil=True)
+
+
+def kernel(function: Kernel) -> Kernel:
+    """Compile ``function`` on its first call; it runs without the interpreter lock."""
+    compiled: Kernel = _compile(function)
+    return compiled

@@ -1,0 +1,1 @@
+"""What is covered, what changed, when to replan: events in, decisions out."""

@@ -1,0 +1,1 @@
+"""Coverage planners: one file per algorithm, one interface, one cost."""
