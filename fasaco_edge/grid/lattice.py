@@ -118,7 +118,8 @@ class CoverageLattice:
     @property
     def coverable(self) -> NDArray[np.bool_]:
         """Which cells are coverable, bool (rows, cols)."""
-        return self.states == COVERABLE
+        mask: NDArray[np.bool_] = self.states == COVERABLE
+        return mask
 
     def contains(self, cell: Cell) -> bool:
         """Tell whether the arrays span ``cell``."""

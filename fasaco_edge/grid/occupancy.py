@@ -51,8 +51,7 @@ class OccupancyGrid:
         """
         window = patch.window
         rows, cols = self.cells.shape
-        inside = 0 <= window.row0 and window.row1 <= rows and 0 <= window.col0
-        if not inside or window.col1 > cols:
+        if window.intersection(Window(0, 0, rows, cols)) != window:
             raise PatchWithoutBase(
                 f"update of rows {window.row0}..{window.row1}, columns {window.col0}.."
                 f"{window.col1} does not lie inside the map of {rows} x {cols} cells"

@@ -43,7 +43,8 @@ def reachable_from(steps: NDArray[np.uint8], row: int, col: int) -> NDArray[np.u
     """Return uint8 (rows, cols), 1 where a walk from (row, col) can come."""
     came_from = np.full(steps.shape, UNSEEN, np.uint8)
     _spread(steps, row, col, came_from, -1)
-    return (came_from != UNSEEN).astype(np.uint8)
+    reached: NDArray[np.uint8] = (came_from != UNSEEN).astype(np.uint8)
+    return reached
 
 
 @kernel

@@ -1,0 +1,88 @@
+"""Between Zenoh's threads and a loop: a post costs O(1) and never blocks.
+
+What is newer makes the older of its kind worthless, except for map updates:
+each patches the map before it, so they stay in order, until a full map clears
+them.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
+
+# A patch queue this long means that the loop cannot follow: better to start
+# again from the next full map than to grow.
+MAX_QUEUED = 256
+
+
+class LatestSlot(Generic[Item]):
+    """Holds the newest value; a reader waits for it."""
+
+    def __init__(self) -> None:
+        self._filled = threading.Condition()
+        self._value: Item | None = None
+
+    def put(self, value: Item) -> None:
+        """Replace whatever was there."""
+        with self._filled:
+            self._value = value
+            self._filled.notify()
+
+    def take(self, timeout_s: float) -> Item | None:
+        """Return the value and empty the slot; None after ``timeout_s`` [s] without one."""
+        with self._filled:
+            if self._value is None:
+                self._filled.wait(timeout_s)
+            value, self._value = self._value, None
+            return value
+
+
+class Mailbox(Generic[Item]):
+    """Collects items of several kinds until the loop takes them all.
+
+    Of a kind only the newest is kept, in the order of first arrival, unless it
+    was declared ``queued``. Posting a kind declared in ``clears`` drops what is
+    queued of the other.
+    """
+
+    def __init__(self, *, queued: frozenset[str], clears: dict[str, str]) -> None:
+        self._changed = threading.Condition()
+        self._newest: dict[str, Item] = {}
+        self._queued = {kind: deque[Item]() for kind in sorted(queued)}
+        self._clears = clears
+        self._lost = dict.fromkeys(self._queued, 0)
+
+    def post(self, kind: str, item: Item) -> None:
+        """Leave an item; safe from any thread."""
+        with self._changed:
+            if kind in self._clears:
+                self._queued[self._clears[kind]].clear()
+            if kind not in self._queued:
+                self._newest[kind] = item
+            elif len(self._queued[kind]) < MAX_QUEUED:
+                self._queued[kind].append(item)
+            else:
+                self._lost[kind] += 1
+            self._changed.notify()
+
+    def take(self, timeout_s: float) -> list[tuple[str, Item]]:
+        """Return everything there is as (kind, item); wait up to ``timeout_s`` [s] for it.
+
+        Newest-only kinds come first, so that a full map precedes its patches.
+        """
+        with self._changed:
+            if not self._newest and not any(self._queued.values()):
+                self._changed.wait(timeout_s)
+            items = list(self._newest.items())
+            self._newest = {}
+            for kind, queue in self._queued.items():
+                items.extend((kind, item) for item in queue)
+                queue.clear()
+            return items
+
+    def lost(self, kind: str) -> int:
+        """Return how many items of a queued kind found the queue full."""
+        return self._lost[kind]
