@@ -13,10 +13,6 @@ from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
 
-# A patch queue this long means that the loop cannot follow: better to start
-# again from the next full map than to grow.
-MAX_QUEUED = 256
-
 
 class LatestSlot(Generic[Item]):
     """Holds the newest value; a reader waits for it."""
@@ -43,29 +39,30 @@ class LatestSlot(Generic[Item]):
 class Mailbox(Generic[Item]):
     """Collects items of several kinds until the loop takes them all.
 
-    Of a kind only the newest is kept, in the order of first arrival, unless it
-    was declared ``queued``. Posting a kind declared in ``clears`` drops what is
-    queued of the other.
+    Of a kind only the newest is kept, unless it was declared ``queued`` with the
+    length of its queue; a full queue loses its oldest. Posting a kind declared in
+    ``clears`` drops what is queued of the other.
     """
 
-    def __init__(self, *, queued: frozenset[str], clears: dict[str, str]) -> None:
+    def __init__(self, *, queued: dict[str, int], clears: dict[str, str]) -> None:
         self._changed = threading.Condition()
         self._newest: dict[str, Item] = {}
-        self._queued = {kind: deque[Item]() for kind in sorted(queued)}
+        self._queued = {kind: deque[Item](maxlen=length) for kind, length in queued.items()}
         self._clears = clears
-        self._lost = dict.fromkeys(self._queued, 0)
+        self._lost = dict.fromkeys(queued, 0)
 
     def post(self, kind: str, item: Item) -> None:
         """Leave an item; safe from any thread."""
         with self._changed:
             if kind in self._clears:
                 self._queued[self._clears[kind]].clear()
+                self._lost[self._clears[kind]] = 0
             if kind not in self._queued:
                 self._newest[kind] = item
-            elif len(self._queued[kind]) < MAX_QUEUED:
-                self._queued[kind].append(item)
             else:
-                self._lost[kind] += 1
+                queue = self._queued[kind]
+                self._lost[kind] += len(queue) == queue.maxlen
+                queue.append(item)
             self._changed.notify()
 
     def take(self, timeout_s: float) -> list[tuple[str, Item]]:
@@ -83,6 +80,8 @@ class Mailbox(Generic[Item]):
                 queue.clear()
             return items
 
-    def lost(self, kind: str) -> int:
-        """Return how many items of a queued kind found the queue full."""
-        return self._lost[kind]
+    def take_lost(self, kind: str) -> int:
+        """Return how many items of a queued kind were lost since the last call."""
+        with self._changed:
+            lost, self._lost[kind] = self._lost[kind], 0
+            return lost

@@ -139,25 +139,6 @@ class CoverageLattice:
         """Return the centres (x, y) [m], float64 (n, 2), of cells (row, col), (n, 2)."""
         return (cells[:, ::-1].astype(np.float64) + 0.5) * self.cell_m
 
-    def same_plan(self, other: CoverageLattice) -> bool:
-        """Tell whether both lattices allow exactly the same walks."""
-        common = self.window.intersection(other.window)
-        if self.cell_m != other.cell_m:
-            return False
-        if common is None:
-            return not (self.steps.any() or other.steps.any())
-        for array in ("states", "steps"):
-            mine, theirs = getattr(self, array), getattr(other, array)
-            if array == "states":
-                mine, theirs = mine == COVERABLE, theirs == COVERABLE
-            ours = mine[common.slices_in(self.window)]
-            if not np.array_equal(ours, theirs[common.slices_in(other.window)]):
-                return False
-            inside = np.count_nonzero(ours)
-            if np.count_nonzero(mine) != inside or np.count_nonzero(theirs) != inside:
-                return False
-        return True
-
 
 def _window_over(geometry: GridGeometry, cell_m: float, max_cells: int) -> Window:
     x0, y0, x1, y1 = geometry.bounds()

@@ -1,0 +1,97 @@
+"""What a mission hears and what it decides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.problem import CoverageProblem
+
+
+@dataclass(frozen=True, slots=True)
+class MapReceived:
+    """A full map came in."""
+
+    grid: OccupancyGrid
+
+
+@dataclass(frozen=True, slots=True)
+class PatchReceived:
+    """New values for a part of the map came in."""
+
+    patch: MapPatch
+
+
+@dataclass(frozen=True, slots=True)
+class PatchesLost:
+    """Map updates were lost: the map is wrong until the next full one."""
+
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class PoseReceived:
+    """The robot's pose came in."""
+
+    pose: StampedPose
+
+
+@dataclass(frozen=True, slots=True)
+class PlanReady:
+    """The plan asked for by request ``number`` is there, made in ``seconds``."""
+
+    number: int
+    path: CoveragePath
+    seconds: float
+
+
+Event = MapReceived | PatchReceived | PatchesLost | PoseReceived | PlanReady
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """A walk is wanted; ``reason`` says why."""
+
+    number: int
+    problem: CoverageProblem
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathUpdate:
+    """A path to publish, in place of the one before.
+
+    Attributes:
+        revision: counts the published paths, from 1.
+        cells: int32 (n, 2), the walk still to be driven; n = 0 tells the robot to stop.
+        reason: why it replaces the one before.
+        plan: the plan it comes from; None where none was needed.
+        plan_s: how long that took [s].
+    """
+
+    revision: int
+    cells: NDArray[np.int32]
+    reason: str
+    plan: CoveragePath | None = None
+    plan_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What is to be done after some events.
+
+    Attributes:
+        plan: a plan to make; replaces none, there is one at a time.
+        path: a path to publish; of several in one step the last is the one that holds.
+        faults: events that were refused, and why; they changed nothing.
+    """
+
+    plan: PlanRequest | None = None
+    path: PathUpdate | None = None
+    faults: tuple[FasacoError, ...] = ()

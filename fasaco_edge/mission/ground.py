@@ -1,0 +1,114 @@
+"""The part of the lattice the robot can come to, and what a new map changed of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
+from fasaco_edge.kernels.directions import COL_STEP, ROW_STEP
+from fasaco_edge.kernels.walks import reachable_from, shortest_walk
+
+# A robot that stands a little off, or whose cell was just closed by a noisy
+# scan, goes on from the nearest coverable cell this close.
+ANCHOR_CELLS = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class GroundChange:
+    """How many reachable cells came, went, or have other steps than before."""
+
+    gained: int
+    lost: int
+    rewired: int
+
+    def __bool__(self) -> bool:
+        return bool(self.gained or self.lost or self.rewired)
+
+    def __str__(self) -> str:
+        parts = []
+        if self.gained:
+            parts.append(f"{self.gained} cells more")
+        if self.lost:
+            parts.append(f"{self.lost} cells fewer")
+        if self.rewired and not parts:
+            parts.append(f"passages changed at {self.rewired} cells")
+        return "map: " + ", ".join(parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """A lattice and what of it is reachable, bool (rows, cols)."""
+
+    lattice: CoverageLattice
+    reachable: NDArray[np.bool_]
+
+    @classmethod
+    def around(cls, lattice: CoverageLattice, cell: Cell) -> Self:
+        """Return the ground that can be reached from a coverable ``cell``."""
+        reachable = reachable_from(lattice.steps, *lattice.local(cell)).astype(bool)
+        return cls(lattice, reachable)
+
+    def holds(self, cell: Cell) -> bool:
+        """Tell whether a coverable ``cell`` is reachable."""
+        return bool(self.reachable[self.lattice.local(cell)])
+
+    def change_since(self, before: Ground) -> GroundChange:
+        """Compare with the ground before; cells outside an array are not reachable."""
+        mine, theirs = self.lattice.window, before.lattice.window
+        common = mine.intersection(theirs)
+        total, total_before = np.count_nonzero(self.reachable), np.count_nonzero(before.reachable)
+        if common is None:
+            return GroundChange(int(total), int(total_before), 0)
+        here, there = common.slices_in(mine), common.slices_in(theirs)
+        now, then = self.reachable[here], before.reachable[there]
+        both = now & then
+        kept = np.count_nonzero(both)
+        steps_differ = self.lattice.steps[here] != before.lattice.steps[there]
+        return GroundChange(
+            gained=int(total - kept),
+            lost=int(total_before - kept),
+            rewired=int(np.count_nonzero(steps_differ & both)),
+        )
+
+    def legal_steps(self, cells: NDArray[np.int32]) -> int:
+        """Return how many leading steps of a walk, int32 (n, 2), are legal here."""
+        window, steps = self.lattice.window, self.lattice.steps
+        rows, cols = cells[:-1, 0] - window.row0, cells[:-1, 1] - window.col0
+        inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
+        moves = np.diff(cells, axis=0)
+        legal = np.zeros(len(moves), bool)
+        for direction, move in enumerate(zip(ROW_STEP, COL_STEP, strict=True)):
+            heading = inside & (moves == move).all(axis=1)
+            legal[heading] = steps[rows[heading], cols[heading]] >> direction & 1
+        return int(np.argmin(legal)) if not legal.all() else len(legal)
+
+    def way(self, start: Cell, goal: Cell) -> NDArray[np.int32]:
+        """Return a shortest walk, int32 (n, 2); empty where there is none."""
+        lattice = self.lattice
+        if not (lattice.contains(start) and lattice.contains(goal)):
+            return np.empty((0, 2), np.int32)
+        walk = shortest_walk(lattice.steps, lattice.local(start), lattice.local(goal))
+        offset = np.array((lattice.window.row0, lattice.window.col0), np.int32)
+        return (walk + offset).astype(np.int32)
+
+
+def anchor_cell(lattice: CoverageLattice, pose: Pose2D) -> Cell | None:
+    """Return the coverable cell a robot at ``pose`` is in, or is next to; else None."""
+    row, col = lattice.cell_at(pose.x, pose.y)
+    best, best_distance = None, ANCHOR_CELLS * lattice.cell_m
+    for cell in ((row + i, col + j) for i in (0, -1, 1) for j in (0, -1, 1)):
+        if not (lattice.contains(cell) and lattice.states[lattice.local(cell)] == COVERABLE):
+            continue
+        if cell == (row, col):
+            return cell
+        x, y = (cell[1] + 0.5) * lattice.cell_m, (cell[0] + 0.5) * lattice.cell_m
+        distance = math.hypot(x - pose.x, y - pose.y)
+        if distance < best_distance:
+            best, best_distance = cell, distance
+    return best

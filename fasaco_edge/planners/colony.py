@@ -1,0 +1,86 @@
+"""What an ant colony is made of: its cohorts and the constants of its equations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fasaco_edge.errors import BadConfiguration
+
+
+@dataclass(frozen=True, slots=True)
+class Cohort:
+    """Ants of one velocity [cells/step]."""
+
+    ants: int
+    velocity: int
+
+
+@dataclass(frozen=True, slots=True)
+class ColonyConfig:
+    """A colony; the defaults are the paper's FaSACO: 1,000 ants, cohorts from 8 down to 1.
+
+    Attributes:
+        ants: ants in all.
+        velocities: velocity of each cohort [cells/step], in the order they walk.
+        q0: probability of taking the strongest trail, equation (4).
+        alpha: weight of new pheromone, equations (7) and (8).
+        tau0: pheromone every move starts with, equation (7).
+        seed: seed of all random streams.
+    """
+
+    ants: int = 1000
+    velocities: tuple[int, ...] = (8, 7, 6, 5, 4, 3, 2, 1)
+    q0: float = 0.7
+    alpha: float = 0.1
+    tau0: float = 0.1
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _require(bool(self.velocities), "velocities", "name at least one", self.velocities)
+        for velocity in self.velocities:
+            _require(1 <= velocity <= 64, "velocities", "be in 1..64", velocity)
+        _require(
+            len(self.velocities) <= self.ants <= 1_000_000,
+            "ants",
+            f"be in {len(self.velocities)}..1000000, one for each cohort at least",
+            self.ants,
+        )
+        _require(0.0 <= self.q0 <= 1.0, "q0", "be in [0, 1]", self.q0)
+        _require(0.0 < self.alpha <= 1.0, "alpha", "be in (0, 1]", self.alpha)
+        _require(0.0 < self.tau0 <= 1e6, "tau0", "be in (0, 1e6]", self.tau0)
+        _require(0 <= self.seed < 2**63, "seed", "be in 0..2^63 - 1", self.seed)
+
+    def cohorts(self) -> tuple[Cohort, ...]:
+        """Return the cohorts in order; sizes differ by one ant at most."""
+        share, extra = divmod(self.ants, len(self.velocities))
+        return tuple(
+            Cohort(share + (index < extra), velocity)
+            for index, velocity in enumerate(self.velocities)
+        )
+
+
+def parse_velocities(text: str) -> tuple[int, ...]:
+    """Return the cohorts' velocities from ``8:1`` (falling), ``1:8`` (rising), ``4`` or ``8,4,1``.
+
+    Raises:
+        BadConfiguration: the text is none of these.
+    """
+    try:
+        if ":" in text:
+            first, last = (int(part) for part in text.split(":"))
+            step = 1 if last >= first else -1
+            velocities = tuple(range(first, last + step, step))
+        else:
+            velocities = tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise BadConfiguration(
+            f"velocities must look like 8:1, 1:8, 4 or 8,4,1, got {text!r}"
+        ) from None
+    for velocity in velocities[:1] + velocities[-1:]:
+        _require(1 <= velocity <= 64, "velocities", "be in 1..64", velocity)
+    return velocities
+
+
+def _require(condition: bool, key: str, expectation: str, value: object) -> None:
+    if not condition:
+        raise BadConfiguration(f"{key} must {expectation}, got {value!r}")
