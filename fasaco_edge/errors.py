@@ -74,6 +74,13 @@ class NothingToCover(FasacoError):
     hint = "check cell size and robot radius against the map"
 
 
+class NotYet(FasacoError):
+    """A query came for something that does not exist yet."""
+
+    code = "not_yet"
+    hint = "ask again once the daemon has a map and a pose"
+
+
 class BadConfiguration(FasacoError):
     """A configuration key is unknown or its value impossible."""
 

@@ -19,10 +19,12 @@ class CoverageLedger:
     """Visits of the tool to each cell.
 
     A cell is visited when the tool, a disc as wide as a cell, passes over its
-    centre. Coming back after having left counts as another visit.
+    centre. Coming back after having left counts as another visit; ``total`` counts
+    all of them.
     """
 
     def __init__(self, cell_m: float) -> None:
+        self.total = 0
         self._cell_m = cell_m
         self._window = Window(0, 0, 0, 0)
         self._visits = np.zeros((0, 0), np.uint16)
@@ -39,6 +41,7 @@ class CoverageLedger:
         for row, col in entered:
             self._include(row, col)
             index = row - self._window.row0, col - self._window.col0
+            self.total += 1
             self._visits[index] = min(int(self._visits[index]) + 1, 65535)
         self._under_tool = self._swept(pose, pose)
         self._last = pose

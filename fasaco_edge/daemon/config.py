@@ -1,0 +1,148 @@
+"""The daemon's configuration: typed, checked as a whole, nothing repaired."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+import yaml
+from msgspec import Meta
+
+from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.wire import schemas
+from fasaco_edge.wire.keys import Keys
+
+Metres = Annotated[float, Meta(gt=0, le=10)]
+Percent = Annotated[int, Meta(ge=0, le=100)]
+
+
+class _Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Unknown keys are errors."""
+
+
+class RobotConfig(_Section, frozen=True):
+    """The robot: its name on the bus, its disc's radius and its tool's width [m]."""
+
+    name: str = "robot"
+    radius_m: Metres = 0.18
+    tool_width_m: Metres = 0.3
+
+
+class BusConfig(_Section, frozen=True):
+    """How to join the bus. Nothing beyond loopback is listened on unless it stands here."""
+
+    base: str = "fasaco"
+    mode: Literal["peer", "client", "router"] = "peer"
+    listen: tuple[str, ...] = (DEFAULT_ENDPOINT,)
+    connect: tuple[str, ...] = ()
+
+    def settings(self) -> BusSettings:
+        """Return these as settings of a session."""
+        return BusSettings(self.mode, self.connect, self.listen)
+
+
+class MapConfig(_Section, frozen=True):
+    """What in an occupancy grid is free and occupied [percent], and the largest lattice."""
+
+    free_at_most: Percent = 25
+    occupied_at_least: Percent = 65
+    max_lattice_cells: Annotated[int, Meta(ge=1, le=100_000_000)] = 4_000_000
+
+
+class PoseConfig(_Section, frozen=True):
+    """The type of a pose whose sender names none, as ROS 2's do not."""
+
+    schema: Literal[
+        "geometry_msgs/msg/PoseStamped",
+        "geometry_msgs/msg/PoseWithCovarianceStamped",
+        "nav_msgs/msg/Odometry",
+    ] = schemas.POSE_STAMPED
+
+
+class PlannerConfig(_Section, frozen=True):
+    """The colony, see ``planners.colony.ColonyConfig``; and the time one plan may take [s].
+
+    ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
+    """
+
+    name: Literal["fasaco"] = "fasaco"
+    ants: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
+    velocities: str = "8:1"
+    q0: Annotated[float, Meta(ge=0, le=1)] = 0.7
+    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.1
+    tau0: Annotated[float, Meta(gt=0, le=1e6)] = 0.1
+    seed: Annotated[int, Meta(ge=0, lt=2**63)] = 0
+    budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.5
+
+
+class DaemonConfig(_Section, frozen=True):
+    """The whole configuration."""
+
+    robot: RobotConfig = RobotConfig()
+    bus: BusConfig = BusConfig()
+    map: MapConfig = MapConfig()
+    pose: PoseConfig = PoseConfig()
+    planner: PlannerConfig = PlannerConfig()
+
+    def keys(self) -> Keys:
+        """Return the keys of this robot.
+
+        Raises:
+            BadConfiguration: a name does not fit into a key.
+        """
+        return Keys(robot=self.robot.name, base=self.bus.base)
+
+
+def load_config(path: Path | None) -> DaemonConfig:
+    """Read a YAML file; without one return the defaults.
+
+    Raises:
+        BadConfiguration: the file is missing, is no YAML, has unknown keys or
+            impossible values; the text names key, value and what is allowed.
+    """
+    if path is None:
+        return DaemonConfig()
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadConfiguration(f"{path}: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise BadConfiguration(f"{path}: not YAML: {error}") from error
+    try:
+        config = msgspec.convert(document if document is not None else {}, DaemonConfig)
+        _check_together(config)
+    except msgspec.ValidationError as error:
+        raise BadConfiguration(f"{path}: {_explain(str(error), document)}") from error
+    except BadConfiguration as error:
+        raise BadConfiguration(f"{path}: {error}") from error
+    return config
+
+
+def _check_together(config: DaemonConfig) -> None:
+    """Check what no single value shows."""
+    low, high = config.map.free_at_most, config.map.occupied_at_least
+    if low >= high:
+        raise BadConfiguration(
+            f"map.free_at_most must be below map.occupied_at_least, got {low} and {high}"
+        )
+    if not (config.bus.listen or config.bus.connect):
+        raise BadConfiguration("bus.listen and bus.connect must not both be empty")
+    config.keys()
+
+
+def _explain(message: str, document: object) -> str:
+    """Turn ``Expected `int` >= 1 - at `$.planner.ants``` into key, expectation and value."""
+    match = re.fullmatch(r"(?P<what>.*?)(?: - at `\$\.?(?P<key>[^`]*)`)?", message, re.DOTALL)
+    assert match is not None
+    what, key = match["what"].replace("`", ""), match["key"] or ""
+    unknown = re.fullmatch(r"Object contains unknown field (?P<name>.*)", what)
+    if unknown:
+        return f"unknown key {'.'.join(filter(None, (key, unknown['name'])))}"
+    value: Any = document
+    for part in re.findall(r"[^.\[\]]+", key):
+        value = value[int(part)] if isinstance(value, list) else value[part]
+    expected = what[0].lower() + what[1:].partition(", got")[0]
+    return f"{key or 'the file'}: {expected}, got {value!r}"

@@ -1,0 +1,77 @@
+"""What comes in: samples off the bus, decoded into events of the mission."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.session import Bus, Sample
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.mission.events import (
+    Event,
+    MapReceived,
+    PatchesLost,
+    PatchReceived,
+    PoseReceived,
+)
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.poses import decode_pose
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A sample and when it came in [s, monotonic]."""
+
+    sample: Sample
+    at: float
+
+
+def make_mailbox() -> Mailbox[object]:
+    """Return the mailbox of a daemon.
+
+    Poses are queued: each tells what the tool passed over. Some seconds of them
+    are plenty.
+    """
+    return Mailbox(
+        queued={"map_update": 256, "pose": 1024, "snapshot": 64}, clears={"map": "map_update"}
+    )
+
+
+class Inbox:
+    """Subscribes to what the mission needs, and decodes it."""
+
+    def __init__(self, bus: Bus, keys: Keys, mailbox: Mailbox[object], pose_schema: str) -> None:
+        self._pose_schema = pose_schema
+        for kind, key in (("map", keys.map), ("map_update", keys.map_update), ("pose", keys.pose)):
+            bus.subscribe(key, _poster(mailbox, kind), latched=kind == "map")
+
+    def decode(
+        self, items: Sequence[tuple[str, object]], patches_lost: int
+    ) -> tuple[list[Event], list[FasacoError]]:
+        """Return the events in ``items``; a malformed sample costs that sample alone."""
+        events: list[Event] = [PatchesLost(patches_lost)] if patches_lost else []
+        faults: list[FasacoError] = []
+        for kind, item in items:
+            if isinstance(item, Received):
+                try:
+                    events.append(self._event(kind, item.sample))
+                except FasacoError as error:
+                    faults.append(error)
+        return events, faults
+
+    def _event(self, kind: str, sample: Sample) -> Event:
+        match kind:
+            case "map":
+                return MapReceived(decode_occupancy_grid(sample.payload))
+            case "map_update":
+                return PatchReceived(decode_map_update(sample.payload))
+            case _:
+                schema = sample.schema or self._pose_schema
+                return PoseReceived(decode_pose(sample.payload, schema))
+
+
+def _poster(mailbox: Mailbox[object], kind: str) -> Callable[[Sample], None]:
+    return lambda sample: mailbox.post(kind, Received(sample, time.monotonic()))

@@ -1,0 +1,71 @@
+"""Kernels come with the first map: until then the daemon is small.
+
+Importing numba costs 60 MB, and compiling on a new machine takes many seconds;
+both happen in a thread of their own, so that the loop keeps answering.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.daemon.config import DaemonConfig
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.worker import PlanningWorker
+    from fasaco_edge.mission.mission import Mission
+
+
+class Loader:
+    """Imports what plans, warms the kernels up, and sets up mission and worker."""
+
+    def __init__(self, config: DaemonConfig, mailbox: Mailbox[object]) -> None:
+        self.stage = "importing"
+        self.error: BaseException | None = None
+        self._config = config
+        self._mailbox = mailbox
+        self._loaded: tuple[Mission, PlanningWorker] | None = None
+        threading.Thread(target=self._run, name="loader", daemon=True).start()
+
+    def poll(self) -> tuple[Mission, PlanningWorker] | None:
+        """Return what was loaded, None until then; raise what went wrong."""
+        if self.error is not None:
+            raise self.error
+        return self._loaded
+
+    def _run(self) -> None:
+        try:
+            self._loaded = self._load()
+        except BaseException as error:
+            self.error = error
+        self._mailbox.post("loaded", None)
+
+    def _load(self) -> tuple[Mission, PlanningWorker]:
+        from fasaco_edge.daemon.worker import PlanningWorker  # noqa: PLC0415
+        from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
+        from fasaco_edge.mission.mission import Mission, MissionConfig  # noqa: PLC0415
+        from fasaco_edge.planners.colony import ColonyConfig, parse_velocities  # noqa: PLC0415
+        from fasaco_edge.planners.table import PLANNERS  # noqa: PLC0415
+        from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
+
+        warm_up(self._report)
+        robot, maps, planner = self._config.robot, self._config.map, self._config.planner
+        footprint = Footprint(
+            robot.tool_width_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least
+        )
+        colony = ColonyConfig(
+            ants=planner.ants,
+            velocities=parse_velocities(planner.velocities),
+            q0=planner.q0,
+            alpha=planner.alpha,
+            tau0=planner.tau0,
+            seed=planner.seed,
+        )
+        worker = PlanningWorker(
+            PLANNERS[planner.name](colony), planner.budget_s, self._mailbox.post
+        )
+        return Mission(MissionConfig(footprint, maps.max_lattice_cells)), worker
+
+    def _report(self, stage: str) -> None:
+        self.stage = f"kernels: {stage}"

@@ -1,0 +1,166 @@
+"""What the daemon says about itself: one JSON document, on change and once a second."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from fasaco_edge import __version__
+from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.errors import FasacoError
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.events import PathUpdate
+    from fasaco_edge.mission.mission import Mission
+
+HEARTBEAT_S = 1.0
+# Changes closer together than this go out as one.
+LEAST_INTERVAL_S = 0.05
+
+
+class Faults:
+    """Counts what was refused, by code."""
+
+    def __init__(self) -> None:
+        self._by_code: Counter[str] = Counter()
+        self._last = ""
+
+    def count(self, faults: Sequence[FasacoError]) -> None:
+        """Note refused events."""
+        for fault in faults:
+            self._by_code[fault.code] += 1
+            self._last = str(fault)
+
+    def document(self) -> dict[str, Any]:
+        """Return the counts as part of a status."""
+        return {
+            "total": self._by_code.total(),
+            "last": self._last,
+            "by_code": dict(self._by_code),
+        }
+
+
+class StatusBoard:
+    """Collects what a status says, and knows when one is due."""
+
+    def __init__(self, config: DaemonConfig) -> None:
+        self.faults = Faults()
+        self.ingest_s: float | None = None
+        self.plan_s: float | None = None
+        self.map_to_path_s: float | None = None
+        self.recorder: dict[str, Any] | None = None
+        self.path: PathUpdate | None = None
+        self._config = config
+        self._started = time.monotonic()
+        self._sent_at = float("-inf")
+        self._sent_key: tuple[Any, ...] = ()
+
+    def due(self, mission: Mission | None, loading: str, now: float) -> dict[str, Any] | None:
+        """Return the status if it changed or a second has passed, else None."""
+        state, reason = _state(mission, loading)
+        recorder = (self.recorder or {}).get("state")
+        key = (state, reason, self.path and self.path.revision, recorder)
+        # Many small faults are not worth a message each: the heartbeat counts them.
+        wait = LEAST_INTERVAL_S if key != self._sent_key else HEARTBEAT_S
+        if now - self._sent_at < wait:
+            return None
+        self._sent_at, self._sent_key = now, key
+        return self._document(mission, state, reason, now)
+
+    def _document(
+        self, mission: Mission | None, state: str, reason: str, now: float
+    ) -> dict[str, Any]:
+        return {
+            "robot": self._config.robot.name,
+            "version": __version__,
+            "state": state,
+            "reason": reason,
+            "uptime_s": round(now - self._started, 3),
+            "map": _map(mission),
+            "pose": _pose(mission),
+            "coverage": _coverage(mission),
+            "path": self._path(mission),
+            "plan": {
+                "plans": mission.plans if mission else 0,
+                "planning": bool(mission and mission.planning),
+            },
+            "latency_ms": {
+                "ingest": _ms(self.ingest_s),
+                "plan": _ms(self.plan_s),
+                "map_to_path": _ms(self.map_to_path_s),
+            },
+            "errors": self.faults.document(),
+            "recorder": self.recorder,
+            "rss_mb": resident_mb(),
+            "config": msgspec.to_builtins(self._config),
+        }
+
+    def _path(self, mission: Mission | None) -> dict[str, Any] | None:
+        update = self.path
+        if update is None or mission is None:
+            return None
+        plan = update.plan
+        return {
+            "revision": update.revision,
+            "steps": max(len(update.cells) - 1, 0),
+            "remaining_steps": max(len(mission.path.ahead) - 1, 0),
+            "reason": update.reason,
+            "planner": plan.planner if plan else None,
+            "seed": plan.seed if plan else None,
+            "ants": plan.ants if plan else None,
+        }
+
+
+def resident_mb() -> float:
+    """Return the resident memory of this process [MB]."""
+    with open("/proc/self/statm", encoding="ascii") as statm:
+        return round(int(statm.read().split()[1]) * 4096 / 1e6, 1)
+
+
+def _state(mission: Mission | None, loading: str) -> tuple[str, str]:
+    if mission is not None:
+        return str(mission.state), mission.reason
+    return ("loading", loading) if loading else ("waiting for map", "no map yet")
+
+
+def _map(mission: Mission | None) -> dict[str, Any] | None:
+    if mission is None or mission.grid is None:
+        return None
+    geometry = mission.grid.geometry
+    return {
+        "rows": geometry.rows,
+        "cols": geometry.cols,
+        "resolution_m": geometry.resolution,
+        "revision": mission.map_revision,
+        "stamp_ns": mission.grid.stamp_ns,
+    }
+
+
+def _pose(mission: Mission | None) -> dict[str, float] | None:
+    if mission is None or mission.pose is None:
+        return None
+    pose = mission.pose.pose
+    return {"x": round(pose.x, 3), "y": round(pose.y, 3), "yaw": round(pose.yaw, 4)}
+
+
+def _coverage(mission: Mission | None) -> dict[str, Any] | None:
+    coverage = mission.coverage() if mission else None
+    if coverage is None:
+        return None
+    return {
+        "coverable": coverage.coverable,
+        "covered": coverage.covered,
+        "recovered": coverage.recovered,
+        "remaining": coverage.remaining,
+        "unreachable": coverage.unreachable,
+        "covered_m2": round(coverage.covered * coverage.cell_m2, 3),
+        "fraction": round(coverage.fraction, 4),
+    }
+
+
+def _ms(seconds: float | None) -> float | None:
+    return None if seconds is None else round(1e3 * seconds, 3)

@@ -1,0 +1,94 @@
+"""Keeps a recorder running beside the daemon; whatever happens to it harms only the recording."""
+
+from __future__ import annotations
+
+import logging
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from fasaco_edge.bus.mailbox import LatestSlot
+from fasaco_edge.bus.session import Bus, Sample
+from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.wire.status import decode_json
+
+LOG = logging.getLogger(__name__)
+
+FIRST_PAUSE_S = 1.0
+LONGEST_PAUSE_S = 30.0
+# A recorder that says nothing for this long, although its process lives, hangs.
+SILENT_AFTER_S = 10.0
+
+
+class RecorderSupervisor:
+    """Starts ``fasaco-edge record``, starts it again when it dies, and tells how it is."""
+
+    def __init__(self, config: DaemonConfig, bus: Bus, folder: Path) -> None:
+        self._command = _command(config, folder)
+        self._word = LatestSlot[Sample]()
+        self._heard: dict[str, Any] = {}
+        self._heard_at = time.monotonic()
+        self._restarts = 0
+        self._pause_s = FIRST_PAUSE_S
+        self._start_at: float | None = None
+        self._death = ""
+        bus.subscribe(config.keys().recorder, self._word.put, latched=True)
+        self._process = subprocess.Popen(self._command)
+
+    def poll(self, now: float) -> dict[str, Any]:
+        """Look after the process; return its state for the daemon's status."""
+        self._listen(now)
+        code = self._process.poll()
+        if code is None:
+            return self._running(now)
+        if self._start_at is None:
+            self._death = f"died by signal {-code}" if code < 0 else f"exited with {code}"
+            LOG.warning("recorder %s; again in %.0f s", self._death, self._pause_s)
+            self._start_at = now + self._pause_s
+            self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
+        elif now >= self._start_at:
+            self._start_at = None
+            self._restarts += 1
+            self._heard, self._heard_at = {}, now
+            self._process = subprocess.Popen(self._command)
+        return {"state": "restarting", "reason": self._death, "restarts": self._restarts}
+
+    def close(self, timeout_s: float) -> None:
+        """Ask the recorder to end, wait for its footer, and insist if it hangs."""
+        self._process.terminate()
+        try:
+            self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            LOG.warning("recorder did not end in %.1f s: killed", timeout_s)
+            self._process.kill()
+            self._process.wait()
+
+    def _listen(self, now: float) -> None:
+        sample = self._word.take(timeout_s=0.0)
+        if sample is None:
+            return
+        try:
+            heard = decode_json(sample.payload)
+        except MalformedMessage:
+            return
+        if heard.get("pid") == self._process.pid:
+            self._heard, self._heard_at = heard, now
+            self._pause_s = FIRST_PAUSE_S
+
+    def _running(self, now: float) -> dict[str, Any]:
+        if now - self._heard_at > SILENT_AFTER_S:
+            state = {"state": "silent", "reason": f"no word for {SILENT_AFTER_S:.0f} s"}
+        else:
+            state = self._heard or {"state": "starting"}
+        return {**state, "restarts": self._restarts}
+
+
+def _command(config: DaemonConfig, folder: Path) -> list[str]:
+    endpoints = config.bus.listen or config.bus.connect
+    connect = [word for endpoint in endpoints for word in ("--connect", endpoint)]
+    robot = ["--robot", config.robot.name, "--base", config.bus.base]
+    program = [sys.executable, "-m", "fasaco_edge", "record", "--with-parent"]
+    return [*program, "--out", str(folder), *connect, *robot]

@@ -1,0 +1,63 @@
+"""The thread that plans. Its kernels run without the interpreter lock, so the loop stays awake."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fasaco_edge.bus.mailbox import LatestSlot
+from fasaco_edge.mission.events import PlanReady, PlanRequest
+from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.planner import CoveragePlanner
+from fasaco_edge.planners.stopping import Interrupt, TimeBudget
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerFailed:
+    """The planner raised: a bug, and the end of the daemon."""
+
+    error: BaseException
+
+
+class PlanningWorker:
+    """Plans one request at a time and posts the result."""
+
+    def __init__(
+        self, planner: CoveragePlanner, budget_s: float, post: Callable[[str, object], None]
+    ) -> None:
+        self._planner = planner
+        self._budget_s = budget_s
+        self._post = post
+        self._requests = LatestSlot[PlanRequest]()
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="planner", daemon=True)
+        self._thread.start()
+
+    def submit(self, request: PlanRequest) -> None:
+        """Plan ``request`` next."""
+        self._requests.put(request)
+
+    def close(self, timeout_s: float) -> None:
+        """Interrupt the search and end the thread."""
+        self._stopping.set()
+        self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        try:
+            while not self._stopping.is_set():
+                request = self._requests.take(timeout_s=0.2)
+                if request is not None:
+                    self._plan(request)
+        except BaseException as error:
+            self._post("failed", WorkerFailed(error))
+
+    def _plan(self, request: PlanRequest) -> None:
+        started = time.monotonic()
+        interrupt = Interrupt(TimeBudget(self._budget_s), self._stopping)
+        path = self._planner.plan(request.problem, interrupt, self._observe)
+        self._post("plan", PlanReady(request.number, path, time.monotonic() - started))
+
+    def _observe(self, snapshot: ColonySnapshot) -> None:
+        self._post("snapshot", snapshot)

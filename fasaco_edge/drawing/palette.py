@@ -1,0 +1,50 @@
+"""The colours of all pictures, so that the same thing looks the same everywhere."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Colour = tuple[int, int, int]
+
+PAPER: Colour = (255, 255, 255)
+INK: Colour = (31, 41, 55)
+FAINT_INK: Colour = (107, 114, 128)
+RULE: Colour = (209, 213, 219)
+
+FREE: Colour = (255, 255, 255)
+OCCUPIED: Colour = (44, 52, 64)
+UNKNOWN: Colour = (222, 226, 231)
+
+COVERED: Colour = (226, 238, 247)
+# By number of visits: two, three, four and more.
+RECOVERED: tuple[Colour, ...] = ((255, 232, 176), (255, 206, 140), (250, 172, 120))
+LEFT_OUT: Colour = (244, 214, 232)
+UNREACHABLE: Colour = (200, 60, 60)
+
+START: Colour = (13, 128, 92)
+END: Colour = (190, 24, 60)
+
+# Matplotlib's plasma (CC0) at nine even places of its first four fifths: perceptually
+# uniform, and without the yellow end that is lost on white.
+_GRADIENT = np.array(
+    [
+        (13, 8, 135),
+        (65, 4, 157),
+        (106, 0, 168),
+        (143, 13, 164),
+        (177, 42, 144),
+        (204, 71, 120),
+        (225, 100, 98),
+        (242, 132, 75),
+        (252, 166, 54),
+    ],
+    np.float64,
+)
+
+
+def gradient(fractions: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return colours, uint8 (n, 3), for fractions (n,) from 0 (start) to 1 (end)."""
+    places = np.linspace(0.0, 1.0, len(_GRADIENT))
+    channels = [np.interp(fractions, places, _GRADIENT[:, channel]) for channel in range(3)]
+    return np.rint(np.stack(channels, axis=-1)).astype(np.uint8)

@@ -1,0 +1,145 @@
+"""The drawing area: a map, tinted cells, trails and marks, in map coordinates."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageChops, ImageDraw
+
+from fasaco_edge.drawing import palette
+from fasaco_edge.drawing.palette import Colour
+from fasaco_edge.drawing.view import View
+from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice
+from fasaco_edge.grid.occupancy import OccupancyGrid
+
+# Below this many pixels a cell, lines between cells would be all there is to see.
+RULED_CELL_PX = 14
+HATCH_PX = 7
+LINE_PX = 1.2
+MARK_RADIUS_PX = 8.0
+
+
+class Plot:
+    """A picture under construction, drawn in layers from the bottom up."""
+
+    def __init__(self, view: View) -> None:
+        self.view = view
+        self._size = (view.width * view.oversampling, view.height * view.oversampling)
+        self._image = Image.new("RGB", self._size, palette.UNKNOWN)
+        self._draw = ImageDraw.Draw(self._image)
+
+    def finished(self) -> Image.Image:
+        """Return the picture, RGB, (view.width, view.height)."""
+        return self._image.reduce(self.view.oversampling)
+
+    def ground(self, source: OccupancyGrid | CoverageLattice) -> None:
+        """Draw what is free, occupied and unknown: a map's pixels, or a lattice's cells."""
+        if isinstance(source, CoverageLattice):
+            table = np.empty((3, 3), np.uint8)
+            table[UNKNOWN], table[BLOCKED] = palette.UNKNOWN, palette.OCCUPIED
+            table[COVERABLE] = palette.FREE
+            image = self._spread(source, table[source.states], palette.UNKNOWN)
+        else:
+            image = self._placed(source)
+        self._image, self._draw = image, ImageDraw.Draw(image)
+
+    def _placed(self, grid: OccupancyGrid) -> Image.Image:
+        shades = np.rint(np.linspace(palette.FREE, palette.OCCUPIED, 101))
+        # The last entry is for -1, unknown.
+        table = np.vstack([shades, palette.UNKNOWN]).astype(np.uint8)
+        geometry, step = grid.geometry, 1 / self.view.samples_per_metre
+        left, top = self.view.left, self.view.top
+        col, row = geometry.to_pixels(left, top)
+        right, down = geometry.to_pixels(left + step, top), geometry.to_pixels(left, top - step)
+        return Image.fromarray(table[grid.cells]).transform(
+            self._size,
+            Image.Transform.AFFINE,
+            (right[0] - col, down[0] - col, col, right[1] - row, down[1] - row, row),
+            Image.Resampling.NEAREST,
+            fillcolor=palette.UNKNOWN,
+        )
+
+    def tint(self, lattice: CoverageLattice, colours: NDArray[np.uint8]) -> None:
+        """Tint cells, uint8 (rows, cols, 3); white leaves a cell as it is."""
+        layer = self._spread(lattice, colours, palette.PAPER)
+        if lattice.cell_m * self.view.scale >= RULED_CELL_PX:
+            self._rule(layer, lattice.cell_m)
+        # Multiplied, so that what is dark on the map stays dark.
+        self._image = ImageChops.multiply(self._image, layer)
+        self._draw = ImageDraw.Draw(self._image)
+
+    def hatch(self, lattice: CoverageLattice, where: NDArray[np.bool_], colour: Colour) -> None:
+        """Hatch the cells ``where``, bool (rows, cols)."""
+        if not where.any():
+            return
+        spread = self._spread(lattice, where.astype(np.uint8) * 255, 0)
+        width, height = self._size
+        period = HATCH_PX * self.view.oversampling
+        stripes = np.add.outer(np.arange(height), np.arange(width)) % period < period // 3
+        mask = np.asarray(spread) * stripes
+        self._image.paste(colour, mask=Image.fromarray(mask))
+
+    def trail(self, starts: NDArray[np.float64], ends: NDArray[np.float64], width_m: float) -> None:
+        """Draw segments (n, 2) to (n, 2) [m], coloured from the first to the last."""
+        colours = palette.gradient(np.linspace(0.0, 1.0, len(starts))).tolist()
+        thinnest = LINE_PX * self.view.oversampling
+        # Whole numbers and odd widths, or the round ends stand out from the line.
+        radius = round(max(width_m * self.view.samples_per_metre, thinnest)) // 2
+        width = 2 * radius + 1
+        places = np.hstack([self.view.samples(starts), self.view.samples(ends)])
+        lines = np.rint(places).astype(np.int64).tolist()
+        for (x0, y0, x1, y1), colour in zip(lines, map(tuple, colours), strict=True):
+            self._draw.line((x0, y0, x1, y1), colour, width)
+            self._draw.ellipse((x1 - radius, y1 - radius, x1 + radius, y1 + radius), colour)
+
+    def arrow(self, at: NDArray[np.float64], along: NDArray[np.float64], size_m: float) -> None:
+        """Draw an arrow head, its middle at (x, y) [m], pointing ``along`` a unit vector."""
+        across = np.array([-along[1], along[0]])
+        for grown, colour in ((1.6, palette.PAPER), (1.0, palette.INK)):
+            # A triangle's incircle lies a third up: so the rim is as wide on all sides.
+            front = along * size_m * (grown * 2 / 3)
+            back = along * size_m * (-grown / 3)
+            side = across * size_m * (grown * 0.58)
+            corners = at + np.array([front, back + side, back - side])
+            self._draw.polygon([*map(tuple, self.view.samples(corners).tolist())], colour)
+
+    def start_mark(self, point: NDArray[np.float64]) -> None:
+        """Mark where it began, (x, y) [m], with a disc."""
+        for radius, colour in ((1.35, palette.PAPER), (1.0, palette.START), (0.35, palette.PAPER)):
+            self._draw.ellipse(self._box(point, radius), colour)
+
+    def end_mark(self, point: NDArray[np.float64]) -> None:
+        """Mark where it ended, (x, y) [m], with a square."""
+        for radius, colour in ((1.25, palette.PAPER), (0.9, palette.END), (0.3, palette.PAPER)):
+            self._draw.rectangle(self._box(point, radius), colour)
+
+    def _box(self, point: NDArray[np.float64], radius: float) -> tuple[float, float, float, float]:
+        x, y = self.view.samples(point[None])[0].tolist()
+        half = radius * MARK_RADIUS_PX * self.view.oversampling
+        return x - half, y - half, x + half, y + half
+
+    def _spread(
+        self, lattice: CoverageLattice, values: NDArray[np.uint8], outside: Colour | int
+    ) -> Image.Image:
+        step = 1 / (self.view.samples_per_metre * lattice.cell_m)
+        col = self.view.left / lattice.cell_m - lattice.window.col0
+        row = self.view.top / lattice.cell_m - lattice.window.row0
+        return Image.fromarray(values).transform(
+            self._size,
+            Image.Transform.AFFINE,
+            (step, 0, col, 0, -step, row),
+            Image.Resampling.NEAREST,
+            fillcolor=outside,
+        )
+
+    def _rule(self, layer: Image.Image, cell_m: float) -> None:
+        view, draw, (width, height) = self.view, ImageDraw.Draw(layer), self._size
+        step = view.samples_per_metre * cell_m
+        x = (math.ceil(view.left / cell_m) * cell_m - view.left) * view.samples_per_metre
+        y = (view.top - math.floor(view.top / cell_m) * cell_m) * view.samples_per_metre
+        for place in np.arange(x, width, step).tolist():
+            draw.line((place, 0, place, height), palette.PAPER, view.oversampling)
+        for place in np.arange(y, height, step).tolist():
+            draw.line((0, place, width, place), palette.PAPER, view.oversampling)

@@ -1,0 +1,78 @@
+"""A picture of a walk over the lattice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from fasaco_edge.drawing.lanes import arrow_places, directions, lanes
+from fasaco_edge.drawing.plot import Plot
+from fasaco_edge.drawing.sheet import Sheet
+from fasaco_edge.drawing.view import View, bounds_of
+from fasaco_edge.drawing.visits import draw_visits
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.grid.occupancy import OccupancyGrid
+
+# In cells.
+LANE_OFFSET = 0.11
+LINE_WIDTH = 0.13
+ARROW_SIZE = 0.34
+
+SMALLEST_ARROW_PX = 7
+ARROW_EVERY_PX = 170
+MOST_ARROWS = 400
+
+
+def draw_walk(
+    lattice: CoverageLattice,
+    cells: NDArray[np.int32],
+    *,
+    grid: OccupancyGrid | None,
+    title: str,
+    lines: Sequence[str],
+) -> Image.Image:
+    """Return a picture, RGB, of a walk over the lattice, with the map below it.
+
+    Args:
+        lattice: the planning grid.
+        cells: int32 (n, 2), n >= 1: the walk's cells (row, col), the start first; all
+            inside the lattice's window.
+        grid: the map the lattice was made from; None draws the lattice's own states.
+        title: heading.
+        lines: caption below it.
+    """
+    centres = lattice.centres(cells)
+    plot = Plot(View.over(bounds_of(grid, lattice, centres), lattice.cell_m))
+    plot.ground(lattice if grid is None else grid)
+    key = draw_visits(plot, lattice, _visits(lattice, cells), tuple(cells[0].tolist()))
+    _draw_line(plot, centres, lattice.cell_m)
+    plot.end_mark(centres[-1])
+    plot.start_mark(centres[0])
+    bar = ("0", f"{len(cells) - 1:,} steps")
+    return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
+
+
+def _visits(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.int64]:
+    visits = np.zeros(lattice.states.shape, np.int64)
+    window = lattice.window
+    np.add.at(visits, (cells[:, 0] - window.row0, cells[:, 1] - window.col0), 1)
+    return visits
+
+
+def _draw_line(plot: Plot, centres: NDArray[np.float64], cell_m: float) -> None:
+    moves = np.ones(len(centres), np.bool_)
+    moves[1:] = (np.diff(centres, axis=0) != 0).any(axis=1)
+    points = centres[moves]
+    offset = LANE_OFFSET * cell_m
+    plot.trail(*lanes(points, offset), LINE_WIDTH * cell_m)
+
+    along = directions(points)
+    right = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    middles = (points[:-1] + points[1:]) / 2 + right * offset
+    size = max(ARROW_SIZE * cell_m, SMALLEST_ARROW_PX / plot.view.scale)
+    every = max(ARROW_EVERY_PX / plot.view.scale, len(along) * cell_m / MOST_ARROWS)
+    for place in arrow_places(points, every).tolist():
+        plot.arrow(middles[place], along[place], size)

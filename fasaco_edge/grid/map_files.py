@@ -1,0 +1,268 @@
+"""Map files: map_server's YAML and image, coverage grids, and the maps that come along.
+
+A map file means here what it means to nav2_map_server (map_io.cpp). Its releases
+differ on transparent pixels in trinary mode: older ones average the alpha channel
+into the brightness, so that opaque black is 75 % occupied (navigation2 issue 4233);
+newer ones take a transparent pixel for unknown, as scale mode always did. Here
+alpha is never a brightness and a transparent pixel is unknown.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import MapFileError
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.map_image import MapImage, check_size, read_image
+from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from fasaco_edge.resources import folder
+
+MODES = ("trinary", "scale", "raw")
+
+# What nav2's map saver writes for unknown, free and occupied, and the thresholds
+# that lie between: 205 is 19.608 % occupied.
+UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 205, 254, 0
+WRITTEN_THRESHOLDS = {"occupied_thresh": 0.65, "free_thresh": 0.196}
+FREE_AT_MOST, OCCUPIED_AT_LEAST = 25, 65
+
+
+@dataclass(frozen=True, slots=True)
+class _MapYaml:
+    image: Path
+    mode: str
+    resolution: float
+    origin: Pose2D
+    negate: bool
+    free_thresh: float
+    occupied_thresh: float
+
+
+def read_map(path: str | Path) -> OccupancyGrid:
+    """Return the map described by a map_server YAML file.
+
+    Args:
+        path: the YAML file; its ``image`` is sought from the YAML's own folder.
+
+    Raises:
+        MapFileError: a file is missing, is not what it should be or too large; a key is
+            missing or its value impossible.
+    """
+    path = Path(path)
+    described = _read_yaml(path)
+    # Images run from the top down, maps from the smallest y up.
+    cells = np.ascontiguousarray(_occupancy(described, read_image(described.image))[::-1])
+    rows, cols = cells.shape
+    return OccupancyGrid(GridGeometry(rows, cols, described.resolution, described.origin), cells)
+
+
+def write_map(grid: OccupancyGrid, path: str | Path) -> None:
+    """Write ``grid`` in trinary mode: a YAML file at ``path`` and a PGM file beside it.
+
+    Values up to 25 are written as free and from 65 on as occupied, as nav2's map
+    saver does; what lies between is written as unknown.
+    """
+    path = Path(path)
+    image = path.with_suffix(".pgm")
+    known = grid.cells >= 0
+    grey = np.full(grid.cells.shape, UNKNOWN_GREY, np.uint8)
+    grey[known & (grid.cells <= FREE_AT_MOST)] = FREE_GREY
+    grey[grid.cells >= OCCUPIED_AT_LEAST] = OCCUPIED_GREY
+    geometry = grid.geometry
+    header = f"P5\n{geometry.cols} {geometry.rows}\n255\n"
+    image.write_bytes(header.encode() + grey[::-1].tobytes())
+    origin = geometry.origin
+    description = {
+        "image": image.name,
+        "mode": "trinary",
+        "resolution": geometry.resolution,
+        "origin": [origin.x, origin.y, origin.yaw],
+        "negate": 0,
+        **WRITTEN_THRESHOLDS,
+    }
+    text = yaml.safe_dump(description, sort_keys=False, default_flow_style=None)
+    path.write_text(text, encoding="utf-8")
+
+
+def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
+    """Return the coverage grid, bool (rows, cols), True = coverable, of a .npy file.
+
+    Raises:
+        MapFileError: the file is missing, not a .npy file, of another type or
+            dimension, empty or too large.
+    """
+    try:
+        # Mapped first, so that a header that promises too much costs nothing.
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (OSError, ValueError, EOFError, OverflowError) as error:
+        raise MapFileError(f"{path}: not readable as a .npy file: {error}") from error
+    if not isinstance(array, np.ndarray):
+        array.close()
+        raise MapFileError(f"{path}: expected one array (.npy), got an archive of arrays")
+    if array.ndim != 2 or array.dtype != np.bool_:
+        raise MapFileError(
+            f"{path}: expected a bool array of two dimensions, got {array.dtype} {array.shape}"
+        )
+    check_size(path, array.shape[1], array.shape[0])
+    return np.array(array)
+
+
+def find_map(name_or_path: str | Path) -> Path:
+    """Return the file meant: an existing path, or the name of a built-in map.
+
+    Raises:
+        MapFileError: it is neither.
+    """
+    # Unlike Path's methods these do not raise on names no file system takes.
+    path = Path(os.path.expanduser(name_or_path))
+    if os.path.isfile(path):
+        return path
+    names = [name for name, _ in builtin_maps()]
+    if str(name_or_path) in names:
+        return _maps() / f"{name_or_path}.yaml"
+    raise MapFileError(
+        f"no map {str(name_or_path)!r}: neither a file nor a built-in map ({', '.join(names)})"
+    )
+
+
+def builtin_maps() -> list[tuple[str, str]]:
+    """Return name and purpose, one line, of every map that comes with the package.
+
+    Raises:
+        MapFileError: this installation has no maps.
+    """
+    return [(name, entry["why"]) for name, entry in _index().items()]
+
+
+def suggested_start(path: Path) -> tuple[float, float] | None:
+    """Return where (x, y) [m] to start on a built-in map's file; None for any other file.
+
+    Raises:
+        MapFileError: this installation has no maps.
+    """
+    entry = _index().get(path.stem)
+    if entry is None or path.resolve() != (_maps() / f"{path.stem}.yaml").resolve():
+        return None
+    x, y = entry["start"]
+    return float(x), float(y)
+
+
+def _maps() -> Path:
+    try:
+        return folder("maps")
+    except FileNotFoundError as error:
+        raise MapFileError(str(error)) from error
+
+
+def _index() -> dict[str, dict[str, Any]]:
+    index: dict[str, dict[str, Any]] = _load_yaml(_maps() / "index.yaml")
+    return index
+
+
+def _load_yaml(path: Path) -> dict[str, Any]:
+    try:
+        loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
+        raise MapFileError(f"{path}: not readable as YAML: {error}") from error
+    if not isinstance(loaded, dict):
+        raise MapFileError(f"{path}: expected a mapping of keys, got {type(loaded).__name__}")
+    return loaded
+
+
+def _read_yaml(path: Path) -> _MapYaml:
+    keys = _YamlKeys(path, _load_yaml(path))
+    free_thresh, occupied_thresh = keys.number("free_thresh"), keys.number("occupied_thresh")
+    for key, value in (("free_thresh", free_thresh), ("occupied_thresh", occupied_thresh)):
+        if not 0 <= value <= 1:
+            raise keys.error(key, "a number from 0 to 1")
+    if free_thresh >= occupied_thresh:
+        raise keys.error("free_thresh", f"less than occupied_thresh, {occupied_thresh}")
+    resolution = keys.number("resolution")
+    if resolution <= 0:
+        raise keys.error("resolution", "more than 0 [m/pixel]")
+    return _MapYaml(
+        keys.image(), keys.mode(), resolution, keys.origin(), keys.negate(), free_thresh,
+        occupied_thresh,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _YamlKeys:
+    path: Path
+    values: dict[str, Any]
+
+    def error(self, key: str, expected: str) -> MapFileError:
+        got = f"got {self.values[key]!r}" if key in self.values else "the key is missing"
+        return MapFileError(f"{self.path}: {key} must be {expected}; {got}")
+
+    def number(self, key: str) -> float:
+        return self._finite(key, self.values.get(key), "a number")
+
+    def _finite(self, key: str, value: object, expected: str) -> float:
+        # YAML 1.1 takes 5e-2 for a string, yaml-cpp and with it ROS for a number.
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise self.error(key, expected)
+        try:
+            number = float(value)
+        except (ValueError, OverflowError) as error:
+            raise self.error(key, expected) from error
+        if not math.isfinite(number):
+            raise self.error(key, expected)
+        return number
+
+    def origin(self) -> Pose2D:
+        expected = "three numbers: x [m], y [m], yaw [rad]"
+        origin = self.values.get("origin")
+        if not isinstance(origin, list) or len(origin) != 3:
+            raise self.error("origin", expected)
+        return Pose2D(*(self._finite("origin", value, expected) for value in origin))
+
+    def mode(self) -> str:
+        mode = self.values.get("mode", MODES[0])
+        if mode not in MODES:
+            raise self.error("mode", "trinary, scale or raw")
+        return str(mode)
+
+    def negate(self) -> bool:
+        negate = self.values.get("negate")
+        if negate not in (0, 1):
+            raise self.error("negate", "0 or 1")
+        return bool(negate)
+
+    def image(self) -> Path:
+        image = self.values.get("image")
+        if not isinstance(image, str) or not image:
+            raise self.error("image", "the name of an image file")
+        found = self.path.parent / image
+        if not os.path.isfile(found):
+            raise self.error("image", f"an existing file, sought at {found}")
+        return found
+
+
+def _occupancy(described: _MapYaml, image: MapImage) -> NDArray[np.int8]:
+    cells = _occupancy_of_levels(described, image.white)[image.levels]
+    if image.transparent is not None and described.mode != "raw":
+        cells[image.transparent] = UNKNOWN
+    return cells
+
+
+def _occupancy_of_levels(described: _MapYaml, white: int) -> NDArray[np.int8]:
+    """Return the cell value, int8 (white + 1,), of every level of brightness."""
+    brightness = np.arange(white + 1) / white
+    if described.mode == "raw":
+        value = np.rint(brightness * 255)
+        return np.where(value <= OCCUPIED, value, UNKNOWN).astype(np.int8)
+    occupied = brightness if described.negate else 1 - brightness
+    free_thresh, occupied_thresh = described.free_thresh, described.occupied_thresh
+    between = np.full(white + 1, float(UNKNOWN))
+    if described.mode == "scale":
+        between = np.rint((occupied - free_thresh) / (occupied_thresh - free_thresh) * 100)
+    below, above = occupied < free_thresh, occupied > occupied_thresh
+    return np.select([below, above], [FREE, OCCUPIED], between).astype(np.int8)

@@ -1,0 +1,39 @@
+"""Compile, or load from the cache, every kernel that a mission uses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.path import walk_figures
+from fasaco_edge.planners.problem import CoverageProblem
+
+LATTICE, REACH, WALKS, COLONY = "lattice", "reachability", "shortest walks", "colony"
+STAGES = (LATTICE, REACH, WALKS, COLONY)
+
+
+def warm_up(report: Callable[[str], None] | None = None) -> None:
+    """Run every kernel once on a tiny map; ``report`` hears each stage's name before it."""
+    for stage in _stages():
+        if report is not None:
+            report(stage)
+
+
+def _stages() -> Iterator[str]:
+    yield LATTICE
+    # Read-only, as maps off the bus are: numba compiles for that apart.
+    cells = np.zeros((4, 4), np.int8)
+    grid = OccupancyGrid(GridGeometry(4, 4, 1.0, Pose2D(0.0, 0.0)), cells)
+    lattice = CoverageLattice.from_map(grid, Footprint(cell_m=1.0, robot_radius_m=0.4))
+    yield REACH
+    problem = CoverageProblem.of(lattice, (0, 0))
+    yield WALKS
+    walk_figures(lattice, np.array([[0, 0], [0, 1]], np.int32))
+    yield COLONY
+    Fasaco(ColonyConfig(ants=1, velocities=(1,))).plan(problem)

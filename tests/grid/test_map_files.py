@@ -1,0 +1,348 @@
+"""Map files mean what they mean to map_server, and bad ones are named."""
+
+import math
+import struct
+import subprocess
+import sys
+import zlib
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+from PIL import Image
+
+from fasaco_edge.errors import MapFileError
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map, write_map
+from fasaco_edge.grid.occupancy import OccupancyGrid
+
+DESCRIPTION = {
+    "image": "map.png",
+    "resolution": 0.05,
+    "origin": [-1.0, -2.0, 0.0],
+    "negate": 0,
+    "occupied_thresh": 0.65,
+    "free_thresh": 0.196,
+}
+SHARED_TMP = settings(
+    deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+def described(folder, image=None, drop=(), **changes):
+    """Write map.yaml, and ``image`` as map.png beside it; return the YAML's path."""
+    if image is not None:
+        image.save(folder / "map.png")
+    keys = {key: value for key, value in {**DESCRIPTION, **changes}.items() if key not in drop}
+    path = folder / "map.yaml"
+    path.write_text(yaml.safe_dump(keys))
+    return path
+
+
+def grey(*rows, dtype=np.uint8):
+    return Image.fromarray(np.array(rows, dtype))
+
+
+def cell_of(brightness, mode, negate, free_thresh, occupied_thresh):
+    """Return the occupancy of one opaque pixel, step by step as map_io.cpp has it."""
+    if mode == "raw":
+        value = round(brightness * 255)
+        return value if value <= 100 else -1
+    occupied = brightness if negate else 1 - brightness
+    if occupied > occupied_thresh:
+        return 100
+    if occupied < free_thresh:
+        return 0
+    if mode == "trinary":
+        return -1
+    return round((occupied - free_thresh) / (occupied_thresh - free_thresh) * 100)
+
+
+@SHARED_TMP
+@given(
+    pixels=arrays.arrays(np.uint8, arrays.array_shapes(min_dims=2, max_dims=2, max_side=6)),
+    mode=st.sampled_from(["trinary", "scale", "raw"]),
+    negate=st.sampled_from([0, 1, True, False]),
+    thresholds=st.tuples(st.integers(0, 100), st.integers(0, 100)).filter(lambda t: t[0] < t[1]),
+)
+def test_every_grey_in_every_mode(tmp_path, pixels, mode, negate, thresholds):
+    free, occupied = thresholds[0] / 100, thresholds[1] / 100
+    path = described(
+        tmp_path,
+        Image.fromarray(pixels),
+        mode=mode,
+        negate=negate,
+        free_thresh=free,
+        occupied_thresh=occupied,
+    )
+    expected = [
+        [cell_of(value / 255, mode, negate, free, occupied) for value in row]
+        for row in pixels[::-1].tolist()
+    ]
+    assert read_map(path).cells.tolist() == expected
+
+
+def test_the_picture_is_turned_upright_and_placed(tmp_path):
+    path = described(tmp_path, grey([0, 254, 254], [205, 254, 0]), origin=[1.5, -2, math.pi / 2])
+    grid = read_map(path)
+    assert grid.cells.tolist() == [[-1, 0, 100], [100, 0, 0]]
+    assert grid.geometry == GridGeometry(2, 3, 0.05, Pose2D(1.5, -2.0, math.pi / 2))
+    assert not grid.cells.flags.writeable
+
+
+def test_mode_is_trinary_unless_said(tmp_path):
+    image = grey([128])
+    assert read_map(described(tmp_path, image)).cells.tolist() == [[-1]]
+    assert read_map(described(tmp_path, image, mode="scale")).cells.tolist() == [[67]]
+
+
+@pytest.mark.parametrize("mode", ["L", "LA", "RGB", "RGBA", "P", "1"])
+def test_black_is_occupied_and_white_free_in_every_kind_of_image(tmp_path, mode):
+    image = grey([0, 255]).convert(mode)
+    path = described(tmp_path, image, occupied_thresh=0.9, free_thresh=0.1)
+    assert read_map(path).cells.tolist() == [[100, 0]]
+
+
+@pytest.mark.parametrize("name", ["map.pgm", "map.bmp"])
+def test_other_formats(tmp_path, name):
+    grey([0, 255], [254, 205]).save(tmp_path / name)
+    assert read_map(_naming(tmp_path, name)).cells.tolist() == [[0, -1], [100, 0]]
+
+
+def _naming(folder, name):
+    path = described(folder)
+    path.write_text(path.read_text().replace("map.png", name))
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["P2\n# made by hand\n3 1\n255\n0 205 255\n", "P2 3 1 100 0 80 100", "P5 3 1 255 \x00\xcd\xff"],
+)
+def test_plain_and_binary_pgm(tmp_path, text):
+    (tmp_path / "map.pgm").write_bytes(text.encode("latin-1"))
+    assert read_map(_naming(tmp_path, "map.pgm")).cells.tolist() == [[100, -1, 0]]
+
+
+def test_sixteen_bits(tmp_path):
+    image = grey([0, 32768, 65535], dtype=np.uint16)
+    assert read_map(described(tmp_path, image, mode="scale")).cells.tolist() == [[100, 67, 0]]
+    (tmp_path / "map.pgm").write_bytes(b"P5 2 1 65535 \x00\x00\xff\xff")
+    assert read_map(_naming(tmp_path, "map.pgm")).cells.tolist() == [[100, 0]]
+
+
+def test_colours_are_averaged_evenly(tmp_path):
+    image = Image.new("RGB", (1, 1), (255, 0, 0))
+    path = described(tmp_path, image, mode="scale", free_thresh=0.0, occupied_thresh=1.0)
+    assert read_map(path).cells.tolist() == [[67]]
+
+
+@pytest.mark.parametrize("mode", ["trinary", "scale"])
+def test_alpha_is_no_brightness_and_what_is_transparent_is_unknown(tmp_path, mode):
+    row = [(0, 0, 0, 255), (255, 255, 255, 255), (0, 0, 0, 0), (255, 255, 255, 254)]
+    image = Image.fromarray(np.array([row], np.uint8))
+    path = described(tmp_path, image, mode=mode, occupied_thresh=0.9)
+    assert read_map(path).cells.tolist() == [[100, 0, -1, -1]]
+
+
+def test_alpha_does_not_matter_to_raw_values(tmp_path):
+    image = Image.fromarray(np.array([[[42, 0], [100, 255], [101, 255]]], np.uint8))
+    assert read_map(described(tmp_path, image, mode="raw")).cells.tolist() == [[42, 100, -1]]
+
+
+def test_numbers_as_yaml_cpp_reads_them(tmp_path):
+    path = described(tmp_path, grey([0]))
+    path.write_text(path.read_text().replace("0.05", "5e-2"))
+    assert read_map(path).geometry.resolution == 0.05
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"mode": "binary"}, "mode must be trinary, scale or raw; got 'binary'"),
+        ({"occupied_thresh": 1.5}, "occupied_thresh must be a number from 0 to 1; got 1.5"),
+        ({"free_thresh": -0.1}, "free_thresh must be a number from 0 to 1; got -0.1"),
+        ({"free_thresh": 0.7}, "free_thresh must be less than occupied_thresh, 0.65; got 0.7"),
+        ({"free_thresh": "low"}, "free_thresh must be a number; got 'low'"),
+        ({"free_thresh": True}, "free_thresh must be a number; got True"),
+        ({"resolution": 0}, "resolution must be more than 0 [m/pixel]; got 0"),
+        ({"resolution": -0.05}, "resolution must be more than 0 [m/pixel]; got -0.05"),
+        ({"resolution": math.nan}, "resolution must be a number; got nan"),
+        ({"origin": [0, 0]}, "origin must be three numbers: x [m], y [m], yaw [rad]; got [0, 0]"),
+        ({"origin": "here"}, "origin must be three numbers"),
+        ({"origin": [0, 0, math.inf]}, "origin must be three numbers"),
+        ({"negate": "maybe"}, "negate must be 0 or 1; got 'maybe'"),
+        ({"image": ""}, "image must be the name of an image file; got ''"),
+        ({"image": "none.pgm"}, "image must be an existing file, sought at"),
+        ({"image": "x" * 5000}, "image must be an existing file, sought at"),
+    ],
+)
+def test_impossible_values_are_named(tmp_path, changes, expected):
+    grey([0]).save(tmp_path / "map.png")
+    path = tmp_path / "map.yaml"
+    path.write_text(yaml.safe_dump({**DESCRIPTION, **changes}))
+    with pytest.raises(MapFileError) as caught:
+        read_map(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert expected in str(caught.value)
+
+
+@pytest.mark.parametrize("key", DESCRIPTION)
+def test_missing_keys_are_named(tmp_path, key):
+    path = described(tmp_path, grey([0]), drop=[key])
+    with pytest.raises(MapFileError, match=f"{key} must be .*the key is missing"):
+        read_map(path)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "- a\n- b\n", "just words", "a: [1", "\x00", "[" * 5000, "a: 2020-13-45"]
+)
+def test_not_a_mapping(tmp_path, text):
+    path = tmp_path / "map.yaml"
+    path.write_text(text)
+    with pytest.raises(MapFileError, match=r"map\.yaml"):
+        read_map(path)
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(MapFileError, match=r"none\.yaml"):
+        read_map(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"not an image", b"P5 0 3 255 ", b"P5 3 3 255 \x00", b"Pf 1 1 -1 \0\0\0\0"]
+)
+def test_not_an_image(tmp_path, content):
+    (tmp_path / "map.png").write_bytes(content)
+    with pytest.raises(MapFileError, match=r"map\.png"):
+        read_map(described(tmp_path))
+
+
+def _png_of_size(width, height):
+    def chunk(kind, content):
+        crc = struct.pack(">I", zlib.crc32(kind + content))
+        return struct.pack(">I", len(content)) + kind + content + crc
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", b"") + chunk(b"IEND", b"")
+
+
+@pytest.mark.parametrize("side", [8001, 10_000, 20_000, 2**31 - 1])
+def test_absurd_sizes_are_refused_by_their_header(tmp_path, side):
+    (tmp_path / "map.png").write_bytes(_png_of_size(side, side))
+    with pytest.raises(MapFileError, match=r"map\.png: .*64000000 pixels"):
+        read_map(described(tmp_path))
+
+
+@SHARED_TMP
+@given(place=st.integers(0, 10_000), value=st.integers(0, 255), end=st.integers(0, 10_000))
+@pytest.mark.parametrize("suffix", [".png", ".pgm", ".bmp"])
+def test_damaged_images_are_read_or_refused(tmp_path, suffix, place, value, end):
+    image = tmp_path / f"map{suffix}"
+    grey([0, 255, 7], [1, 2, 3]).save(image)
+    damaged = bytearray(image.read_bytes())
+    damaged[place % len(damaged)] = value
+    image.write_bytes(damaged[: end % (2 * len(damaged)) + 1])
+    try:
+        grid = read_map(_naming(tmp_path, image.name))
+    except MapFileError:
+        return
+    assert grid.cells.size > 0
+
+
+@SHARED_TMP
+@given(
+    cells=arrays.arrays(
+        np.int8,
+        arrays.array_shapes(min_dims=2, max_dims=2, max_side=12),
+        elements=st.sampled_from([-1, 0, 100]),
+    ),
+    resolution=st.floats(1e-3, 10),
+    pose=st.tuples(*[st.floats(-1e6, 1e6)] * 3),
+)
+def test_what_is_written_is_read(tmp_path, cells, resolution, pose):
+    grid = OccupancyGrid(GridGeometry(*cells.shape, resolution, Pose2D(*pose)), cells)
+    write_map(grid, tmp_path / "written.yaml")
+    again = read_map(tmp_path / "written.yaml")
+    assert again.geometry == grid.geometry
+    np.testing.assert_array_equal(again.cells, cells)
+
+
+def test_probabilities_are_written_as_free_occupied_or_unknown(tmp_path):
+    cells = np.array([[0, 25, 26, 64, 65, 100, -1]], np.int8)
+    write_map(OccupancyGrid(GridGeometry(1, 7, 0.05, Pose2D(0, 0)), cells), tmp_path / "w.yaml")
+    assert read_map(tmp_path / "w.yaml").cells.tolist() == [[0, 0, -1, -1, 100, 100, -1]]
+
+
+def test_coverage_grid(tmp_path):
+    free = np.array([[True, False], [True, True], [False, True]])
+    np.save(tmp_path / "grid.npy", free)
+    read = read_coverage_grid(tmp_path / "grid.npy")
+    assert read.dtype == np.bool_
+    np.testing.assert_array_equal(read, free)
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.zeros((2, 2), np.uint8),
+        np.zeros(3, bool),
+        np.zeros((2, 2, 2), bool),
+        np.zeros((0, 3), bool),
+        np.array([[None]], object),
+    ],
+)
+def test_other_arrays_are_refused(tmp_path, array):
+    np.save(tmp_path / "grid.npy", array, allow_pickle=True)
+    with pytest.raises(MapFileError, match=r"grid\.npy"):
+        read_coverage_grid(tmp_path / "grid.npy")
+
+
+def _npy_header(shape):
+    text = f"{{'descr': '|b1', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"words",
+        b"\x93NUMPY\x01\x00",
+        _npy_header("(3, 3)") + b"\1\1",
+        _npy_header("(100000, 100000)"),
+        _npy_header(f"({10**30}, 1)"),
+        _npy_header("(-1, -1)") + b"\1",
+    ],
+)
+def test_no_coverage_grid(tmp_path, content):
+    (tmp_path / "grid.npy").write_bytes(content)
+    with pytest.raises(MapFileError, match=r"grid\.npy"):
+        read_coverage_grid(tmp_path / "grid.npy")
+
+
+def test_an_archive_is_no_coverage_grid(tmp_path):
+    with open(tmp_path / "grid.npy", "wb") as file:
+        np.savez(file, np.ones((2, 2), bool))
+    with pytest.raises(MapFileError, match="an archive of arrays"):
+        read_coverage_grid(tmp_path / "grid.npy")
+
+
+def test_a_path_is_found(tmp_path):
+    path = described(tmp_path, grey([0]))
+    assert find_map(path) == path
+    assert find_map(str(path)) == path
+
+
+@pytest.mark.parametrize("name", ["palace", "", "x" * 5000, "../maps/office", "~nobody-here/x"])
+def test_an_unknown_map_is_told_the_names(name):
+    with pytest.raises(MapFileError, match=r"built-in map \(.*basement"):
+        find_map(name)
+
+
+def test_pillow_is_loaded_with_the_first_image_only():
+    source = "import sys, fasaco_edge.grid.map_files; sys.exit('PIL' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", source], check=False).returncode == 0
