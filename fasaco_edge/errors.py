@@ -100,3 +100,16 @@ class MissingExtra(FasacoError):
 
     code = "missing_extra"
     hint = "pip install 'fasaco-edge[record]'"
+
+
+class ProcessEnded(FasacoError):
+    """A process that was started to serve ended by itself."""
+
+    code = "process_ended"
+
+
+class UnreadableRecording(FasacoError):
+    """A file is no recording, or ends within a frame."""
+
+    code = "unreadable_recording"
+    hint = "a recorder started in its folder cuts a torn recording at the last whole frame"

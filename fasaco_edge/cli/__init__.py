@@ -1,1 +1,68 @@
-"""The command line: fasaco-edge and its commands, one file each."""
+"""The command line: ``fasaco-edge`` and its commands, one file each."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import sys
+from collections.abc import Sequence
+
+from fasaco_edge import __version__
+from fasaco_edge.cli import bench, demo, maps, plan, record, run, simulate, warmup
+from fasaco_edge.cli.parent import end_with_parent
+from fasaco_edge.errors import BadConfiguration, FasacoError
+
+COMMANDS = (demo, plan, run, record, simulate, bench, maps, warmup)
+
+EXIT_ERROR = 1
+EXIT_CONFIG = 78  # EX_CONFIG of sysexits.h: a service must not be started again
+EXIT_INTERRUPTED = 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return the process's exit code."""
+    args = _parser().parse_args(argv)
+    logging.basicConfig(level=args.log_level.upper(), format="%(levelname)s %(name)s: %(message)s")
+    if args.with_parent:
+        end_with_parent()
+    try:
+        code: int = args.command(args)
+    except FasacoError as error:
+        return _fail(error)
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # The reader has seen enough (``| head``); nothing is left to be flushed to it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_ERROR
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="fasaco-edge",
+        description="Coverage path planning with fast-spanning ant colonies, on a robot.",
+        epilog="Begin with `fasaco-edge demo`. Each command explains itself with --help.",
+    )
+    parser.add_argument("--version", action="version", version=f"fasaco-edge {__version__}")
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument(
+        "--log-level",
+        choices=("debug", "info", "warning", "error"),
+        default="info",
+        help="how much to say on standard error (default: %(default)s)",
+    )
+    # For the processes that other commands start: they end when those do.
+    common.add_argument("--with-parent", action="store_true", help=argparse.SUPPRESS)
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    for module in COMMANDS:
+        module.add_to(commands, common)
+    return parser
+
+
+def _fail(error: FasacoError) -> int:
+    print(f"fasaco-edge: {error}", file=sys.stderr)
+    if error.hint:
+        print(f"  hint: {error.hint}", file=sys.stderr)
+    return EXIT_CONFIG if isinstance(error, BadConfiguration) else EXIT_ERROR

@@ -74,7 +74,7 @@ class PlannerConfig(_Section, frozen=True):
     q0: Annotated[float, Meta(ge=0, le=1)] = 0.7
     alpha: Annotated[float, Meta(gt=0, le=1)] = 0.1
     tau0: Annotated[float, Meta(gt=0, le=1e6)] = 0.1
-    seed: Annotated[int, Meta(ge=0, lt=2**63)] = 0
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.5
 
 

@@ -21,6 +21,8 @@ from fasaco_edge.mission.events import (
     PlanReady,
     PoseReceived,
 )
+from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.wire.coverage import coverage_grid
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.worker import PlanningWorker
@@ -83,10 +85,10 @@ class Loop:
         """Take what is not the mission's: snapshots, the recorder's word, failures."""
         self._map_arrived = None
         for kind, item in items:
-            if kind == "snapshot":
+            if isinstance(item, ColonySnapshot):
                 self._publish_snapshot(item)
-            elif kind == "failed":
-                raise item.error  # type: ignore[attr-defined]
+            elif isinstance(item, BaseException):
+                raise item
             elif kind in ("map", "map_update") and isinstance(item, Received):
                 self._map_arrived = item.at
 
@@ -143,8 +145,6 @@ class Loop:
             return
         if mission.lattice is None or mission.grid is None:
             return
-        from fasaco_edge.wire.coverage import coverage_grid  # noqa: PLC0415
-
         self._coverage_at, self._coverage_key = now, key
         lattice = mission.lattice
         visits = mission.ledger.visits(lattice.window)
@@ -155,7 +155,7 @@ class Loop:
             )
         )
 
-    def _publish_snapshot(self, snapshot: Any) -> None:
+    def _publish_snapshot(self, snapshot: ColonySnapshot) -> None:
         mission = self._mission
         frame = mission.grid.frame if mission and mission.grid else "map"
         self._outbox.pheromone(snapshot, frame)

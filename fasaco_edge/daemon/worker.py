@@ -5,20 +5,12 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.mission.events import PlanReady, PlanRequest
 from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.planners.planner import CoveragePlanner
 from fasaco_edge.planners.stopping import Interrupt, TimeBudget
-
-
-@dataclass(frozen=True, slots=True)
-class WorkerFailed:
-    """The planner raised: a bug, and the end of the daemon."""
-
-    error: BaseException
 
 
 class PlanningWorker:
@@ -51,7 +43,7 @@ class PlanningWorker:
                 if request is not None:
                     self._plan(request)
         except BaseException as error:
-            self._post("failed", WorkerFailed(error))
+            self._post("failed", error)
 
     def _plan(self, request: PlanRequest) -> None:
         started = time.monotonic()

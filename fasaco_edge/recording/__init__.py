@@ -1,1 +1,1 @@
-"""A process of its own: bus in, .rrd out. The only place that imports rerun."""
+"""A process of its own: bus in, .rrd out; the blueprint; reading back. Only here is rerun."""

@@ -1,0 +1,66 @@
+"""``fasaco-edge demo``: a robot covers a building nobody mapped before."""
+
+from __future__ import annotations
+
+import argparse
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fasaco_edge.cli.arguments import DEFAULT_CELL_M, DEFAULT_RADIUS_M
+
+if TYPE_CHECKING:
+    from fasaco_edge.cli.arguments import Subparsers
+
+
+def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "demo",
+        parents=[common],
+        help="watch a simulated robot map and cover a building",
+        description="Start daemon, recorder and a simulated robot as processes of their own that "
+        "talk Zenoh over loopback; show the mission; end when every reachable cell is covered. "
+        "Leaves a recording (.rrd), a picture and the figures in the output folder.",
+    )
+    parser.add_argument(
+        "--map", default="flat", metavar="MAP", help="YAML or a name from `maps` (default: flat)"
+    )
+    parser.add_argument(
+        "--speed",
+        type=float,
+        default=20.0,
+        metavar="X",
+        help="simulated seconds per second (default: %(default)g)",
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="the planner's seed")
+    parser.add_argument("--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="[m]")
+    parser.add_argument(
+        "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="[m]"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder for the results (default: ./runs/<time>)"
+    )
+    parser.add_argument("--json", action="store_true", help="print the summary as JSON")
+    parser.add_argument(
+        "--timeout", type=float, default=1800.0, metavar="S", help="give up after so long [s]"
+    )
+    parser.set_defaults(command=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the mission; 0 if every reachable cell was covered."""
+    from fasaco_edge.cli.demo_mission import DemoMission
+    from fasaco_edge.cli.demo_summary import print_summary, summarise
+    from fasaco_edge.cli.terminal import err
+    from fasaco_edge.cli.warmup import compile_kernels
+
+    out: Path = args.out or Path("runs") / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
+    out.mkdir(parents=True, exist_ok=True)
+    seconds = compile_kernels()
+    err().print(f"kernels ready ({seconds:.1f} s); results go to {out}")
+    with DemoMission(args, out) as mission:
+        ending = mission.watch()
+    summary = summarise(args, out, ending)
+    print_summary(summary, as_json=args.json)
+    return 0 if summary["complete"] else 1

@@ -1,0 +1,172 @@
+"""The demo's processes: daemon with recorder, and robot; and what is heard of them."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import yaml
+
+from fasaco_edge.bus.mailbox import LatestSlot
+from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.cli.demo_view import DemoView
+from fasaco_edge.errors import BusUnavailable, ProcessEnded
+from fasaco_edge.grid.map_files import find_map
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.status import decode_json
+
+START_TIMEOUT_S = 20.0
+STOP_TIMEOUT_S = 8.0
+# "Done" has to hold for some maps [simulated s]: the last one may still be on its way.
+SETTLE_SIM_S = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How the mission ended.
+
+    Attributes:
+        status: the daemon's last status.
+        wall_s: how long it took [s].
+        replan_ms: time of every plan heard of [ms].
+        timed_out: whether time ran out first.
+    """
+
+    status: dict[str, Any]
+    wall_s: float
+    replan_ms: tuple[float, ...]
+    timed_out: bool
+
+
+class DemoMission:
+    """Starts everything on entry, ends everything on exit."""
+
+    def __init__(self, args: argparse.Namespace, out: Path) -> None:
+        self._args = args
+        self._out = out
+        self._map = find_map(args.map)
+        self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
+        self._keys = Keys()
+        self._processes: list[tuple[str, subprocess.Popen[bytes]]] = []
+        self._bus: Bus | None = None
+        self._newest = LatestSlot[Sample]()
+
+    def __enter__(self) -> Self:
+        try:
+            self._start()
+        except BaseException:
+            self._stop()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stop()
+
+    def watch(self) -> Ending:
+        """Show the mission until all is covered; return how it ended."""
+        started = time.monotonic()
+        done_since: float | None = None
+        status: dict[str, Any] = {}
+        plans: dict[int, float] = {}
+        settle_s = max(SETTLE_SIM_S / self._args.speed, 1.5)
+        with DemoView(str(self._args.map)) as view:
+            while (now := time.monotonic()) - started < self._args.timeout:
+                self._check_processes()
+                sample = self._newest.take(timeout_s=0.25)
+                if sample is not None:
+                    status = decode_json(sample.payload)
+                    _note_plan(plans, status)
+                    view.show(status, now - started)
+                done = status.get("state") == "done"
+                done_since = (done_since or now) if done else None
+                if done_since is not None and now - done_since >= settle_s:
+                    break
+        timed_out = status.get("state") != "done"
+        return Ending(status, time.monotonic() - started, tuple(plans.values()), timed_out)
+
+    def _start(self) -> None:
+        config = self._out / "config.yaml"
+        config.write_text(yaml.safe_dump(self._config()), encoding="utf-8")
+        recording = ["--record", str(self._out)]
+        self._spawn("daemon", ["run", "--config", str(config), *recording])
+        self._bus = self._join()
+        self._bus.subscribe(self._keys.status, self._newest.put, latched=True)
+        robot = ["--speed", str(self._args.speed), "--robot-radius", str(self._args.robot_radius)]
+        trail = ["--trail-out", str(self._out / "trail.csv")]
+        self._spawn(
+            "robot", ["simulate", str(self._map), "--connect", self._endpoint, *robot, *trail]
+        )
+
+    def _config(self) -> dict[str, Any]:
+        return {
+            "robot": {"radius_m": self._args.robot_radius, "tool_width_m": self._args.cell},
+            "bus": {"listen": [self._endpoint]},
+            "planner": {"seed": self._args.seed},
+        }
+
+    def _spawn(self, name: str, words: list[str]) -> None:
+        program = [sys.executable, "-m", "fasaco_edge", *words, "--with-parent"]
+        with (self._out / f"{name}.log").open("wb") as log:
+            process = subprocess.Popen(program, stdout=log, stderr=log)
+        self._processes.append((name, process))
+
+    def _join(self) -> Bus:
+        """Connect to the daemon, once it listens."""
+        deadline = time.monotonic() + START_TIMEOUT_S
+        while True:
+            self._check_processes()
+            try:
+                return open_bus(BusSettings("client", (self._endpoint,)))
+            except BusUnavailable:
+                if time.monotonic() > deadline:
+                    raise
+                time.sleep(0.05)
+
+    def _check_processes(self) -> None:
+        for name, process in self._processes:
+            if process.poll() is not None:
+                log = self._out / f"{name}.log"
+                last = deque(log.read_text(errors="replace").splitlines(), maxlen=5)
+                raise ProcessEnded(
+                    f"the {name} ended with {process.returncode}:\n  " + "\n  ".join(last),
+                    hint=f"see {log}",
+                )
+
+    def _stop(self) -> None:
+        """End the robot first, so that the recording holds its last word."""
+        for _, process in reversed(self._processes):
+            process.send_signal(signal.SIGTERM)
+            try:
+                process.wait(STOP_TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        if self._bus is not None:
+            self._bus.close()
+
+
+def _note_plan(plans: dict[int, float], status: dict[str, Any]) -> None:
+    number, milliseconds = status["plan"]["plans"], status["latency_ms"]["plan"]
+    if milliseconds is not None:
+        plans[number] = milliseconds
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port

@@ -1,0 +1,113 @@
+"""What came of a demo: checked against the building itself, not by the daemon's word."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.cli.demo_mission import Ending
+from fasaco_edge.drawing import draw_mission
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+from fasaco_edge.grid.map_files import find_map, read_map
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.ground import Ground, anchor_cell
+from fasaco_edge.mission.ledger import CoverageLedger
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Truth:
+    """The building, what of it can be reached, and how often the robot's trail visited it."""
+
+    grid: OccupancyGrid
+    lattice: CoverageLattice
+    reachable: NDArray[np.bool_]
+    trail: NDArray[np.float64]
+    visits: NDArray[np.uint16]
+
+
+def summarise(args: argparse.Namespace, out: Path, ending: Ending) -> dict[str, Any]:
+    """Return the figures of a demo, and draw and write them into ``out``."""
+    truth = _truth(args, out)
+    covered = truth.reachable & (truth.visits > 0)
+    driven = np.hypot(*np.diff(truth.trail, axis=0).T).sum()
+    reachable, done = int(truth.reachable.sum()), int(covered.sum())
+    status = ending.status
+    summary: dict[str, Any] = {
+        "map": str(args.map),
+        "complete": done == reachable and not ending.timed_out,
+        "reachable_cells": reachable,
+        "covered_cells": done,
+        "recovered_cells": int((truth.reachable & (truth.visits > 1)).sum()),
+        "unreachable_cells": int((truth.lattice.coverable & ~truth.reachable).sum()),
+        "covered_m2": round(done * args.cell**2, 2),
+        "driven_m": round(float(driven), 1),
+        "plans": status.get("plan", {}).get("plans", 0),
+        "paths": (status.get("path") or {}).get("revision", 0),
+        "plan_ms_p50": _percentile(ending.replan_ms, 50),
+        "plan_ms_p99": _percentile(ending.replan_ms, 99),
+        "errors": status.get("errors", {}).get("total", 0),
+        "wall_s": round(ending.wall_s, 1),
+        "recording": [str(file) for file in sorted(out.glob("*.rrd"))],
+        "picture": str(out / "mission.png"),
+    }
+    _draw(args, out, truth, summary)
+    (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    return summary
+
+
+def print_summary(summary: dict[str, Any], *, as_json: bool) -> None:
+    """Print a table, or JSON."""
+    from fasaco_edge.cli import terminal
+
+    if as_json:
+        print(json.dumps(summary))
+        return
+    ending = "every reachable cell is covered" if summary["complete"] else "NOT ALL WAS COVERED"
+    files = {*summary["recording"], summary["picture"]}
+    rows = [
+        (name.replace("_", " "), str(value))
+        for name, value in summary.items()
+        if name not in ("recording", "picture", "complete")
+    ]
+    console = terminal.out()
+    console.print(terminal.figures(ending, rows))
+    for file in sorted(files):
+        console.print(file, soft_wrap=True)
+    if summary["recording"]:
+        console.print(f"review it:  rerun {' '.join(summary['recording'])}", soft_wrap=True)
+
+
+def _truth(args: argparse.Namespace, out: Path) -> _Truth:
+    grid = read_map(find_map(args.map))
+    lattice = CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius))
+    trail = np.loadtxt(out / "trail.csv", delimiter=",", skiprows=1, ndmin=2)
+    ledger = CoverageLedger(args.cell)
+    for x, y in trail:
+        ledger.record(Pose2D(float(x), float(y)))
+    start = anchor_cell(lattice, Pose2D(float(trail[0, 0]), float(trail[0, 1])))
+    nowhere = np.zeros(lattice.states.shape, bool)
+    reachable = nowhere if start is None else Ground.around(lattice, start).reachable
+    return _Truth(grid, lattice, reachable, trail, ledger.visits(lattice.window))
+
+
+def _draw(args: argparse.Namespace, out: Path, truth: _Truth, summary: dict[str, Any]) -> None:
+    lines = [
+        f"{summary['covered_cells']} of {summary['reachable_cells']} reachable cells covered, "
+        f"{summary['driven_m']} m driven, {summary['paths']} paths",
+    ]
+    title = f"{Path(args.map).stem}: mapped and covered"
+    picture = draw_mission(
+        truth.grid, truth.lattice, truth.trail, truth.visits, title=title, lines=lines
+    )
+    picture.save(out / "mission.png")
+
+
+def _percentile(values: tuple[float, ...], percent: float) -> float | None:
+    return round(float(np.percentile(values, percent)), 1) if values else None

@@ -1,0 +1,32 @@
+"""``fasaco-edge maps``: the buildings that come with the package."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fasaco_edge.cli.arguments import Subparsers
+
+
+def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "maps",
+        parents=[common],
+        help="list the maps that come with the package",
+        description="List the maps that come with the package; plan, simulate and demo "
+        "take them by name.",
+    )
+    parser.set_defaults(command=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print name and purpose of each map."""
+    from fasaco_edge.cli.terminal import figures, out
+    from fasaco_edge.grid.map_files import builtin_maps
+
+    table = figures("maps", builtin_maps())
+    table.columns[1].justify = "left"
+    out().print(table)
+    return 0

@@ -1,0 +1,46 @@
+"""``fasaco-edge run``: the daemon."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fasaco_edge.cli.arguments import Subparsers
+
+EPILOG = """\
+Without a file the daemon answers at tcp/127.0.0.1:7447 (where a router listens
+there already, it joins that one) under the keys fasaco/@v1/robot/...:
+  in    map, map_update, pose      ROS messages in CDR
+  out   path, coverage, pheromone  ROS messages in CDR
+        status                     JSON, on change and once a second
+        alive                      liveliness token
+  ask   @rpc/path, @rpc/status, @rpc/coverage
+"""
+
+
+def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "run",
+        parents=[common],
+        help="run the daemon: maps come in over Zenoh, paths go out",
+        description="Run the daemon until SIGTERM or SIGINT.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--config", type=Path, metavar="FILE", help="YAML configuration")
+    parser.add_argument(
+        "--record", type=Path, metavar="DIR", help="start a recorder that writes to DIR"
+    )
+    parser.set_defaults(command=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve."""
+    from fasaco_edge.daemon.config import load_config
+    from fasaco_edge.daemon.service import run_daemon
+
+    run_daemon(load_config(args.config), args.record)
+    return 0

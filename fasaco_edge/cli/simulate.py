@@ -1,0 +1,95 @@
+"""``fasaco-edge simulate``: a robot that maps a building and follows the path."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fasaco_edge.cli.arguments import (
+    DEFAULT_RADIUS_M,
+    add_robot_on_bus,
+    client_settings,
+    pair_of_floats,
+)
+
+if TYPE_CHECKING:
+    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.simulation.node import Progress
+
+
+def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "simulate",
+        parents=[common],
+        help="simulate a robot with a laser scanner on the bus",
+        description="A differential-drive robot with a 360-degree scanner in a building it does "
+        "not know. It publishes the map it has scanned so far and its pose, and follows the "
+        "newest path, until SIGTERM or SIGINT.",
+    )
+    parser.add_argument("map", metavar="MAP", help="map_server YAML, or a name from `maps`")
+    parser.add_argument(
+        "--speed", type=float, default=1.0, metavar="X", help="simulated seconds per second"
+    )
+    parser.add_argument(
+        "--start-xy", type=pair_of_floats, metavar="X,Y", help="where the robot starts [m]"
+    )
+    parser.add_argument(
+        "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="[m]"
+    )
+    parser.add_argument(
+        "--range", type=float, default=3.5, metavar="M", help="reach of the scanner [m]"
+    )
+    parser.add_argument(
+        "--map-hz", type=float, default=2.0, metavar="HZ", help="maps a simulated second, 1 to 5"
+    )
+    parser.add_argument(
+        "--trail-out", type=Path, metavar="FILE.csv", help="write where it drove, header x,y"
+    )
+    add_robot_on_bus(parser)
+    parser.set_defaults(command=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Drive until told to stop."""
+    from fasaco_edge.cli.places import start_point
+    from fasaco_edge.grid.geometry import Pose2D
+    from fasaco_edge.grid.map_files import find_map, read_map
+    from fasaco_edge.simulation.config import SimulationConfig
+    from fasaco_edge.simulation.node import run_simulation
+    from fasaco_edge.simulation.world import World
+    from fasaco_edge.wire.keys import Keys
+
+    path = find_map(args.map)
+    config = SimulationConfig(
+        robot_radius_m=args.robot_radius, range_m=args.range, map_hz=args.map_hz
+    )
+    x, y = args.start_xy or start_point(path)
+    world = World(read_map(path), Pose2D(x, y), config)
+    result = run_simulation(
+        world, Keys(args.robot, args.base), client_settings(args), speed=args.speed, report=_report
+    )
+    if args.trail_out is not None:
+        np.savetxt(args.trail_out, result.trail, "%.4f", ",", header="x,y", comments="")
+    print(
+        f"drove {result.distance_m:.1f} m in {result.sim_s:.0f} simulated s, "
+        f"{result.collisions} collisions"
+    )
+    return 0
+
+
+def _report(progress: Progress) -> None:
+    """Overwrite one line of a terminal; say nothing into a file."""
+    import sys
+
+    if sys.stderr.isatty():
+        pose = progress.pose
+        print(
+            f"\r{progress.sim_s:8.1f} s  x {progress.speed:5.1f}  ({pose.x:7.2f}, {pose.y:7.2f}) m"
+            f"  {progress.distance_m:7.1f} m driven  {progress.collisions} collisions ",
+            end="",
+            file=sys.stderr,
+        )

@@ -1,0 +1,83 @@
+"""What a new map says otherwise than the one before it, and how far the known map reaches."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import GridGeometry, Window
+from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
+
+Bounds = tuple[float, float, float, float]
+
+# Crossing it, a pixel has become an obstacle or ceased to be one [percent].
+OCCUPIED_FROM = 50
+# Rasters further apart than this are not compared [pixels].
+RASTER_TOLERANCE_PX = 0.01
+
+
+def known_bounds(grid: OccupancyGrid) -> Bounds | None:
+    """Return (x_min, y_min, x_max, y_max) [m] of what is known; None where nothing is."""
+    window = _window_of(grid.cells != UNKNOWN)
+    return _bounds(grid.geometry, window) if window else None
+
+
+def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None:
+    """Return (x_min, y_min, x_max, y_max) [m] around the pixels that turned free or occupied.
+
+    Pixels that were unknown do not count, else the whole exploration would. None where
+    no pixel changed, or where the two rasters do not match.
+    """
+    shift = _raster_shift(before.geometry, after.geometry)
+    if shift is None:
+        return None
+    row0, col0 = shift
+    outer = Window(0, 0, after.geometry.rows, after.geometry.cols)
+    placed = Window(row0, col0, row0 + before.geometry.rows, col0 + before.geometry.cols)
+    common = outer.intersection(placed)
+    if common is None:
+        return None
+    old, new = before.cells[common.slices_in(placed)], after.cells[common.slices_in(outer)]
+    was, is_now = old >= OCCUPIED_FROM, new >= OCCUPIED_FROM
+    window = _window_of((was != is_now) & (old != UNKNOWN) & (new != UNKNOWN))
+    if window is None:
+        return None
+    row, col = common.row0, common.col0
+    moved = Window(window.row0 + row, window.col0 + col, window.row1 + row, window.col1 + col)
+    return _bounds(after.geometry, moved)
+
+
+def union(one: Bounds | None, other: Bounds) -> Bounds:
+    """Return the least rectangle around both."""
+    if one is None:
+        return other
+    least, most = map(min, one[:2], other[:2]), map(max, one[2:], other[2:])
+    x0, y0 = least
+    x1, y1 = most
+    return x0, y0, x1, y1
+
+
+def _raster_shift(before: GridGeometry, after: GridGeometry) -> tuple[int, int] | None:
+    """Return (row, col) in ``after`` of pixel (0, 0) of ``before``; None off the raster."""
+    turned = not math.isclose(before.origin.yaw, after.origin.yaw, abs_tol=1e-6)
+    if turned or not math.isclose(before.resolution, after.resolution, rel_tol=1e-6):
+        return None
+    col, row = after.to_pixels(before.origin.x, before.origin.y)
+    if max(abs(col - round(col)), abs(row - round(row))) > RASTER_TOLERANCE_PX:
+        return None
+    return round(row), round(col)
+
+
+def _window_of(marked: NDArray[np.bool_]) -> Window | None:
+    rows, cols = np.flatnonzero(marked.any(axis=1)), np.flatnonzero(marked.any(axis=0))
+    if not len(rows):
+        return None
+    return Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
+
+
+def _bounds(geometry: GridGeometry, window: Window) -> Bounds:
+    corner = geometry.to_map(window.col0, window.row0)
+    origin = type(geometry.origin)(*corner, geometry.origin.yaw)
+    return GridGeometry(window.rows, window.cols, geometry.resolution, origin).bounds()

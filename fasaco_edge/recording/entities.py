@@ -1,0 +1,44 @@
+"""Names of what a recording holds: they are its interface, for blueprints and for readers."""
+
+from __future__ import annotations
+
+from typing import Final
+
+APPLICATION: Final = "fasaco_edge"
+
+WALL: Final = "wall"
+"""Timeline: when the recorder received it."""
+REPLAN: Final = "replan"
+"""Timeline: revision of the path in force."""
+ITER: Final = "iter"
+"""Timeline: cohorts seen, over all plans."""
+
+WORLD: Final = "world"
+MAP: Final = "world/map"
+MAP_CHANGE: Final = "world/map_change"
+COVERAGE: Final = "world/coverage"
+PHEROMONE: Final = "world/pheromone"
+PATH: Final = "world/path/current"
+OLD_PATH: Final = "world/path/previous"
+ROBOT: Final = "world/robot"
+ROBOT_BODY: Final = "world/robot/body"
+ROBOT_HEADING: Final = "world/robot/heading"
+TRAIL: Final = "world/trail"
+
+LATENCY: Final = "metrics/latency"
+COVERED_FRACTION: Final = "metrics/coverage/covered"
+RECOVERED_FRACTION: Final = "metrics/coverage/recovered"
+BEST_STEPS: Final = "metrics/colony/best_steps"
+TRAIL_RANGE: Final = "metrics/trail"
+MEMORY: Final = "metrics/memory"
+
+MISSION_STATE: Final = "state/mission"
+PLANNER_STATE: Final = "state/planner"
+RECORDER_STATE: Final = "state/recorder"
+
+PATH_LOG: Final = "log/path"
+MISSION_LOG: Final = "log/mission"
+BUS_LOG: Final = "log/bus"
+RECORDER_LOG: Final = "log/recorder"
+
+RUN_CARD: Final = "run/card"

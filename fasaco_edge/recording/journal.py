@@ -1,0 +1,259 @@
+"""A recording over its parts: what is logged survives rotation, and a full or stalled disk.
+
+The journal remembers static data and the newest value of what is latched. Each
+part begins with them, so that each can be read alone; all share one recording
+id, so that a viewer shows them as one run.
+"""
+
+from __future__ import annotations
+
+import enum
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.part import Flush, Part
+from fasaco_edge.recording.sdk import rr, rrb
+
+FLUSH_PERIOD_NS = 1_000_000_000
+# Rerun's own queue has no bound: no more than this may wait in it between two flushes.
+FLUSH_BYTES = 8_000_000
+FLUSH_TIMEOUT_S = 0.5
+# How long to look whether a stalled disk has come back.
+PROBE_TIMEOUT_S = 0.05
+CLOSE_TIMEOUT_S = 1.2
+# Room beyond the floor before recording goes on: not to fill the disk again at once.
+RESUME_BYTES = 1_000_000
+
+
+class JournalState(enum.Enum):
+    """Whether what is logged is being written."""
+
+    RECORDING = "recording"
+    DISK_FULL = "disk full"
+    STALLED = "stalled"
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """How much a part may take, and how much the disk must keep free [bytes]."""
+
+    part_bytes: int
+    least_free_bytes: int
+
+
+class Journal:
+    """Writes to the parts ``<recording_id>-part<n>.rrd`` in ``folder``; for one thread only.
+
+    Rerun keeps the time per thread, and logs as static what a thread without one logs.
+
+    Raises:
+        BadConfiguration: the folder cannot be made or written to.
+    """
+
+    def __init__(
+        self, folder: Path, recording_id: str, room: Room, blueprint: rrb.Blueprint
+    ) -> None:
+        self._folder = folder
+        self._recording_id = recording_id
+        self._room = room
+        self._blueprint = blueprint
+        self._name = recording_id
+        self._properties: dict[str, str] = {}
+        self._static: dict[str, tuple[rr.AsComponents, ...]] = {}
+        self._latched: dict[str, rr.AsComponents] = {}
+        self._sequences: dict[str, int] = {}
+        self._wall_ns = 0
+        self._part: Part | None = None
+        self._parts = 0
+        self._next_flush_ns = 0
+        self._unflushed_messages = 0
+        self._unflushed_bytes = 0
+        self.lost = 0
+        self.state = JournalState.RECORDING
+        self.reason = ""
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._begin_part()
+        except OSError as error:
+            raise BadConfiguration(f"cannot record into {folder}: {error}") from error
+
+    @property
+    def path(self) -> Path | None:
+        """The part being written; None while there is no room for one."""
+        return self._part.path if self._part else None
+
+    @property
+    def bytes(self) -> int:
+        """Size of the part being written [bytes]."""
+        return self._part.size if self._part else 0
+
+    def message(self, wall_ns: int, size: int) -> None:
+        """Begin what a message of ``size`` bytes, received at ``wall_ns``, gives to log.
+
+        A message that is not written is counted as lost, one that only may have been
+        lost with a broken part, too.
+        """
+        self.at(wall_ns)
+        if self.state is JournalState.RECORDING:
+            self._unflushed_messages += 1
+            self._unflushed_bytes += size
+        else:
+            self.lost += 1
+
+    def at(self, wall_ns: int) -> None:
+        """Set the time [ns] of what is logged next."""
+        self._wall_ns = wall_ns
+        if self._part:
+            self._set_times(self._part.stream)
+
+    def sequence(self, timeline: str, number: int) -> None:
+        """Set the place on another timeline of all that is logged from now on."""
+        self._sequences[timeline] = number
+        if self._part:
+            self._set_times(self._part.stream)
+
+    def log(self, entity: str, archetype: rr.AsComponents, *, latched: bool = False) -> None:
+        """Log at the time set; ``latched``: in force until the next, so parts begin with it."""
+        if latched:
+            self._latched[entity] = archetype
+        if self._part and self.state is JournalState.RECORDING:
+            self._part.stream.log(entity, archetype)
+
+    def log_static(self, entity: str, *archetypes: rr.AsComponents) -> None:
+        """Log what holds for the whole run; takes the place of what held before."""
+        self._static[entity] = archetypes
+        if self._part and self.state is JournalState.RECORDING:
+            self._part.stream.log(entity, *archetypes, static=True)
+
+    def describe(self, name: str, properties: dict[str, str]) -> None:
+        """Name the recording, and set its properties."""
+        self._name, self._properties = name, properties
+        if self._part and self.state is JournalState.RECORDING:
+            self._send_description(self._part.stream)
+
+    def show(self, blueprint: rrb.Blueprint) -> None:
+        """Make ``blueprint`` the one that opens; a file's last one counts."""
+        self._blueprint = blueprint
+        if self._part and self.state is JournalState.RECORDING:
+            self._part.stream.send_blueprint(blueprint)
+
+    def sync(self, now_ns: int) -> None:
+        """Find out whether all is written, and act on it; call it often.
+
+        Args:
+            now_ns: a monotonic clock [ns].
+        """
+        if now_ns < self._next_flush_ns and self._unflushed_bytes < FLUSH_BYTES:
+            return
+        self._next_flush_ns = now_ns + FLUSH_PERIOD_NS
+        if self._part is None:
+            self._try_again()
+        elif self._is_flushed(self._part):
+            self._keep_room(self._part)
+
+    def close(self) -> bool:
+        """End the part in order; False where the disk holds rerun's writer up."""
+        if self._part is None:
+            return True
+        outcome = self._part.flush(CLOSE_TIMEOUT_S)
+        if outcome is Flush.STALLED:
+            return False
+        if outcome is Flush.BROKEN:
+            self._give_up(self._part)
+        else:
+            self._part.close()
+        self._part = None
+        return True
+
+    def _is_flushed(self, part: Part) -> bool:
+        stalled = self.state is JournalState.STALLED
+        outcome = part.flush(PROBE_TIMEOUT_S if stalled else FLUSH_TIMEOUT_S)
+        if outcome is Flush.STALLED:
+            self._enter(JournalState.STALLED, f"{part.path.name} waits for the disk")
+            return False
+        if outcome is Flush.BROKEN:
+            self._give_up(part)
+            return False
+        self._unflushed_messages = self._unflushed_bytes = 0
+        if stalled:
+            self._enter(JournalState.RECORDING, "the disk writes again")
+            self._send_latched(part.stream)
+        return True
+
+    def _keep_room(self, part: Part) -> None:
+        if self._free_bytes() < self._room.least_free_bytes:
+            part.close()
+            self._part = None
+            floor_mb = self._room.least_free_bytes / 1e6
+            self._enter(JournalState.DISK_FULL, f"less than {floor_mb:.0f} MB are free")
+        elif part.size >= self._room.part_bytes:
+            try:
+                self._begin_part()
+            except OSError as error:
+                self._part = None
+                self._enter(JournalState.DISK_FULL, f"no new part: {error}")
+            part.close()
+
+    def _give_up(self, part: Part) -> None:
+        part.abandon()
+        self._part = None
+        self.lost += self._unflushed_messages
+        self._unflushed_messages = self._unflushed_bytes = 0
+        full = self._free_bytes() < self._room.least_free_bytes + RESUME_BYTES
+        reason = f"{part.path.name} can no longer be written"
+        if full:
+            self._enter(JournalState.DISK_FULL, f"{reason}: no space left")
+        else:
+            self._enter(JournalState.STALLED, reason)
+
+    def _try_again(self) -> None:
+        if self._free_bytes() < self._room.least_free_bytes + RESUME_BYTES:
+            return
+        try:
+            self._begin_part()
+        except OSError as error:
+            self._enter(self.state, f"no new part: {error}")
+        else:
+            self._enter(JournalState.RECORDING, "there is room again")
+
+    def _begin_part(self) -> None:
+        number = self._parts + 1
+        path = self._folder / f"{self._recording_id}-part{number}.rrd"
+        part = Part(path, self._recording_id, self._blueprint)
+        self._part, self._parts = part, number
+        self._send_description(part.stream)
+        for entity, archetypes in self._static.items():
+            part.stream.log(entity, *archetypes, static=True)
+        self._send_latched(part.stream)
+
+    def _send_description(self, stream: rr.RecordingStream) -> None:
+        stream.send_recording_name(self._name)
+        if self._properties:
+            stream.send_property(entities.APPLICATION, rr.AnyValues(**self._properties))
+
+    def _send_latched(self, stream: rr.RecordingStream) -> None:
+        if not self._latched:
+            return
+        self._set_times(stream)
+        for entity, archetype in self._latched.items():
+            stream.log(entity, archetype)
+
+    def _set_times(self, stream: rr.RecordingStream) -> None:
+        stream.set_time(entities.WALL, timestamp=np.datetime64(self._wall_ns, "ns"))
+        for timeline, number in self._sequences.items():
+            stream.set_time(timeline, sequence=number)
+
+    def _free_bytes(self) -> int:
+        try:
+            return shutil.disk_usage(self._folder).free
+        except OSError:
+            # The folder, or the disk it was on, is gone: no room there until it is back.
+            return 0
+
+    def _enter(self, state: JournalState, reason: str) -> None:
+        self.state, self.reason = state, reason

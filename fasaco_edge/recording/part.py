@@ -1,0 +1,88 @@
+"""One file of a recording, from its first byte to its footer."""
+
+from __future__ import annotations
+
+import enum
+import fcntl
+import os
+from pathlib import Path
+
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.repair import repair_recording
+from fasaco_edge.recording.sdk import rr, rrb
+
+# Rows gather this long before they are written [s]: what a kill -9 costs, and what
+# keeps chunks from being tiny.
+FLUSH_TICK_S = 1.0
+
+
+class Flush(enum.Enum):
+    """What became of what was logged."""
+
+    DONE = "done"
+    """It is handed to the disk."""
+    STALLED = "stalled"
+    """It takes longer than one was ready to wait."""
+    BROKEN = "broken"
+    """Rerun's writer has given up on the file, for good."""
+
+
+class Part:
+    """A file being written.
+
+    Rerun's logging calls never fail: what became of the data only ``flush`` can tell.
+
+    Raises:
+        OSError: the file cannot be made.
+    """
+
+    def __init__(self, path: Path, recording_id: str, blueprint: rrb.Blueprint) -> None:
+        self.path = path
+        self.flushed = False
+        # Held while the part is written, so that no other recorder repairs it.
+        self._lock = _locked(path)
+        self.stream = rr.RecordingStream(
+            entities.APPLICATION,
+            recording_id=recording_id,
+            batcher_config=rr.ChunkBatcherConfig(flush_tick=FLUSH_TICK_S),
+        )
+        self.stream.set_log_time_enabled(False)
+        try:
+            self.stream.set_sinks(rr.FileSink(str(path)), default_blueprint=blueprint)
+        except RuntimeError as error:
+            os.close(self._lock)
+            raise OSError(str(error)) from error
+
+    @property
+    def size(self) -> int:
+        """Size of the file so far [bytes]."""
+        return os.fstat(self._lock).st_size
+
+    def flush(self, timeout_s: float) -> Flush:
+        """Wait up to ``timeout_s`` [s] until all that was logged is handed to the disk."""
+        try:
+            self.stream.flush(timeout_sec=timeout_s)
+        except RuntimeError as error:
+            # One type for both: the text is all there is to tell them apart (rerun 0.41).
+            return Flush.STALLED if "timed out" in str(error) else Flush.BROKEN
+        self.flushed = True
+        return Flush.DONE
+
+    def close(self) -> None:
+        """Write the footer and end the file; call it only after a flush that succeeded."""
+        self.stream.disconnect()
+        os.close(self._lock)
+
+    def abandon(self) -> None:
+        """Save of a broken part what can be read: whole frames, or nothing."""
+        self.stream.disconnect()
+        os.close(self._lock)
+        repair_recording(self.path)
+        if not self.flushed:
+            self.path.unlink(missing_ok=True)
+
+
+def _locked(path: Path) -> int:
+    lock = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_NONBLOCK | os.O_CLOEXEC, 0o644)
+    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    return lock

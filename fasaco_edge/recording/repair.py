@@ -1,0 +1,98 @@
+"""Recordings torn by a crash: found, and cut at their last whole frame.
+
+A reader refuses a whole file for one torn frame at its end, which is what a
+power cut or a full disk leaves. The format: 12 bytes of header, then frames,
+each two little-endian u64 (kind, length) and ``length`` bytes; kind 0 is the
+footer. Rerun never calls fsync, so more than the last frame may be missing.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+MAGIC = b"RRF"
+HEADER_BYTES = 12
+FRAME = struct.Struct("<QQ")
+FOOTER_KIND = 0
+LAST_KIND = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """What a recording holds, by its frames.
+
+    Attributes:
+        frames: whole frames.
+        whole_bytes: size up to the end of the last whole frame [bytes].
+        total_bytes: size of the file [bytes].
+        has_footer: whether the recording was ended in order.
+    """
+
+    frames: int
+    whole_bytes: int
+    total_bytes: int
+    has_footer: bool
+
+    @property
+    def torn_bytes(self) -> int:
+        """Bytes behind the last whole frame."""
+        return self.total_bytes - self.whole_bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Repair:
+    """A recording that was cut, and by how much [bytes]."""
+
+    path: Path
+    cut_bytes: int
+
+
+def scan_recording(recording: BinaryIO) -> Scan | None:
+    """Walk the frames of ``recording``; None where it does not even begin as one."""
+    total = os.fstat(recording.fileno()).st_size
+    recording.seek(0)
+    header = recording.read(HEADER_BYTES)
+    if len(header) < HEADER_BYTES or not header.startswith(MAGIC):
+        return None
+    end, frames, has_footer = HEADER_BYTES, 0, False
+    while not has_footer:
+        recording.seek(end)
+        head = recording.read(FRAME.size)
+        if len(head) < FRAME.size:
+            break
+        kind, length = FRAME.unpack(head)
+        if kind > LAST_KIND or end + FRAME.size + length > total:
+            break
+        end += FRAME.size + length
+        frames += 1
+        has_footer = kind == FOOTER_KIND
+    return Scan(frames, end, total, has_footer)
+
+
+def repair_recording(path: Path) -> Repair | None:
+    """Cut ``path`` behind its last whole frame; None where nothing was torn.
+
+    A recording whose writer lives is left alone: it holds a lock on the file. So is one
+    with a footer, and a file that is no recording.
+    """
+    with path.open("r+b") as recording:
+        try:
+            fcntl.flock(recording, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return None
+        scan = scan_recording(recording)
+        if scan is None or scan.has_footer or not scan.torn_bytes:
+            return None
+        recording.truncate(scan.whole_bytes)
+    return Repair(path, scan.torn_bytes)
+
+
+def repair_folder(folder: Path) -> list[Repair]:
+    """Cut every torn recording in ``folder``; return what was cut, in order of name."""
+    paths = sorted(path for path in folder.glob("*.rrd") if path.is_file())
+    return [repair for path in paths if (repair := repair_recording(path)) is not None]

@@ -1,0 +1,40 @@
+"""What the recorder says about itself on the bus."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderReport:
+    """The recorder's status, JSON on the key ``recorder``.
+
+    Attributes:
+        state: "recording", "disk full", "stalled" or "stopping".
+        reason: why, for a person; may be "".
+        file: the part being written; "" while there is none.
+        bytes: its size [bytes].
+        messages: samples taken from the bus.
+        lost: samples that were not written, or may not have been.
+        malformed: samples that were not what they should be.
+        rss_mb: memory of the process [MB].
+        pid: its process id.
+    """
+
+    state: str
+    reason: str
+    file: str
+    bytes: int
+    messages: int
+    lost: int
+    malformed: int
+    rss_mb: float
+    pid: int
+
+
+def resident_mb() -> float:
+    """Return this process's resident memory [MB] (proc(5), statm)."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return round(pages * os.sysconf("SC_PAGE_SIZE") / 1e6, 1)

@@ -1,0 +1,225 @@
+"""Decoded messages in, entities out: what the recording shows of a mission."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from fasaco_edge.errors import PatchWithoutBase
+from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.recording import archetypes as draw
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.blueprint import build_blueprint
+from fasaco_edge.recording.changes import Bounds, changed_bounds, known_bounds, union
+from fasaco_edge.recording.fields import Json, integer, number, section, text
+from fasaco_edge.recording.journal import Journal
+from fasaco_edge.recording.report import RecorderReport
+from fasaco_edge.recording.runcard import RunDescription
+from fasaco_edge.recording.sdk import rr
+from fasaco_edge.recording.styles import log_styles
+from fasaco_edge.wire.paths import PathMessage
+from fasaco_edge.wire.pheromone import PheromoneMessage
+
+TRAIL_SPACING_M = 0.02
+DEFAULT_RADIUS_M = 0.2
+# The view follows the growing map in steps of this fraction of its size: each blueprint
+# takes 120 kB.
+REFRAME_FRACTION = 0.15
+
+
+class Scene:
+    """Draws a mission into a journal, message by message; the caller sets the time."""
+
+    def __init__(self, journal: Journal, description: RunDescription) -> None:
+        self._journal = journal
+        self._run = description
+        self._map: OccupancyGrid | None = None
+        self._known: Bounds | None = None
+        self._framed: Bounds | None = None
+        self._path: PathMessage | None = None
+        self._revision: int | None = None
+        self._last_place: tuple[float, float] | None = None
+        self._cohorts = 0
+        self._errors = 0
+        self._states: dict[str, str] = {}
+        log_styles(journal)
+        self._describe()
+        self._draw_robot(DEFAULT_RADIUS_M)
+
+    def add_map(self, grid: OccupancyGrid) -> None:
+        """Draw the map, and where it contradicts the one before."""
+        before, self._map = self._map, grid
+        if before is not None:
+            if before.geometry == grid.geometry and np.array_equal(before.cells, grid.cells):
+                return
+            changed = changed_bounds(before, grid)
+            if changed is not None:
+                self._journal.log(entities.MAP_CHANGE, draw.change_archetype(changed))
+        self._journal.log(entities.MAP, draw.map_archetype(grid), latched=True)
+        self._frame(grid)
+
+    def add_map_update(self, patch: MapPatch) -> None:
+        """Lay a patch over the map.
+
+        Raises:
+            PatchWithoutBase: it fits no map that came before.
+        """
+        if self._map is None:
+            raise PatchWithoutBase("a map update came before any map")
+        self.add_map(self._map.patched(patch))
+
+    def add_pose(self, stamped: StampedPose) -> None:
+        """Move the robot, and draw its trail."""
+        pose = stamped.pose
+        self._journal.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
+        here = (pose.x, pose.y)
+        if self._last_place is None:
+            self._last_place = here
+        elif math.dist(self._last_place, here) >= TRAIL_SPACING_M:
+            step = np.array([self._last_place, here])
+            line = draw.path_archetype(step, draw.TRAIL_COLOUR, draw.TRAIL_Z, draw.TRAIL_RADIUS)
+            self._journal.log(entities.TRAIL, line)
+            self._last_place = here
+
+    def add_path(self, message: PathMessage, note: Json) -> None:
+        """Draw the path to drive, over the one before it, and log why it came."""
+        revision = integer(note, "revision")
+        if revision is not None:
+            self._journal.sequence(entities.REPLAN, revision)
+        if self._path is not None and revision != self._revision:
+            old = draw.path_archetype(
+                self._path.xy, draw.OLD_PATH_COLOUR, draw.OLD_PATH_Z, draw.OLD_PATH_RADIUS
+            )
+            self._journal.log(entities.OLD_PATH, old, latched=True)
+        new = draw.path_archetype(message.xy, draw.PATH_COLOUR, draw.PATH_Z, draw.PATH_RADIUS)
+        self._journal.log(entities.PATH, new, latched=True)
+        if self._path is None or revision != self._revision:
+            self._say(entities.PATH_LOG, _path_line(message, note))
+        self._path, self._revision = message, revision
+
+    def add_coverage(self, grid: OccupancyGrid) -> None:
+        """Tint what is covered, and plot how much that is."""
+        self._journal.log(entities.COVERAGE, draw.coverage_archetype(grid), latched=True)
+        covered, recovered = draw.coverage_fractions(grid)
+        self._plot(entities.COVERED_FRACTION, covered)
+        self._plot(entities.RECOVERED_FRACTION, recovered)
+
+    def add_pheromone(self, message: PheromoneMessage) -> None:
+        """Draw the pheromone after a cohort, and plot the best walk so far."""
+        self._cohorts += 1
+        self._journal.sequence(entities.ITER, self._cohorts)
+        self._journal.log(entities.PHEROMONE, draw.pheromone_archetype(message), latched=True)
+        self._plot(entities.BEST_STEPS, message.best_steps)
+        # The levels' scale: with it they can be turned back into trails.
+        self._plot(f"{entities.TRAIL_RANGE}/min", message.trail_min)
+        self._plot(f"{entities.TRAIL_RANGE}/max", message.trail_max)
+
+    def add_status(self, status: Json) -> None:
+        """Plot the planner's figures, show its states, log its errors; any key may be missing."""
+        for name, value in section(status, "latency_ms").items():
+            if number({name: value}, name) is not None:
+                self._plot(f"{entities.LATENCY}/{name}", value)
+        memory = number(status, "rss_mb")
+        if memory is not None:
+            self._plot(f"{entities.MEMORY}/planner", memory)
+        self._add_configuration(status)
+        self.enter(entities.MISSION_STATE, text(status, "state"), text(status, "reason"))
+        planning = section(status, "plan").get("planning")
+        if isinstance(planning, bool):
+            self.enter(entities.PLANNER_STATE, "planning" if planning else "idle")
+        self._add_errors(section(status, "errors"))
+
+    def add_report(self, report: RecorderReport) -> None:
+        """Show the recorder's own state and memory."""
+        self.enter(entities.RECORDER_STATE, report.state, report.reason)
+        self._plot(f"{entities.MEMORY}/recorder", report.rss_mb)
+
+    def enter(self, entity: str, state: str, reason: str = "") -> None:
+        """Show that ``entity`` is in ``state`` from now on; log it where there is a reason."""
+        if not state or self._states.get(entity) == state:
+            return
+        self._states[entity] = state
+        self._journal.log(entity, rr.StateChange(state=state), latched=True)
+        if reason:
+            recorder = entity == entities.RECORDER_STATE
+            log = entities.RECORDER_LOG if recorder else entities.MISSION_LOG
+            self._say(log, f"{state}: {reason}")
+
+    def complain(self, log: str, message: str) -> None:
+        """Log something that went wrong."""
+        self._say(log, message, "WARN")
+
+    def finish(self) -> None:
+        """Frame the map as it was at the end."""
+        if self._known is not None and self._known != self._framed:
+            self._journal.show(build_blueprint(self._known))
+
+    def _frame(self, grid: OccupancyGrid) -> None:
+        bounds = known_bounds(grid)
+        if bounds is None:
+            return
+        self._known = bounds = union(self._known, bounds)
+        if self._framed is None or _is_far(self._framed, bounds):
+            self._framed = bounds
+            self._journal.show(build_blueprint(bounds))
+
+    def _add_configuration(self, status: Json) -> None:
+        version, config = text(status, "version"), dict(section(status, "config"))
+        known = replace(
+            self._run, version=version or self._run.version, config=config or self._run.config
+        )
+        if known == self._run:
+            return
+        self._run = known
+        self._describe()
+        radius = number(config, "robot_radius_m")
+        if radius is not None and radius > 0:
+            self._draw_robot(radius)
+
+    def _describe(self) -> None:
+        card = rr.TextDocument(self._run.markdown(), media_type="text/markdown")
+        self._journal.log_static(entities.RUN_CARD, card)
+        self._journal.describe(self._run.name, self._run.properties())
+
+    def _draw_robot(self, radius_m: float) -> None:
+        body, heading = draw.body_archetypes(radius_m)
+        self._journal.log_static(entities.ROBOT_BODY, body)
+        self._journal.log_static(entities.ROBOT_HEADING, heading)
+
+    def _add_errors(self, errors: Json) -> None:
+        total = integer(errors, "total")
+        if total is None or total == self._errors:
+            return
+        # Fewer than before: the planner was started again.
+        if total > self._errors:
+            last = text(errors, "last") or "no text"
+            self._say(entities.MISSION_LOG, f"error {total}: {last}", "ERROR")
+        self._errors = total
+
+    def _plot(self, entity: str, value: float) -> None:
+        self._journal.log(entity, rr.Scalars(value))
+
+    def _say(self, log: str, message: str, level: str = "INFO") -> None:
+        self._journal.log(log, rr.TextLog(message, level=level))
+
+
+def _is_far(framed: Bounds, bounds: Bounds) -> bool:
+    size = max(framed[2] - framed[0], framed[3] - framed[1])
+    moved = max(abs(a - b) for a, b in zip(framed, bounds, strict=True))
+    return moved > REFRAME_FRACTION * size
+
+
+def _path_line(message: PathMessage, note: Json) -> str:
+    revision = integer(note, "revision")
+    named = "path" if revision is None else f"path {revision}"
+    facts = [f"{max(len(message.xy) - 1, 0)} steps"]
+    planner, plan_ms = text(note, "planner"), number(note, "plan_ms")
+    if planner:
+        facts.append(planner)
+    if plan_ms is not None:
+        facts.append(f"{plan_ms:.0f} ms")
+    reason = text(note, "reason")
+    return f"{named} ({', '.join(facts)}){': ' if reason else ''}{reason}"

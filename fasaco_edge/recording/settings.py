@@ -1,0 +1,59 @@
+"""What the recorder is told: where to write, whom to listen to, how much room to leave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fasaco_edge.bus.session import BusSettings
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.schemas import POSE_STAMPED
+
+MEGABYTE = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderSettings:
+    """How to record one robot.
+
+    Attributes:
+        out: folder for the recordings; made if missing.
+        robot: name of the robot.
+        base: what all keys begin with.
+        bus: how to join the bus.
+        map_key, map_update_key, pose_key: keys to listen on where they are not the native
+            ones; "" for native.
+        pose_schema: message type of poses that come without one, as under ROS 2.
+        part_bytes: a part larger than this is followed by the next.
+        least_free_bytes: recording pauses while the disk has less room than this.
+        queue_bytes: samples waiting to be written take at most this much memory.
+
+    Raises:
+        BadConfiguration: a size is impossible, or a name is no key.
+    """
+
+    out: Path
+    robot: str = "robot"
+    base: str = "fasaco"
+    bus: BusSettings = field(default_factory=BusSettings)
+    map_key: str = ""
+    map_update_key: str = ""
+    pose_key: str = ""
+    pose_schema: str = POSE_STAMPED
+    part_bytes: int = 64 * MEGABYTE
+    least_free_bytes: int = 50 * MEGABYTE
+    queue_bytes: int = 64 * MEGABYTE
+
+    def __post_init__(self) -> None:
+        for name, least in (("part_bytes", 1), ("least_free_bytes", 0), ("queue_bytes", 1)):
+            if getattr(self, name) < least:
+                raise BadConfiguration(
+                    f"{name} must be at least {least}, got {getattr(self, name)}"
+                )
+        Keys(self.robot, self.base)
+
+    @property
+    def keys(self) -> Keys:
+        """The robot's keys."""
+        return Keys(self.robot, self.base)

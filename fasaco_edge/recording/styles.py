@@ -1,0 +1,62 @@
+"""How curves and states look: static, logged once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.archetypes import COVERED_COLOUR, RECOVERED_COLOUR, Colour
+from fasaco_edge.recording.journal import Journal
+from fasaco_edge.recording.sdk import rr
+
+CURVES: tuple[tuple[str, str, Colour], ...] = (
+    (entities.COVERED_FRACTION, "covered", COVERED_COLOUR),
+    (entities.RECOVERED_FRACTION, "covered again", RECOVERED_COLOUR),
+    (f"{entities.LATENCY}/ingest", "map taken in", (56, 152, 222)),
+    (f"{entities.LATENCY}/plan", "plan", (167, 139, 250)),
+    (f"{entities.LATENCY}/map_to_path", "map to path", (245, 140, 40)),
+    (entities.BEST_STEPS, "best walk", (250, 204, 21)),
+    (f"{entities.MEMORY}/planner", "planner", (167, 139, 250)),
+    (f"{entities.MEMORY}/recorder", "recorder", (156, 163, 175)),
+)
+
+GREEN, AMBER, RED, BLUE, VIOLET, GREY = (
+    0x059669FF,
+    0xD97706FF,
+    0xDC2626FF,
+    0x2563EBFF,
+    0x7C3AEDFF,
+    0x6B7280FF,
+)
+
+STATES: dict[str, dict[str, int]] = {
+    entities.MISSION_STATE: {
+        "waiting for map": GREY,
+        "waiting for pose": GREY,
+        "planning": VIOLET,
+        "covering": GREEN,
+        "blocked": RED,
+        "done": BLUE,
+        "silent": AMBER,
+    },
+    entities.PLANNER_STATE: {"idle": GREY, "planning": VIOLET},
+    entities.RECORDER_STATE: {
+        "recording": GREEN,
+        "disk full": RED,
+        "stalled": AMBER,
+        "stopping": GREY,
+    },
+}
+
+
+def log_styles(journal: Journal) -> None:
+    """Log names and colours of all curves and states."""
+    journal.log_static(entities.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    for entity, name, colour in CURVES:
+        journal.log_static(entity, rr.SeriesLines(names=name, colors=colour, widths=1.5))
+    for entity, colours in STATES.items():
+        states = list(colours)
+        palette = np.array(list(colours.values()), np.uint32)
+        journal.log_static(
+            entity, rr.StateConfiguration(values=states, labels=states, colors=palette)
+        )

@@ -1,0 +1,205 @@
+"""The simulated robot on the bus: map and pose go out, paths come in, as with a real one."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bus.mailbox import LatestSlot
+from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.simulation.pace import Pace
+from fasaco_edge.simulation.world import Activity, Emission, World
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.maps import encode_occupancy_grid
+from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.schemas import OCCUPANCY_GRID, POSE_STAMPED
+
+log = logging.getLogger(__name__)
+
+# A turn of the loop runs ticks for this long at most, before it looks for a new path [s].
+TURN_S = 0.02
+# Waits are no shorter than this, or a fast simulation would do nothing but wake up [s].
+WAIT_S = 0.004
+REPORT_EVERY_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How a simulation is getting on.
+
+    Attributes:
+        sim_s: simulated time [s].
+        pose: the robot's pose.
+        activity: what it is about.
+        distance_m: way driven [m].
+        collisions: how often a path led into an obstacle.
+        refused_paths: how many paths were malformed or in another frame.
+        speed: simulated seconds per second, achieved since the report before.
+    """
+
+    sim_s: float
+    pose: Pose2D
+    activity: Activity
+    distance_m: float
+    collisions: int
+    refused_paths: int
+    speed: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulationResult:
+    """What became of a simulation.
+
+    Attributes:
+        trail: float64 (n, 2): where the robot was, points (x, y) [m], the start first.
+        distance_m: way driven [m].
+        sim_s: simulated time [s].
+        collisions: how often a path led into an obstacle.
+    """
+
+    trail: NDArray[np.float64]
+    distance_m: float
+    sim_s: float
+    collisions: int
+
+
+def run_simulation(
+    world: World,
+    keys: Keys,
+    settings: BusSettings,
+    *,
+    speed: float = 1.0,
+    should_stop: Callable[[], bool] = lambda: False,
+    report: Callable[[Progress], None] = lambda _progress: None,
+) -> SimulationResult:
+    """Run the robot of ``world`` on the bus until it is told to stop.
+
+    It publishes its map (latched) and its pose with simulated time as the stamp, and
+    drives along the newest path. In the main thread, SIGINT and SIGTERM end it too.
+    Its last map and pose are published before it returns.
+
+    Args:
+        world: the building and the robot.
+        keys: the robot's keys.
+        settings: how to join the bus.
+        speed: simulated seconds per second, above 0; a machine that cannot keep up
+            runs slower.
+        should_stop: asked some fifty times a second.
+        report: called about twice a second, and at the end.
+
+    Raises:
+        BadConfiguration: ``speed`` is not above 0.
+        BusUnavailable: the bus cannot be joined.
+    """
+    if not speed > 0.0:
+        raise BadConfiguration(f"speed must be above 0, got {speed}")
+    with open_bus(settings) as bus, _told_to_end() as ended:
+        robot = _RobotOnBus(world, keys, bus)
+        meter = _Meter(robot, report)
+        pace = Pace(speed, world.config.tick_s, time.monotonic())
+        while not (ended.is_set() or should_stop()):
+            behind_s = pace.behind_s(time.monotonic())
+            robot.take_path(0.0 if behind_s >= 0.0 else min(max(-behind_s, WAIT_S), TURN_S))
+            turn_ends_s = time.monotonic() + TURN_S
+            while pace.behind_s(now_s := time.monotonic()) >= 0.0 and now_s < turn_ends_s:
+                robot.publish(world.tick())
+                pace.ticked(now_s)
+            meter.report_if_due(now_s)
+        robot.publish(world.emission())
+        meter.report(time.monotonic())
+    return SimulationResult(world.trail, world.distance_m, world.stamp_ns * 1e-9, world.collisions)
+
+
+class _RobotOnBus:
+    """The world's publishers and its one subscription."""
+
+    def __init__(self, world: World, keys: Keys, bus: Bus) -> None:
+        self.world = world
+        self.refused_paths = 0
+        self._map = bus.publisher(keys.map, OCCUPANCY_GRID, latched=True)
+        self._pose = bus.publisher(keys.pose, POSE_STAMPED)
+        self._newest_path: LatestSlot[Sample] = LatestSlot()
+        bus.subscribe(keys.path, self._newest_path.put, latched=True)
+
+    def publish(self, emission: Emission) -> None:
+        # The map first: where the robot stands is on it.
+        if emission.map is not None:
+            self._map.put(encode_occupancy_grid(emission.map))
+        if emission.pose is not None:
+            self._pose.put(encode_pose_stamped(emission.pose))
+
+    def take_path(self, timeout_s: float) -> None:
+        """Wait for a path and follow it; one that cannot be followed costs only itself."""
+        sample = self._newest_path.take(timeout_s)
+        if sample is None:
+            return
+        try:
+            self.world.follow(_waypoints(sample, self.world.frame))
+        except (MalformedMessage, WrongFrame) as error:
+            self.refused_paths += 1
+            log.warning("path refused: %s", error)
+
+
+class _Meter:
+    """Reports progress, with the speed achieved since the report before."""
+
+    def __init__(self, robot: _RobotOnBus, report: Callable[[Progress], None]) -> None:
+        self._robot = robot
+        self._report = report
+        self._last_s = time.monotonic()
+        self._last_sim_s = robot.world.stamp_ns * 1e-9
+
+    def report_if_due(self, now_s: float) -> None:
+        if now_s - self._last_s >= REPORT_EVERY_S:
+            self.report(now_s)
+
+    def report(self, now_s: float) -> None:
+        world = self._robot.world
+        sim_s = world.stamp_ns * 1e-9
+        elapsed_s = max(now_s - self._last_s, 1e-9)
+        self._report(
+            Progress(
+                sim_s=sim_s,
+                pose=world.pose,
+                activity=world.activity,
+                distance_m=world.distance_m,
+                collisions=world.collisions,
+                refused_paths=self._robot.refused_paths,
+                speed=(sim_s - self._last_sim_s) / elapsed_s,
+            )
+        )
+        self._last_s, self._last_sim_s = now_s, sim_s
+
+
+def _waypoints(sample: Sample, frame: str) -> NDArray[np.float64]:
+    path = decode_path(sample.payload)
+    if path.frame != frame:
+        raise WrongFrame(f"path in frame {path.frame!r}, map in {frame!r}")
+    return path.xy
+
+
+@contextmanager
+def _told_to_end() -> Iterator[threading.Event]:
+    """Yield an event that SIGINT and SIGTERM set, where this thread may ask for them."""
+    ended = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield ended
+        return
+    signals = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: ended.set()) for number in signals]
+    try:
+        yield ended
+    finally:
+        for number, handler in zip(signals, before, strict=True):
+            signal.signal(number, handler)

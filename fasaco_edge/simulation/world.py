@@ -1,0 +1,198 @@
+"""The simulated world: a ground truth, a robot in it, and a clock of equal ticks.
+
+No bus, no file, no wall clock: ``tick`` returns what is to be published. The
+same calls give the same values, bit for bit.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import StartBlocked, StartOutsideMap
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.raycast import disc_is_free
+from fasaco_edge.simulation.config import SimulationConfig
+from fasaco_edge.simulation.joining import joined
+from fasaco_edge.simulation.mapper import Mapper
+from fasaco_edge.simulation.robot import ARRIVED_M, DriveState, driven, stopping_point
+
+# Spacing of the recorded trail on straight runs [m]; corners are recorded as they are.
+TRAIL_SPACING_M = 0.02
+# About two metres of it tell what of a new path is driven already.
+RECENT_TRAIL_POINTS = 100
+
+
+class Activity(enum.Enum):
+    """What the robot is about."""
+
+    IDLE = "idle"
+    """It has no path, or has driven it to its end."""
+    DRIVING = "driving"
+    """It is on a path, or on its way to one."""
+    NO_WAY = "no_way"
+    """It sees no clear way to the path's beginning, and looks again after every scan."""
+    COLLIDED = "collided"
+    """The path led into an obstacle; it stands before it and waits for another path."""
+
+
+@dataclass(frozen=True, slots=True)
+class Emission:
+    """What the robot publishes after a tick: its map, its pose, both or neither."""
+
+    map: OccupancyGrid | None = None
+    pose: StampedPose | None = None
+
+
+class World:
+    """A robot that knows only what it scanned, in a building that does not move.
+
+    Args:
+        truth: the building. What is not free there (unknown too) is an obstacle.
+        start: the robot's first pose, in the frame of ``truth``.
+        config: the robot.
+
+    Raises:
+        StartOutsideMap: ``start`` is not on ``truth``.
+        StartBlocked: the robot's hull does not fit at ``start``.
+    """
+
+    def __init__(self, truth: OccupancyGrid, start: Pose2D, config: SimulationConfig) -> None:
+        self._truth = truth
+        self.config = config
+        _check_start(truth, start, config)
+        self._drive = DriveState(start)
+        self._mapper = Mapper(truth, config)
+        self._path: NDArray[np.float64] | None = None
+        self._corners: list[tuple[float, float]] = []
+        self._trail = [(start.x, start.y)]
+        self._ticks = 0
+        self.activity = Activity.IDLE
+        self.distance_m = 0.0
+        self.collisions = 0
+
+    @property
+    def pose(self) -> Pose2D:
+        """The robot's true pose, which is also what it believes."""
+        return self._drive.pose
+
+    @property
+    def frame(self) -> str:
+        """Name of the frame of everything the robot publishes."""
+        return self._truth.frame
+
+    @property
+    def stamp_ns(self) -> int:
+        """Simulated time since the start [ns]."""
+        return self._ticks * self.config.tick_ns
+
+    @property
+    def trail(self) -> NDArray[np.float64]:
+        """Where the robot has been: points (x, y) [m], float64 (n, 2), the start first."""
+        pose = self._drive.pose
+        return np.array([*self._trail, (pose.x, pose.y)], np.float64)
+
+    def emission(self) -> Emission:
+        """Return map and pose as they are now; there is no map before the first tick."""
+        return self._emission(with_map=True, with_pose=True)
+
+    def follow(self, path: NDArray[np.float64]) -> None:
+        """Drive along ``path``, waypoints (x, y) [m], float64 (n, 2); an empty one halts.
+
+        It replaces the path before it. From the first tick on: the robot must have
+        scanned to see a way.
+        """
+        self._path = path
+        self._join()
+
+    def tick(self) -> Emission:
+        """Let one time step pass; return what is published after it."""
+        self._move()
+        self._ticks += 1
+        config, since_first = self.config, self._ticks - 1
+        if since_first % config.period_ticks(config.scan_hz) == 0:
+            self._mapper.scan(self.pose)
+            if self.activity is Activity.NO_WAY:
+                self._join()
+        map_is_due = since_first % config.period_ticks(config.map_hz) == 0
+        pose_is_due = since_first % config.period_ticks(config.pose_hz) == 0
+        return self._emission(with_map=map_is_due, with_pose=pose_is_due)
+
+    def _emission(self, *, with_map: bool, with_pose: bool) -> Emission:
+        return Emission(
+            self._mapper.snapshot(self.stamp_ns) if with_map else None,
+            StampedPose(self.pose, self.frame, self.stamp_ns) if with_pose else None,
+        )
+
+    def _join(self) -> None:
+        if self._path is None:
+            return
+        route = joined(self._path, self._recent_trail(), self._mapper.is_clear)
+        if route is None:
+            self._corners, self.activity = [], Activity.NO_WAY
+            return
+        self._corners = [(float(x), float(y)) for x, y in route[::-1]]
+        self.activity = Activity.DRIVING if self._corners else Activity.IDLE
+
+    def _recent_trail(self) -> NDArray[np.float64]:
+        """Return the trail's last metres, to the point where the robot can come to rest."""
+        here = (self.pose.x, self.pose.y)
+        rest = stopping_point(self._drive, self.config)
+        points = 2 + int(math.dist(here, rest) / TRAIL_SPACING_M)
+        behind = np.array(self._trail[-RECENT_TRAIL_POINTS:], np.float64)
+        return np.vstack((behind, np.linspace(here, rest, points)))
+
+    def _move(self) -> None:
+        while self._corners and self._is_at(self._corners[-1]):
+            self._corners.pop()
+        if not self._corners:
+            if self.activity is Activity.DRIVING:
+                self.activity = Activity.IDLE
+            if not self._drive.moving:
+                return
+        ahead = driven(self._drive, self._corners[-1] if self._corners else None, self.config)
+        if not _fits(self._truth, ahead.pose, self.config):
+            self._collide()
+            return
+        self._leave_trail(ahead)
+        self.distance_m += ahead.speed * self.config.tick_s
+        self._drive = ahead
+
+    def _is_at(self, corner: tuple[float, float]) -> bool:
+        return math.dist((self.pose.x, self.pose.y), corner) < ARRIVED_M
+
+    def _collide(self) -> None:
+        self._drive = DriveState(self.pose)
+        self._path, self._corners = None, []
+        self.activity = Activity.COLLIDED
+        self.collisions += 1
+
+    def _leave_trail(self, ahead: DriveState) -> None:
+        """Note the place the robot is about to leave, where the trail so far does not tell it."""
+        here = (self.pose.x, self.pose.y)
+        gone = math.dist(self._trail[-1], here)
+        turns_off = ahead.speed > 0.0 and self._drive.speed == 0.0
+        if gone >= TRAIL_SPACING_M or (gone > 0.0 and turns_off):
+            self._trail.append(here)
+
+
+def _fits(truth: OccupancyGrid, pose: Pose2D, config: SimulationConfig) -> bool:
+    x, y = truth.geometry.to_pixels(pose.x, pose.y)
+    radius = config.hull_radius_m / truth.geometry.resolution
+    return bool(disc_is_free(truth.cells, x, y, radius, config.free_at_most))
+
+
+def _check_start(truth: OccupancyGrid, start: Pose2D, config: SimulationConfig) -> None:
+    col, row = truth.geometry.to_pixels(start.x, start.y)
+    if not (0 <= row < truth.geometry.rows and 0 <= col < truth.geometry.cols):
+        raise StartOutsideMap(f"start ({start.x:g}, {start.y:g}) m is not on the map")
+    if not _fits(truth, start, config):
+        raise StartBlocked(
+            f"a robot of radius {config.robot_radius_m:g} m does not fit at the start "
+            f"({start.x:g}, {start.y:g}) m"
+        )

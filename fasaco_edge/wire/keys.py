@@ -1,0 +1,99 @@
+"""Keys of the native contract; ``protocol/keys.yaml`` is the same table as data."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from fasaco_edge.errors import BadConfiguration
+
+VERSION = "@v1"
+
+_CHUNK = re.compile(r"[A-Za-z0-9_-]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Keys:
+    """The keys of one robot, under ``<base>/@v1/<robot>``.
+
+    Attributes:
+        robot: name of the robot, one chunk.
+        base: what all robots' keys begin with, one chunk or several joined by ``/``.
+
+    Raises:
+        BadConfiguration: a chunk is empty or holds more than letters, digits, ``_``, ``-``.
+    """
+
+    robot: str = "robot"
+    base: str = "fasaco"
+
+    def __post_init__(self) -> None:
+        _check_chunk("robot", self.robot)
+        for chunk in self.base.split("/"):
+            _check_chunk("base", chunk)
+
+    @property
+    def prefix(self) -> str:
+        """What all keys of this robot begin with."""
+        return f"{self.base}/{VERSION}/{self.robot}"
+
+    @property
+    def map(self) -> str:
+        """In: the map."""
+        return f"{self.prefix}/map"
+
+    @property
+    def map_update(self) -> str:
+        """In: new values for a window of the map."""
+        return f"{self.prefix}/map_update"
+
+    @property
+    def pose(self) -> str:
+        """In: the robot's pose."""
+        return f"{self.prefix}/pose"
+
+    @property
+    def path(self) -> str:
+        """Out: the walk still to be driven."""
+        return f"{self.prefix}/path"
+
+    @property
+    def coverage(self) -> str:
+        """Out: what is covered."""
+        return f"{self.prefix}/coverage"
+
+    @property
+    def pheromone(self) -> str:
+        """Out: the pheromone field."""
+        return f"{self.prefix}/pheromone"
+
+    @property
+    def status(self) -> str:
+        """Out: what the planner is doing."""
+        return f"{self.prefix}/status"
+
+    @property
+    def alive(self) -> str:
+        """Liveliness token of the planner."""
+        return f"{self.prefix}/alive"
+
+    @property
+    def recorder(self) -> str:
+        """Out, by the recorder: what it is doing."""
+        return f"{self.prefix}/recorder"
+
+    def rpc(self, name: str) -> str:
+        """Return the key of the queryable ``name``.
+
+        Raises:
+            BadConfiguration: the name is not one chunk.
+        """
+        _check_chunk("rpc", name)
+        return f"{self.prefix}/@rpc/{name}"
+
+
+def _check_chunk(what: str, chunk: str) -> None:
+    if not _CHUNK.fullmatch(chunk):
+        raise BadConfiguration(
+            f"{what} must be chunks of letters, digits, '_' and '-', got {chunk!r}"
+        )

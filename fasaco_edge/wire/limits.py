@@ -1,0 +1,25 @@
+"""What a message may hold at most; ``protocol/limits.yaml`` is the same table as data."""
+
+from __future__ import annotations
+
+from typing import Final
+
+MAX_STRING_BYTES: Final = 256
+"""Longest string, in UTF-8, without its NUL."""
+
+MAX_COORDINATE_M: Final = 1e6
+"""Largest magnitude of a position's x, y or z [m]."""
+
+MIN_RESOLUTION_M: Final = 1e-4
+MAX_RESOLUTION_M: Final = 100.0
+"""Edge of a grid's pixel [m]."""
+
+QUATERNION_TOLERANCE: Final = 0.01
+"""How far the norm of a quaternion may be from 1."""
+
+MAX_GRID_TILT: Final = 0.01
+"""Largest magnitude of the x and y of a grid's orientation: a map lies in the plane."""
+
+MAX_GRID_CELLS: Final = 64_000_000
+MAX_PATH_POSES: Final = 1_000_000
+MAX_JSON_BYTES: Final = 1_048_576

@@ -1,0 +1,158 @@
+"""The coverage path: nav_msgs/Path, thousands of poses at once.
+
+A PoseStamped ends with eight-byte floats, so every pose after the first begins at a
+multiple of eight: with one frame name in all of them, they are the records of an array.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.wire.cdr import CdrReader, CdrWriter, aligned, encoded_string, refuse
+from fasaco_edge.wire.fields import (
+    POSE_FLOATS,
+    SECOND_NS,
+    check_poses,
+    planar_poses,
+    read_header,
+    write_header,
+    yaw_of,
+)
+from fasaco_edge.wire.limits import MAX_PATH_POSES
+from fasaco_edge.wire.schemas import PATH
+
+LEAST_POSE_BYTES = 72
+"""Of a PoseStamped with an empty frame: stamp 8, length 4, NUL 1, padding 3, floats 56."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathMessage:
+    """A path as it came off the bus.
+
+    Attributes:
+        frame: name of the frame of all poses.
+        stamp_ns: time of the path [ns].
+        xy: float64 (n, 2), read-only: points [m].
+        yaw: float64 (n,), read-only: headings [rad].
+    """
+
+    frame: str
+    stamp_ns: int
+    xy: NDArray[np.float64]
+    yaw: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        self.xy.flags.writeable = self.yaw.flags.writeable = False
+
+
+def encode_path(
+    xy: NDArray[np.float64], yaw: NDArray[np.float64], frame: str, stamp_ns: int
+) -> bytes:
+    """Return a nav_msgs/Path whose poses all carry the header's frame and stamp.
+
+    Args:
+        xy: float64 (n, 2), points [m]; n may be 0.
+        yaw: float64 (n,), headings [rad].
+        frame: name of the frame.
+        stamp_ns: time [ns].
+
+    Raises:
+        MalformedMessage: the message would be one that ``decode_path`` refuses.
+    """
+    writer = CdrWriter(PATH)
+    if xy.ndim != 2 or xy.shape[1] != 2 or yaw.shape != (len(xy),):
+        refuse(writer.message, "poses", "points (n, 2), yaws (n,)", f"{xy.shape}, {yaw.shape}")
+    poses = planar_poses(xy, yaw)
+    check_poses(poses, writer.message, _pose_field)
+    _check_count(len(poses), MAX_PATH_POSES)
+    write_header(writer, frame, stamp_ns)
+    writer.uint32(len(poses), "length of poses")
+    text = encoded_string(frame, writer.message, "header.frame_id")
+    for some in (poses[:1], poses[1:]):
+        records = np.zeros(len(some), _record(writer.position, len(text)))
+        records["sec"], records["nanosec"] = divmod(stamp_ns, SECOND_NS)
+        records["length"] = len(text)
+        records["frame"] = np.frombuffer(text, np.uint8)
+        records["pose"] = some
+        writer.octets(records.tobytes())
+    return writer.payload()
+
+
+def decode_path(payload: bytes, max_poses: int = MAX_PATH_POSES) -> PathMessage:
+    """Return the path in a nav_msgs/Path.
+
+    Raises:
+        MalformedMessage: it is no such message, has over ``max_poses`` poses, or a pose
+            names another frame than the path; a pose that names none is in the path's.
+    """
+    reader = CdrReader(payload, PATH)
+    frame, stamp_ns = read_header(reader)
+    count = reader.length("poses", LEAST_POSE_BYTES)
+    _check_count(count, max_poses)
+    poses = _read_records(reader, frame, count)
+    if poses is None:
+        poses = _read_one_by_one(reader, frame, count)
+    reader.end()
+    check_poses(poses, reader.message, _pose_field)
+    return PathMessage(frame, stamp_ns, poses[:, :2].copy(), yaw_of(poses[:, 3:]))
+
+
+def _read_records(reader: CdrReader, frame: str, count: int) -> NDArray[np.float64] | None:
+    """Read poses that all name ``frame``, float64 (count, 7); take nothing and return None
+    where they do not, or where anything else is odd."""
+    text = np.frombuffer(encoded_string(frame, reader.message, "header.frame_id"), np.uint8)
+    first, rest = _record(reader.position, len(text)), _record(0, len(text))
+    size = first.itemsize + (count - 1) * rest.itemsize
+    block = reader.peek(size) if count else None
+    if block is None:
+        return None
+    poses = np.empty((count, POSE_FLOATS))
+    for some, to in (
+        (block[: first.itemsize].view(first), poses[:1]),
+        (block[first.itemsize :].view(rest), poses[1:]),
+    ):
+        same_frame = (some["length"] == len(text)).all() and (some["frame"] == text).all()
+        if not (same_frame and (some["nanosec"] < SECOND_NS).all()):
+            return None
+        to[:] = some["pose"]
+    reader.octets(size, "poses")
+    return poses
+
+
+def _read_one_by_one(reader: CdrReader, frame: str, count: int) -> NDArray[np.float64]:
+    poses = np.empty((count, POSE_FLOATS))
+    for index in range(count):
+        field = f"poses[{index}].header"
+        named, _ = read_header(reader, field)
+        if named not in ("", frame):
+            refuse(
+                reader.message, f"{field}.frame_id", f"{frame!r}, as the path's, or ''", repr(named)
+            )
+        poses[index] = reader.float64s(POSE_FLOATS, _pose_field(index))
+    return poses
+
+
+def _record(start: int, frame_size: int) -> np.dtype[np.void]:
+    """Return the layout of a PoseStamped that begins at ``start``, a multiple of four."""
+    frame_at = 12
+    pose_at = aligned(start + frame_at + frame_size, 8) - start
+    return np.dtype(
+        {
+            "names": ["sec", "nanosec", "length", "frame", "pose"],
+            "formats": ["<i4", "<u4", "<u4", (np.uint8, frame_size), ("<f8", POSE_FLOATS)],
+            "offsets": [0, 4, 8, frame_at, pose_at],
+            "itemsize": pose_at + 8 * POSE_FLOATS,
+        }
+    )
+
+
+def _pose_field(index: int) -> str:
+    return f"poses[{index}].pose"
+
+
+def _check_count(count: int, max_poses: int) -> None:
+    if count > max_poses:
+        refuse(PATH, "length of poses", f"at most {max_poses}", count)

@@ -1,0 +1,196 @@
+"""The simulated robot on a real bus; a session in the test stands for the planner."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.errors import BadConfiguration, BusUnavailable
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.simulation.config import SimulationConfig
+from fasaco_edge.simulation.node import run_simulation
+from fasaco_edge.simulation.world import Activity, World
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.maps import decode_occupancy_grid
+from fasaco_edge.wire.paths import encode_path
+from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.schemas import PATH
+from tests.simulation.rooms import building, centres, distances_to, serpentine
+
+ROBOT = """
+import json, sys
+from fasaco_edge.bus.session import BusSettings
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.simulation.config import SimulationConfig
+from fasaco_edge.simulation.node import run_simulation
+from fasaco_edge.simulation.world import World
+from fasaco_edge.wire.keys import Keys
+from tests.simulation.rooms import building
+
+world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
+result = run_simulation(world, Keys("r1"), BusSettings(connect=(sys.argv[1],)), speed=40.0)
+print(json.dumps({"trail": result.trail.tolist(), "distance_m": result.distance_m,
+                  "sim_s": result.sim_s, "collisions": result.collisions}))
+"""
+
+
+class Planner:
+    """What a planner sees and says: maps and poses come in, paths go out."""
+
+    def __init__(self, robot):
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+        self.keys = Keys(robot)
+        self.maps, self.poses = [], []
+        self.bus = open_bus(BusSettings(mode="router", connect=(), listen=(self.endpoint,)))
+        self.bus.subscribe(self.keys.map, self.maps.append, latched=True)
+        self.bus.subscribe(self.keys.pose, self.poses.append)
+        self._path = self.bus.publisher(self.keys.path, PATH, latched=True)
+
+    @property
+    def settings(self):
+        return BusSettings(connect=(self.endpoint,))
+
+    def send(self, xy, frame="map"):
+        self._path.put(encode_path(xy, np.zeros(len(xy)), frame, 1))
+
+    def send_rubbish(self):
+        self._path.put(b"\x00\x01\x00\x00rubbish")
+
+    def pose(self):
+        sample = self.poses[-1]
+        return decode_pose(sample.payload, sample.schema)
+
+    def map(self):
+        return decode_occupancy_grid(self.maps[-1].payload)
+
+
+@pytest.fixture
+def planner():
+    planner = Planner("r1")
+    yield planner
+    planner.bus.close()
+
+
+def until(condition, timeout_s=20.0):
+    ends = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < ends, "nothing happened in time"
+        time.sleep(0.01)
+
+
+def test_a_robot_in_another_process_maps_and_drives_until_told_to_end(planner):
+    path = serpentine(range(2, 6), range(2, 10))
+    end = path[-1]
+    root = Path(__file__).parents[2]
+    robot = subprocess.Popen(
+        [sys.executable, "-c", ROBOT, planner.endpoint],
+        cwd=root,
+        env={**os.environ, "PYTHONPATH": str(root)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        until(lambda: planner.maps and planner.poses)
+        first = planner.map()
+        assert first.cells.shape < building(6.0, 4.0).cells.shape
+        planner.send(path)
+        until(lambda: np.hypot(*(end - (planner.pose().pose.x, planner.pose().pose.y))) < 2e-3)
+        robot.send_signal(signal.SIGTERM)
+        output, _ = robot.communicate(timeout=20)
+    finally:
+        robot.kill()
+        robot.wait()
+    assert robot.returncode == 0
+    result = json.loads(output)
+    assert result["collisions"] == 0
+    assert distances_to(np.array(result["trail"]), path).max() < 0.03
+    # Its last words are its final state.
+    until(lambda: planner.pose().stamp_ns == round(result["sim_s"] * 1e9))
+    last = planner.map()
+    assert last.stamp_ns == planner.pose().stamp_ns
+    assert np.count_nonzero(last.cells != -1) > np.count_nonzero(first.cells != -1)
+
+
+def test_bad_paths_cost_only_themselves(planner):
+    world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
+    reports = []
+    stages = iter(
+        [
+            (lambda: world.stamp_ns > 0, planner.send_rubbish),
+            (lambda: refused(1), lambda: planner.send(centres((2, 2), (2, 5)), frame="odom")),
+            (lambda: refused(2), lambda: planner.send(centres((2, 2), (2, 5)))),
+            (lambda: world.activity is Activity.DRIVING, lambda: None),
+            (lambda: world.activity is Activity.IDLE, lambda: None),
+        ]
+    )
+
+    def refused(count):
+        return bool(reports) and reports[-1].refused_paths == count
+
+    stage = [next(stages)]
+    ends = time.monotonic() + 20
+
+    def finished():
+        reached, act = stage[0]
+        if reached():
+            act()
+            stage[0] = next(stages, None)
+        return stage[0] is None or time.monotonic() > ends
+
+    result = run_simulation(
+        world,
+        planner.keys,
+        planner.settings,
+        speed=20.0,
+        should_stop=finished,
+        report=reports.append,
+    )
+    assert stage[0] is None
+    assert reports[-1].refused_paths == 2
+    assert result.trail[-1] == pytest.approx(centres((2, 5))[0], abs=2e-3)
+    assert result.distance_m == pytest.approx(reports[-1].distance_m)
+    assert all(0.0 < report.speed < 40.0 for report in reports[1:])
+
+
+def test_it_runs_outside_the_main_thread_and_leaves_signals_alone(planner):
+    before = signal.getsignal(signal.SIGTERM)
+    world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
+    results = []
+
+    def run():
+        results.append(
+            run_simulation(
+                world,
+                planner.keys,
+                planner.settings,
+                speed=10.0,
+                should_stop=lambda: world.stamp_ns >= 2_000_000_000,
+            )
+        )
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join(20)
+    assert not thread.is_alive()
+    assert results[0].sim_s >= 2.0
+    assert results[0].distance_m == 0.0
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_what_cannot_run_says_so():
+    world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
+    with pytest.raises(BadConfiguration, match="speed"):
+        run_simulation(world, Keys(), BusSettings(), speed=0.0)
+    with pytest.raises(BusUnavailable):
+        run_simulation(world, Keys(), BusSettings(connect=("tcp/127.0.0.1:1",)))

@@ -1,0 +1,160 @@
+"""The whole simulated robot, without a bus."""
+
+import numpy as np
+import pytest
+
+from fasaco_edge.errors import StartBlocked, StartOutsideMap
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.simulation.config import SimulationConfig
+from fasaco_edge.simulation.world import Activity, World
+from tests.simulation.rooms import building, centres, distances_to, serpentine
+
+
+def run(world, ticks=100_000):
+    emissions = []
+    for _ in range(ticks):
+        emissions.append(world.tick())
+        if world.activity is not Activity.DRIVING:
+            break
+    return emissions
+
+
+def ticks(world, count):
+    return [world.tick() for _ in range(count)]
+
+
+def started(truth, start, config=None):
+    world = World(truth, start, config or SimulationConfig())
+    world.tick()
+    return world
+
+
+def test_a_serpentine_is_driven_to_its_end_on_the_line():
+    world = started(building(4.4, 4.0, origin=Pose2D(-0.4, -0.4)), Pose2D(0.25, 0.12, 2.0))
+    path = serpentine(range(8), range(9))
+    world.follow(path)
+    run(world)
+    assert world.activity is Activity.IDLE
+    assert world.collisions == 0
+    trail = world.trail
+    assert distances_to(trail, path).max() < 0.03
+    on_the_path = trail[np.flatnonzero(distances_to(path, trail) < 1e-6)[0] :]
+    assert distances_to(path, on_the_path).max() < 0.03
+    length = np.hypot(*np.diff(path, axis=0).T).sum()
+    assert world.distance_m == pytest.approx(length, abs=0.15)
+    assert np.hypot(*np.diff(trail, axis=0).T).sum() == pytest.approx(world.distance_m, abs=0.01)
+
+
+def test_a_path_through_a_wall_ends_before_it_and_is_counted_once():
+    config = SimulationConfig()
+    world = started(building(6, 2, (3.0, 0.0, 3.1, 2.0)), Pose2D(1.0, 1.0), config)
+    through = centres(*[(2, col) for col in range(2, 12)])
+    world.follow(through)
+    run(world)
+    assert world.activity is Activity.COLLIDED
+    ticks(world, 200)
+    assert world.collisions == 1
+    assert 3.0 - config.hull_radius_m - 0.01 < world.pose.x <= 3.0 - config.hull_radius_m + 1e-9
+    # Another path takes it away again.
+    world.follow(through[3::-1])
+    run(world)
+    assert world.activity is Activity.IDLE
+    assert world.collisions == 1
+    assert world.pose.x == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_new_path_under_way_is_joined_without_a_stop_where_it_goes_on_alike():
+    world = started(building(8, 4), Pose2D(1.0, 1.0))
+    lane = centres(*[(2, col) for col in range(2, 18)])
+    world.follow(lane)
+    run(world, 300)
+    before = world.distance_m
+    world.follow(lane[3:])
+    run(world, 100)
+    assert world.distance_m - before == pytest.approx(100 * 0.02 * 0.25, rel=1e-6)
+
+
+def test_a_new_path_that_turns_off_behind_is_fetched():
+    world = started(building(8, 4), Pose2D(1.0, 1.0))
+    world.follow(centres(*[(2, col) for col in range(2, 18)]))
+    run(world, 400)
+    behind = int(world.pose.x / 0.4)
+    off = centres((2, behind), *[(row, behind) for row in range(3, 8)])
+    world.follow(off)
+    run(world)
+    assert world.activity is Activity.IDLE
+    assert world.collisions == 0
+    assert distances_to(world.trail, off).max() < 0.03
+
+
+def test_an_empty_path_halts():
+    world = started(building(8, 4), Pose2D(1.0, 1.0))
+    world.follow(centres(*[(2, col) for col in range(2, 18)]))
+    run(world, 300)
+    world.follow(np.empty((0, 2)))
+    assert world.activity is Activity.IDLE
+    ticks(world, 50)
+    halted = world.pose
+    ticks(world, 50)
+    assert world.pose == halted
+    assert world.pose.x < 3.0
+
+
+def test_without_a_clear_way_it_waits_and_says_so():
+    world = started(building(8, 4, (3.0, 0.0, 3.1, 4.0)), Pose2D(1.0, 1.0))
+    world.follow(centres((2, 12), (2, 13)))
+    ticks(world, 100)
+    assert world.activity is Activity.NO_WAY
+    assert world.pose == Pose2D(1.0, 1.0)
+
+
+def test_a_path_given_before_the_first_scan_is_taken_up_after_it():
+    world = World(building(8, 4), Pose2D(1.0, 1.2), SimulationConfig())
+    world.follow(centres((2, 2), (2, 3), (2, 4)))
+    assert world.activity is Activity.NO_WAY
+    world.tick()
+    assert world.activity is Activity.DRIVING
+
+
+def test_map_and_pose_come_at_their_rates_with_simulated_stamps():
+    world = World(building(8, 4), Pose2D(1.0, 1.0), SimulationConfig(map_hz=4.0, pose_hz=10.0))
+    emissions = ticks(world, 500)
+    maps = [emission.map.stamp_ns for emission in emissions if emission.map is not None]
+    poses = [emission.pose.stamp_ns for emission in emissions if emission.pose is not None]
+    assert len(poses) == 100
+    assert set(np.diff(poses)) == {100_000_000}
+    assert maps[0] == poses[0] == 20_000_000
+    assert len(maps) == pytest.approx(40, abs=2)
+    assert world.stamp_ns == 10_000_000_000
+
+
+def test_two_runs_are_equal_bit_for_bit():
+    def once():
+        world = started(building(6, 4, (2.4, 1.6, 2.8, 2.0)), Pose2D(0.63, 0.71, 0.4))
+        world.follow(serpentine(range(1, 3), range(1, 13)))
+        emissions = run(world, 2000)
+        world.follow(serpentine(range(2, 7), range(1, 5)))
+        emissions += run(world)
+        return world, emissions
+
+    (one, ones), (other, others) = once(), once()
+    assert one.trail.tobytes() == other.trail.tobytes()
+    assert (one.pose, one.distance_m, one.stamp_ns) == (
+        other.pose,
+        other.distance_m,
+        other.stamp_ns,
+    )
+    assert [emission.pose for emission in ones] == [emission.pose for emission in others]
+    maps = [(a.map, b.map) for a, b in zip(ones, others, strict=True) if a.map is not None]
+    assert len(maps) > 20
+    for a, b in maps:
+        assert a.geometry == b.geometry
+        assert a.cells.tobytes() == b.cells.tobytes()
+
+
+def test_an_impossible_start_is_an_error():
+    truth = building(4, 4, (2.0, 2.0, 2.5, 2.5))
+    with pytest.raises(StartOutsideMap):
+        World(truth, Pose2D(9.0, 1.0), SimulationConfig())
+    with pytest.raises(StartBlocked):
+        World(truth, Pose2D(1.9, 2.2), SimulationConfig())

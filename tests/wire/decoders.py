@@ -1,0 +1,20 @@
+"""One decoder per message type, as the tests that go over all types call them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from fasaco_edge.wire import schemas
+from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.pheromone import decode_pheromone
+from fasaco_edge.wire.poses import POSE_SCHEMAS, decode_pose
+
+DECODERS: dict[str, Callable[[bytes], object]] = {
+    schemas.OCCUPANCY_GRID: decode_occupancy_grid,
+    schemas.OCCUPANCY_GRID_UPDATE: decode_map_update,
+    schemas.PATH: decode_path,
+    schemas.PHEROMONE_GRID: decode_pheromone,
+    **{schema: partial(decode_pose, schema=schema) for schema in POSE_SCHEMAS},
+}

@@ -1,0 +1,183 @@
+"""The contract as data (protocol/*.yaml) and as code agree; JSON and keys keep to it."""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import math
+import re
+import sys
+from dataclasses import dataclass
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.errors import BadConfiguration, MalformedMessage, NothingToCover
+from fasaco_edge.resources import folder
+from fasaco_edge.wire import coverage, limits, schemas
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.poses import POSE_SCHEMAS
+from fasaco_edge.wire.status import decode_json, encode_error, encode_json
+
+PROTOCOL = folder("protocol")
+TABLE = yaml.safe_load((PROTOCOL / "keys.yaml").read_text())
+ENTRIES = {entry["name"]: entry for entry in TABLE["keys"]}
+README = (PROTOCOL / "README.md").read_text()
+
+
+def constants(module: object) -> dict[str, object]:
+    return {name: value for name, value in vars(module).items() if name.isupper()}
+
+
+def test_keys_are_those_of_the_table() -> None:
+    keys = Keys("mower-2", "site/hall_1")
+    names = {name for name, _ in inspect.getmembers(Keys, lambda m: isinstance(m, property))}
+    assert names - {"prefix"} | {"rpc"} == ENTRIES.keys()
+    for name, entry in ENTRIES.items():
+        key = keys.rpc("plan") if name == "rpc" else getattr(keys, name)
+        assert key == entry["key"].format(base="site/hall_1", robot="mower-2", name="plan")
+        assert key.startswith(f"{keys.prefix}/")
+
+
+def test_defaults_are_those_of_the_table() -> None:
+    assert Keys() == Keys(TABLE["robot"], TABLE["base"])
+    assert Keys().map == "fasaco/@v1/robot/map"
+
+
+def test_payloads_are_those_of_the_table() -> None:
+    named = {schema for entry in ENTRIES.values() for schema in entry["schema"]}
+    ours = {value for value in constants(schemas).values() if "/msg/" in str(value)}
+    assert named == ours
+    assert ENTRIES["pose"]["schema"] == list(POSE_SCHEMAS)
+    encodings = {entry["encoding"] for entry in ENTRIES.values()}
+    assert encodings == {schemas.CDR, schemas.JSON, None}
+    columns = {frozenset(entry) for entry in ENTRIES.values()}
+    assert len(columns) == 1
+
+
+def test_the_readme_has_the_keys_of_the_table() -> None:
+    shown = re.findall(r"^\| `\.\.\./([^`]+)` \|", README, re.MULTILINE)
+    assert shown == [
+        entry["key"].removeprefix("{base}/@v1/{robot}/").replace("{name}", "<name>")
+        for entry in TABLE["keys"]
+    ]
+
+
+def test_the_readme_has_the_values_of_coverage() -> None:
+    shown = re.findall(r"^\| (-?\d+) \|", README, re.MULTILINE)
+    assert [int(value) for value in shown] == sorted(constants(coverage).values())
+
+
+def test_limits_are_those_of_the_table() -> None:
+    table = yaml.safe_load((PROTOCOL / "limits.yaml").read_text())
+    assert table == {name.lower(): value for name, value in constants(limits).items()}
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "@v1", "a b", "*", "**", "$*", "a#", "ä", "a\n", "a?"])
+def test_names_that_are_no_chunk(name: str) -> None:
+    for make in (lambda: Keys(robot=name), lambda: Keys().rpc(name)):
+        with pytest.raises(BadConfiguration, match="got"):
+            make()
+    for base in (f"{name}/fasaco", f"fasaco/{name}"):
+        if name != "a/b":
+            with pytest.raises(BadConfiguration, match="base must be"):
+                Keys(base=base)
+
+
+def test_encodings_name_their_schema() -> None:
+    encoding = schemas.cdr_encoding(schemas.PATH)
+    assert encoding == "application/cdr;nav_msgs/msg/Path"
+    assert schemas.schema_of(encoding) == schemas.PATH
+    for other in ("", "application/cdr", "application/cdr;", "zenoh/bytes", "text/plain;x"):
+        assert schemas.schema_of(other) is None
+
+
+@dataclass
+class Progress:
+    covered: int
+    ratio: float | None
+
+
+def test_json_of_values() -> None:
+    payload = encode_json({"state": "planning", "progress": Progress(3, None), "list": [1, 2.5]})
+    assert payload == b'{"state":"planning","progress":{"covered":3,"ratio":null},"list":[1,2.5]}'
+    assert decode_json(payload)["progress"] == {"covered": 3, "ratio": None}
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_json_has_no_nan(value: float) -> None:
+    with pytest.raises(MalformedMessage, match=r"message\.a\[1\]\.ratio must be finite"):
+        encode_json({"a": [0.0, Progress(1, value)]})
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        b"",
+        b"[]",
+        b"1",
+        b'"text"',
+        b"{",
+        b'{"a":1}x',
+        b'{"a":NaN}',
+        b'{"a":Infinity}',
+        b'{"a":1e999}',
+        b'{"a":' + b"9" * 5000 + b"}",
+        b'{"a":"\xff"}',
+        b'{"\xff":1}',
+        b'{"a":"\\ud800"}',
+        b"\xef\xbb\xbf{}",
+        b'{"a":' * 100_000,
+        b'{"a":"' + b"x" * limits.MAX_JSON_BYTES + b'"}',
+    ],
+    ids=lambda payload: repr(payload[:14]),
+)
+def test_json_that_is_none_is_refused(payload: bytes) -> None:
+    with pytest.raises(MalformedMessage, match="JSON"):
+        decode_json(payload)
+
+
+json_values = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**63), 2**63 - 1)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=4),
+    max_leaves=12,
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.dictionaries(st.text(), json_values, max_size=5))
+def test_json_round_trip(message: dict[str, object]) -> None:
+    assert decode_json(encode_json(message)) == message
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=60), st.integers(0, 59))
+def test_json_noise(noise: bytes, at: int) -> None:
+    good = encode_json({"state": "planning", "steps": [1, 2, 3], "eta_s": 1.5})
+    for payload in (noise, good[:at] + noise + good[at:], good[:at]):
+        with contextlib.suppress(MalformedMessage):
+            assert isinstance(decode_json(payload), dict)
+
+
+def test_error_reply() -> None:
+    reply = decode_json(encode_error(NothingToCover("every reachable cell is covered")))
+    assert reply == {
+        "code": "nothing_to_cover",
+        "message": "every reachable cell is covered",
+        "hint": NothingToCover.hint,
+    }
+
+
+def test_reading_the_bus_needs_no_compiler() -> None:
+    import subprocess
+
+    modules = ["maps", "poses", "paths", "pheromone", "coverage", "keys", "status"]
+    program = "; ".join(f"import fasaco_edge.wire.{module}" for module in modules)
+    check = f"{program}; import sys; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0

@@ -1,0 +1,109 @@
+"""The golden bytes in protocol/vectors: up to date, read or refused as their index says."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.resources import folder
+from fasaco_edge.wire.paths import PathMessage
+from fasaco_edge.wire.pheromone import PheromoneMessage
+from tests.wire.decoders import DECODERS
+from tests.wire.make_vectors import files
+
+VECTORS = folder("protocol") / "vectors"
+
+
+def index(kind: str) -> list[Any]:
+    entries = yaml.safe_load((VECTORS / kind / "index.yaml").read_text(encoding="utf-8"))
+    return [pytest.param(entry, id=entry["file"]) for entry in entries]
+
+
+def payload_of(kind: str, entry: dict[str, Any]) -> bytes:
+    return (VECTORS / kind / entry["file"]).read_bytes()
+
+
+def placed(geometry: Any) -> dict[str, Any]:
+    origin = geometry.origin
+    return {
+        "rows": geometry.rows,
+        "cols": geometry.cols,
+        "resolution": geometry.resolution,
+        "origin": [origin.x, origin.y, origin.yaw],
+    }
+
+
+def facts_of(message: Any) -> dict[str, Any]:
+    """Return what an index says of a message."""
+    facts: dict[str, Any] = {"frame": message.frame, "stamp_ns": message.stamp_ns}
+    match message:
+        case OccupancyGrid():
+            facts |= {**placed(message.geometry), "cells": message.cells.tolist()}
+        case MapPatch():
+            corner = {"row": message.window.row0, "col": message.window.col0}
+            facts |= {**corner, "cells": message.cells.tolist()}
+        case StampedPose():
+            facts["pose"] = [message.pose.x, message.pose.y, message.pose.yaw]
+        case PathMessage():
+            facts |= {"xy": message.xy.tolist(), "yaw": message.yaw.tolist()}
+        case PheromoneMessage():
+            names = ("cohort", "velocity", "ants", "best_steps", "trail_min", "trail_max")
+            facts |= {**placed(message.geometry), "levels": message.levels.tolist()}
+            facts |= {name: getattr(message, name) for name in names}
+    return facts
+
+
+def flat(value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        return [value]
+    return [leaf for item in value for leaf in flat(item)]
+
+
+def test_the_files_are_what_the_generator_makes() -> None:
+    found = {
+        file.relative_to(VECTORS).as_posix(): file.read_bytes()
+        for file in VECTORS.rglob("*")
+        if file.is_file()
+    }
+    assert found == files()
+    assert max(len(content) for name, content in found.items() if name.endswith(".bin")) < 4096
+
+
+@pytest.mark.parametrize("entry", index("valid"))
+def test_valid_payload_is_read(entry: dict[str, Any]) -> None:
+    message = DECODERS[entry["schema"]](payload_of("valid", entry))
+    facts = facts_of(message)
+    assert facts.keys() == entry.keys() - {"file", "schema"}
+    for name, value in facts.items():
+        expected = entry[name]
+        if isinstance(value, list):
+            # One ulp of an arctangent is not a matter of the contract.
+            np.testing.assert_allclose(flat(value), flat(expected), rtol=1e-15, atol=1e-15)
+        else:
+            assert value == expected, name
+
+
+@pytest.mark.parametrize("entry", index("hostile"))
+def test_hostile_payload_is_refused_for_its_reason(entry: dict[str, Any]) -> None:
+    with pytest.raises(MalformedMessage) as caught:
+        DECODERS[entry["schema"]](payload_of("hostile", entry))
+    text = str(caught.value)
+    assert text.startswith(entry["schema"])
+    assert entry["refused"] in text
+    assert "got" in text
+
+
+@pytest.mark.parametrize("entry", index("valid"))
+def test_every_prefix_is_refused(entry: dict[str, Any]) -> None:
+    payload = payload_of("valid", entry)
+    if "padded" in entry["file"]:
+        payload = payload[:-1]
+    for size in range(len(payload)):
+        with pytest.raises(MalformedMessage):
+            DECODERS[entry["schema"]](payload[:size])

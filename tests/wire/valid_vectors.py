@@ -1,0 +1,153 @@
+"""Payloads every decoder must read: rosbags' bytes, with the values in them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.wire import schemas
+from tests.wire import oracle
+
+STAMP_NS = 1_700_000_000_123_456_789
+# Half the yaw has sine 0.6 and cosine 0.8: bytes that depend on no library's sine.
+YAW = 2 * math.atan2(0.6, 0.8)
+GEOMETRY = GridGeometry(3, 5, 0.05, Pose2D(-1.25, 2.5, YAW))
+ORIGIN = oracle.turned(-1.25, 2.5, 0.6, 0.8)
+CELLS = np.array([[-1, 0, 0, 100, 50], [0, 1, 25, 65, -1], [0, 0, 0, 0, 99]], np.int8)
+ROBOT = oracle.turned(1.5, -2.25, 0.6, 0.8)
+FLOATS = np.arange(36.0)
+
+
+@dataclass(frozen=True)
+class Vector:
+    """A payload, its name, the type it claims to be and what is to be known about it."""
+
+    name: str
+    schema: str
+    payload: bytes
+    facts: dict[str, Any]
+
+
+def valid_vectors() -> list[Vector]:
+    """Return payloads every decoder must read, with the values in them."""
+    return [*_valid_grids(), *_valid_poses(), *_valid_paths(), *_valid_pheromone()]
+
+
+def _stamped(frame: str = "map") -> dict[str, Any]:
+    return {"frame": frame, "stamp_ns": STAMP_NS}
+
+
+def _placed(geometry: GridGeometry) -> dict[str, Any]:
+    origin = geometry.origin
+    return {
+        "rows": geometry.rows,
+        "cols": geometry.cols,
+        "resolution": geometry.resolution,
+        "origin": [origin.x, origin.y, origin.yaw],
+    }
+
+
+def _valid_grids() -> list[Vector]:
+    one, cell = GridGeometry(1, 1, 100.0, Pose2D(1e6, -1e6)), np.array([[-1]], np.int8)
+    schema, update = schemas.OCCUPANCY_GRID, schemas.OCCUPANCY_GRID_UPDATE
+    grid = oracle.to_bytes(schema, oracle.occupancy_grid("map", STAMP_NS, GEOMETRY, CELLS, ORIGIN))
+    facts = {**_stamped(), **_placed(GEOMETRY), "cells": CELLS.tolist()}
+    return [
+        Vector("occupancy_grid", schema, grid, facts),
+        Vector("occupancy_grid_padded", schema, grid + bytes(1), facts),
+        Vector(
+            "occupancy_grid_padding_counted", schema, grid[:3] + b"\1" + grid[4:] + bytes(1), facts
+        ),
+        Vector(
+            "occupancy_grid_at_the_limits",
+            schema,
+            oracle.to_bytes(schema, oracle.occupancy_grid("f" * 256, STAMP_NS, one, cell)),
+            {**_stamped("f" * 256), **_placed(one), "cells": [[-1]]},
+        ),
+        Vector(
+            "occupancy_grid_update",
+            update,
+            oracle.to_bytes(update, oracle.update("map", STAMP_NS, (7, 4), CELLS)),
+            {**_stamped(), "row": 4, "col": 7, "cells": CELLS.tolist()},
+        ),
+    ]
+
+
+def _valid_poses() -> list[Vector]:
+    schema = schemas.POSE_STAMPED
+    facts = {**_stamped(), "pose": [1.5, -2.25, YAW]}
+    cases = [
+        Vector(
+            f"pose_stamped_{name}",
+            schema,
+            oracle.to_bytes(schema, oracle.pose_stamped(frame, STAMP_NS, ROBOT)),
+            {**facts, "frame": frame},
+        )
+        for name, frame in (("map", "map"), ("no_frame", ""), ("utf8", "Küche"))
+    ]
+    schema = schemas.POSE_WITH_COVARIANCE_STAMPED
+    message = oracle.pose_with_covariance_stamped("map", STAMP_NS, ROBOT, FLOATS)
+    cases.append(Vector("pose_with_covariance", schema, oracle.to_bytes(schema, message), facts))
+    for name, spread in (("odometry", FLOATS), ("odometry_spread_unknown", FLOATS * np.nan)):
+        message = oracle.odometry("map", STAMP_NS, "base_link", ROBOT, spread, FLOATS[:6], spread)
+        payload = oracle.to_bytes(schemas.ODOMETRY, message)
+        cases.append(Vector(name, schemas.ODOMETRY, payload, facts))
+    return cases
+
+
+def _valid_paths() -> list[Vector]:
+    xy = [[0.5 * step, 0.25 * step] for step in range(4)]
+    cases = []
+    for name, frames in (
+        ("path", ["map"] * 4),
+        ("path_of_no_pose", []),
+        ("path_of_one_pose", ["map"]),
+        ("path_with_unnamed_frames", ["", "map", "", "map"]),
+    ):
+        points = xy[: len(frames)]
+        poses = [
+            (frame, STAMP_NS + index, oracle.turned(*point, 0.6, 0.8))
+            for index, (frame, point) in enumerate(zip(frames, points, strict=True))
+        ]
+        payload = oracle.to_bytes(schemas.PATH, oracle.path("map", STAMP_NS, poses))
+        facts = {**_stamped(), "xy": points, "yaw": [YAW] * len(points)}
+        cases.append(Vector(name, schemas.PATH, payload, facts))
+    return cases
+
+
+def pheromone_bytes(levels: Any, trail_min: float, trail_max: float) -> bytes:
+    geometry = GridGeometry(2, 3, 0.3, Pose2D(-0.9, 0.6))
+    counts = {"cohort": 2, "velocity": 4, "ants": 96, "best_steps": 31}
+    message = oracle.pheromone_grid(
+        "map",
+        STAMP_NS,
+        geometry,
+        np.array(levels, np.uint8),
+        trail_min=trail_min,
+        trail_max=trail_max,
+        **counts,
+    )
+    return oracle.to_bytes(schemas.PHEROMONE_GRID, message)
+
+
+def _valid_pheromone() -> list[Vector]:
+    geometry = GridGeometry(2, 3, 0.3, Pose2D(-0.9, 0.6))
+    facts = {**_stamped(), **_placed(geometry)}
+    facts |= {"cohort": 2, "velocity": 4, "ants": 96, "best_steps": 31}
+    return [
+        Vector(
+            name,
+            schemas.PHEROMONE_GRID,
+            pheromone_bytes(levels, low, high),
+            {**facts, "trail_min": low, "trail_max": high, "levels": levels},
+        )
+        for name, levels, low, high in (
+            ("pheromone_grid", [[0, 1, 128], [255, 64, 0]], 0.125, 8.0),
+            ("pheromone_grid_of_one_value", [[1, 1, 1], [1, 0, 1]], 0.5, 0.5),
+            ("pheromone_grid_not_coverable", [[0, 0, 0], [0, 0, 0]], 0.0, 0.0),
+        )
+    ]
