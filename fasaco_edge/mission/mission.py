@@ -62,6 +62,7 @@ class Mission:
         self.plans = 0
         self._lattice: CoverageLattice | None = None
         self._ground: Ground | None = None
+        self._checked_on: Ground | None = None
         self._patches_lost = False
         self._wanted = ""
         self._asked: PlanRequest | None = None
@@ -244,6 +245,9 @@ class Mission:
     def _cut_off(self) -> PathUpdate | None:
         """Shorten a path that a new map blocks, at once; a new plan follows."""
         assert self._ground is not None
+        if self._ground is self._checked_on:
+            return None
+        self._checked_on = self._ground
         ahead = self.path.ahead
         legal = self._ground.legal_steps(ahead) if len(ahead) else 0
         if legal >= len(ahead) - 1:

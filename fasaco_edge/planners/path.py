@@ -69,7 +69,9 @@ def walk_figures(lattice: CoverageLattice, cells: NDArray[np.int32]) -> WalkFigu
     steps = len(cells) - 1
     moves = np.diff(cells, axis=0)
     along = (moves[1:] * moves[:-1]).sum(axis=1)
-    last, first = lattice.local(tuple(cells[-1])), lattice.local(tuple(cells[0]))
+    # Plain integers, or the kernel is compiled a second time for numpy's.
+    (first_row, first_col), (last_row, last_col) = cells[0].tolist(), cells[-1].tolist()
+    last, first = lattice.local((last_row, last_col)), lattice.local((first_row, first_col))
     way_home = len(shortest_walk(lattice.steps, last, first)) - 1
     revisits = steps + 1 - len(visits)
     return WalkFigures(

@@ -1,0 +1,38 @@
+# One command sets up all that is needed and does the job; nothing has to be run before.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+.PHONY: demo test check format bench clean
+
+demo: $(STAMP)  ## watch a robot cover a building nobody mapped before
+	$(BIN)/fasaco-edge demo $(ARGS)
+
+test: $(STAMP)  ## all tests
+	$(BIN)/python -m pytest $(ARGS)
+
+check: $(STAMP)  ## format, lint, types, import contracts
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(STAMP)  ## put the sources into their format
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(STAMP)  ## speed, footprint, latency
+	$(BIN)/fasaco-edge bench speed
+	$(BIN)/fasaco-edge bench footprint
+	$(BIN)/fasaco-edge bench latency
+
+clean:  ## remove the environment and all that tools left behind
+	rm -rf $(VENV) dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+
+# Kept apart from the targets above, so that a second run starts at once.
+$(STAMP): pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit("fasaco_edge needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; try make PYTHON=python3.11") if sys.version_info < (3, 11) else 0'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[dev]"
+	touch $(STAMP)

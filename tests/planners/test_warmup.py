@@ -1,0 +1,47 @@
+"""Warming up compiles all that a mission needs: nothing is compiled while a robot waits."""
+
+import importlib
+
+import numpy as np
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
+from fasaco_edge.grid.lattice import Footprint
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.jit import KERNEL_SOURCES
+from fasaco_edge.mission.events import MapReceived, PlanReady, PoseReceived
+from fasaco_edge.mission.mission import Mission, MissionConfig
+from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.path import walk_figures
+from fasaco_edge.planners.warmup import STAGES, warm_up
+from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
+
+
+def compiled_signatures() -> set[str]:
+    modules = [importlib.import_module(f"fasaco_edge.kernels.{p.stem}") for p in KERNEL_SOURCES]
+    return {
+        f"{name}{signature}"
+        for module in modules
+        for name, kernel in vars(module).items()
+        for signature in getattr(kernel, "signatures", ())
+    }
+
+
+def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up():
+    heard = []
+    warm_up(heard.append)
+    assert heard == list(STAGES)
+    before = compiled_signatures()
+
+    grid = OccupancyGrid(GridGeometry(40, 40, 0.05, Pose2D(0, 0)), np.zeros((40, 40), np.int8))
+    off_the_bus = decode_occupancy_grid(encode_occupancy_grid(grid))
+    mission = Mission(MissionConfig(Footprint(0.3, 0.18)))
+    pose = PoseReceived(StampedPose(Pose2D(1.0, 1.0)))
+    asked = mission.step([MapReceived(off_the_bus), pose], 0.0).plan
+    assert asked is not None
+    path = Fasaco().plan(asked.problem)
+    answer = mission.step([PlanReady(asked.number, path, 0.0)], 0.0)
+    assert answer.path is not None
+    assert mission.coverage() is not None
+    walk_figures(asked.problem.lattice, path.cells)
+
+    assert compiled_signatures() == before
