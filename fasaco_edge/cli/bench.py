@@ -1,5 +1,152 @@
-"""``fasaco-edge bench``: placeholder"""
+"""``fasaco-edge bench``: benchmarks, each a command of its own."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import textwrap
+from contextlib import closing
+from typing import TYPE_CHECKING, Any
+
+from fasaco_edge.bench.table import BENCHMARKS
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from fasaco_edge.bench.benchmark import Benchmark, Report
+    from fasaco_edge.cli.arguments import Subparsers
+
+EXIT_GOAL_MISSED = 1
+EXIT_INTERRUPTED = 130
+WIDTH = 80
+
+EPILOG = """\
+Each benchmark explains itself with --help, prints a table or --json, and can be
+interrupted (Ctrl-C): it then reports what it has measured so far. Figures are
+medians with their range; run them on a quiet machine.
+"""
 
 
-def add_to(commands, common):
-    commands.add_parser("bench", parents=[common])
+def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
+    """Add the command and its benchmarks."""
+    parser = commands.add_parser(
+        "bench",
+        help="measure speed, footprint and latency",
+        description="Measure this installation on this machine.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(
+        command=run, benchmark=None, usage=parser, log_level="warning", with_parent=False
+    )
+    benchmarks = parser.add_subparsers(title="benchmarks", metavar="BENCHMARK")
+    for benchmark in BENCHMARKS:
+        _add(benchmark, benchmarks, common)
+
+
+def _add(
+    benchmark: Benchmark[Any], benchmarks: Subparsers, common: argparse.ArgumentParser
+) -> None:
+    parser = benchmarks.add_parser(
+        benchmark.name,
+        parents=[common],
+        help=benchmark.summary,
+        description=textwrap.fill(benchmark.description, WIDTH),
+        epilog=benchmark.epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    benchmark.add_options(parser)
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    parser.add_argument(
+        "--check", action="store_true", help=f"exit with {EXIT_GOAL_MISSED} if a goal is missed"
+    )
+    parser.set_defaults(benchmark=benchmark)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and report; without a benchmark list them."""
+    if args.benchmark is None:
+        args.usage.print_help()
+        return 0
+    samples, interrupted = _measure(args.benchmark, args)
+    report: Report = args.benchmark.report(args, samples)
+    if args.json:
+        goals = [goal.document() for goal in report.goals]
+        document = {"benchmark": args.benchmark.name, **report.figures, "goals": goals}
+        print(json.dumps({**document, "interrupted": interrupted}))
+    else:
+        _print(report, interrupted)
+    if interrupted:
+        return EXIT_INTERRUPTED
+    missed = any(goal.met is False for goal in report.goals)
+    return EXIT_GOAL_MISSED if args.check and missed else 0
+
+
+def _measure(benchmark: Benchmark[Any], args: argparse.Namespace) -> tuple[list[Any], bool]:
+    """Return the samples, and whether somebody did not want to wait for all of them."""
+    from fasaco_edge.cli.terminal import progress
+
+    samples: list[Any] = []
+    with progress() as bar:
+        task = bar.add_task(benchmark.name, total=benchmark.count(args))
+        try:
+            with closing(
+                benchmark.measure(args, lambda what: bar.update(task, description=what))
+            ) as measuring:
+                for sample in measuring:
+                    samples.append(sample)
+                    bar.advance(task)
+        except KeyboardInterrupt:
+            return samples, True
+    return samples, False
+
+
+def _print(report: Report, interrupted: bool) -> None:
+    from rich.markup import escape
+
+    from fasaco_edge.cli import terminal
+
+    table = _table(escape(report.title))
+    for index, column in enumerate(report.header):
+        if index:
+            table.add_column(escape(column), justify="right", overflow="fold")
+        else:
+            table.add_column(escape(column), style="cyan", overflow="fold")
+    for row in report.rows:
+        table.add_row(*map(escape, row))
+    console = terminal.out()
+    console.print(table)
+    if report.goals:
+        console.print(_goals(report))
+    for remark in report.remarks:
+        console.print(remark, style="dim", markup=False)
+    if interrupted:
+        console.print("interrupted: these are the measurements made until then", style="yellow")
+
+
+def _goals(report: Report) -> Table:
+    verdicts = {True: "[green]met[/]", False: "[red]missed[/]", None: "not measured"}
+    table = _table("goals")
+    for column in ("", "measured", "goal", ""):
+        table.add_column(column, justify="left" if column == "" else "right")
+    for goal in report.goals:
+        sign = "at least" if goal.at_least else "at most"
+        measured = "-" if goal.measured is None else f"{goal.measured:g} {goal.unit}".strip()
+        table.add_row(
+            goal.what, measured, f"{sign} {goal.limit:g} {goal.unit}".strip(), verdicts[goal.met]
+        )
+    return table
+
+
+def _table(title: str) -> Table:
+    """Return an empty table with narrow columns: ranges take room."""
+    from rich import box
+    from rich.table import Table
+
+    return Table(
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 0, 0, 1),
+    )

@@ -69,19 +69,28 @@ def print_summary(summary: dict[str, Any], *, as_json: bool) -> None:
     if as_json:
         print(json.dumps(summary))
         return
-    ending = "every reachable cell is covered" if summary["complete"] else "NOT ALL WAS COVERED"
-    files = {*summary["recording"], summary["picture"]}
-    rows = [
-        (name.replace("_", " "), str(value))
-        for name, value in summary.items()
-        if name not in ("recording", "picture", "complete")
-    ]
     console = terminal.out()
-    console.print(terminal.figures(ending, rows))
-    for file in sorted(files):
+    ending = "every reachable cell is covered" if summary["complete"] else "NOT ALL WAS COVERED"
+    console.print(f"[bold]{summary['map']}: {ending}[/bold]")
+    console.print(terminal.figures(_rows(summary)))
+    for file in (*summary["recording"], summary["picture"]):
         console.print(file, soft_wrap=True)
     if summary["recording"]:
         console.print(f"review it:  rerun {' '.join(summary['recording'])}", soft_wrap=True)
+
+
+def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    cells, covered = summary["reachable_cells"], summary["covered_cells"]
+    return [
+        ("covered", f"{covered} of {cells} cells, {summary['covered_m2']} m2"),
+        ("covered again", f"{summary['recovered_cells']} cells"),
+        ("out of reach", f"{summary['unreachable_cells']} cells"),
+        ("driven", f"{summary['driven_m']} m"),
+        ("plans, paths", f"{summary['plans']}, {summary['paths']}"),
+        ("time of a plan", f"{summary['plan_ms_p50']} ms, p99 {summary['plan_ms_p99']} ms"),
+        ("messages refused", str(summary["errors"])),
+        ("time in all", f"{summary['wall_s']} s"),
+    ]
 
 
 def _truth(args: argparse.Namespace, out: Path) -> _Truth:

@@ -51,7 +51,8 @@ class DemoView:
         now = time.monotonic()
         if not self._console.is_terminal and now - self._printed_at >= PLAIN_LINE_EVERY_S:
             self._printed_at = now
-            self._console.print(f"{elapsed_s:6.1f} s  {100 * fraction:5.1f} %  {text}")
+            line = f"{elapsed_s:6.1f} s  {100 * fraction:5.1f} %  {text}"
+            self._console.print(line, soft_wrap=True)
 
 
 def _figures(status: dict[str, Any], coverage: dict[str, Any]) -> str:

@@ -26,7 +26,5 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.cli.terminal import figures, out
     from fasaco_edge.grid.map_files import builtin_maps
 
-    table = figures("maps", builtin_maps())
-    table.columns[1].justify = "left"
-    out().print(table)
+    out().print(figures(builtin_maps()))
     return 0

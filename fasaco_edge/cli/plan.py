@@ -143,7 +143,7 @@ def _read(args: argparse.Namespace) -> tuple[CoverageLattice, OccupancyGrid | No
 
 
 def _start(args: argparse.Namespace, lattice: CoverageLattice, file: Path) -> Cell:
-    from fasaco_edge.cli.places import start_cell
+    from fasaco_edge.planners.start import start_cell
 
     if args.start is not None:
         cell: Cell = args.start
@@ -228,7 +228,7 @@ def _print(args: argparse.Namespace, figures: dict[str, Any]) -> None:
         print(json.dumps(figures))
         return
     rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
-    terminal.out().print(terminal.figures("coverage path", rows))
+    terminal.out().print(terminal.figures(rows))
     for file in (args.path_out, args.png):
         if file is not None:
             terminal.out().print(f"wrote {file}")

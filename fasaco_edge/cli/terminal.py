@@ -31,11 +31,11 @@ def progress() -> Progress:
     )
 
 
-def figures(title: str, rows: Iterable[tuple[str, str]]) -> Table:
+def figures(rows: Iterable[tuple[str, str]]) -> Table:
     """Return a table of names and values."""
-    table = Table(title=title, title_justify="left", show_header=False, title_style="bold")
+    table = Table(show_header=False)
     table.add_column(style="cyan")
-    table.add_column(justify="right")
+    table.add_column()
     for name, value in rows:
         table.add_row(name, value)
     return table

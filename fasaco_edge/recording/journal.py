@@ -66,10 +66,12 @@ class Journal:
         self._properties: dict[str, str] = {}
         self._static: dict[str, tuple[rr.AsComponents, ...]] = {}
         self._latched: dict[str, rr.AsComponents] = {}
+        self._missed_ns: dict[str, int] = {}
         self._sequences: dict[str, int] = {}
         self._wall_ns = 0
         self._part: Part | None = None
         self._parts = 0
+        self._abandoned: list[Part] = []
         self._next_flush_ns = 0
         self._unflushed_messages = 0
         self._unflushed_bytes = 0
@@ -86,6 +88,11 @@ class Journal:
     def path(self) -> Path | None:
         """The part being written; None while there is no room for one."""
         return self._part.path if self._part else None
+
+    @property
+    def hangs(self) -> bool:
+        """Whether rerun would hang when the interpreter exits."""
+        return bool(self._abandoned) or self.state is JournalState.STALLED
 
     @property
     def bytes(self) -> int:
@@ -123,6 +130,8 @@ class Journal:
             self._latched[entity] = archetype
         if self._part and self.state is JournalState.RECORDING:
             self._part.stream.log(entity, archetype)
+        elif latched:
+            self._missed_ns[entity] = self._wall_ns
 
     def log_static(self, entity: str, *archetypes: rr.AsComponents) -> None:
         """Log what holds for the whole run; takes the place of what held before."""
@@ -162,6 +171,7 @@ class Journal:
             return True
         outcome = self._part.flush(CLOSE_TIMEOUT_S)
         if outcome is Flush.STALLED:
+            self._enter(JournalState.STALLED, f"{self._part.path.name} waits for the disk")
             return False
         if outcome is Flush.BROKEN:
             self._give_up(self._part)
@@ -201,6 +211,7 @@ class Journal:
 
     def _give_up(self, part: Part) -> None:
         part.abandon()
+        self._abandoned.append(part)
         self._part = None
         self.lost += self._unflushed_messages
         self._unflushed_messages = self._unflushed_bytes = 0
@@ -224,8 +235,9 @@ class Journal:
     def _begin_part(self) -> None:
         number = self._parts + 1
         path = self._folder / f"{self._recording_id}-part{number}.rrd"
-        part = Part(path, self._recording_id, self._blueprint)
+        part = Part(path, self._recording_id)
         self._part, self._parts = part, number
+        part.stream.send_blueprint(self._blueprint)
         self._send_description(part.stream)
         for entity, archetypes in self._static.items():
             part.stream.log(entity, *archetypes, static=True)
@@ -237,11 +249,15 @@ class Journal:
             stream.send_property(entities.APPLICATION, rr.AnyValues(**self._properties))
 
     def _send_latched(self, stream: rr.RecordingStream) -> None:
-        if not self._latched:
-            return
-        self._set_times(stream)
+        now_ns = self._wall_ns
         for entity, archetype in self._latched.items():
+            # What came while nothing was written is in force since then.
+            self._wall_ns = self._missed_ns.get(entity, now_ns)
+            self._set_times(stream)
             stream.log(entity, archetype)
+        self._missed_ns.clear()
+        self._wall_ns = now_ns
+        self._set_times(stream)
 
     def _set_times(self, stream: rr.RecordingStream) -> None:
         stream.set_time(entities.WALL, timestamp=np.datetime64(self._wall_ns, "ns"))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.repair import repair_recording
-from fasaco_edge.recording.sdk import rr, rrb
+from fasaco_edge.recording.sdk import rr
 
 # Rows gather this long before they are written [s]: what a kill -9 costs, and what
 # keeps chunks from being tiny.
@@ -36,7 +36,7 @@ class Part:
         OSError: the file cannot be made.
     """
 
-    def __init__(self, path: Path, recording_id: str, blueprint: rrb.Blueprint) -> None:
+    def __init__(self, path: Path, recording_id: str) -> None:
         self.path = path
         self.flushed = False
         # Held while the part is written, so that no other recorder repairs it.
@@ -48,7 +48,9 @@ class Part:
         )
         self.stream.set_log_time_enabled(False)
         try:
-            self.stream.set_sinks(rr.FileSink(str(path)), default_blueprint=blueprint)
+            # Without a blueprint: one given here is written before the call returns, which
+            # on a stalled disk is never.
+            self.stream.set_sinks(rr.FileSink(str(path)))
         except RuntimeError as error:
             os.close(self._lock)
             raise OSError(str(error)) from error
@@ -63,8 +65,10 @@ class Part:
         try:
             self.stream.flush(timeout_sec=timeout_s)
         except RuntimeError as error:
-            # One type for both: the text is all there is to tell them apart (rerun 0.41).
-            return Flush.STALLED if "timed out" in str(error) else Flush.BROKEN
+            # One type for both, and a writer that died during a flush lets it time out, too
+            # (rerun 0.41).
+            slow = "timed out" in str(error) and self._has_writer()
+            return Flush.STALLED if slow else Flush.BROKEN
         self.flushed = True
         return Flush.DONE
 
@@ -74,12 +78,27 @@ class Part:
         os.close(self._lock)
 
     def abandon(self) -> None:
-        """Save of a broken part what can be read: whole frames, or nothing."""
-        self.stream.disconnect()
+        """Save of a broken part what can be read: whole frames, or nothing.
+
+        The stream stays: to disconnect it, or to let go of it, may hang for ever (rerun 0.41).
+        """
         os.close(self._lock)
         repair_recording(self.path)
         if not self.flushed:
             self.path.unlink(missing_ok=True)
+
+    def _has_writer(self) -> bool:
+        """Tell whether rerun still holds the file open: its writer closes it when it dies."""
+        file = os.fstat(self._lock)
+        others = {int(name) for name in os.listdir("/proc/self/fd")} - {self._lock}
+        return any(_is_same_file(descriptor, file) for descriptor in others)
+
+
+def _is_same_file(descriptor: int, file: os.stat_result) -> bool:
+    try:
+        return os.path.samestat(os.fstat(descriptor), file)
+    except OSError:
+        return False  # closed since it was listed
 
 
 def _locked(path: Path) -> int:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from itertools import chain, count
 from pathlib import Path
 from types import FrameType
 
@@ -45,7 +46,8 @@ EXIT_STALLED = 1
 def run_recorder(settings: RecorderSettings, stop: threading.Event | None = None) -> int:
     """Record until SIGTERM, SIGINT or ``stop``; return the process's exit code.
 
-    Importing this module raises MissingExtra where rerun is not installed.
+    Importing this module raises MissingExtra where rerun is not installed. After a disk
+    failed, the process ends here (``os._exit``), because rerun would never let it.
 
     Raises:
         BusUnavailable: nothing listens at the endpoints.
@@ -60,11 +62,11 @@ def run_recorder(settings: RecorderSettings, stop: threading.Event | None = None
         recorder.listen()
         while not stop.is_set():
             recorder.step(TAKE_TIMEOUT_S)
-        ended = recorder.end()
-    if not ended:
-        # Rerun's writer hangs in the kernel and would hold the interpreter's exit, too.
-        os._exit(EXIT_STALLED)
-    return 0
+        code = 0 if recorder.end() else EXIT_STALLED
+    if recorder.hangs:
+        # What could be saved is saved; rerun's own way out would never end.
+        os._exit(code)
+    return code
 
 
 class Recorder:
@@ -75,7 +77,7 @@ class Recorder:
         self._bus = bus
         self._clock = RunClock()
         began = datetime.fromtimestamp(self._clock.now_ns() / 1e9, UTC)
-        name = f"{began:%Y%m%dT%H%M%SZ}-{settings.robot}"
+        name = _unused_name(settings.out, f"{began:%Y%m%dT%H%M%SZ}-{settings.robot}")
         room = Room(settings.part_bytes, settings.least_free_bytes)
         self._journal = Journal(settings.out, name, room, build_blueprint(None))
         self._journal.at(self._clock.now_ns())
@@ -130,6 +132,11 @@ class Recorder:
         self._tell("stopping", "asked to end")
         self._scene.finish()
         return self._journal.close()
+
+    @property
+    def hangs(self) -> bool:
+        """Whether rerun would hang when the interpreter exits."""
+        return self._journal.hangs
 
     def note(self, line: str) -> None:
         """Log something that went wrong before the recording began."""
@@ -214,6 +221,12 @@ class RunClock:
     def now_ns(self) -> int:
         """Return the time [ns] since the epoch, as the clock saw it when the run began."""
         return self._offset_ns + time.monotonic_ns()
+
+
+def _unused_name(folder: Path, stem: str) -> str:
+    """Return ``stem``, numbered where a recorder began in the same second."""
+    names = chain([stem], (f"{stem}-{number}" for number in count(2)))
+    return next(name for name in names if not any(folder.glob(f"{name}-part*.rrd")))
 
 
 def _repaired(folder: Path) -> list[str]:

@@ -49,6 +49,7 @@ class RunDescription:
     def markdown(self) -> str:
         """Return the run card."""
         rows = [
+            ("robot", self.robot),
             ("began", self.began),
             ("version", self.version or "unknown until the first status"),
         ]

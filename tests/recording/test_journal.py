@@ -1,0 +1,140 @@
+"""Parts: they rotate, make room, wait for a stalled disk, and each can be read alone."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import threading
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.errors import BadConfiguration, UnreadableRecording
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.blueprint import build_blueprint
+from fasaco_edge.recording.journal import FLUSH_PERIOD_NS, Journal, JournalState, Room
+from fasaco_edge.recording.reading import read_column, read_summary
+from fasaco_edge.recording.sdk import rr
+
+RUN = "run-1"
+
+
+class Clock:
+    """Monotonic time that runs as fast as the test."""
+
+    def __init__(self) -> None:
+        self.now_ns = 10**18
+
+    def tick(self) -> int:
+        self.now_ns += FLUSH_PERIOD_NS
+        return self.now_ns
+
+
+def noise(seed: int, size: int = 100_000) -> rr.GridMap:
+    pixels = np.random.default_rng(seed).integers(0, 255, size, np.uint8)
+    return rr.GridMap(
+        data=pixels.tobytes(),
+        format=rr.components.ImageFormat(
+            width=100, height=size // 100, color_model="L", channel_datatype="U8"
+        ),
+        cell_size=0.1,
+    )
+
+
+def journal_in(folder, part_bytes: int = 10**9, least_free_bytes: int = 0) -> Journal:
+    return Journal(folder, RUN, Room(part_bytes, least_free_bytes), build_blueprint(None))
+
+
+def test_parts_rotate_and_each_begins_with_what_is_in_force(tmp_path):
+    clock = Clock()
+    journal = journal_in(tmp_path, part_bytes=250_000)
+    journal.describe("a run", {"planner": "fasaco"})
+    journal.log_static(entities.RUN_CARD, rr.TextDocument("card"))
+    journal.message(clock.now_ns, 10)
+    journal.log(entities.PATH, rr.LineStrips3D([[[0, 0, 0], [1, 2, 0]]]), latched=True)
+    for seed in range(7):
+        journal.message(clock.now_ns, 100_000)
+        journal.log("noise", noise(seed))
+        journal.sync(clock.tick())
+    assert journal.close()
+    parts = sorted(tmp_path.glob("*.rrd"))
+    assert len(parts) == 4
+    for part in parts:
+        summary = read_summary(part)
+        assert summary.complete
+        assert summary.rows[entities.PATH] == 1
+        assert list(read_cards(part)) == ["card"]
+    assert sum(read_summary(part).rows.get("noise", 0) for part in parts) == 7
+    assert journal.lost == 0
+
+
+def test_no_part_is_written_below_the_floor(tmp_path):
+    clock = Clock()
+    # One more than there is: no room, though the disk is far from full.
+    journal = journal_in(tmp_path, least_free_bytes=shutil.disk_usage(tmp_path).total)
+    journal.message(clock.now_ns, 10)
+    journal.sync(clock.tick())
+    assert journal.state is JournalState.DISK_FULL
+    assert journal.path is None
+    journal.message(clock.now_ns, 10)
+    assert journal.lost == 1
+    (part,) = tmp_path.glob("*.rrd")
+    assert read_summary(part).complete
+    assert journal.close()
+
+
+def test_a_stalled_disk_is_told_and_taken_up_again(tmp_path):
+    # A pipe that nobody empties: to rerun's writer, a disk that hangs.
+    pipe = tmp_path / f"{RUN}-part1.rrd"
+    os.mkfifo(pipe)
+    clock = Clock()
+    journal = journal_in(tmp_path)
+    journal.message(clock.now_ns, 10)
+    journal.log(entities.PATH, rr.LineStrips3D([[[0, 0, 0], [1, 2, 0]]]), latched=True)
+    journal.log("noise", noise(1, 400_000))
+    journal.sync(clock.tick())
+    assert journal.state is JournalState.STALLED
+    journal.message(clock.now_ns, 10)
+    assert journal.lost == 1
+    assert not journal.close()
+    drained = threading.Thread(target=drain, args=(pipe, tmp_path / "copy.rrd"))
+    drained.start()
+    deadline = time.monotonic() + 10
+    while journal.state is JournalState.STALLED and time.monotonic() < deadline:
+        journal.sync(clock.tick())
+    assert journal.state is JournalState.RECORDING
+    assert journal.close()
+    drained.join()
+    # What is in force was logged again after the gap.
+    values = read_column(tmp_path / "copy.rrd", entities.PATH, "LineStrips3D:strips").values
+    assert len(values) == 2
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(BadConfiguration, match="cannot record into"):
+        journal_in(tmp_path / "file" / "runs")
+
+
+def test_what_is_no_recording_is_said_to_be_none(tmp_path):
+    (tmp_path / "a.rrd").write_text("hello")
+    with pytest.raises(UnreadableRecording, match=r"a\.rrd"):
+        read_summary(tmp_path / "a.rrd")
+
+
+def read_cards(part):
+    """Yield the texts of the run card, which is static."""
+    from rerun.chunk import RrdReader
+
+    for chunk in RrdReader(str(part)).stream().filter(content=f"/{entities.RUN_CARD}"):
+        for texts in chunk.to_record_batch().column("TextDocument:text").to_pylist():
+            yield texts[0]
+
+
+def drain(pipe, copy) -> None:
+    """Copy what comes out of ``pipe`` until its writer closes it."""
+    with pipe.open("rb") as source, copy.open("wb") as target:
+        shutil.copyfileobj(source, target)

@@ -1,0 +1,230 @@
+"""A recorder process on a bus, a mission published to it, and what its file then holds."""
+
+from __future__ import annotations
+
+import os
+import runpy
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.errors import MissingExtra
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.reading import RecordingSummary, read_column, read_summary
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.schemas import OCCUPANCY_GRID
+from tests.recording.mission import CELL_M, COLS, ORIGIN, ROWS, Mission, building
+from tests.recording.recorders import bus_on_free_port, recorder_process
+
+FRAMES = 40
+FRAME_S = 0.04
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A mission that was recorded and ended by SIGTERM."""
+
+    path: Path
+    mission: Mission
+    summary: RecordingSummary
+    report: dict
+    exit_code: int
+
+
+def play(mission: Mission, frames: int = FRAMES) -> None:
+    for _ in mission.frames(frames):
+        time.sleep(FRAME_S)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    out = tmp_path_factory.mktemp("runs")
+    with bus_on_free_port() as (bus, endpoint), recorder_process(bus, endpoint, out) as recorder:
+        mission = Mission(bus)
+        play(mission)
+        bus.publisher(Keys().coverage, OCCUPANCY_GRID).put(b"\x00\x01\x00\x00not a map")
+        mission.publish_status("done", 1.0, planning=False, latency_ms="none", errors={"total": 2})
+        report = recorder.wait_until(lambda report: report["malformed"] > 0)
+        assert bus.alive(f"{Keys().recorder}/alive")
+        recorder.process.send_signal(signal.SIGTERM)
+        exit_code = recorder.process.wait(10)
+    path = Path(report["file"])
+    return Recorded(path, mission, read_summary(path), report, exit_code)
+
+
+def test_everything_on_the_bus_becomes_an_entity(recorded):
+    rows = recorded.summary.rows
+    assert rows[entities.PATH] == rows[entities.PATH_LOG] == recorded.mission.revision
+    assert rows[entities.PHEROMONE] == 3 * recorded.mission.revision
+    assert rows[entities.ROBOT] == FRAMES
+    assert rows[entities.COVERAGE] == FRAMES // 4
+    assert {entities.MAP, entities.TRAIL, f"{entities.LATENCY}/plan"} <= set(rows)
+    assert rows[entities.MAP_CHANGE] == 1
+    assert recorded.summary.timelines == (entities.ITER, entities.REPLAN, entities.WALL)
+    assert 0.9 * FRAMES * FRAME_S < recorded.summary.duration_s < 30
+
+
+def test_the_end_is_orderly(recorded):
+    assert recorded.exit_code == 0
+    assert recorded.summary.complete
+    assert recorded.summary.states[-1] == "done"
+    assert read_column(recorded.path, entities.RECORDER_STATE, "StateChange:state").values == [
+        ["recording"],
+        ["stopping"],
+    ]
+
+
+def test_the_summary_gives_the_last_figures(recorded):
+    mission = recorded.mission
+    assert recorded.summary.covered == pytest.approx(mission.covered, abs=1e-6)
+    assert recorded.summary.recovered == pytest.approx(mission.recovered, abs=1e-6)
+    assert recorded.summary.best_steps == mission.best_steps
+    assert recorded.summary.paths[0].endswith("first map")
+    assert len(recorded.summary.paths) == mission.revision
+
+
+def test_the_path_lies_where_it_was_published(recorded):
+    strip = read_column(recorded.path, entities.PATH, "LineStrips3D:strips").values[-1][0]
+    assert np.allclose(np.array(strip)[:, :2], recorded.mission.rest, atol=1e-5)
+
+
+def test_the_robot_stands_where_it_was_published(recorded):
+    places = read_column(recorded.path, entities.ROBOT, "Transform3D:translation").values
+    assert np.allclose(places[0][0][:2], recorded.mission.walk[0], atol=1e-5)
+    assert np.allclose(places[-1][0][:2], recorded.mission.walk[-1], atol=1e-5)
+
+
+def test_the_map_is_not_mirrored(recorded):
+    image = grid_image(recorded.path, entities.MAP)
+    truth = building(1.0)[:, : image.shape[1]]
+    assert image.shape == (ROWS, COLS)
+    # An image's row 0 is its top, the map's has the smallest y.
+    assert np.array_equal(image[::-1].view(np.int8), truth)
+    assert not np.array_equal(image.view(np.int8), truth)
+    corner = read_column(recorded.path, entities.MAP, "GridMap:translation").values[-1][0]
+    assert np.allclose(corner, [*ORIGIN, 0.0])
+
+
+def test_the_pheromone_is_neither_flat_nor_misplaced(recorded):
+    image = grid_image(recorded.path, entities.PHEROMONE)
+    assert len(np.unique(image)) > 10
+    assert image.max() == 255
+    # The box at the lower right takes no pheromone: in the image, bottom right.
+    assert not image[-5:, 24:28].any()
+    assert image[1:5, 24:26].all()
+    cell = read_column(recorded.path, entities.PHEROMONE, "GridMap:cell_size").values[-1][0]
+    assert cell == pytest.approx(CELL_M)
+
+
+def test_a_malformed_sample_costs_that_sample(recorded):
+    assert recorded.report["malformed"] == 1
+    assert recorded.report["lost"] == 0
+    lines = read_column(recorded.path, entities.BUS_LOG, "TextLog:text").values
+    assert Keys().coverage in lines[0][0]
+
+
+def test_the_report_tells_what_is_going_on(recorded):
+    report = recorded.report
+    assert report["state"] == "recording"
+    assert report["messages"] > FRAMES
+    assert 0 < report["rss_mb"] < 400
+    assert report["bytes"] > 0
+
+
+def test_recording_brings_no_compiler_along():
+    check = "import sys, fasaco_edge.recording.recorder; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0
+
+
+def test_without_rerun_the_missing_extra_is_named(monkeypatch):
+    from fasaco_edge.recording import sdk
+
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    with pytest.raises(MissingExtra, match="rerun"):
+        runpy.run_path(sdk.__file__)
+
+
+def test_killed_and_torn_recordings_read_after_the_next_start(tmp_path):
+    with bus_on_free_port() as (bus, endpoint):
+        mission = Mission(bus)
+        with recorder_process(bus, endpoint, tmp_path) as recorder:
+            play(mission, 20)
+            # Flushed once a second: then all of it is on the disk.
+            recorder.written(40)
+            time.sleep(1.2)
+            recorder.process.kill()
+            recorder.process.wait()
+        (killed,) = tmp_path.glob("*.rrd")
+        summary = read_summary(killed)
+        assert not summary.complete
+        assert summary.rows[entities.ROBOT] == 20
+        # As a power cut would leave it: the last frame's end is missing.
+        os.truncate(killed, killed.stat().st_size - 7)
+        with recorder_process(bus, endpoint, tmp_path) as recorder:
+            assert read_summary(killed).rows[entities.ROBOT] >= 15
+            # What is latched is there at once, though nobody publishes any more.
+            second = Path(recorder.written(3)["file"])
+            recorder.process.terminate()
+            recorder.process.wait(10)
+    lines = read_column(second, entities.RECORDER_LOG, "TextLog:text").values
+    assert any(killed.name in line and "torn" in line for (line,) in lines)
+    assert {entities.MAP, entities.PATH} <= set(read_summary(second).rows)
+
+
+@pytest.fixture
+def tiny_disk(tmp_path):
+    """A disk of two megabytes."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(disk)]
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("no right to mount a disk")
+    yield disk
+    subprocess.run(["umount", "--lazy", str(disk)], check=True)
+
+
+def test_a_full_disk_is_told_and_recording_goes_on_when_there_is_room(tiny_disk):
+    ballast = tiny_disk / "ballast"
+    with (
+        bus_on_free_port() as (bus, endpoint),
+        recorder_process(bus, endpoint, tiny_disk, least_free_bytes=0) as recorder,
+    ):
+        mission = Mission(bus)
+        play(mission, 10)
+        with ballast.open("wb") as file:
+            file.write(bytes(os.statvfs(tiny_disk).f_bavail * os.statvfs(tiny_disk).f_bsize - 9000))
+        play(mission, 10)
+        full = recorder.wait_until(lambda report: report["state"] == "disk full")
+        assert full["file"] == ""
+        assert full["reason"]
+        play(mission, 5)
+        ballast.unlink()
+        again = recorder.wait_until(lambda report: report["state"] == "recording")
+        assert again["lost"] > 0
+        play(mission, 5)
+        recorder.process.terminate()
+        assert recorder.process.wait(10) == 0
+        first, second = sorted(tiny_disk.glob("*.rrd"))
+        assert read_summary(first).rows[entities.ROBOT] > 0
+        summary = read_summary(second)
+        assert summary.complete
+        assert {entities.MAP, entities.PATH, entities.COVERAGE} <= set(summary.rows)
+        states = read_column(second, entities.RECORDER_STATE, "StateChange:state")
+        assert states.values == [["disk full"], ["recording"], ["stopping"]]
+        # The gap is seen where it was, not where it ended.
+        assert states.wall_ns[1] - states.wall_ns[0] > 5 * FRAME_S * 1e9
+
+
+def grid_image(path: Path, entity: str) -> np.ndarray:
+    """Return the last grid of ``entity`` as the image it was logged as, uint8."""
+    size = read_column(path, entity, "GridMap:format").values[-1][0]
+    pixels = read_column(path, entity, "GridMap:data").values[-1][0]
+    return np.array(pixels, np.uint8).reshape(size["height"], size["width"])

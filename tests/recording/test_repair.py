@@ -1,0 +1,89 @@
+"""Recordings cut anywhere are cut back to whole frames; nothing else is touched."""
+
+from __future__ import annotations
+
+import fcntl
+import io
+import struct
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fasaco_edge.recording.repair import (
+    HEADER_BYTES,
+    repair_folder,
+    repair_recording,
+    scan_recording,
+)
+
+HEADER = b"RRF2" + bytes(HEADER_BYTES - 4)
+
+
+def frame(kind: int, body: bytes) -> bytes:
+    return struct.pack("<QQ", kind, len(body)) + body
+
+
+FRAMES = [frame(1, b"store"), frame(2, b"x" * 40), frame(2, b""), frame(3, b"blueprint")]
+WHOLE = HEADER + b"".join(FRAMES)
+ENDS = [HEADER_BYTES + sum(map(len, FRAMES[:count])) for count in range(len(FRAMES) + 1)]
+
+
+def written(folder: Path, content: bytes, name: str = "a.rrd") -> Path:
+    path = folder / name
+    path.write_bytes(content)
+    return path
+
+
+@given(st.integers(HEADER_BYTES, len(WHOLE)))
+def test_a_cut_leaves_the_frames_before_it(tmp_path_factory, size):
+    path = written(tmp_path_factory.mktemp("cut"), WHOLE[:size])
+    repair = repair_recording(path)
+    kept = max(end for end in ENDS if end <= size)
+    assert path.read_bytes() == WHOLE[:kept]
+    assert (repair.cut_bytes if repair else 0) == size - kept
+    assert repair_recording(path) is None
+
+
+@pytest.mark.parametrize("content", [b"", b"RRF", b"hello, this is a text of some length"])
+def test_what_is_no_recording_is_left_alone(tmp_path, content):
+    path = written(tmp_path, content)
+    assert repair_recording(path) is None
+    assert path.read_bytes() == content
+
+
+def test_an_ended_recording_keeps_what_follows_its_footer(tmp_path):
+    content = WHOLE + frame(0, b"footer") + b"pointer to the footer"
+    path = written(tmp_path, content)
+    assert repair_recording(path) is None
+    assert path.read_bytes() == content
+    with path.open("rb") as recording:
+        scan = scan_recording(recording)
+    assert scan is not None
+    assert scan.has_footer
+    assert scan.frames == len(FRAMES) + 1
+
+
+def test_a_recording_being_written_is_left_alone(tmp_path):
+    path = written(tmp_path, WHOLE + b"half a fra")
+    with path.open("rb") as writer:
+        fcntl.flock(writer, fcntl.LOCK_EX)
+        assert repair_folder(tmp_path) == []
+    assert [repair.cut_bytes for repair in repair_folder(tmp_path)] == [10]
+
+
+def test_a_folder_is_repaired_in_order_and_may_be_missing(tmp_path):
+    for name in ("b.rrd", "a.rrd", "c.txt"):
+        written(tmp_path, WHOLE + b"torn", name)
+    assert [repair.path.name for repair in repair_folder(tmp_path)] == ["a.rrd", "b.rrd"]
+    assert repair_folder(tmp_path / "missing") == []
+
+
+def test_a_frame_of_unknown_kind_ends_the_scan(tmp_path):
+    path = written(tmp_path, WHOLE + frame(7, b"noise"))
+    with path.open("rb") as recording:
+        scan = scan_recording(recording)
+    assert scan is not None
+    assert scan.whole_bytes == len(WHOLE)
+    assert isinstance(recording, io.BufferedReader)

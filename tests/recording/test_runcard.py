@@ -1,0 +1,54 @@
+"""The run card and the run's properties, from whatever a status gives."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fasaco_edge.recording.fields import integer, number, section, text
+from fasaco_edge.recording.runcard import RunDescription
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=20),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner),
+    max_leaves=10,
+)
+
+
+def test_settings_that_matter_come_first():
+    config = {"zeta": 1, "robot": {"robot_radius_m": 0.2}, "planner": "fasaco", "seed": 7}
+    card = RunDescription("r2", "2026-01-01", "1.0", config).markdown()
+    order = [card.index(name) for name in ("r2", "planner", "robot_radius_m", "seed", "zeta")]
+    assert order == sorted(order)
+
+
+def test_a_value_cannot_break_the_table():
+    card = RunDescription("r2", "now", "1.0", {"planner": "a|b\nc"}).markdown()
+    assert "| planner | a\\|b c |" in card.splitlines()
+
+
+def test_properties_are_text():
+    config = {"robot": {"radius": 0.2}, "planner": "fasaco", "limits": [1, 2]}
+    assert RunDescription("r2", "now", "", config).properties() == {
+        "robot": "r2",
+        "began": "now",
+        "robot_radius": "0.2",
+        "planner": "fasaco",
+        "limits": "1, 2",
+    }
+
+
+@given(st.dictionaries(st.sampled_from("abc"), JSON))
+def test_fields_of_any_type_are_read_or_missing(message):
+    assert isinstance(section(message, "a"), dict)
+    assert number(message, "a") is None or isinstance(number(message, "a"), float)
+    assert integer(message, "a") is None or abs(integer(message, "a")) <= 2**53
+    assert isinstance(text(message, "a"), str)
+    RunDescription("r2", "now", "1.0", message).markdown()
+
+
+def test_a_truth_value_is_no_number():
+    assert number({"a": True}, "a") is None
+    assert integer({"a": False}, "a") is None
+    assert integer({"a": 10**400}, "a") is None
+    assert number({"a": 10**400}, "a") is None
