@@ -37,12 +37,15 @@ def cache_folder() -> Path:
     given = os.environ.get("NUMBA_CACHE_DIR")
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     base = Path(given) if given else Path(home) / "fasaco-edge"
-    for folder in (base / name, Path(tempfile.gettempdir()) / f"fasaco-edge-{os.getuid()}" / name):
+    # Straight in the sticky temporary folder, where nobody else can move it away.
+    temporary = Path(tempfile.gettempdir()) / f"fasaco-edge-{os.getuid()}-{name}"
+    for folder in (base / name, temporary):
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         except OSError:
             continue
-        if os.access(folder, os.W_OK):
+        # A cache is code that will be run: one made by another user is not trusted.
+        if folder.stat().st_uid == os.getuid() and os.access(folder, os.W_OK):
             return folder
     return base / name
 

@@ -81,11 +81,14 @@ class Ground:
         window, steps = self.lattice.window, self.lattice.steps
         rows, cols = cells[:-1, 0] - window.row0, cells[:-1, 1] - window.col0
         inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
-        moves = np.diff(cells, axis=0)
-        legal = np.zeros(len(moves), bool)
-        for direction, move in enumerate(zip(ROW_STEP, COL_STEP, strict=True)):
-            heading = inside & (moves == move).all(axis=1)
-            legal[heading] = steps[rows[heading], cols[heading]] >> direction & 1
+        allowed = np.zeros(len(rows), np.uint8)
+        allowed[inside] = steps[rows[inside], cols[inside]]
+        # Column by column: this runs at every pose, over tens of thousands of cells.
+        row_moves, col_moves = np.diff(cells[:, 0]), np.diff(cells[:, 1])
+        legal = np.zeros(len(rows), bool)
+        for direction, (row_step, col_step) in enumerate(zip(ROW_STEP, COL_STEP, strict=True)):
+            heading = (row_moves == row_step) & (col_moves == col_step)
+            legal |= heading & (allowed >> direction & 1).astype(bool)
         return int(np.argmin(legal)) if not legal.all() else len(legal)
 
     def way(self, start: Cell, goal: Cell) -> NDArray[np.int32]:

@@ -146,7 +146,10 @@ class Mission:
         if pose.frame != self.grid.frame:
             raise WrongFrame(f"pose in frame {pose.frame!r}, map in {self.grid.frame!r}")
         self.pose = pose
-        self.ledger.record(pose.pose)
+        x, y = pose.pose.x, pose.pose.y
+        # A pose kilometres astray would make the ledger span all the way there.
+        if self._lattice is not None and self._lattice.contains(self._lattice.cell_at(x, y)):
+            self.ledger.record(pose.pose)
         cell = self._cell()
         if cell is None:
             return
@@ -173,13 +176,16 @@ class Mission:
             self._wanted = str(change)
 
     def _take_plan(self, event: PlanReady) -> PathUpdate | None:
-        asked, self._asked = self._asked, None
+        asked = self._asked
+        if asked is None or asked.number != event.number:
+            return None
+        self._asked = None
         self.plans += 1
         cell = self._cell()
-        if asked is None or asked.number != event.number or cell is None or self._ground is None:
+        if cell is None or self._ground is None:
             return None
         cells = self._from_here(event.path.cells, cell)
-        if self._ground.legal_steps(cells) < len(cells) - 1:
+        if not len(cells) or self._ground.legal_steps(cells) < len(cells) - 1:
             self._wanted = self._wanted or "the map changed while planning"
             return None
         return self._publish(cells, asked.reason, event)
@@ -188,7 +194,7 @@ class Mission:
         """Return a fresh plan without what was covered while it was made.
 
         The robot went on meanwhile: it joins the plan at the first cell that still
-        needs a visit.
+        needs a visit. Empty where it cannot come there: it was carried elsewhere.
         """
         assert self._ground is not None
         assert self._lattice is not None
@@ -200,7 +206,7 @@ class Mission:
         still_open[inside] = visits[rows[inside], cols[inside]] == 0
         first = int(np.argmax(still_open)) if still_open.any() else len(cells) - 1
         lead = self._ground.way(here, (int(cells[first, 0]), int(cells[first, 1])))
-        return np.concatenate((lead[:-1], cells[first:])) if len(lead) else cells
+        return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead
 
     def _publish(
         self, cells: NDArray[np.int32], reason: str, ready: PlanReady | None = None

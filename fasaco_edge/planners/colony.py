@@ -66,19 +66,18 @@ def parse_velocities(text: str) -> tuple[int, ...]:
         BadConfiguration: the text is none of these.
     """
     try:
-        if ":" in text:
-            first, last = (int(part) for part in text.split(":"))
-            step = 1 if last >= first else -1
-            velocities = tuple(range(first, last + step, step))
-        else:
-            velocities = tuple(int(part) for part in text.split(","))
+        named = tuple(int(part) for part in text.replace(":", ",", 1).split(","))
     except ValueError:
-        raise BadConfiguration(
-            f"velocities must look like 8:1, 1:8, 4 or 8,4,1, got {text!r}"
-        ) from None
-    for velocity in velocities[:1] + velocities[-1:]:
+        named = ()
+    if not named or (":" in text and len(named) != 2):
+        raise BadConfiguration(f"velocities must look like 8:1, 1:8, 4 or 8,4,1, got {text!r}")
+    for velocity in named:
         _require(1 <= velocity <= 64, "velocities", "be in 1..64", velocity)
-    return velocities
+    if ":" not in text:
+        return named
+    first, last = named
+    step = 1 if last >= first else -1
+    return tuple(range(first, last + step, step))
 
 
 def _require(condition: bool, key: str, expectation: str, value: object) -> None:

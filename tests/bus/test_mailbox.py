@@ -1,0 +1,130 @@
+"""The mailbox between Zenoh's threads and the loop."""
+
+import threading
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fasaco_edge.bus.mailbox import LatestSlot, Mailbox
+
+
+def mailbox(length=3):
+    return Mailbox(queued={"update": length}, clears={"map": "update"})
+
+
+def test_of_a_kind_only_the_newest_is_kept():
+    box = mailbox()
+    for number in range(5):
+        box.post("pose", number)
+    box.post("plan", "a")
+    assert box.take(0) == [("pose", 4), ("plan", "a")]
+    assert box.take(0) == []
+
+
+def test_updates_stay_in_order_and_come_after_their_map():
+    box = mailbox()
+    box.post("map", "base")
+    box.post("update", 1)
+    box.post("pose", "here")
+    box.post("update", 2)
+    assert box.take(0) == [("map", "base"), ("pose", "here"), ("update", 1), ("update", 2)]
+
+
+def test_a_full_map_makes_the_updates_before_it_worthless():
+    box = mailbox()
+    for number in range(5):
+        box.post("update", number)
+    box.post("map", "new")
+    box.post("update", "after")
+    assert box.take(0) == [("map", "new"), ("update", "after")]
+    assert box.take_lost("update") == 0
+
+
+def test_a_full_queue_loses_its_oldest_and_says_how_many():
+    box = mailbox(length=3)
+    for number in range(5):
+        box.post("update", number)
+    assert box.take(0) == [("update", 2), ("update", 3), ("update", 4)]
+    assert box.take_lost("update") == 2
+    assert box.take_lost("update") == 0
+
+
+def test_an_empty_mailbox_is_waited_for_no_longer_than_asked():
+    began = time.monotonic()
+    assert mailbox().take(0.05) == []
+    assert time.monotonic() - began >= 0.04
+
+
+def test_a_post_wakes_whoever_waits():
+    box, taken = mailbox(), []
+    waiting = threading.Thread(target=lambda: taken.extend(box.take(30.0)))
+    waiting.start()
+    box.post("update", 1)
+    waiting.join(10.0)
+    assert not waiting.is_alive()
+    assert taken == [("update", 1)]
+
+
+def test_many_threads_lose_nothing_that_is_queued():
+    box = mailbox(length=10_000)
+    taken = []
+
+    def post(name):
+        for number in range(500):
+            box.post("update", (name, number))
+
+    threads = [threading.Thread(target=post, args=(name,)) for name in range(4)]
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads):
+        taken += box.take(0.01)
+    for thread in threads:
+        thread.join()
+    taken += box.take(0)
+    assert len(taken) == 2000
+    for name in range(4):
+        assert [number for _, (who, number) in taken if who == name] == list(range(500))
+
+
+@given(st.lists(st.sampled_from(["map", "update", "pose", "take"]), max_size=40))
+def test_what_is_taken_is_what_a_plain_list_would_keep(kinds):
+    """The twin keeps everything posted and thinks about it only when it is taken."""
+    box, posted = mailbox(length=4), []
+    for number, kind in enumerate([*kinds, "take"]):
+        if kind != "take":
+            box.post(kind, number)
+            posted.append((kind, number))
+            continue
+        newest = {name: item for name, item in posted if name != "update"}
+        updates = [(name, item) for name, item in posted if name == "update"]
+        updates = [(name, item) for name, item in updates if item > newest.get("map", -1)]
+        taken = box.take(0)
+        assert dict(taken[: len(newest)]) == newest
+        assert taken[len(newest) :] == updates[-4:]
+        assert box.take_lost("update") == max(len(updates) - 4, 0)
+        posted = []
+
+
+def test_a_slot_holds_the_newest():
+    slot = LatestSlot()
+    assert slot.take(0) is None
+    slot.put(1)
+    slot.put(2)
+    assert slot.take(0) == 2
+    assert slot.take(0) is None
+
+
+def test_a_slot_wakes_its_reader():
+    slot, taken = LatestSlot(), []
+    waiting = threading.Thread(target=lambda: taken.append(slot.take(30.0)))
+    waiting.start()
+    slot.put("now")
+    waiting.join(10.0)
+    assert taken == ["now"]
+
+
+def test_a_kind_that_is_not_queued_has_no_losses():
+    with pytest.raises(KeyError):
+        mailbox().take_lost("pose")

@@ -1,0 +1,52 @@
+"""Maps and footprints at random, with origins of every kind."""
+
+import math
+
+import numpy as np
+from hypothesis import strategies as st
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.lattice import Footprint
+from fasaco_edge.grid.occupancy import OccupancyGrid
+
+# 45 and 30 degrees put pixel corners on cell borders; the rest are as they come.
+YAWS = st.one_of(
+    st.sampled_from([0.0, math.pi / 2, math.pi, -math.pi / 4, math.pi / 6]),
+    st.floats(-math.pi, math.pi),
+)
+RESOLUTIONS = st.sampled_from([0.05, 0.1, 0.25, float(np.float32(0.05)), 0.07])
+
+
+def grid(cells, resolution=0.1, x=0.0, y=0.0, yaw=0.0):
+    cells = np.asarray(cells, np.int8)
+    return OccupancyGrid(GridGeometry(*cells.shape, resolution, Pose2D(x, y, yaw)), cells)
+
+
+@st.composite
+def occupancy_grids(draw, max_side=14):
+    """A map of 0x0 up to max_side pixels, mostly free, placed and turned somewhere."""
+    rows, cols = draw(st.integers(0, max_side)), draw(st.integers(0, max_side))
+    random = np.random.default_rng(draw(st.integers(0, 2**32)))
+    walls = draw(st.sampled_from([0.0, 0.02, 0.1]))
+    values = random.choice([0, 10, 25], size=(rows, cols))
+    obstacles = random.choice([100, 65, 64, 26, -1], size=(rows, cols))
+    cells = np.where(random.random((rows, cols)) < walls, obstacles, values)
+    place = st.one_of(st.sampled_from([0.0, 0.3, -0.9]), st.floats(-5, 5))
+    return grid(cells, draw(RESOLUTIONS), draw(place), draw(place), draw(YAWS))
+
+
+@st.composite
+def footprints(draw, resolution):
+    """Cells of 1 to 6 pixels; a robot narrower, as wide or wider than its tool."""
+    cell_m = resolution * draw(st.sampled_from([1.0, 2.0, 3.0, 4.3, 6.0]))
+    return Footprint(cell_m, cell_m * draw(st.sampled_from([0.1, 0.35, 0.5, 0.6, 1.1])))
+
+
+def cropped(grid, row0, col0, row1, col1):
+    """The same map, of which less has been seen: another size and origin."""
+    geometry = grid.geometry
+    x, y = geometry.to_map(col0, row0)
+    part = GridGeometry(
+        row1 - row0, col1 - col0, geometry.resolution, Pose2D(x, y, geometry.origin.yaw)
+    )
+    return OccupancyGrid(part, grid.cells[row0:row1, col0:col1].copy())

@@ -1,0 +1,100 @@
+"""The compiled classification of cells against exact geometry in plain Python."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
+from tests import naive
+from tests.grid.maps import footprints, grid, occupancy_grids
+
+
+def assert_agrees(occupancy, footprint):
+    lattice = CoverageLattice.from_map(occupancy, footprint)
+    twin = naive.classify(occupancy.cells, occupancy.geometry, lattice.window, footprint)
+    assert np.array_equal(lattice.states[twin.sure], twin.states[twin.sure])
+    assert np.array_equal(lattice.steps[twin.sure], twin.steps[twin.sure])
+    return lattice, twin
+
+
+@settings(max_examples=300, deadline=None)
+@given(data=st.data(), occupancy=occupancy_grids(max_side=12))
+def test_twin_classifies_alike(data, occupancy):
+    assert_agrees(occupancy, data.draw(footprints(occupancy.geometry.resolution)))
+
+
+@pytest.mark.parametrize("shape", [(0, 0), (1, 1), (1, 9), (9, 1), (0, 5)])
+@pytest.mark.parametrize("value", [0, 100, -1, 50])
+@pytest.mark.parametrize("yaw", [0.0, 0.5])
+def test_twin_classifies_small_and_uniform_maps_alike(shape, value, yaw):
+    occupancy = grid(np.full(shape, value), 0.1, 0.23, -0.31, yaw)
+    lattice, twin = assert_agrees(occupancy, Footprint(0.1, 0.04))
+    assert twin.sure.all()
+    if value != 0:
+        assert not lattice.coverable.any()
+        assert not lattice.steps.any()
+
+
+@pytest.mark.parametrize("shape", [(8, 16), (16, 8)])
+@pytest.mark.parametrize("yaw", [0.0, 0.1])
+def test_twin_agrees_wherever_a_single_pixel_stands(shape, yaw):
+    """A robot much narrower than its cells: between two discs the lane alone counts."""
+    closed = 0
+    for place in np.ndindex(shape):
+        cells = np.zeros(shape, np.int8)
+        cells[place] = 100
+        lattice, _ = assert_agrees(grid(cells, 0.25, 0.1, -0.1, yaw), Footprint(2.0, 0.33))
+        fits = np.count_nonzero(lattice.coverable)
+        closed += fits == 2 and not lattice.steps.any()
+    assert closed > 0
+
+
+def test_twin_is_hardly_ever_unsure():
+    """A twin that calls everything a matter of rounding would agree with anything."""
+    cells = np.zeros((12, 12), np.int8)
+    cells[5, 7] = 100
+    for yaw in (0.0, math.pi / 4, 1.0):
+        _, twin = assert_agrees(grid(cells, 0.1, yaw=yaw), Footprint(0.3, 0.15))
+        assert twin.sure.all()
+        assert set(np.unique(twin.states)) == {UNKNOWN, BLOCKED, COVERABLE}
+
+
+def test_a_robot_flush_with_both_walls_fits_the_corridor():
+    cells = np.zeros((5, 12), np.int8)
+    cells[0] = cells[4] = 100
+    # As off the wire: the resolution is a float32, its pixels a hair too wide or narrow.
+    for resolution in (0.1, float(np.float32(0.1)), np.nextafter(0.1, 0)):
+        lattice = CoverageLattice.from_map(
+            grid(cells, resolution, y=-resolution), Footprint(0.3, 0.15)
+        )
+        assert lattice.coverable[0 - lattice.window.row0].tolist()[:4] == [True] * 4
+        wider = CoverageLattice.from_map(
+            grid(cells, resolution, y=-resolution), Footprint(0.3, 0.151)
+        )
+        assert not wider.coverable.any()
+
+
+@pytest.mark.parametrize(("row", "is_open"), [(9, True), (8, False), (1, False), (0, True)])
+def test_a_lane_is_closed_by_a_pixel_between_two_discs_that_fit(row, is_open):
+    cells = np.zeros((10, 20), np.int8)
+    cells[row, 10] = 100
+    # Centres at (5, 5) and (15, 5): the lane sweeps rows 1 to 8.
+    lattice = CoverageLattice.from_map(grid(cells, 1.0), Footprint(10.0, 4.0))
+    assert lattice.coverable.tolist() == [[True, True]]
+    assert (lattice.steps != 0).tolist() == [[is_open, is_open]]
+
+
+def test_steps_are_legal_both_ways_and_only_between_coverable_cells():
+    random = np.random.default_rng(5)
+    cells = np.where(random.random((60, 70)) < 0.01, 100, 0)
+    lattice = CoverageLattice.from_map(grid(cells, 0.05, -1.3, 0.2, 0.4), Footprint(0.2, 0.13))
+    steps = np.pad(lattice.steps, 1)
+    assert steps.any()
+    for direction, (up, right) in enumerate(naive.DIRECTIONS):
+        leaves = (steps >> direction & 1).astype(bool)
+        arrives = np.roll(steps >> (direction + 2) % 4 & 1, (-up, -right), (0, 1)).astype(bool)
+        assert np.array_equal(leaves, arrives)
+    assert not lattice.steps[~lattice.coverable].any()

@@ -1,0 +1,130 @@
+"""What can be reached, what changed of it, and where a robot that stands badly belongs."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.mission.ground import Ground, GroundChange, anchor_cell
+from fasaco_edge.mission.progress import FAR_CELLS, LOOK_AHEAD, DrivenPath
+from tests import naive
+from tests.planners.grids import lattice, placed, problems
+
+
+def ground(*rows, at=(0, 0), cell=None):
+    return Ground.around(placed(lattice(*rows), *at), cell or at)
+
+
+def path(*cells):
+    return np.array(cells, np.int32).reshape(-1, 2)
+
+
+def test_changes_are_counted_over_reachable_cells_only():
+    before = ground("....#..", "....#..")
+    assert not ground("....#.#", "....#..").change_since(before)
+    assert ground("...##..", "....#..").change_since(before) == GroundChange(0, 1, 2)
+    assert ground(".......", "....#..").change_since(before) == GroundChange(5, 0, 1)
+    assert ground("....", "....").change_since(before) == GroundChange(0, 0, 0)
+    assert ground("..", "..", at=(50, 50)).change_since(before) == GroundChange(4, 8, 0)
+
+
+def test_a_shifted_window_is_no_change():
+    before = ground("###", "#..", at=(3, -4), cell=(3, -3))
+    after = ground("#####", "#####", "##..#", "#####", at=(2, -5), cell=(3, -3))
+    assert not after.change_since(before)
+    assert not before.change_since(after)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (GroundChange(3, 0, 5), "map: 3 cells more"),
+        (GroundChange(0, 2, 5), "map: 2 cells fewer"),
+        (GroundChange(3, 2, 0), "map: 3 cells more, 2 cells fewer"),
+        (GroundChange(0, 0, 4), "map: passages changed at 4 cells"),
+    ],
+)
+def test_a_change_says_what_it_is(change, text):
+    assert str(change) == text
+    assert change
+
+
+@settings(max_examples=100, deadline=None)
+@given(problems(max_side=5), st.lists(st.integers(0, 3), max_size=12), st.integers(0, 12))
+def test_legal_steps_are_counted_up_to_the_first_illegal_one(given_ground, headings, jump_at):
+    lattice, start = given_ground
+    walk = [start]
+    for index, heading in enumerate(headings):
+        up, right = naive.DIRECTIONS[heading]
+        far = 2 if index == jump_at else 1
+        walk.append((walk[-1][0] + far * up, walk[-1][1] + far * right))
+    around = naive.neighbours(lattice.steps)
+    legal = [
+        there in around.get(here, {}).values()
+        for here, there in itertools.pairwise(map(lattice.local, walk))
+    ]
+    expected = legal.index(False) if False in legal else len(legal)
+    assert Ground.around(lattice, start).legal_steps(path(*walk)) == expected
+
+
+def test_no_path_has_no_legal_steps():
+    room = ground("..")
+    assert room.legal_steps(path()) == 0
+    assert room.legal_steps(path((7, 7))) == 0
+
+
+def test_the_way_is_in_cells_of_the_map_frame():
+    room = ground("...", ".#.", "...", at=(-2, 10))
+    assert len(room.way((-2, 10), (0, 12))) == 5
+    assert room.way((0, 11), (0, 12)).tolist() == [[0, 11], [0, 12]]
+    assert room.way((-2, 10), (-2, 10)).tolist() == [[-2, 10]]
+    for goal in ((-1, 11), (1, 10), (-2, 13)):
+        assert room.way((-2, 10), goal).shape == (0, 2)
+
+
+def test_a_robot_is_in_its_cell_or_next_to_the_nearest_coverable_one():
+    room = lattice("...", "###", "...")
+    assert anchor_cell(room, Pose2D(1.5, 0.5)) == (0, 1)
+    assert anchor_cell(room, Pose2D(1.5, 0.99)) == (0, 1)
+    assert anchor_cell(room, Pose2D(1.5, 1.3)) == (0, 1)
+    assert anchor_cell(room, Pose2D(1.5, 1.7)) == (2, 1)
+    assert anchor_cell(room, Pose2D(-0.4, 0.5)) == (0, 0)
+    assert anchor_cell(room, Pose2D(-1.1, 0.5)) is None
+    assert anchor_cell(room, Pose2D(80.0, -30.0)) is None
+
+
+def test_a_robot_two_cells_from_anything_is_nowhere():
+    room = lattice("####", "####", ".###", "####")
+    assert anchor_cell(room, Pose2D(1.5, 2.5)) == (1, 0)
+    assert anchor_cell(room, Pose2D(2.5, 3.5)) is None
+
+
+def test_a_driven_path_follows_the_robot_a_little_way_ahead():
+    line = DrivenPath(path(*[(0, col) for col in range(40)]))
+    assert line.driven_to((0, 3)).index == 3
+    assert line.driven_to((0, LOOK_AHEAD - 1)).index == LOOK_AHEAD - 1
+    assert line.driven_to((0, LOOK_AHEAD)).index == 0
+    assert line.driven_to((0, 3)).driven_to((0, 1)).index == 3, "never backwards"
+    assert line.driven_to((5, 5)) is line
+    assert line.driven_to((0, 3)).ahead[0].tolist() == [0, 3]
+
+
+def test_a_path_that_comes_back_is_followed_once_each_way():
+    spike = DrivenPath(path((0, 0), (0, 1), (0, 0), (1, 0)))
+    out = spike.driven_to((0, 1))
+    assert (spike.driven_to((0, 0)).index, out.index, out.driven_to((0, 0)).index) == (0, 1, 2)
+    assert not out.finished
+    assert out.driven_to((1, 0)).finished
+
+
+def test_a_robot_is_far_from_its_path_beyond_some_cells():
+    line = DrivenPath(path((0, 0), (0, 1)))
+    assert not line.is_far((FAR_CELLS, 0))
+    assert line.is_far((FAR_CELLS, 1))
+    nothing = DrivenPath.none()
+    assert not nothing.is_far((9, 9))
+    assert nothing.finished
+    assert nothing.driven_to((0, 0)) is nothing

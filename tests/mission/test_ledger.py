@@ -1,0 +1,156 @@
+"""Visits are counted by cell, as the tool passes over its centre."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.mission.ledger import JUMP_CELLS, CoverageLedger
+
+CELL = 0.25
+
+
+def drive(*points, cell_m=CELL):
+    """A ledger of a drive over points (row, col) in cells, and what each pose entered."""
+    ledger = CoverageLedger(cell_m)
+    entered = [ledger.record(Pose2D(col * cell_m, row * cell_m)) for row, col in points]
+    return ledger, entered
+
+
+NEARBY = Window(-8, -8, 12, 40)
+
+
+def counts(ledger, window=NEARBY):
+    visits = ledger.visits(window)
+    return {
+        (row + window.row0, col + window.col0): int(visits[row, col])
+        for row, col in np.argwhere(visits).tolist()
+    }
+
+
+def test_a_straight_drive_visits_each_cell_on_it_once():
+    ledger, entered = drive(*[(0.5, 0.5 + 0.1 * step) for step in range(51)])
+    assert counts(ledger) == {(0, col): 1 for col in range(6)}
+    assert ledger.total == 6
+    assert sum(len(cells) for cells in entered) == 6
+    assert entered[0] == {(0, 0)}
+
+
+def test_a_cell_is_visited_when_the_tool_passes_over_its_centre():
+    ledger, entered = drive((0.5, 0.5), (0.5, 0.99), (0.5, 1.01))
+    # Half a cell from the centre of (0, 1) is at 1.0: there the tool's edge meets it.
+    assert entered == [{(0, 0)}, set(), {(0, 1)}]
+    assert counts(ledger) == {(0, 0): 1, (0, 1): 1}
+
+
+def test_standing_still_is_one_visit():
+    ledger, _ = drive(*[(0.5, 0.5)] * 20)
+    assert counts(ledger) == {(0, 0): 1}
+
+
+def test_a_turn_on_the_spot_is_no_visit():
+    ledger = CoverageLedger(CELL)
+    for yaw in np.linspace(-math.pi, math.pi, 30):
+        ledger.record(Pose2D(0.5 * CELL, 0.5 * CELL, float(yaw)))
+    assert ledger.total == 1
+
+
+def test_poses_few_and_far_between_are_swept():
+    ledger, _ = drive((0.5, 0.5), (0.5, 0.5 + JUMP_CELLS))
+    assert counts(ledger) == {(0, 0): 1, (0, 1): 1, (0, 2): 1}
+
+
+def test_a_jump_is_not_swept():
+    ledger, entered = drive((0.5, 0.5), (0.5, 0.6 + JUMP_CELLS))
+    assert entered[1] == {(0, 2)}
+    assert counts(ledger) == {(0, 0): 1, (0, 2): 1}
+    # From where it landed it goes on as ever.
+    ledger.record(Pose2D(4.5 * CELL, 0.5 * CELL))
+    assert counts(ledger) == {(0, 0): 1, (0, 2): 1, (0, 3): 1, (0, 4): 1}
+
+
+def test_a_corner_is_not_cut():
+    """Around the corner cell by cell: the inner cell stays uncovered."""
+    ledger, _ = drive((0.5, 0.5), (0.5, 1.5), (1.5, 1.5))
+    assert counts(ledger) == {(0, 0): 1, (0, 1): 1, (1, 1): 1}
+
+
+def test_between_two_lanes_the_tool_covers_neither():
+    """A disc as wide as a cell, on the border of two rows, just misses both centres."""
+    ledger, _ = drive(*[(1.0, 0.5 + step) for step in range(5)])
+    assert ledger.total == 0
+    ledger, _ = drive(*[(1.01, 0.5 + step) for step in range(5)])
+    assert counts(ledger) == {(1, col): 1 for col in range(5)}
+
+
+def test_coming_back_counts_again():
+    there = [(0.5, 0.5 + 0.5 * step) for step in range(7)]
+    ledger, _ = drive(*there, *there[::-1])
+    # The far end was never left.
+    assert counts(ledger) == {(0, 0): 2, (0, 1): 2, (0, 2): 2, (0, 3): 1}
+    assert ledger.total == 7
+
+
+def test_a_small_wobble_within_a_cell_is_no_second_visit():
+    ledger, _ = drive(*[(0.5 + 0.2 * (step % 2), 0.5) for step in range(9)])
+    assert ledger.total == 1
+
+
+def test_negative_cells_and_far_ones_are_kept_as_the_array_grows():
+    ledger, _ = drive((0.5, 0.5), (-99.5, 130.5), (400.5, -7.5), (0.5, 0.5))
+    window = Window(-120, -20, 420, 150)
+    assert counts(ledger, window) == {(0, 0): 2, (-100, 130): 1, (400, -8): 1}
+
+
+def test_a_window_beside_what_was_driven_is_empty():
+    ledger, _ = drive((0.5, 0.5))
+    assert not ledger.visits(Window(1, 1, 5, 5)).any()
+    assert not ledger.visits(Window(500, 500, 502, 503)).any()
+    assert ledger.visits(Window(500, 500, 502, 503)).shape == (2, 3)
+    assert CoverageLedger(CELL).visits(Window(0, 0, 2, 2)).tolist() == [[0, 0], [0, 0]]
+
+
+def test_what_is_returned_is_a_copy():
+    ledger, _ = drive((0.5, 0.5))
+    ledger.visits(Window(0, 0, 1, 1))[0, 0] = 9
+    assert counts(ledger) == {(0, 0): 1}
+
+
+def test_visits_stop_counting_before_they_wrap():
+    ledger = CoverageLedger(CELL)
+    for _ in range(65_540):
+        ledger.record(Pose2D(0.5 * CELL, 0.5 * CELL))
+        ledger.record(Pose2D(9.5 * CELL, 0.5 * CELL))
+    assert ledger.visits(Window(0, 0, 1, 1))[0, 0] == 65_535
+    assert ledger.total == 2 * 65_540
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-1.2, 1.2), st.floats(-1.2, 1.2)), max_size=12),
+    st.sampled_from([0.25, 0.3, 1.0]),
+)
+def test_a_drive_visits_what_its_twin_finds_under_many_small_discs(moves, cell_m):
+    """The twin walks each leg in tiny steps and asks at every one what lies under the tool."""
+    points = np.cumsum([(0.5, 0.5), *moves], axis=0)
+    ledger, _ = drive(*points, cell_m=cell_m)
+    window = Window(-16, -16, 17, 17)
+    visits = ledger.visits(window) > 0
+    rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1] + 0.5
+    nearest = np.full(rows.shape, np.inf)
+    for a, b in zip(points, [*points[1:], points[-1]], strict=True):
+        for share in np.linspace(0, 1, 200):
+            row, col = a + share * (b - a)
+            nearest = np.minimum(nearest, np.hypot(rows - row, cols - col))
+    sure = abs(nearest - 0.5) > 1e-3
+    assert np.array_equal(visits[sure], (nearest < 0.5)[sure])
+
+
+@pytest.mark.parametrize("first", [(0.5, 0.5), (-3.5, 7.5)])
+def test_the_first_pose_sweeps_nothing_but_where_it_is(first):
+    ledger, entered = drive(first)
+    assert entered == [{(math.floor(first[0]), math.floor(first[1]))}]
+    assert ledger.total == 1

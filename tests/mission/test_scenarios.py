@@ -1,0 +1,408 @@
+"""A mission told by plain values: what happens, and what it decides."""
+
+import numpy as np
+import pytest
+
+from fasaco_edge.errors import MapTooLarge, PatchWithoutBase, WrongFrame
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.events import Decision, MapReceived, PatchesLost, PlanReady
+from fasaco_edge.mission.mission import PATIENCE_S
+from fasaco_edge.mission.progress import State
+from fasaco_edge.planners.path import CoveragePath
+from tests.mission.world import (
+    Drive,
+    answer,
+    building,
+    patch,
+    placed,
+    pose_at,
+    reachable_cells,
+    started,
+)
+
+ROOM = ("......", "......", "......", "......")
+TWO_ROOMS = ("...#...", "...#...", ".......", "...#...")
+CORRIDOR = ("..........",)
+
+
+def test_it_waits_for_a_map_then_for_a_pose_then_asks_for_the_first_plan():
+    drive = Drive((0, 0))
+    assert drive.mission.state is State.WAITING_FOR_MAP
+    assert drive.mission.coverage() is None
+    assert drive.decisions == [Decision()]
+    drive.tell(MapReceived(building(*ROOM)))
+    assert drive.mission.state is State.WAITING_FOR_POSE
+    decision = drive.tell(pose_at(1, 2))
+    assert drive.mission.state is State.PLANNING
+    assert drive.mission.planning
+    assert decision.path is None
+    assert decision.plan.reason == "first plan"
+    assert decision.plan.problem.start == (1, 2)
+    # The tool stands over cell (1, 2): that one is covered, the others are asked for.
+    assert decision.plan.problem.cells == 23
+    assert not decision.plan.problem.to_cover[1, 2]
+
+
+def test_a_pose_may_come_before_the_map():
+    drive = Drive((0, 0), pose_at(0, 0))
+    assert drive.mission.state is State.WAITING_FOR_MAP
+    assert drive.tell(MapReceived(building(*ROOM))).plan.problem.start == (0, 0)
+    drive.plan()
+    drive.finish()
+    assert drive.visited == reachable_cells(building(*ROOM), (0, 0))
+
+
+def test_a_plan_that_comes_back_is_published():
+    drive = Drive((1, 2), MapReceived(building(*ROOM)), pose_at(1, 2))
+    request = drive.request
+    decision = drive.plan()
+    assert drive.mission.state is State.COVERING
+    update = decision.path
+    assert (update.revision, update.reason, update.plan_s) == (1, "first plan", 0.25)
+    assert np.array_equal(update.plan.cells, answer(request).path.cells)
+    assert update.cells[0].tolist() in ([1, 2], [1, 1], [1, 3], [0, 2], [2, 2])
+    assert {tuple(cell) for cell in update.cells.tolist()} | {(1, 2)} == set(np.ndindex(4, 6))
+    assert decision.plan is None
+
+
+def test_driving_along_the_path_ends_done_with_an_empty_path():
+    drive = started(*TWO_ROOMS)
+    drive.finish()
+    assert drive.mission.state is State.DONE
+    assert drive.visited == reachable_cells(building(*TWO_ROOMS), (0, 0))
+    first, last = drive.updates
+    assert last.cells.shape == (0, 2)
+    assert (last.revision, last.reason) == (2, "every reachable cell is covered")
+    assert drive.driven[1:] == [tuple(cell) for cell in first.cells.tolist()][1:]
+    coverage = drive.mission.coverage()
+    assert (coverage.covered, coverage.coverable, coverage.remaining) == (25, 25, 0)
+    assert coverage.fraction == 1.0
+    assert coverage.cell_m2 == 0.0625
+    assert drive.tell(pose_at(*drive.cell), after=10.0) == Decision()
+    assert drive.mission.state is State.DONE
+
+
+def test_a_map_that_touches_no_reachable_cell_changes_nothing():
+    drive = started("#????#", "######", "......", "......")
+    drive.go()
+    for event in (
+        patch("##", at=(3, 2)),
+        patch("....", at=(3, 1)),  # a room beyond the wall: coverable, not reachable
+        MapReceived(building("######", "#....#", "######", *ROOM[:2], "######", at=(-1, 0))),
+    ):
+        revision = drive.mission.map_revision
+        assert drive.tell(event) == Decision()
+        assert drive.mission.map_revision == revision + 1
+    assert drive.mission.coverage().unreachable == 4
+    assert len(drive.updates) == 1
+
+
+def test_a_grown_map_asks_for_a_plan_from_the_robot_s_cell_without_what_is_covered():
+    drive = started("...", "...", cell=(1, 0))
+    for _ in range(2):
+        drive.go()
+    here, visited = drive.cell, drive.visited
+    assert len(visited) == 3
+    decision = drive.tell(MapReceived(building("???..", "...##", "...??", "...??", at=(-1, 0))))
+    assert decision.path is None, "the path still holds until the new one is there"
+    request = decision.plan
+    assert request.reason == "map: 3 cells more"
+    assert request.problem.start == here
+    window = request.problem.lattice.window
+    wanted = {
+        (row + window.row0, col + window.col0)
+        for row, col in np.argwhere(request.problem.to_cover).tolist()
+    }
+    assert wanted == {(row, col) for row in (-1, 0, 1) for col in range(3)} - visited
+    assert drive.mission.coverage().unreachable == 2
+    drive.finish()
+    assert drive.visited == {(row, col) for row in (-1, 0, 1) for col in range(3)}
+
+
+def test_a_wall_across_the_path_cuts_it_off_at_once_at_the_last_legal_cell():
+    drive = started(*CORRIDOR)
+    for _ in range(3):
+        drive.go()
+    decision = drive.tell(patch("#", at=(0, 6)))
+    assert decision.path.cells.tolist() == [[0, 3], [0, 4], [0, 5]]
+    assert decision.path.reason == "path blocked at cell (0, 6)"
+    assert decision.path.plan is None
+    assert decision.plan.reason == decision.path.reason
+    assert decision.plan.problem.cells == 2
+    drive.finish()
+    assert drive.cell == (0, 5)
+    assert drive.visited == {(0, col) for col in range(6)}
+
+
+def test_a_wall_and_its_removal_leave_everything_covered():
+    drive = started(*CORRIDOR)
+    drive.go(patch("#", at=(0, 6)))
+    drive.finish()
+    decision = drive.tell(patch(".", at=(0, 6)))
+    assert decision.plan.reason == "map: 4 cells more"
+    assert drive.mission.state is State.PLANNING
+    drive.finish()
+    assert drive.visited == {(0, col) for col in range(10)}
+
+
+def test_a_closed_passage_between_reachable_cells_is_a_change():
+    """A thin wall that closes a lane but no cell: the path must not lead through it."""
+    drive = Drive((0, 0))
+    radius = 0.0625
+    drive.mission.config = type(drive.mission.config)(
+        type(drive.mission.config.footprint)(0.25, radius)
+    )
+    cells = np.zeros((16, 16), np.int8)  # four pixels a cell
+    geometry = GridGeometry(16, 16, 0.0625, Pose2D(0.0, 0.0))
+    drive.tell(MapReceived(OccupancyGrid(geometry, cells)), pose_at(0, 0))
+    drive.plan()
+    walled = cells.copy()
+    walled[:12, 8] = 100  # between columns 1 and 2, up to the last row
+    decision = drive.tell(MapReceived(OccupancyGrid(geometry, walled)))
+    assert decision.plan.reason.startswith(("path blocked", "map: passages changed at 6 cells"))
+    drive.finish()
+    assert drive.visited == set(np.ndindex(4, 4))
+
+
+def test_a_robot_inside_a_wall_stops_and_says_why_and_recovers():
+    drive = started("........", "........", "..####..", "..####..", "..####..", "..####..")
+    for _ in range(2):
+        drive.go()
+    decision = drive.tell(pose_at(1, 3))
+    assert drive.mission.state is State.BLOCKED
+    reason = "robot at (0.88, 0.38) m is not on coverable ground"
+    assert drive.mission.reason == decision.path.reason == reason
+    assert decision.path.cells.shape == (0, 2)
+    assert decision.plan is None
+    assert drive.tell(pose_at(1, 3)) == Decision(), "one empty path is enough"
+    drive.cell = (5, 5)
+    decision = drive.tell(pose_at(5, 5))
+    assert decision.plan.reason == "robot is on coverable ground again"
+    assert decision.plan.problem.start == (5, 5)
+    assert drive.mission.state is State.PLANNING
+    drive.finish()
+    free = reachable_cells(drive.mission.grid, (5, 5))
+    assert free <= drive.visited
+    assert len(free) == 32
+
+
+def test_a_wall_around_the_robot_blocks_it_and_its_removal_frees_it():
+    drive = started(*ROOM)
+    assert drive.tell(MapReceived(building(*["######"] * 4))).path.cells.shape == (0, 2)
+    assert drive.mission.state is State.BLOCKED
+    assert drive.tell(MapReceived(building(*ROOM))).plan is not None
+    drive.finish()
+
+
+def test_a_plan_that_comes_while_blocked_is_not_published():
+    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
+    drive.tell(MapReceived(building(*["######"] * 4)))
+    decision = drive.plan()
+    assert decision == Decision()
+    assert drive.mission.state is State.BLOCKED
+    drive.tell(MapReceived(building(*ROOM)))
+    drive.finish()
+
+
+def test_a_robot_carried_away_gets_a_new_path():
+    drive = started(*["............"] * 8)
+    drive.go()
+    drive.cell = (7, 11)
+    assert drive.tell(pose_at(7, 11)).plan is None, "a flickering pose is no reason yet"
+    decision = drive.tell(pose_at(7, 11), after=PATIENCE_S)
+    assert decision.plan.reason == "robot left the path"
+    assert decision.plan.problem.start == (7, 11)
+    drive.finish()
+    assert drive.visited == set(np.ndindex(8, 12))
+
+
+def test_a_robot_carried_to_another_room_while_planning_gets_no_path_from_the_old_one():
+    rooms = ("...#...", "...#...", "...#...")
+    drive = Drive((0, 0), MapReceived(building(*rooms)), pose_at(0, 0))
+    drive.cell = (0, 6)
+    drive.tell(pose_at(0, 6))
+    update = drive.plan().path
+    assert update is None
+    drive.finish()
+    assert {(row, col) for row in range(3) for col in (4, 5, 6)} <= drive.visited
+
+
+def test_a_plan_for_a_map_that_has_changed_is_refused_where_it_is_not_legal_any_more():
+    drive = Drive((0, 0), MapReceived(building(*CORRIDOR)), pose_at(0, 0))
+    stale = answer(drive.request)
+    # The plan is still being made: no second one is asked for.
+    assert drive.tell(patch("#", at=(0, 6))) == Decision()
+    drive.request = None
+    decision = drive.tell(stale)
+    assert decision.path is None
+    assert decision.plan.problem.cells == 5
+    assert decision.plan.reason == "map: 4 cells fewer"
+    drive.finish()
+    assert drive.visited == {(0, col) for col in range(6)}
+
+
+def test_a_plan_for_a_map_that_has_changed_elsewhere_is_driven_until_a_better_one_is_there():
+    drive = Drive((0, 0), MapReceived(building(*CORRIDOR, "##########")), pose_at(1, 0))
+    stale = answer(drive.request)
+    drive.tell(patch(".", at=(0, 9)))
+    drive.request = None
+    decision = drive.tell(stale)
+    assert decision.path.cells[-1].tolist() == [1, 9]
+    assert decision.plan.reason == "map: 1 cells more"
+
+
+def test_a_plan_leaves_out_what_was_driven_while_it_was_made():
+    drive = started(*CORRIDOR)
+    drive.tell(patch("#", at=(0, 9)))
+    stale = answer(drive.request)
+    drive.request = None
+    for _ in range(4):
+        drive.go()
+    assert drive.tell(stale).path.cells.tolist() == [[0, col] for col in range(4, 9)]
+
+
+def test_an_answer_nobody_asked_for_changes_nothing():
+    drive = started(*CORRIDOR)
+    path = CoveragePath(np.array([[0, 0], [0, 1]], np.int32), "fasaco", 0)
+    assert drive.tell(PlanReady(99, path, 0.1)) == Decision()
+
+
+def test_an_answer_to_another_question_leaves_the_question_open():
+    drive = Drive((0, 0), MapReceived(building(*CORRIDOR)), pose_at(0, 0))
+    path = CoveragePath(np.array([[0, 0], [0, 1]], np.int32), "fasaco", 0)
+    assert drive.tell(PlanReady(drive.request.number + 1, path, 0.1)) == Decision()
+    assert drive.mission.planning
+    assert drive.plan().path.revision == 1
+    drive.finish()
+
+
+def fault_of(drive, event):
+    """Tell the mission an event it cannot use; it must change nothing."""
+    mission = drive.mission
+    before = (mission.grid, mission.pose, mission.map_revision, mission.revision, mission.state)
+    visited, total = drive.visited, mission.ledger.total
+    decision = drive.tell(event)
+    assert (decision.plan, decision.path) == (None, None)
+    after = (mission.grid, mission.pose, mission.map_revision, mission.revision, mission.state)
+    assert after == before
+    assert (drive.visited, mission.ledger.total) == (visited, total)
+    (fault,) = decision.faults
+    return fault
+
+
+def test_an_update_before_any_map_is_a_fault():
+    drive = Drive((0, 0))
+    (fault,) = drive.tell(patch("#")).faults
+    assert isinstance(fault, PatchWithoutBase)
+    assert str(fault) == "map update refused: there is no map yet"
+    assert drive.mission.state is State.WAITING_FOR_MAP
+
+
+def test_an_update_that_does_not_fit_is_a_fault():
+    drive = started(*ROOM)
+    for event in (patch("#", at=(0, 6)), patch("##", at=(3, 5)), patch(".", frame="odom")):
+        assert isinstance(fault_of(drive, event), PatchWithoutBase)
+    drive.finish()
+
+
+def test_after_lost_updates_only_a_full_map_counts():
+    drive = started(*ROOM)
+    fault = fault_of(drive, PatchesLost(3))
+    assert isinstance(fault, PatchWithoutBase)
+    assert str(fault) == "3 map updates were lost"
+    assert "updates before it were lost" in str(fault_of(drive, patch("#", at=(2, 2))))
+    drive.tell(MapReceived(building(*ROOM)))
+    assert drive.tell(patch("#", at=(2, 2))).faults == ()
+    assert drive.mission.coverage().coverable == 23
+
+
+def test_a_pose_or_map_in_another_frame_is_a_fault():
+    drive = started(*ROOM)
+    fault = fault_of(drive, pose_at(2, 2, frame="odom"))
+    assert isinstance(fault, WrongFrame)
+    assert str(fault) == "pose in frame 'odom', map in 'map'"
+    assert isinstance(fault_of(drive, MapReceived(building(*ROOM, frame="odom"))), WrongFrame)
+    drive.finish()
+
+
+def test_a_pose_in_another_frame_from_before_the_map_is_not_used():
+    drive = Drive((0, 0), pose_at(0, 0, frame="odom"), MapReceived(building(*ROOM)))
+    assert drive.mission.state is State.WAITING_FOR_POSE
+    assert drive.request is None
+
+
+def test_a_map_too_large_is_a_fault_and_the_old_one_stays():
+    drive = started(*ROOM)
+    huge = OccupancyGrid(GridGeometry(2, 2, 1e4, Pose2D(0, 0)), np.zeros((2, 2), np.int8))
+    assert isinstance(fault_of(drive, MapReceived(huge)), MapTooLarge)
+    drive.finish()
+
+
+def test_one_bad_event_does_not_cost_the_others():
+    drive = Drive((0, 0))
+    decision = drive.tell(
+        patch("#"), MapReceived(building(*ROOM)), pose_at(0, 0, frame="odom"), pose_at(0, 0)
+    )
+    assert [type(fault) for fault in decision.faults] == [PatchWithoutBase, WrongFrame]
+    assert decision.plan.problem.start == (0, 0)
+
+
+def test_a_pose_far_off_the_map_is_no_reason_to_run_out_of_memory():
+    """A localiser gone astray: the wire lets positions up to a thousand kilometres through."""
+    drive = started(*ROOM)
+    drive.tell(pose_at(4_000_000, -4_000_000))
+    assert drive.mission.state is State.BLOCKED
+    drive.tell(pose_at(*drive.cell))
+    drive.finish()
+
+
+def test_a_robot_at_the_end_of_its_path_with_cells_left_over_gets_another():
+    drive = started(*CORRIDOR)
+    drive.walk = [(0, col) for col in (1, 2, 3)]
+    for _ in range(3):
+        drive.go()
+    # It was carried over the middle of the corridor: that is no driving.
+    drive.cell = (0, 9)
+    for cell in ((0, 7), (0, 9)):
+        drive.tell(pose_at(*cell))
+    drive.tell(pose_at(0, 9), after=PATIENCE_S)
+    drive.finish()
+    assert drive.visited == {(0, col) for col in range(10)}
+
+
+def test_a_robot_that_stops_short_of_its_last_cell_is_sent_there_again():
+    drive = started(*CORRIDOR)
+    for _ in range(8):
+        drive.go()
+    short = pose_at(0.49, 8.51)  # in cell (0, 9), its tool not over the centre
+    assert drive.tell(short) == Decision()
+    assert (0, 9) not in drive.visited
+    decision = drive.tell(short, after=PATIENCE_S + 10.0)
+    assert decision.plan.reason == "cells left over"
+    assert decision.plan.problem.cells == 1
+    drive.finish()
+
+
+def test_a_done_mission_is_done_once():
+    drive = started(*ROOM)
+    drive.finish()
+    updates = len(drive.updates)
+    assert drive.tell(patch("#", at=(3, 0))) == Decision()
+    assert drive.tell(patch(".", at=(3, 0))) == Decision(), "covered before, covered still"
+    assert drive.mission.state is State.DONE
+    assert len(drive.updates) == updates
+
+
+def test_a_map_without_pixels_blocks_the_robot():
+    drive = Drive((0, 0), MapReceived(placed(np.zeros((0, 0), np.int8), (0, 0))), pose_at(0, 0))
+    assert drive.mission.state is State.BLOCKED
+    assert drive.mission.coverage().fraction == 0.0
+
+
+@pytest.mark.parametrize("cell", [(0, 0), (-7, 3)])
+def test_a_single_cell_is_covered_by_standing_in_it(cell):
+    drive = Drive(cell, MapReceived(building("###", "#.#", "###", at=(cell[0] - 1, cell[1] - 1))))
+    decision = drive.tell(pose_at(*cell))
+    assert drive.mission.state is State.DONE
+    assert decision == Decision()

@@ -1,0 +1,370 @@
+"""Slow, obvious twins of the compiled kernels: dicts, sets, lists and plain arithmetic.
+
+Written from the paper and from what the kernels' docstrings promise. Where two
+ways of adding up would differ in the last bit, the order is the documented one,
+so that a twin and its kernel agree bit for bit.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import GridGeometry, Window
+from fasaco_edge.grid.lattice import TOUCH_TOLERANCE_PX, Footprint
+from fasaco_edge.planners.colony import ColonyConfig
+
+UNKNOWN, BLOCKED, COVERABLE = 0, 1, 2
+
+Cell = tuple[int, int]
+Point = tuple[float, float]
+Move = tuple[Cell, Cell]
+
+# Counter-clockwise from east; row 0 is the southernmost.
+EAST, NORTH, WEST, SOUTH = (0, 1), (1, 0), (0, -1), (-1, 0)
+DIRECTIONS = (EAST, NORTH, WEST, SOUTH)
+
+# Eq. (5): visibility is 1 for every neighbour, whatever power it is raised to.
+BETA = 2.0
+
+
+class Xoshiro128PlusPlus:
+    """Blackman and Vigna's generator, as they publish it, on Python's integers."""
+
+    def __init__(self, state: list[int]) -> None:
+        self.s = state
+
+    def word(self) -> int:
+        """Return the next 32 bits."""
+        s = self.s
+        result = (_rotated((s[0] + s[3]) % 2**32, 7) + s[0]) % 2**32
+        t = (s[1] << 9) % 2**32
+        s[2] ^= s[0]
+        s[3] ^= s[1]
+        s[1] ^= s[2]
+        s[0] ^= s[3]
+        s[2] ^= t
+        s[3] = _rotated(s[3], 11)
+        return result
+
+    def uniform(self) -> float:
+        """Return a number in [0, 1)."""
+        return self.word() / 2**32
+
+
+def _rotated(word: int, by: int) -> int:
+    return (word << by) % 2**32 | word >> (32 - by)
+
+
+def neighbours(steps: NDArray[np.uint8]) -> dict[Cell, dict[Cell, Cell]]:
+    """Return for each cell the legal steps: direction -> the cell it leads to."""
+    table: dict[Cell, dict[Cell, Cell]] = {}
+    for row in range(steps.shape[0]):
+        for col in range(steps.shape[1]):
+            table[row, col] = {
+                (up, right): (row + up, col + right)
+                for bit, (up, right) in enumerate(DIRECTIONS)
+                if int(steps[row, col]) & 2**bit
+            }
+    return table
+
+
+def distances(steps: NDArray[np.uint8], start: Cell) -> dict[Cell, int]:
+    """Return the number of steps to every cell that can be reached."""
+    around = neighbours(steps)
+    found, ring = {start: 0}, [start]
+    while ring:
+        ring = list({after for cell in ring for after in around[cell].values()} - found.keys())
+        found.update(dict.fromkeys(ring, 1 + max(found.values())))
+    return found
+
+
+@dataclass
+class Colony:
+    """Equations (4) to (8) on a dictionary of moves."""
+
+    around: dict[Cell, dict[Cell, Cell]]
+    to_cover: set[Cell]
+    config: ColonyConfig
+    return_home: bool
+    trail: dict[Move, float]
+
+    def walk(self, start: Cell, velocity: int, random: Xoshiro128PlusPlus) -> list[Cell]:
+        """Let one ant walk until every cell is covered (Algorithm 1, lines 3 to 5)."""
+        uncovered = self.to_cover - {start}
+        walk, heading = [start], EAST
+        while uncovered:
+            direction = self.choose(walk[-1], heading, uncovered, random)
+            if direction is None:
+                # A dead end is left by the shortest walk to the nearest uncovered cell.
+                way = self.shortest(walk[-1], uncovered)
+                heading = _difference(way[-2], way[-1])
+                self.follow(walk, way[1:])
+            else:
+                heading = direction
+                # Velocity v: straight on for up to v cells, as long as they are uncovered.
+                for _ in range(velocity):
+                    ahead = self.around[walk[-1]].get(direction)
+                    if ahead not in uncovered:
+                        break
+                    self.follow(walk, [ahead])
+                    uncovered.discard(ahead)
+            uncovered.discard(walk[-1])
+        if self.return_home and walk[-1] != start:
+            self.follow(walk, self.shortest(walk[-1], {start})[1:])
+        return walk
+
+    def choose(
+        self, here: Cell, heading: Cell, uncovered: set[Cell], random: Xoshiro128PlusPlus
+    ) -> Cell | None:
+        """Equation (4): the strongest trail, or a draw from equation (6); None at a dead end."""
+        straight_on = DIRECTIONS.index(heading)
+        attraction: dict[Cell, float] = {}
+        for direction in DIRECTIONS[straight_on:] + DIRECTIONS[:straight_on]:
+            there = self.around[here].get(direction)
+            if there in uncovered:
+                eta = 1.0 / (abs(there[0] - here[0]) + abs(there[1] - here[1]))  # Eq. (5)
+                attraction[direction] = self.trail[here, there] * eta**BETA
+        if not attraction:
+            return None
+        strongest = max(attraction, key=lambda direction: attraction[direction])
+        if len(attraction) == 1 or random.uniform() <= self.config.q0:
+            return strongest
+        total = 0.0
+        for value in attraction.values():
+            total += value
+        left = random.uniform() * total
+        for direction, value in attraction.items():
+            left -= value
+            if left < 0:
+                return direction
+        return direction
+
+    def shortest(self, here: Cell, goals: set[Cell]) -> list[Cell]:
+        """Return the shortest walk to the first of ``goals`` that a breadth-first search meets."""
+        before: dict[Cell, Cell] = {here: here}
+        queue = deque([here])
+        while queue:
+            cell = queue.popleft()
+            for direction in DIRECTIONS:
+                after = self.around[cell].get(direction)
+                if after is None or after in before:
+                    continue
+                before[after] = cell
+                if after in goals:
+                    way = [after]
+                    while way[0] != here:
+                        way.insert(0, before[way[0]])
+                    return way
+                queue.append(after)
+        raise ValueError("no goal can be reached")
+
+    def follow(self, walk: list[Cell], cells: list[Cell]) -> None:
+        """Move on to each of ``cells``, with the local update of equation (7)."""
+        alpha, tau0 = self.config.alpha, self.config.tau0
+        for cell in cells:
+            move = walk[-1], cell
+            self.trail[move] = (1.0 - alpha) * self.trail[move] + alpha * tau0
+            walk.append(cell)
+
+    def strengthen(self, best: list[Cell]) -> None:
+        """Global update, equation (8), with delta phi = cells / steps."""
+        alpha = self.config.alpha
+        amount = len(self.to_cover) / max(len(best) - 1, 1)
+        for move in itertools.pairwise(best):
+            self.trail[move] = (1.0 - alpha) * self.trail[move] + alpha * amount
+
+
+def fasaco(
+    steps: NDArray[np.uint8],
+    to_cover: NDArray[np.bool_],
+    start: Cell,
+    config: ColonyConfig,
+    return_home: bool = False,
+) -> list[Cell]:
+    """Algorithm 1: return the shortest walk a colony finds.
+
+    Args:
+        steps: step masks, uint8 (rows, cols), bit ``1 << direction``, east first,
+            counter-clockwise.
+        to_cover: bool (rows, cols), cells that need a visit, all reachable from the start.
+        start: index (row, col) in the arrays.
+        config: the colony.
+        return_home: end every walk where it began.
+    """
+    around = neighbours(steps)
+    trail = {(here, there): config.tau0 for here in around for there in around[here].values()}
+    wanted = {(int(row), int(col)) for row, col in np.argwhere(to_cover)}
+    colony = Colony(around, wanted, config, return_home, trail)
+    best: list[Cell] = []
+    for number, cohort in enumerate(config.cohorts()):
+        words = np.random.SeedSequence((config.seed, number)).generate_state(4 * cohort.ants)
+        for ant in range(cohort.ants):
+            random = Xoshiro128PlusPlus([int(word) for word in words[4 * ant : 4 * ant + 4]])
+            walk = colony.walk(start, cohort.velocity, random)
+            if not best or len(walk) < len(best):
+                best = walk
+        colony.strengthen(best)
+    return best
+
+
+def figures(steps: NDArray[np.uint8], walk: list[Cell]) -> dict[str, int]:
+    """Count what ``WalkFigures`` names, entry by entry."""
+    visits: dict[Cell, int] = {}
+    for cell in walk:
+        visits[cell] = visits.get(cell, 0) + 1
+    moves = [_difference(here, there) for here, there in itertools.pairwise(walk)]
+    turns = list(itertools.pairwise(moves))
+    backwards = [(before, after) for before, after in turns if after == (-before[0], -before[1])]
+    straight = [(before, after) for before, after in turns if after == before]
+    revisits = len(walk) - len(visits)
+    return {
+        "cells": len(visits),
+        "steps": len(moves),
+        "revisits": revisits,
+        "recovered_cells": sum(count >= 2 for count in visits.values()),
+        "n_r_paper": revisits + distances(steps, walk[-1])[walk[0]],
+        "turns_90": len(turns) - len(straight) - len(backwards),
+        "turns_180": len(backwards),
+    }
+
+
+def _difference(here: Cell, there: Cell) -> Cell:
+    return there[0] - here[0], there[1] - here[1]
+
+
+@dataclass
+class Classified:
+    """The twin's lattice; ``sure`` is False where rounding alone decides."""
+
+    states: NDArray[np.uint8]
+    steps: NDArray[np.uint8]
+    sure: NDArray[np.bool_]
+
+
+def classify(
+    cells: NDArray[np.int8], geometry: GridGeometry, window: Window, footprint: Footprint
+) -> Classified:
+    """Return the states and step masks of the lattice cells in ``window``.
+
+    All in metres of the map frame: pixels are squares there, turned by the origin's
+    yaw; the robot's disc, swept from one centre to another, touches those whose
+    distance from the segment is below its radius.
+    """
+    ground = _Ground(cells, geometry, footprint)
+    shape = window.rows, window.cols
+    states, steps = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
+    sure = np.ones(shape, bool)
+    for row in range(window.rows):
+        for col in range(window.cols):
+            centre = ground.centre(row + window.row0, col + window.col0)
+            states[row, col], sure[row, col] = ground.under_sweep(centre, centre)
+    for row in range(window.rows):
+        for col in range(window.cols):
+            for bit, (up, right) in ((0, EAST), (1, NORTH)):
+                there = row + up, col + right
+                if there[0] >= window.rows or there[1] >= window.cols:
+                    continue
+                if states[row, col] != COVERABLE or states[there] != COVERABLE:
+                    continue
+                state, certain = ground.under_sweep(
+                    ground.centre(row + window.row0, col + window.col0),
+                    ground.centre(there[0] + window.row0, there[1] + window.col0),
+                )
+                sure[row, col] &= certain
+                sure[there] &= certain
+                if state == COVERABLE:
+                    steps[row, col] |= 2**bit
+                    steps[there] |= 2 ** (bit + 2)
+    return Classified(states, steps, sure)
+
+
+class _Ground:
+    """Pixels as squares in the map frame."""
+
+    def __init__(
+        self, cells: NDArray[np.int8], geometry: GridGeometry, footprint: Footprint
+    ) -> None:
+        self.cells, self.footprint = cells, footprint
+        self.edge = geometry.resolution
+        self.tolerance = TOUCH_TOLERANCE_PX * self.edge
+        self.radius = max(footprint.robot_radius_m - self.tolerance, self.tolerance)
+        # A ring around the map is enough: whoever leaves the map touches it.
+        reach = [range(-1, size + 1) for size in (geometry.rows, geometry.cols)]
+        turned = complex(math.cos(geometry.origin.yaw), math.sin(geometry.origin.yaw))
+        corner = complex(geometry.origin.x, geometry.origin.y)
+        self.pixels = [
+            (row, col, [corner + turned * self.edge * complex(x, y) for x, y in square])
+            for row in reach[0]
+            for col in reach[1]
+            for square in [[(col, row), (col + 1, row), (col + 1, row + 1), (col, row + 1)]]
+        ]
+
+    def centre(self, row: int, col: int) -> complex:
+        """Return the centre of a lattice cell as x + yi."""
+        return complex((col + 0.5) * self.footprint.cell_m, (row + 0.5) * self.footprint.cell_m)
+
+    def under_sweep(self, start: complex, end: complex) -> tuple[int, bool]:
+        """Return the worst state under the swept disc, and whether that is beyond rounding."""
+        middle = (start + end) / 2
+        reach = abs(end - start) / 2 + self.radius + self.edge
+        certain, touched = True, set()
+        for row, col, square in self.pixels:
+            if abs(sum(square) / 4 - middle) > reach:
+                continue
+            distance = segment_to_square(start, end, square)
+            certain = certain and abs(distance - self.radius) > 1e-9
+            if distance < self.radius:
+                touched.add(self.pixel(row, col))
+        if BLOCKED in touched:
+            return BLOCKED, certain
+        return (COVERABLE if touched == {COVERABLE} else UNKNOWN), certain
+
+    def pixel(self, row: int, col: int) -> int:
+        """Return the state of a pixel, on the map or off it."""
+        rows, cols = self.cells.shape
+        if not (0 <= row < rows and 0 <= col < cols):
+            return UNKNOWN
+        value = int(self.cells[row, col])
+        if value >= self.footprint.occupied_at_least:
+            return BLOCKED
+        return COVERABLE if 0 <= value <= self.footprint.free_at_most else UNKNOWN
+
+
+def segment_to_square(start: complex, end: complex, square: list[complex]) -> float:
+    """Return how far a segment is from a closed square, its corners counter-clockwise."""
+    edges = list(zip(square, square[1:] + square[:1], strict=True))
+    if all(_cross(b - a, start - a) >= 0 for a, b in edges):
+        return 0.0
+    if any(_segments_cross(start, end, a, b) for a, b in edges):
+        return 0.0
+    return min(
+        min(point_to_segment(start, a, b), point_to_segment(end, a, b), corner)
+        for a, b in edges
+        for corner in [point_to_segment(a, start, end)]
+    )
+
+
+def point_to_segment(point: complex, start: complex, end: complex) -> float:
+    """Return how far a point is from a segment, which may be a point."""
+    along = end - start
+    if along == 0:
+        return abs(point - start)
+    share = ((point - start) * along.conjugate()).real / abs(along) ** 2
+    return abs(point - start - along * min(max(share, 0.0), 1.0))
+
+
+def _cross(a: complex, b: complex) -> float:
+    return (a.conjugate() * b).imag
+
+
+def _segments_cross(a: complex, b: complex, c: complex, d: complex) -> bool:
+    return (
+        _cross(b - a, c - a) * _cross(b - a, d - a) < 0
+        and _cross(d - c, a - c) * _cross(d - c, b - c) < 0
+    )

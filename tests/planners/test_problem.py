@@ -1,0 +1,98 @@
+"""What cannot be planned is refused by name, and what is planned ends when asked."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from fasaco_edge.errors import NothingToCover, StartBlocked, StartOutsideMap
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
+from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import ignore, never
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.stopping import Interrupt, TimeBudget, WorkLimit
+from fasaco_edge.planners.table import PLANNERS
+from fasaco_edge.planners.warmup import STAGES, warm_up
+from tests.planners.grids import lattice, placed
+
+GROUND = placed(lattice("..#", "..#", "###", "..."), -2, 5)
+
+
+@pytest.mark.parametrize("start", [(-3, 5), (2, 5), (-2, 4), (-2, 8), (0, 0)])
+def test_a_start_off_the_lattice_is_refused(start):
+    with pytest.raises(StartOutsideMap) as caught:
+        CoverageProblem.of(GROUND, start)
+    assert str(caught.value) == f"start cell {start} lies outside rows -2..1, columns 5..7"
+
+
+def test_a_blocked_start_is_refused():
+    with pytest.raises(StartBlocked, match=r"\(-1, 5\) is blocked: the robot does not fit there"):
+        CoverageProblem.of(GROUND, (-1, 5))
+
+
+def test_an_unknown_start_is_refused():
+    states = np.full((2, 2), UNKNOWN, np.uint8)
+    unknown = CoverageLattice(Window(0, 0, 2, 2), 1.0, states, np.zeros((2, 2), np.uint8))
+    with pytest.raises(StartBlocked, match=r"\(1, 0\) is unknown"):
+        CoverageProblem.of(unknown, (1, 0))
+
+
+def test_nothing_is_left_to_cover():
+    with pytest.raises(NothingToCover, match="every reachable cell is covered"):
+        CoverageProblem.of(GROUND, (-2, 5), covered=np.ones((4, 3), bool))
+    # What the robot cannot come to is not left to cover either.
+    covered = np.zeros((4, 3), bool)
+    covered[0] = True
+    with pytest.raises(NothingToCover):
+        CoverageProblem.of(GROUND, (-2, 5), covered=covered)
+
+
+def test_what_cannot_be_reached_is_reported_and_not_asked_for():
+    problem = CoverageProblem.of(GROUND, (-2, 6))
+    assert np.argwhere(problem.to_cover).tolist() == [[0, 0], [0, 1], [0, 2]]
+    assert np.argwhere(problem.unreachable).tolist() == [[2, 0], [2, 1], [3, 0], [3, 1]]
+    assert problem.cells == 3
+    for mask in (problem.to_cover, problem.unreachable):
+        with pytest.raises(ValueError, match="read-only"):
+            mask[0, 0] = True
+
+
+def test_a_path_is_read_only_and_counts_its_steps():
+    path = CoveragePath(np.array([[0, 0], [0, 1], [0, 2]], np.int32), "fasaco", 0)
+    assert path.steps == 2
+    assert CoveragePath(np.empty((0, 2), np.int32), "fasaco", 0).steps == 0
+    with pytest.raises(ValueError, match="read-only"):
+        path.cells[0] = 1
+
+
+def test_an_interrupt_ends_a_search_at_once_or_with_its_budget():
+    assert not TimeBudget(60.0)(1)
+    assert TimeBudget(60.0, started=time.monotonic() - 60.0)(1)
+    assert [WorkLimit(5)(ants) for ants in (4, 5, 6)] == [False, True, True]
+    interrupt = Interrupt(TimeBudget(60.0))
+    assert not interrupt(1)
+    interrupt.asked.set()
+    assert interrupt(1)
+    assert Interrupt(TimeBudget(0.0))(1)
+    # An event of one's own, as a worker shares it between searches.
+    stopping = threading.Event()
+    assert Interrupt(TimeBudget(60.0), stopping).asked is stopping
+
+
+def test_warm_up_names_each_stage_once():
+    heard = []
+    warm_up(heard.append)
+    assert tuple(heard) == STAGES
+
+
+def test_every_planner_of_the_table_plans():
+    problem = CoverageProblem.of(GROUND, (-2, 6))
+    for name, make in PLANNERS.items():
+        path = make(ColonyConfig(ants=8)).plan(problem, never, ignore)
+        assert path.planner == name
+        walk = [tuple(cell) for cell in path.cells.tolist()]
+        assert walk[0] == (-2, 6)
+        assert set(walk) == {(-2, 5), (-2, 6), (-2, 7)}
