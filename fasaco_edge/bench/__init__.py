@@ -1,1 +1,1 @@
-"""Benchmarks: ratios measured side by side in one run."""
+"""Benchmarks of the planner and the daemon: a file each, and one table of them."""

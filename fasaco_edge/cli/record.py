@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings
+from fasaco_edge.wire.poses import POSE_SCHEMAS
+from fasaco_edge.wire.schemas import POSE_STAMPED
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
@@ -22,6 +24,14 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         "robot, until SIGTERM or SIGINT. Open the result with `rerun FILE.rrd`.",
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
+    parser.add_argument(
+        "--pose-schema",
+        choices=POSE_SCHEMAS,
+        default=POSE_STAMPED,
+        metavar="TYPE",
+        help=f"type of poses that come without one: {', '.join(POSE_SCHEMAS)} "
+        "(default: %(default)s)",
+    )
     add_robot_on_bus(parser)
     parser.set_defaults(command=run)
 
@@ -32,6 +42,10 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.recording.settings import RecorderSettings
 
     settings = RecorderSettings(
-        out=args.out, robot=args.robot, base=args.base, bus=client_settings(args)
+        out=args.out,
+        robot=args.robot,
+        base=args.base,
+        bus=client_settings(args),
+        pose_schema=args.pose_schema,
     )
     return run_recorder(settings)

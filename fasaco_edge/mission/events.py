@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,11 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.problem import CoverageProblem
+
+if TYPE_CHECKING:
+    # Only named here: the daemon hears events before it has loaded what plans.
+    from fasaco_edge.planners.path import CoveragePath
+    from fasaco_edge.planners.problem import CoverageProblem
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,110 @@
+"""What a benchmark is: options, samples one by one, and a report on any number of them.
+
+A new benchmark is a file that ends with a ``Benchmark``, and its name in
+``fasaco_edge.bench.table``. Whoever runs it may stop between two samples, or
+within one, and still gets the report on those there are.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, Generic, TypeVar
+
+Sample = TypeVar("Sample")
+
+# Hears what is being measured now, in a few words.
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What was wanted and what came out, in the same ``unit``.
+
+    Attributes:
+        what: what is measured.
+        measured: None where nothing was.
+        limit: the most that is good, or the least where ``at_least``.
+        unit: "s", "MB", ...; "" for a plain number.
+        at_least: whether more is better.
+    """
+
+    what: str
+    measured: float | None
+    limit: float
+    unit: str = ""
+    at_least: bool = False
+
+    @property
+    def met(self) -> bool | None:
+        """Whether it was reached; None where nothing was measured."""
+        if self.measured is None:
+            return None
+        return self.measured >= self.limit if self.at_least else self.measured <= self.limit
+
+    def document(self) -> dict[str, Any]:
+        """Return this as JSON values."""
+        return {**asdict(self), "met": self.met}
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What came out, for people and for machines.
+
+    Attributes:
+        title: heads the table.
+        header: the table's columns.
+        rows: its cells, as many to a row as there are columns.
+        figures: the same, and more, as JSON values.
+        goals: what it is judged by.
+        remarks: sentences below the table.
+    """
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    figures: dict[str, Any]
+    goals: tuple[Goal, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Benchmark(Generic[Sample]):
+    """One benchmark of ``fasaco-edge bench``.
+
+    Attributes:
+        name: the word on the command line.
+        summary: what it measures, a line.
+        description: what is done and how to read the result.
+        add_options: declares the options it takes.
+        count: how many samples ``measure`` will yield.
+        measure: yields samples; what it opened it closes, also when it is closed early.
+        report: sums up the samples there are, even none.
+        epilog: examples.
+    """
+
+    name: str
+    summary: str
+    description: str
+    add_options: Callable[[argparse.ArgumentParser], None]
+    count: Callable[[argparse.Namespace], int]
+    measure: Callable[[argparse.Namespace, Say], Generator[Sample, None, None]]
+    report: Callable[[argparse.Namespace, Sequence[Sample]], Report]
+    epilog: str = field(default="")
+
+
+def positive(text: str) -> int:
+    """Read a whole number above zero."""
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"must be 1 or more, got {number}")
+    return number
+
+
+def seconds(text: str) -> float:
+    """Read a time [s] from 0 to an hour."""
+    number = float(text)
+    if not 0.0 <= number <= 3600.0:
+        raise argparse.ArgumentTypeError(f"must be in 0..3600 s, got {text}")
+    return number

@@ -1,0 +1,179 @@
+"""``bench footprint``: how soon a daemon is there, and how much memory it takes."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+
+from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seconds
+from fasaco_edge.bench.building import building, robot_pose, with_crate
+from fasaco_edge.bench.daemon_process import DaemonProcess, MapSource, warm_kernels
+from fasaco_edge.bench.machine import machine, peak_mb
+from fasaco_edge.bench.process_memory import has_loaded, resident_mb
+from fasaco_edge.bench.process_memory import peak_mb as peak_mb_of
+from fasaco_edge.bench.spread import Spread, document, median, text
+
+GOAL_READY_S, GOAL_IDLE_MB, GOAL_WARM_MB = 1.5, 60.0, 200.0
+MEASURES = (
+    ("ready_s", "exec to liveliness token [s]", 3),
+    ("status_s", "exec to first status [s]", 3),
+    ("idle_mb", "memory before the first map [MB]", 1),
+    ("warm_mb", "memory after map and plan [MB]", 1),
+    ("peak_mb", "peak memory [MB]", 1),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """Whether a daemon has mapped the compiler and the recorder's library."""
+
+    numba: bool
+    rerun: bool
+
+
+@dataclass(frozen=True, slots=True)
+class DaemonStart:
+    """One daemon's life.
+
+    Attributes:
+        ready_s: from exec to its liveliness token [s].
+        status_s: from exec to the first status answered [s].
+        idle_mb: resident before the first map [MB].
+        warm_mb: resident after a map and a plan [MB].
+        peak_mb: the most it was ever resident with [MB].
+        idle, warm: what was loaded at these two points.
+    """
+
+    ready_s: float
+    status_s: float
+    idle_mb: float
+    warm_mb: float
+    peak_mb: float
+    idle: Loaded
+    warm: Loaded
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--starts", type=positive, default=5, help="daemons to start (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--settle",
+        type=seconds,
+        default=1.0,
+        metavar="S",
+        help="wait so long before memory is read [s] (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--ants", type=positive, default=200, help="of the one plan (default: %(default)s)"
+    )
+
+
+def _measure(args: argparse.Namespace, say: Say) -> Generator[DaemonStart, None, None]:
+    say("warming the kernels' cache")
+    warm_kernels()
+    for number in range(1, args.starts + 1):
+        say(f"daemon {number}")
+        yield _start(args)
+
+
+def _start(args: argparse.Namespace) -> DaemonStart:
+    with DaemonProcess({"planner": {"ants": args.ants}}) as daemon:
+        bus = daemon.join()
+        ready_s = daemon.wait_alive(bus)
+        status_s = daemon.wait_status(bus)
+        source = MapSource(daemon, bus)
+        time.sleep(args.settle)
+        idle_mb, idle = resident_mb(daemon.pid), _loaded(daemon.pid)
+        stamp_ns = time.time_ns()
+        source.put_pose(robot_pose(stamp_ns))
+        source.put_map(with_crate(building(), 0, stamp_ns))
+        source.wait_path(stamp_ns)
+        time.sleep(args.settle)
+        return DaemonStart(
+            ready_s=ready_s,
+            status_s=status_s,
+            idle_mb=idle_mb,
+            warm_mb=resident_mb(daemon.pid),
+            peak_mb=peak_mb_of(daemon.pid),
+            idle=idle,
+            warm=_loaded(daemon.pid),
+        )
+
+
+def _loaded(pid: int) -> Loaded:
+    compiler = has_loaded(pid, "numba") or has_loaded(pid, "llvmlite")
+    recorder = has_loaded(pid, "rerun_sdk") or has_loaded(pid, "rerun_bindings")
+    return Loaded(numba=compiler, rerun=recorder)
+
+
+def _report(args: argparse.Namespace, starts: Sequence[DaemonStart]) -> Report:
+    spreads = {
+        name: Spread.of([getattr(start, name) for start in starts]) for name, _, _ in MEASURES
+    }
+    loaded = {
+        point: {
+            package: any(getattr(getattr(start, point), package) for start in starts)
+            for package in ("numba", "rerun")
+        }
+        for point in ("idle", "warm")
+    }
+    rows = [(label, *text(spreads[name], digits)) for name, label, digits in MEASURES]
+    if starts:
+        for package in ("numba", "rerun"):
+            points = [f"{point}: {_yes(loaded[point][package])}" for point in ("idle", "warm")]
+            rows.append((f"{package} loaded", points[0], points[1]))
+    return Report(
+        title=f"a daemon's start and memory, {len(starts)} starts",
+        header=("", "median", "range"),
+        rows=tuple(rows),
+        figures={
+            "starts": len(starts),
+            **{name: document(spread) for name, spread in spreads.items()},
+            "loaded": loaded if starts else None,
+            "peak_rss_mb": peak_mb(),
+            "machine": machine(),
+        },
+        goals=_goals(spreads, loaded if starts else None),
+        remarks=(
+            "the map is 1000 x 1000 pixels of 0.05 m; kernels come from a warm cache",
+            f"peak memory of this process {peak_mb()} MB",
+        ),
+    )
+
+
+def _goals(
+    spreads: dict[str, Spread | None], loaded: dict[str, dict[str, bool]] | None
+) -> tuple[Goal, ...]:
+    recorders = None if loaded is None else float(any(at["rerun"] for at in loaded.values()))
+    return (
+        Goal("ready", median(spreads["ready_s"]), GOAL_READY_S, "s"),
+        Goal("memory before the first map", median(spreads["idle_mb"]), GOAL_IDLE_MB, "MB"),
+        Goal("memory after map and plan", median(spreads["warm_mb"]), GOAL_WARM_MB, "MB"),
+        Goal("rerun loaded (0 = never)", recorders, 0.0),
+    )
+
+
+def _yes(loaded: bool) -> str:
+    return "yes" if loaded else "no"
+
+
+FOOTPRINT = Benchmark(
+    name="footprint",
+    summary="a daemon's time to start and its memory, idle and planning",
+    description="Start a real daemon on a free port of loopback several times; time it from exec "
+    "to its liveliness token and to the first status it answers with; read its resident memory "
+    "before the first map, and after one map of 1000 x 1000 pixels and its plan; look at what "
+    "it has loaded at both points.",
+    add_options=_add_options,
+    count=lambda args: int(args.starts),
+    measure=_measure,
+    report=_report,
+    epilog="""\
+examples:
+  fasaco-edge bench footprint
+  fasaco-edge bench footprint --starts 20 --json
+""",
+)

@@ -1,0 +1,138 @@
+"""``bench latency``: from a map on the bus to the path that answers it."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seconds
+from fasaco_edge.bench.building import building, robot_pose, with_crate
+from fasaco_edge.bench.daemon_process import DaemonProcess, MapSource, warm_kernels
+from fasaco_edge.bench.machine import machine, peak_mb
+from fasaco_edge.bench.process_memory import peak_mb as peak_mb_of
+from fasaco_edge.bench.spread import percentile
+
+GOAL_REST_P99_MS = 20.0
+# The first paths come with the kernels and the first plan of all.
+WARM_UP_MAPS = 5
+PARTS = (
+    ("total", "map put to path received"),
+    ("plan", "planning"),
+    ("rest", "all but planning"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RoundTrip:
+    """One map and its path.
+
+    Attributes:
+        total_ms: from the put of the map to the path's arrival [ms].
+        plan_ms: what of it was planning, by the daemon's word [ms].
+        steps: steps of the path.
+        daemon_peak_mb: the most the daemon was resident with until then [MB].
+    """
+
+    total_ms: float
+    plan_ms: float
+    steps: int
+    daemon_peak_mb: float
+
+    @property
+    def rest_ms(self) -> float:
+        """What was not planning: transport, decoding, lattice, decisions, encoding [ms]."""
+        return self.total_ms - self.plan_ms
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--samples", type=positive, default=200, help="maps to publish (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--ants", type=positive, default=8, help="ants of each plan (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--pause",
+        type=seconds,
+        default=0.05,
+        metavar="S",
+        help="between a path and the next map [s] (default: %(default)g)",
+    )
+
+
+def _measure(args: argparse.Namespace, say: Say) -> Generator[RoundTrip, None, None]:
+    say("warming the kernels' cache")
+    warm_kernels()
+    with DaemonProcess({"planner": {"ants": args.ants}}) as daemon:
+        say("first path")
+        source = MapSource(daemon, daemon.join())
+        source.put_pose(robot_pose(time.time_ns()))
+        grid = building()
+        for number in range(WARM_UP_MAPS + args.samples):
+            stamp_ns = time.time_ns()
+            put_at = source.put_map(with_crate(grid, number, stamp_ns))
+            arrival = source.wait_path(stamp_ns)
+            if number >= WARM_UP_MAPS:
+                say("maps")
+                yield RoundTrip(
+                    total_ms=1e3 * (arrival.at - put_at),
+                    plan_ms=arrival.about["plan_ms"],
+                    steps=arrival.about["steps"],
+                    daemon_peak_mb=peak_mb_of(daemon.pid),
+                )
+            time.sleep(args.pause)
+
+
+def _report(args: argparse.Namespace, trips: Sequence[RoundTrip]) -> Report:
+    parts = {name: _part([getattr(trip, f"{name}_ms") for trip in trips]) for name, _ in PARTS}
+    rows = [(label, *(_ms(value) for value in parts[name].values())) for name, label in PARTS]
+    daemon_mb = trips[-1].daemon_peak_mb if trips else None
+    of_daemon = f"the daemon {daemon_mb} MB, of " if trips else ""
+    return Report(
+        title=f"from map to path, {len(trips)} maps of 1000 x 1000 pixels [ms]",
+        header=("", "p50", "p99", "min", "max"),
+        rows=tuple(rows),
+        figures={
+            "samples": len(trips),
+            "ants": args.ants,
+            "steps": trips[-1].steps if trips else None,
+            **{f"{name}_ms": part for name, part in parts.items()},
+            "daemon_peak_rss_mb": daemon_mb,
+            "peak_rss_mb": peak_mb(),
+            "machine": machine(),
+        },
+        goals=(Goal("p99 of all but planning", parts["rest"]["p99"], GOAL_REST_P99_MS, "ms"),),
+        remarks=(f"peak memory of {of_daemon}this process {peak_mb()} MB",),
+    )
+
+
+def _part(values: Sequence[float]) -> dict[str, float | None]:
+    percents = {"p50": 50.0, "p99": 99.0, "min": 0.0, "max": 100.0}
+    part: dict[str, Any] = {name: percentile(values, at) for name, at in percents.items()}
+    return {name: None if value is None else round(value, 3) for name, value in part.items()}
+
+
+def _ms(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
+
+
+LATENCY = Benchmark(
+    name="latency",
+    summary="from a map on the bus to its path, without the planning",
+    description="Start a real daemon, publish a map of 1000 x 1000 pixels (50 m x 50 m) and a "
+    "pose; then maps in which a crate moves in the farthest hall, each of which needs a new "
+    "path. Time each from its put to the arrival of its path; what the daemon says that planning "
+    "took is told apart. The planner has few ants, so that it does not hide the rest.",
+    add_options=_add_options,
+    count=lambda args: int(args.samples),
+    measure=_measure,
+    report=_report,
+    epilog="""\
+examples:
+  fasaco-edge bench latency
+  fasaco-edge bench latency --samples 1000 --json
+""",
+)

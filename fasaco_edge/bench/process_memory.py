@@ -1,0 +1,40 @@
+"""What a process is resident with and what it has loaded, by proc(5)."""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePath
+
+
+def resident_mb(pid: int) -> float:
+    """Return the resident memory of a process now [MB]."""
+    return _field_mb(pid, "VmRSS")
+
+
+def peak_mb(pid: int) -> float:
+    """Return the most it was ever resident with [MB]."""
+    return _field_mb(pid, "VmHWM")
+
+
+def has_loaded(pid: int, package: str) -> bool:
+    """Tell whether a Python package's compiled modules are mapped into a process."""
+    maps = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8", errors="replace")
+    files = {line.split(maxsplit=5)[5] for line in maps.splitlines() if line.endswith(".so")}
+    return any(package in _below_packages(PurePath(file)) for file in files)
+
+
+def _below_packages(file: PurePath) -> tuple[str, ...]:
+    """Return a file's folders below site-packages: a user's own folder may have any name."""
+    parts = file.parts
+    for root in ("site-packages", "dist-packages"):
+        if root in parts:
+            return parts[parts.index(root) + 1 :]
+    return ()
+
+
+def _field_mb(pid: int, name: str) -> float:
+    for line in Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines():
+        key, _, value = line.partition(":")
+        if key == name:
+            return round(int(value.split()[0]) * 1024 / 1e6, 2)
+    # A process that has ended and not been waited for has no memory.
+    return 0.0

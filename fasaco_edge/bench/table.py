@@ -1,0 +1,12 @@
+"""All benchmarks, in the order they are listed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fasaco_edge.bench.benchmark import Benchmark
+from fasaco_edge.bench.footprint import FOOTPRINT
+from fasaco_edge.bench.latency import LATENCY
+from fasaco_edge.bench.speed import SPEED
+
+BENCHMARKS: tuple[Benchmark[Any], ...] = (SPEED, FOOTPRINT, LATENCY)

@@ -1,0 +1,193 @@
+"""Each benchmark runs, small, and says what it promises."""
+
+import argparse
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fasaco_edge.bench.benchmark import Benchmark, Goal, Report
+from fasaco_edge.bench.table import BENCHMARKS
+from fasaco_edge.cli import bench, main
+
+MACHINE = {"processor", "cores", "load_1min", "python", "version"}
+CHECKOUT = Path(__file__).parents[2]
+
+
+def figures(capsys, *words):
+    code = main(["bench", *words, "--json"])
+    document = json.loads(capsys.readouterr().out)
+    assert code == 0
+    assert document["benchmark"] == words[0]
+    assert document["interrupted"] is False
+    assert set(document["machine"]) == MACHINE
+    assert document["peak_rss_mb"] > 10
+    return document
+
+
+def assert_ordered(spread):
+    assert 0 < spread["low"] <= spread["median"] <= spread["high"]
+
+
+def test_speed(capsys, tmp_path):
+    file = tmp_path / "room.npy"
+    np.save(file, np.ones((7, 9), bool))
+    file.with_suffix(".json").write_text('{"start": [3, 4]}')
+    options = ["--ants", "40", "--repeats", "2", "--naive-s", "0.2", "--return-home"]
+    words = ["--grids", str(file), "--maps", "office", *options]
+    document = figures(capsys, "speed", *words)
+    assert document["naive_available"]
+    assert [grid["grid"] for grid in document["grids"]] == [str(file), "office"]
+    for grid in document["grids"]:
+        assert_ordered(grid["wall_s"])
+        assert_ordered(grid["cpu_s"])
+        assert (grid["ants"], grid["repeats"]) == (40, 2)
+        # Home again: every walk over a grid takes an even number of steps.
+        assert grid["steps"] % 2 == 0
+        assert grid["steps"] >= grid["cells"] - 1
+        assert grid["ants_per_s"] == pytest.approx(40 / grid["wall_s"]["median"], rel=1e-2)
+        naive = grid["naive"]
+        assert naive["same_walk"] is True
+        assert 8 <= naive["ants"] <= 40
+        per_ant = naive["cpu_s"] / naive["ants"] / (grid["cpu_s"]["median"] / grid["ants"])
+        assert naive["ratio"] == pytest.approx(per_ant, rel=1e-2, abs=0.1)
+    assert document["grids"][0]["cells"] == 63
+
+
+def test_speed_goals_are_those_of_a_thousand_ants(capsys):
+    document = figures(capsys, "speed", "--maps", "office", "--repeats", "1", "--naive-s", "0")
+    (goal,) = document["goals"]
+    assert (goal["limit"], goal["unit"], goal["at_least"]) == (0.25, "s", False)
+    assert goal["measured"] == pytest.approx(document["grids"][0]["wall_s"]["median"], abs=1e-3)
+
+
+def test_speed_without_a_checkout_says_so(tmp_path):
+    """As in a wheel: no tests, no project file, maps inside the package."""
+    shutil.copytree(
+        CHECKOUT / "fasaco_edge",
+        tmp_path / "fasaco_edge",
+        ignore=shutil.ignore_patterns("__pycache__"),
+    )
+    shutil.copytree(CHECKOUT / "maps", tmp_path / "fasaco_edge" / "_share" / "maps")
+    words = ["bench", "speed", "--maps", "office", "--ants", "8", "--repeats", "1"]
+    result = subprocess.run(
+        [sys.executable, "-m", "fasaco_edge", *words],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1", "COLUMNS": "120"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "needs a source checkout" in result.stdout
+
+
+def test_footprint(capsys):
+    document = figures(capsys, "footprint", "--starts", "1", "--settle", "0.1", "--ants", "8")
+    assert document["starts"] == 1
+    for name in ("ready_s", "status_s", "idle_mb", "warm_mb", "peak_mb"):
+        assert_ordered(document[name])
+    assert document["ready_s"]["median"] <= document["status_s"]["median"]
+    assert document["idle_mb"]["median"] < document["warm_mb"]["median"]
+    assert document["warm_mb"]["median"] <= document["peak_mb"]["median"]
+    assert document["loaded"]["warm"] == {"numba": True, "rerun": False}
+    assert document["loaded"]["idle"]["rerun"] is False
+    assert [goal["limit"] for goal in document["goals"]] == [1.5, 60.0, 200.0, 0.0]
+
+
+def test_latency(capsys):
+    document = figures(capsys, "latency", "--samples", "3", "--pause", "0")
+    assert (document["samples"], document["ants"]) == (3, 8)
+    assert document["steps"] > 20_000
+    assert document["daemon_peak_rss_mb"] > 10
+    for name in ("total_ms", "plan_ms", "rest_ms"):
+        part = document[name]
+        assert 0 < part["min"] <= part["p50"] <= part["p99"] <= part["max"]
+    assert document["plan_ms"]["p50"] < document["total_ms"]["p50"]
+    (goal,) = document["goals"]
+    assert (goal["measured"], goal["limit"]) == (document["rest_ms"]["p99"], 20.0)
+
+
+def counting(upto, interrupt_at=None):
+    """A benchmark of numbers; the user loses patience at one of them."""
+    closed = []
+
+    def measure(args, say):
+        try:
+            for number in range(upto):
+                if number == interrupt_at:
+                    signal.raise_signal(signal.SIGINT)
+                yield number
+        finally:
+            closed.append(True)
+
+    def report(args, samples):
+        rows = tuple((f"[{sample}]", "x") for sample in samples)
+        goals = (Goal("count", float(len(samples)), 2.0, at_least=True),)
+        return Report("numbers [n]", ("n", "of [n]"), rows, {"n": len(samples)}, goals)
+
+    benchmark = Benchmark("numbers", "", "", lambda _: None, lambda _: upto, measure, report)
+    return benchmark, closed
+
+
+def run(benchmark, **options):
+    given = {"json": False, "check": False, **options}
+    return bench.run(argparse.Namespace(benchmark=benchmark, **given))
+
+
+def test_interrupted_benchmark_prints_what_it_has(capsys):
+    benchmark, closed = counting(5, interrupt_at=3)
+    assert run(benchmark, json=True) == 130
+    document = json.loads(capsys.readouterr().out)
+    assert (document["n"], document["interrupted"]) == (3, True)
+    assert closed == [True]
+
+
+def test_table_shows_brackets_and_the_interruption(capsys):
+    benchmark, _ = counting(2, interrupt_at=1)
+    assert run(benchmark) == 130
+    shown = capsys.readouterr().out
+    for words in ("numbers [n]", "of [n]", "[0]", "missed", "interrupted"):
+        assert words in shown
+
+
+@pytest.mark.parametrize(("samples", "code"), [(1, 1), (2, 0)])
+def test_missed_goal_fails_only_a_check(samples, code, capsys):
+    benchmark, _ = counting(samples)
+    assert run(benchmark, check=True) == code
+    assert run(benchmark) == 0
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("benchmark", BENCHMARKS, ids=lambda benchmark: benchmark.name)
+def test_report_on_nothing_measured(benchmark):
+    parser = argparse.ArgumentParser()
+    benchmark.add_options(parser)
+    report = benchmark.report(parser.parse_args([]), [])
+    assert all(goal.met is None for goal in report.goals)
+    json.dumps(report.figures, allow_nan=False)
+
+
+def test_without_a_name_all_are_listed(capsys):
+    assert main(["bench"]) == 0
+    listed = capsys.readouterr().out
+    assert all(benchmark.name in listed for benchmark in BENCHMARKS)
+
+
+@pytest.mark.parametrize("benchmark", BENCHMARKS, ids=lambda benchmark: benchmark.name)
+def test_help_teaches_by_example(benchmark, capsys):
+    with pytest.raises(SystemExit):
+        main(["bench", benchmark.name, "--help"])
+    assert f"fasaco-edge bench {benchmark.name}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("words", [["--ants", "0"], ["--repeats", "-1"], ["--naive-s", "nan"]])
+def test_impossible_options_are_refused(words, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["bench", "speed", *words])
+    assert words[0] in capsys.readouterr().err

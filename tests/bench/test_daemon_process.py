@@ -1,0 +1,43 @@
+"""A real daemon is started, looked into and ended."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from fasaco_edge.bench.daemon_process import DaemonProcess
+from fasaco_edge.bench.process_memory import has_loaded, peak_mb, resident_mb
+from fasaco_edge.errors import ProcessEnded
+
+
+def test_daemon_is_gone_after_the_block():
+    with DaemonProcess() as daemon:
+        bus = daemon.join()
+        assert 0.0 < daemon.wait_alive(bus) <= daemon.wait_status(bus)
+        pid = daemon.pid
+        assert Path(f"/proc/{pid}").exists()
+    assert not Path(f"/proc/{pid}").exists()
+
+
+def test_daemon_that_ends_by_itself_says_why():
+    with (
+        DaemonProcess({"planner": {"ants": 0}}) as daemon,
+        pytest.raises(ProcessEnded, match=r"planner\.ants"),
+    ):
+        daemon.join()
+
+
+def test_memory_and_libraries_of_this_process():
+    pid = os.getpid()
+    assert 5.0 < resident_mb(pid) <= peak_mb(pid)
+    assert has_loaded(pid, "numpy")
+    assert not has_loaded(pid, "no_such_package")
+
+
+def test_a_process_without_memory_has_none():
+    child = os.fork()
+    if child == 0:
+        os._exit(0)
+    os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)
+    assert resident_mb(child) == 0.0
+    os.waitpid(child, 0)
