@@ -104,7 +104,7 @@ class Colony:
                 # A dead end is left by the shortest walk to the nearest uncovered cell.
                 way = self.shortest(walk[-1], uncovered)
                 heading = _difference(way[-2], way[-1])
-                self.follow(walk, way[1:])
+                walk += way[1:]
             else:
                 heading = direction
                 # Velocity v: straight on for up to v cells, as long as they are uncovered.
@@ -112,11 +112,11 @@ class Colony:
                     ahead = self.around[walk[-1]].get(direction)
                     if ahead not in uncovered:
                         break
-                    self.follow(walk, [ahead])
+                    walk.append(ahead)
                     uncovered.discard(ahead)
             uncovered.discard(walk[-1])
         if self.return_home and walk[-1] != start:
-            self.follow(walk, self.shortest(walk[-1], {start})[1:])
+            walk += self.shortest(walk[-1], {start})[1:]
         return walk
 
     def choose(
@@ -164,13 +164,11 @@ class Colony:
                 queue.append(after)
         raise ValueError("no goal can be reached")
 
-    def follow(self, walk: list[Cell], cells: list[Cell]) -> None:
-        """Move on to each of ``cells``, with the local update of equation (7)."""
+    def settle(self, walk: list[Cell]) -> None:
+        """Local update, equation (7), for every move."""
         alpha, tau0 = self.config.alpha, self.config.tau0
-        for cell in cells:
-            move = walk[-1], cell
+        for move in itertools.pairwise(walk):
             self.trail[move] = (1.0 - alpha) * self.trail[move] + alpha * tau0
-            walk.append(cell)
 
     def strengthen(self, best: list[Cell]) -> None:
         """Global update, equation (8), with delta phi = cells / steps."""
@@ -201,14 +199,20 @@ def fasaco(
     trail = {(here, there): config.tau0 for here in around for there in around[here].values()}
     wanted = {(int(row), int(col)) for row, col in np.argwhere(to_cover)}
     colony = Colony(around, wanted, config, return_home, trail)
+    group_size = min(max(64_000 // len(wanted), 2), 32)
     best: list[Cell] = []
     for number, cohort in enumerate(config.cohorts()):
         words = np.random.SeedSequence((config.seed, number)).generate_state(4 * cohort.ants)
-        for ant in range(cohort.ants):
-            random = Xoshiro128PlusPlus([int(word) for word in words[4 * ant : 4 * ant + 4]])
-            walk = colony.walk(start, cohort.velocity, random)
-            if not best or len(walk) < len(best):
-                best = walk
+        # Ants of a group walk at the same time; what they leave is for the next group.
+        for first in range(0, cohort.ants, group_size):
+            walks = []
+            for ant in range(first, min(first + group_size, cohort.ants)):
+                random = Xoshiro128PlusPlus([int(word) for word in words[4 * ant : 4 * ant + 4]])
+                walks.append(colony.walk(start, cohort.velocity, random))
+            for walk in walks:
+                colony.settle(walk)
+                if not best or len(walk) < len(best):
+                    best = walk
         colony.strengthen(best)
     return best
 

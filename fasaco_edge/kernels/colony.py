@@ -8,9 +8,14 @@ Eq. (4)      pseudo-random proportional rule             ``_choose``
 Eq. (5)      visibility; 1 for every neighbour, so       left out
              ``eta ** beta`` drops out
 Eq. (6)      probability of the other branch of (4)      ``_choose``
-Eq. (7)      local update, after every move              ``_step``
+Eq. (7)      local update, after every move              ``settle``
 Eq. (8)      global update along the best walk           ``deposit``
 ===========  ==========================================  ======================
+
+What ants tell each other, and when: the ants of a group walk at the same time,
+as ants do, on the trail that the groups before them left. Then (7) is applied
+for each of their moves, ant by ant. So the ants of a group may walk on several
+threads, and the result is the same for any number of them.
 
 Where the paper is silent: a tie in (4) goes straight on; a dead end is left by
 the shortest walk to the nearest cell not yet covered, whose moves are moves
@@ -25,25 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import kernel
+from fasaco_edge.kernels.search import Graph, Scratch, append_way, begin, close, find, open_steps_of
 
-NO_DIRECTION = -1
 WORD = 0xFFFFFFFF
-
-
-class Field(NamedTuple):
-    """Where ants walk. Cells are flat indices ``row * cols + col``; n of them.
-
-    Attributes:
-        steps: step masks, uint8 (n,).
-        to_cover: uint8 (n,), 1 where a visit is asked for.
-        offsets: int64 (4,), difference of flat index for a step in each direction.
-        trail: pheromone on the move out of a cell in each direction, float64 (n, 4).
-    """
-
-    steps: NDArray[np.uint8]
-    to_cover: NDArray[np.uint8]
-    offsets: NDArray[np.int64]
-    trail: NDArray[np.float64]
 
 
 class Rules(NamedTuple):
@@ -53,24 +42,6 @@ class Rules(NamedTuple):
     alpha: float
     tau0: float
     return_home: bool
-
-
-class Scratch(NamedTuple):
-    """Working memory of one thread, n cells.
-
-    Attributes:
-        open: uint8 (n,), cells the current ant has not covered.
-        seen: int64 (n,), number of the last search that reached the cell.
-        came_from: int8 (n,), direction by which it was reached.
-        queue: int64 (n,).
-        searches: int64 (1,), how many searches there were.
-    """
-
-    open: NDArray[np.uint8]
-    seen: NDArray[np.int64]
-    came_from: NDArray[np.int8]
-    queue: NDArray[np.int64]
-    searches: NDArray[np.int64]
 
 
 @kernel
@@ -93,177 +64,142 @@ def _draw(state: NDArray[np.int64]) -> float:
 
 @kernel
 def _choose(
-    field: Field, scratch: Scratch, q0: float, here: int, heading: int, random: NDArray[np.int64]
+    mask: int,
+    trail: NDArray[np.float64],
+    here: int,
+    heading: int,
+    q0: float,
+    random: NDArray[np.int64],
 ) -> int:
-    """Return the direction of the next move by equation (4), or NO_DIRECTION at a dead end."""
-    mask = field.steps[here]
-    total, best, best_value, options = 0.0, NO_DIRECTION, -1.0, 0
+    """Return the direction of the next move by equation (4); ``mask`` holds the open ones."""
+    total, best, best_value = 0.0, heading, 0.0
     for turn in range(4):
         direction = (heading + turn) & 3
-        if mask >> direction & 1 and scratch.open[here + field.offsets[direction]]:
-            value = field.trail[here, direction]
-            total += value
-            options += 1
-            if value > best_value:
-                best, best_value = direction, value
-    if options <= 1 or _draw(random) <= q0:
+        value = trail[here, direction] * (mask >> direction & 1)
+        total += value
+        if value > best_value:
+            best, best_value = direction, value
+    if mask & (mask - 1) == 0 or _draw(random) <= q0:
         return best
     # Eq. (6)
     left = _draw(random) * total
     for turn in range(4):
         direction = (heading + turn) & 3
-        if mask >> direction & 1 and scratch.open[here + field.offsets[direction]]:
+        if mask >> direction & 1:
             best = direction
-            left -= field.trail[here, direction]
+            left -= trail[here, direction]
             if left < 0.0:
                 break
     return best
 
 
 @kernel
-def _find(field: Field, scratch: Scratch, here: int, goal: int) -> int:
-    """Search breadth first; return ``goal``, or with goal -1 the nearest open cell."""
-    scratch.searches[0] += 1
-    search = scratch.searches[0]
-    scratch.seen[here] = search
-    scratch.queue[0] = here
-    head, tail = 0, 1
-    while head < tail:
-        cell = scratch.queue[head]
-        head += 1
-        for direction in range(4):
-            if not field.steps[cell] >> direction & 1:
-                continue
-            after = cell + field.offsets[direction]
-            if scratch.seen[after] == search:
-                continue
-            scratch.seen[after] = search
-            scratch.came_from[after] = direction
-            if after == goal or (goal < 0 and scratch.open[after]):
-                return int(after)
-            scratch.queue[tail] = after
-            tail += 1
-    return here
-
-
-@kernel
-def _step(field: Field, rules: Rules, here: int, direction: int) -> int:
-    """Make one move, with the local update of equation (7); return the new cell."""
-    trail = field.trail[here, direction]
-    field.trail[here, direction] = (1.0 - rules.alpha) * trail + rules.alpha * rules.tau0
-    return int(here + field.offsets[direction])
-
-
-@kernel
-def _reserve(walk: NDArray[np.int64], length: int) -> NDArray[np.int64]:
-    """Return ``walk``, or a longer copy where it cannot hold ``length`` entries."""
-    if length <= walk.size:
-        return walk
-    longer = np.empty(2 * length, np.int64)
-    longer[: walk.size] = walk
-    return longer
-
-
-@kernel
-def _go_to(
-    field: Field, rules: Rules, scratch: Scratch, walk: NDArray[np.int64], length: int, goal: int
-) -> tuple[NDArray[np.int64], int]:
-    """Append the shortest walk to ``goal`` (-1: the nearest open cell), without its start."""
-    here = walk[length - 1]
-    goal = _find(field, scratch, here, goal)
-    distance, cell = 0, goal
-    while cell != here:
-        cell -= field.offsets[scratch.came_from[cell]]
-        distance += 1
-    walk = _reserve(walk, length + distance)
-    cell = goal
-    for index in range(length + distance - 1, length - 1, -1):
-        walk[index] = cell
-        cell -= field.offsets[scratch.came_from[cell]]
-    for index in range(length, length + distance):
-        _step(field, rules, walk[index - 1], scratch.came_from[walk[index]])
-    return walk, length + distance
-
-
-@kernel
 def _walk_one(
-    field: Field,
+    graph: Graph,
+    trail: NDArray[np.float64],
     rules: Rules,
     scratch: Scratch,
-    walk: NDArray[np.int64],
     start: int,
     velocity: int,
     random: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], int]:
-    """Let one ant walk until every cell is covered; return its walk and the walk's length."""
-    scratch.open[:] = field.to_cover
-    remaining = np.sum(field.to_cover) - scratch.open[start]
-    scratch.open[start] = 0
+    walk: NDArray[np.int32],
+) -> int:
+    """Let one ant walk until every cell is covered; return the walk's length."""
+    remaining = begin(graph, scratch, start)
     walk[0] = start
     here, length, heading = start, 1, 0
     while remaining > 0:
-        direction = _choose(field, scratch, rules.q0, here, heading, random)
-        if direction == NO_DIRECTION:
-            walk, length = _go_to(field, rules, scratch, walk, length, -1)
-            here = walk[length - 1]
-            heading = scratch.came_from[here]
-            scratch.open[here] = 0
+        mask = open_steps_of(graph, scratch, here)
+        if mask == 0:
+            goal = find(graph, scratch, here, -1)
+            length = append_way(graph, scratch, walk, length, here, goal)
+            here, heading = goal, scratch.came_from[goal]
+            close(graph, scratch, here)
             remaining -= 1
             continue
-        heading = direction
-        walk = _reserve(walk, length + velocity)
+        heading = _choose(mask, trail, here, heading, rules.q0, random)
         # A cohort of velocity v keeps straight on for up to v cells.
         for _ in range(velocity):
-            here = _step(field, rules, here, direction)
-            walk[length] = here
+            here += graph.offsets[heading]
+            if length < walk.size:
+                walk[length] = here
             length += 1
-            scratch.open[here] = 0
+            close(graph, scratch, here)
             remaining -= 1
-            straight_on = field.steps[here] >> direction & 1
-            if not (straight_on and scratch.open[here + field.offsets[direction]]):
+            if not open_steps_of(graph, scratch, here) >> heading & 1:
                 break
     if rules.return_home and here != start:
-        walk, length = _go_to(field, rules, scratch, walk, length, start)
-    return walk, length
+        find(graph, scratch, here, start)
+        length = append_way(graph, scratch, walk, length, here, start)
+    return length
 
 
 @kernel
 def walk_ants(
-    field: Field,
+    graph: Graph,
+    trail: NDArray[np.float64],
     rules: Rules,
     scratch: Scratch,
     start: int,
     velocity: int,
     streams: NDArray[np.int64],
-    best: NDArray[np.int64],
-) -> NDArray[np.int64]:
-    """Let ants walk one after the other; return the shortest walk, theirs or ``best``.
+    walks: NDArray[np.int32],
+    lengths: NDArray[np.int64],
+) -> None:
+    """Let ants walk on a trail that stays as it is.
 
     Args:
-        field: where they walk; the trail is updated.
+        graph: where they walk; all that is wanted can be reached from the start.
+        trail: pheromone on the move out of a cell in each direction, float64 (n, 4), > 0.
         rules: constants.
         scratch: working memory.
-        start: the cell all ants start from, from which all of ``to_cover`` is reachable.
+        start: the cell all ants start from.
         velocity: cells an ant keeps straight on for, at least 1.
         streams: int64 (ants, 4): state of each ant's random stream, words of 32 bits,
             not all zero; advanced in place.
-        best: the best walk so far, int64 (length,); empty where there is none.
+        walks: out, int32 (ants, room); a longer walk is cut.
+        lengths: out, int64 (ants,), the walks' whole lengths.
     """
-    walk = np.empty(2 * field.steps.size + velocity, np.int64)
     for ant in range(streams.shape[0]):
-        walk, length = _walk_one(field, rules, scratch, walk, start, velocity, streams[ant])
-        if best.size == 0 or length < best.size:
-            best = walk[:length].copy()
+        lengths[ant] = _walk_one(
+            graph, trail, rules, scratch, start, velocity, streams[ant], walks[ant]
+        )
+
+
+@kernel
+def _pull(
+    graph: Graph, trail: NDArray[np.float64], walk: NDArray[np.int32], alpha: float, towards: float
+) -> None:
+    """Pull the trail of every move of a walk a little towards a value."""
+    for index in range(walk.size - 1):
+        here, gap = walk[index], walk[index + 1] - walk[index]
+        for direction in range(4):
+            # With one column, east and north are the same difference: the mask decides.
+            if graph.offsets[direction] == gap and graph.steps[here] >> direction & 1:
+                trail[here, direction] = (1.0 - alpha) * trail[here, direction] + alpha * towards
+                break
+
+
+@kernel
+def settle(
+    graph: Graph,
+    trail: NDArray[np.float64],
+    rules: Rules,
+    walks: NDArray[np.int32],
+    lengths: NDArray[np.int64],
+) -> int:
+    """Apply the local update (7) for every move, ant by ant; return the shortest walk's index."""
+    best = 0
+    for ant in range(lengths.size):
+        _pull(graph, trail, walks[ant, : lengths[ant]], rules.alpha, rules.tau0)
+        if lengths[ant] < lengths[best]:
+            best = ant
     return best
 
 
 @kernel
-def deposit(field: Field, alpha: float, amount: float, best: NDArray[np.int64]) -> None:
+def deposit(
+    graph: Graph, trail: NDArray[np.float64], alpha: float, amount: float, best: NDArray[np.int32]
+) -> None:
     """Strengthen the trail along ``best`` by equation (8), ``amount`` being delta phi."""
-    for index in range(best.size - 1):
-        here, gap = best[index], best[index + 1] - best[index]
-        for direction in range(4):
-            if field.offsets[direction] == gap and field.steps[here] >> direction & 1:
-                trail = field.trail[here, direction]
-                field.trail[here, direction] = (1.0 - alpha) * trail + alpha * amount
-                break
+    _pull(graph, trail, best, alpha, amount)

@@ -3,109 +3,127 @@
 import numpy as np
 import pytest
 
-from fasaco_edge.kernels.colony import Field, Rules, Scratch, deposit, walk_ants
+from fasaco_edge.kernels.colony import Rules, deposit, settle, walk_ants
+from fasaco_edge.planners.graph import graph_of, scratch_for
+from fasaco_edge.planners.problem import CoverageProblem
 from tests.planners.grids import lattice
 
 ALPHA, TAU0 = 0.25, 0.5
 
 
-def field_of(ground):
-    size, cols = ground.steps.size, ground.steps.shape[1]
-    return Field(
-        steps=ground.steps.ravel(),
-        to_cover=ground.coverable.astype(np.uint8).ravel(),
-        offsets=np.array([1, cols, -1, -cols]),
-        trail=np.full((size, 4), TAU0),
-    )
+class Ground:
+    """A drawn lattice with a trail on it, and ants to walk there."""
 
+    def __init__(self, *rows):
+        drawn = lattice(*rows)
+        row, col = np.argwhere(drawn.coverable)[0].tolist()
+        self.graph = graph_of(CoverageProblem.of(drawn, (row, col)))
+        self.trail = np.full((drawn.steps.size, 4), TAU0)
 
-def scratch(size):
-    return Scratch(
-        np.empty(size, np.uint8),
-        np.zeros(size, np.int64),
-        np.zeros(size, np.int8),
-        np.empty(size, np.int64),
-        np.zeros(1, np.int64),
-    )
+    def walks(self, start, velocity=1, q0=1.0, return_home=False, ants=1, seed=None):
+        """Return the ants' walks; then their trail is settled."""
+        streams = np.arange(1, 4 * ants + 1, dtype=np.int64).reshape(ants, 4)
+        if seed is not None:
+            words = np.random.SeedSequence(seed).generate_state(4 * ants)
+            streams = words.astype(np.int64).reshape(ants, 4)
+        walks, lengths = np.empty((ants, 64), np.int32), np.empty(ants, np.int64)
+        rules = Rules(q0, ALPHA, TAU0, return_home)
+        walk_ants(
+            self.graph,
+            self.trail,
+            rules,
+            scratch_for(self.graph),
+            start,
+            velocity,
+            streams,
+            walks,
+            lengths,
+        )
+        self.shortest = settle(self.graph, self.trail, rules, walks, lengths)
+        return [walk[:length].tolist() for walk, length in zip(walks, lengths, strict=True)]
 
-
-def walk(field, start, velocity=1, q0=1.0, return_home=False, ants=1, best=()):
-    streams = np.arange(1, 4 * ants + 1, dtype=np.int64).reshape(ants, 4)
-    rules = Rules(q0, ALPHA, TAU0, return_home)
-    best = np.array(best, np.int64)
-    return walk_ants(field, rules, scratch(field.steps.size), start, velocity, streams, best)
+    def walk(self, start, **options):
+        return self.walks(start, **options)[0]
 
 
 def test_equation_4_takes_the_strongest_trail():
-    field = field_of(lattice("..", ".."))
-    assert walk(field, 0).tolist() == [0, 1, 3, 2]  # a tie: straight on, to the east
-    field.trail[0, 1] = 0.6
-    assert walk(field, 0).tolist() == [0, 2, 3, 1]
+    ground = Ground("..", "..")
+    assert ground.walk(0) == [0, 1, 3, 2]  # a tie: straight on, to the east
+    ground.trail[0, 1] = 0.6
+    assert ground.walk(0) == [0, 2, 3, 1]
 
 
 def test_equation_6_draws_in_proportion_to_the_trail():
-    field = field_of(lattice("#.#", "...", "#.#"))
-    field.trail[4] = (1.0, 2.0, 3.0, 4.0)  # out of the middle: east, north, west, south
-    first = []
-    for seed in range(4000):
-        kept = field.trail.copy()
-        streams = np.random.SeedSequence(seed).generate_state(4).astype(np.int64).reshape(1, 4)
-        rules = Rules(0.0, ALPHA, TAU0, False)
-        path = walk_ants(field, rules, scratch(9), 4, 1, streams, np.empty(0, np.int64))
-        first.append(int(path[1]))
-        field.trail[:] = kept
+    ground = Ground("#.#", "...", "#.#")
+    ground.trail[4] = (1.0, 2.0, 3.0, 4.0)  # out of the middle: east, north, west, south
+    # None of these ants sees what another left.
+    first = [walk[1] for walk in ground.walks(4, q0=0.0, ants=4000, seed=0)]
     shares = [first.count(cell) / len(first) for cell in (5, 7, 3, 1)]
     assert shares == pytest.approx([0.1, 0.2, 0.3, 0.4], abs=0.03)
 
 
 def test_equation_7_pulls_the_trail_of_every_move_towards_tau0():
-    field = field_of(lattice("..."))
-    field.trail[:] = 4.0
-    assert walk(field, 1, return_home=True).tolist() == [1, 2, 1, 0, 1]
+    ground = Ground("...")
+    ground.trail[:] = 4.0
+    assert ground.walk(1, return_home=True) == [1, 2, 1, 0, 1]
     once = (1 - ALPHA) * 4.0 + ALPHA * TAU0
     # East out of 0 and 1, west out of 2 and 1: one move each; no other trail moves.
     moved = {(0, 0), (1, 0), (1, 2), (2, 2)}
     for cell in range(3):
         for direction in range(4):
-            assert field.trail[cell, direction] == (once if (cell, direction) in moved else 4.0)
+            assert ground.trail[cell, direction] == (once if (cell, direction) in moved else 4.0)
 
 
 def test_equation_8_strengthens_the_moves_of_the_best_walk_each_time_they_occur():
-    field = field_of(lattice("..."))
-    deposit(field, ALPHA, 2.0, np.array([1, 2, 1, 0, 1, 2]))
+    ground = Ground("...")
+    deposit(ground.graph, ground.trail, ALPHA, 2.0, np.array([1, 2, 1, 0, 1, 2], np.int32))
     once = (1 - ALPHA) * TAU0 + ALPHA * 2.0
     twice = (1 - ALPHA) * once + ALPHA * 2.0
     expected = np.full((3, 4), TAU0)
     expected[1, 0], expected[2, 2], expected[1, 2], expected[0, 0] = twice, once, once, once
-    assert np.array_equal(field.trail, expected)
+    assert np.array_equal(ground.trail, expected)
 
 
 def test_a_column_deposits_north_and_south():
     """With one column, a step north and a step east are the same difference of index."""
-    field = field_of(lattice(".", "."))
-    deposit(field, ALPHA, 2.0, np.array([0, 1, 0]))
-    changed = np.argwhere(field.trail != TAU0).tolist()
+    ground = Ground(".", ".")
+    deposit(ground.graph, ground.trail, ALPHA, 2.0, np.array([0, 1, 0], np.int32))
+    changed = np.argwhere(ground.trail != TAU0).tolist()
     assert changed == [[0, 1], [1, 3]]
 
 
 def test_velocity_keeps_straight_on_past_a_stronger_trail():
-    field = field_of(lattice("....", "...."))
-    field.trail[1, 1] = 9.0  # north out of cell 1 tempts whoever stops there
-    assert walk(field, 0, velocity=1).tolist()[:3] == [0, 1, 5]
-    field = field_of(lattice("....", "...."))
-    field.trail[1, 1] = 9.0
-    assert walk(field, 0, velocity=3).tolist()[:4] == [0, 1, 2, 3]
+    ground = Ground("....", "....")
+    ground.trail[1, 1] = 9.0  # north out of cell 1 tempts whoever stops there
+    assert ground.walk(0, velocity=1)[:3] == [0, 1, 5]
+    ground = Ground("....", "....")
+    ground.trail[1, 1] = 9.0
+    assert ground.walk(0, velocity=3)[:4] == [0, 1, 2, 3]
 
 
 def test_a_dead_end_is_left_by_the_shortest_walk():
-    field = field_of(lattice(".#.", "..."))
+    ground = Ground(".#.", "...")
     # East first: 1, 2, north to 5; back to the nearest open cell, 3, by 2, 1, 0.
-    assert walk(field, 0).tolist() == [0, 1, 2, 5, 2, 1, 0, 3]
+    assert ground.walk(0) == [0, 1, 2, 5, 2, 1, 0, 3]
 
 
-def test_only_a_shorter_walk_replaces_the_best():
-    field = field_of(lattice("..."))
-    assert walk(field, 0, best=(0, 1, 2)).tolist() == [0, 1, 2]
-    assert walk(field, 0, best=(0, 1, 0, 1, 2)).tolist() == [0, 1, 2]
-    equal = walk(field, 1, ants=40, q0=0.0, best=(1, 0, 1, 2))
-    assert equal.tolist() == [1, 0, 1, 2]
+def test_the_shortest_walk_of_a_group_is_found_the_first_of_equals():
+    ground = Ground("...")
+    walks = ground.walks(1, ants=40, q0=0.0, seed=1)
+    assert {len(walk) for walk in walks} == {4}
+    assert ground.shortest == 0
+    ground = Ground("...", "...", "...")
+    lengths = [len(walk) for walk in ground.walks(1, ants=40, q0=0.0, seed=1)]
+    assert len(set(lengths)) > 1
+    assert ground.shortest == lengths.index(min(lengths))
+
+
+def test_a_walk_longer_than_its_room_is_cut_but_counted():
+    ground = Ground("....")
+    streams = np.ones((1, 4), np.int64)
+    walks, lengths = np.full((1, 3), -7, np.int32), np.empty(1, np.int64)
+    rules = Rules(1.0, ALPHA, TAU0, True)
+    scratch = scratch_for(ground.graph)
+    walk_ants(ground.graph, ground.trail, rules, scratch, 0, 4, streams, walks, lengths)
+    assert lengths.tolist() == [7]
+    assert walks.tolist() == [[0, 1, 2]]

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.fasaco import CELLS_PER_BATCH, Fasaco
+from fasaco_edge.planners.fasaco import LARGEST_GROUP, Fasaco
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import never
 from fasaco_edge.planners.problem import CoverageProblem
@@ -80,27 +80,44 @@ def test_a_longer_search_is_never_worse():
     assert steps[1] <= steps[0]
 
 
-@pytest.mark.parametrize("batches", [1, 2, 5, 17])
-def test_a_path_stopped_anywhere_is_complete_and_repeats_from_its_work(batches):
+@pytest.mark.parametrize("groups", [1, 2, 5, 15])
+def test_a_path_stopped_anywhere_is_complete_and_repeats_from_its_work(groups):
     problem = CoverageProblem.of(HALL, (3, 5), return_home=True)
     assert problem.cells == 1200
     looks = itertools.count(1)
-    stopped = plan(problem, ants=400, seed=4, stop=lambda ants: next(looks) >= batches)
-    # 400 ants are 50 in each cohort: batches end with their cohort.
-    batch = CELLS_PER_BATCH // 1200
-    expected = [min(first + batch, 50) + 50 * cohort for cohort in range(8)
-                for first in range(0, 50, batch)]  # fmt: skip
-    assert stopped.ants == expected[batches - 1] < 400
+    stopped = plan(problem, ants=400, seed=4, stop=lambda ants: next(looks) >= groups)
+    # 400 ants are 50 in each cohort: groups end with their cohort.
+    group = LARGEST_GROUP
+    expected = [min(first + group, 50) + 50 * cohort for cohort in range(8)
+                for first in range(0, 50, group)]  # fmt: skip
+    assert stopped.ants == expected[groups - 1] < 400
     assert_answers(problem, stopped)
     again = plan(problem, ants=400, seed=4, stop=WorkLimit(stopped.ants))
     assert again.cells.tobytes() == stopped.cells.tobytes()
     assert again.ants == stopped.ants
 
 
+@pytest.mark.parametrize("threads", [2, 3, 7])
+def test_any_number_of_threads_finds_the_same_path(threads):
+    problem = CoverageProblem.of(HALL, (3, 5))
+    config = ColonyConfig(ants=100, seed=3)
+    alone = Fasaco(config).plan(problem)
+    together = Fasaco(config, threads).plan(problem)
+    assert together.cells.tobytes() == alone.cells.tobytes()
+
+
+def test_a_walk_that_needs_more_room_is_walked_again(monkeypatch):
+    problem = CoverageProblem.of(HALL, (3, 5), return_home=True)
+    config = ColonyConfig(ants=40, seed=3)
+    roomy = Fasaco(config).plan(problem)
+    monkeypatch.setattr("fasaco_edge.planners.fasaco.STEPS_PER_CELL", 0)
+    assert Fasaco(config).plan(problem).cells.tobytes() == roomy.cells.tobytes()
+
+
 def test_a_budget_that_is_gone_still_gives_a_whole_walk():
     problem = CoverageProblem.of(HALL, (0, 0))
     path = plan(problem, stop=TimeBudget(0.0))
-    assert 0 < path.ants <= CELLS_PER_BATCH // 1200
+    assert 0 < path.ants <= LARGEST_GROUP
     assert_answers(problem, path)
 
 

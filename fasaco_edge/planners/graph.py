@@ -1,0 +1,49 @@
+"""From a coverage problem to the flat arrays that kernels walk on, and back."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.search import Graph, Scratch
+from fasaco_edge.planners.problem import CoverageProblem
+
+
+def graph_of(problem: CoverageProblem) -> Graph:
+    """Return the problem's lattice and wishes, cells as flat indices ``row * cols + col``."""
+    steps = problem.lattice.steps
+    cols = steps.shape[1]
+    offsets = np.array([1, cols, -1, -cols], np.int64)
+    wanted = problem.to_cover.astype(np.uint8)
+    open_steps = np.zeros(steps.size + 2 * cols, np.uint8)
+    inner = open_steps[cols : cols + steps.size].reshape(steps.shape)
+    beside = np.pad(wanted, 1)
+    ahead = (beside[1:-1, 2:], beside[2:, 1:-1], beside[1:-1, :-2], beside[:-2, 1:-1])
+    for direction, neighbour in enumerate(ahead):
+        inner |= steps & (neighbour << direction)
+    return Graph(steps.ravel(), wanted.ravel(), open_steps, offsets)
+
+
+def scratch_for(graph: Graph) -> Scratch:
+    """Return working memory for one thread."""
+    size = graph.steps.size
+    return Scratch(
+        open_steps=np.empty_like(graph.open_steps),
+        seen=np.zeros(size, np.int32),
+        came_from=np.zeros(size, np.int8),
+        queue=np.empty(size, np.int32),
+        searches=np.zeros(1, np.int32),
+    )
+
+
+def flat_start(problem: CoverageProblem) -> int:
+    """Return the start as a flat index."""
+    row, col = problem.lattice.local(problem.start)
+    return row * problem.lattice.window.cols + col
+
+
+def cells_of(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return a walk of flat indices, int32 (n,), as cells (row, col), int32 (n, 2)."""
+    window = problem.lattice.window
+    rows, cols = np.divmod(walk, window.cols)
+    return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
