@@ -44,6 +44,7 @@ class Fasaco:
 
     config: ColonyConfig = field(default_factory=ColonyConfig)
     threads: int = 1
+    name: str = "fasaco"
 
     def plan(
         self,
@@ -74,7 +75,7 @@ class Fasaco:
 
     def _path(self, problem: CoverageProblem, walk: NDArray[np.int32], ants: int) -> CoveragePath:
         cells = cells_of(problem, walk)
-        return CoveragePath(cells, planner="fasaco", seed=self.config.seed, ants=ants)
+        return CoveragePath(cells, planner=self.name, seed=self.config.seed, ants=ants)
 
 
 class _Colony:

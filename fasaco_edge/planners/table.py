@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.planner import CoveragePlanner
+from fasaco_edge.planners.stc import SpanningTree
+from fasaco_edge.planners.sweeps import spiral_stc, zigzag
 
-PLANNERS: dict[str, Callable[[ColonyConfig], CoveragePlanner]] = {
+# Each is made from the colony's configuration and a number of threads; what has
+# no ants needs neither.
+PLANNERS: dict[str, Callable[[ColonyConfig, int], CoveragePlanner]] = {
     "fasaco": Fasaco,
+    "aco": lambda colony, threads: Fasaco(replace(colony, velocities=(1,)), threads, name="aco"),
+    "stc": lambda colony, threads: SpanningTree(),
+    "spiral-stc": lambda colony, threads: spiral_stc(),
+    "zigzag": lambda colony, threads: zigzag(),
 }
