@@ -29,9 +29,6 @@ Move = tuple[Cell, Cell]
 EAST, NORTH, WEST, SOUTH = (0, 1), (1, 0), (0, -1), (-1, 0)
 DIRECTIONS = (EAST, NORTH, WEST, SOUTH)
 
-# Eq. (5): visibility is 1 for every neighbour, whatever power it is raised to.
-BETA = 2.0
-
 
 class Xoshiro128PlusPlus:
     """Blackman and Vigna's generator, as they publish it, on Python's integers."""
@@ -99,7 +96,7 @@ class Colony:
         uncovered = self.to_cover - {start}
         walk, heading = [start], EAST
         while uncovered:
-            direction = self.choose(walk[-1], heading, uncovered, random)
+            direction = self.choose(walk[-1], heading, velocity, uncovered, random)
             if direction is None:
                 # A dead end is left by the shortest walk to the nearest uncovered cell.
                 way = self.shortest(walk[-1], uncovered)
@@ -120,7 +117,12 @@ class Colony:
         return walk
 
     def choose(
-        self, here: Cell, heading: Cell, uncovered: set[Cell], random: Xoshiro128PlusPlus
+        self,
+        here: Cell,
+        heading: Cell,
+        velocity: int,
+        uncovered: set[Cell],
+        random: Xoshiro128PlusPlus,
     ) -> Cell | None:
         """Equation (4): the strongest trail, or a draw from equation (6); None at a dead end."""
         straight_on = DIRECTIONS.index(heading)
@@ -128,8 +130,8 @@ class Colony:
         for direction in DIRECTIONS[straight_on:] + DIRECTIONS[:straight_on]:
             there = self.around[here].get(direction)
             if there in uncovered:
-                eta = 1.0 / (abs(there[0] - here[0]) + abs(there[1] - here[1]))  # Eq. (5)
-                attraction[direction] = self.trail[here, there] * eta**BETA
+                eta = 1.0 / self.distance(there, direction, velocity, uncovered)  # Eq. (5)
+                attraction[direction] = self.trail[here, there] * eta**self.config.beta
         if not attraction:
             return None
         strongest = max(attraction, key=lambda direction: attraction[direction])
@@ -144,6 +146,16 @@ class Colony:
             if left < 0:
                 return direction
         return direction
+
+    def distance(self, there: Cell, direction: Cell, velocity: int, uncovered: set[Cell]) -> int:
+        """What visibility is 1 over."""
+        if self.config.visibility == "fewest-open":
+            return 1 + len(uncovered & set(self.around[there].values()))
+        run = 1
+        if self.config.visibility == "distance":
+            while run < velocity and self.around[there].get(direction) in uncovered:
+                there, run = self.around[there][direction], run + 1
+        return run
 
     def shortest(self, here: Cell, goals: set[Cell]) -> list[Cell]:
         """Return the shortest walk to the first of ``goals`` that a breadth-first search meets."""
@@ -372,3 +384,40 @@ def _segments_cross(a: complex, b: complex, c: complex, d: complex) -> bool:
         _cross(b - a, c - a) * _cross(b - a, d - a) < 0
         and _cross(d - c, a - c) * _cross(d - c, b - c) < 0
     )
+
+
+# Directions in the order they are tried, and whether they count from the heading.
+SPIRAL = ((SOUTH, EAST, NORTH, WEST), True)
+ZIGZAG = ((WEST, EAST, SOUTH, NORTH), False)
+
+
+def sweep(
+    steps: NDArray[np.uint8],
+    to_cover: NDArray[np.bool_],
+    start: Cell,
+    rule: tuple[tuple[Cell, ...], bool],
+    *,
+    return_home: bool = False,
+) -> list[Cell]:
+    """Take the first open neighbour in the rule's order, else go to the nearest open cell."""
+    order, from_heading = rule
+    around = neighbours(steps)
+    uncovered = {(int(row), int(col)) for row, col in np.argwhere(to_cover)} - {start}
+    searcher = Colony(around, uncovered, ColonyConfig(), return_home, {})
+    walk, heading = [start], EAST
+    while uncovered:
+        tried = [_turned(direction, heading) for direction in order] if from_heading else order
+        beside = [around[walk[-1]].get(direction) for direction in tried]
+        first = next((cell for cell in beside if cell in uncovered), None)
+        walk += [first] if first else searcher.shortest(walk[-1], uncovered)[1:]
+        heading = _difference(walk[-2], walk[-1])
+        uncovered.discard(walk[-1])
+    if return_home and walk[-1] != start:
+        walk += searcher.shortest(walk[-1], {start})[1:]
+    return walk
+
+
+def _turned(direction: Cell, heading: Cell) -> Cell:
+    """Return ``direction`` as seen by who heads east, in the map's frame."""
+    quarters = DIRECTIONS.index(direction) + DIRECTIONS.index(heading)
+    return DIRECTIONS[quarters % 4]

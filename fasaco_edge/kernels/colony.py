@@ -5,8 +5,8 @@ Mobile Robot Coverage Path Planning", 2022.
 
 ===========  ==========================================  ======================
 Eq. (4)      pseudo-random proportional rule             ``_choose``
-Eq. (5)      visibility; 1 for every neighbour, so       left out
-             ``eta ** beta`` drops out
+Eq. (5)      visibility; 1 for every neighbour, so       ``_visibility``
+             ``eta ** beta`` drops out unless asked for
 Eq. (6)      probability of the other branch of (4)      ``_choose``
 Eq. (7)      local update, after every move              ``settle``
 Eq. (8)      global update along the best walk           ``deposit``
@@ -34,14 +34,28 @@ from fasaco_edge.kernels.search import Graph, Scratch, append_way, begin, close,
 
 WORD = 0xFFFFFFFF
 
+# What eta of equation (5) is 1 over: the distance to a neighbour, which is 1; the
+# distance an ant of this velocity will go; one more than the cells still open
+# beside the neighbour (Warnsdorff's rule: visit first what will soon be cut off).
+NEIGHBOUR, DISTANCE, FEWEST_OPEN = 0, 1, 2
+
 
 class Rules(NamedTuple):
-    """Constants of equations (4) to (8): q0, alpha and tau0; and the end of the walk."""
+    """Constants of equations (4) to (8), and the end of the walk.
+
+    Attributes:
+        q0, alpha, tau0: as in the equations.
+        return_home: whether the walk ends at its start.
+        visibility: NEIGHBOUR, DISTANCE or FEWEST_OPEN.
+        powers: float64, ``(1 / (i + 1)) ** beta`` at index i, as far as it is needed.
+    """
 
     q0: float
     alpha: float
     tau0: float
     return_home: bool
+    visibility: int
+    powers: NDArray[np.float64]
 
 
 @kernel
@@ -63,22 +77,56 @@ def _draw(state: NDArray[np.int64]) -> float:
 
 
 @kernel
+def _visibility(
+    graph: Graph, rules: Rules, scratch: Scratch, here: int, direction: int, velocity: int
+) -> float:
+    """Return eta ** beta of equation (5) for the open neighbour in a direction."""
+    after = here + graph.offsets[direction]
+    if rules.visibility == FEWEST_OPEN:
+        mask = open_steps_of(graph, scratch, after)
+        count = (mask & 1) + (mask >> 1 & 1) + (mask >> 2 & 1) + (mask >> 3)
+        return float(rules.powers[count])
+    run = 1
+    while run < velocity and open_steps_of(graph, scratch, after) >> direction & 1:
+        after += graph.offsets[direction]
+        run += 1
+    return float(rules.powers[run - 1])
+
+
+@kernel
+def _weigh(
+    graph: Graph,
+    trail: NDArray[np.float64],
+    rules: Rules,
+    scratch: Scratch,
+    here: int,
+    velocity: int,
+) -> None:
+    """Fill ``scratch.weights`` with tau * eta ** beta of the open neighbours."""
+    mask = open_steps_of(graph, scratch, here)
+    for direction in range(4):
+        if mask >> direction & 1:
+            seen = _visibility(graph, rules, scratch, here, direction, velocity)
+            scratch.weights[0, direction] = trail[here, direction] * seen
+
+
+@kernel
 def _choose(
     mask: int,
-    trail: NDArray[np.float64],
-    here: int,
+    weights: NDArray[np.float64],
+    row: int,
     heading: int,
     q0: float,
     random: NDArray[np.int64],
 ) -> int:
-    """Return the direction of the next move by equation (4); ``mask`` holds the open ones."""
-    total, best, best_value = 0.0, heading, 0.0
+    """Return a direction in ``mask`` by equation (4), from the weights in ``weights[row]``."""
+    total, best, best_weight = 0.0, heading, 0.0
     for turn in range(4):
         direction = (heading + turn) & 3
-        value = trail[here, direction] * (mask >> direction & 1)
-        total += value
-        if value > best_value:
-            best, best_value = direction, value
+        weight = weights[row, direction] * (mask >> direction & 1)
+        total += weight
+        if weight > best_weight:
+            best, best_weight = direction, weight
     if mask & (mask - 1) == 0 or _draw(random) <= q0:
         return best
     # Eq. (6)
@@ -87,7 +135,7 @@ def _choose(
         direction = (heading + turn) & 3
         if mask >> direction & 1:
             best = direction
-            left -= trail[here, direction]
+            left -= weights[row, direction]
             if left < 0.0:
                 break
     return best
@@ -117,7 +165,11 @@ def _walk_one(
             close(graph, scratch, here)
             remaining -= 1
             continue
-        heading = _choose(mask, trail, here, heading, rules.q0, random)
+        if rules.visibility == NEIGHBOUR:
+            heading = _choose(mask, trail, here, heading, rules.q0, random)
+        else:
+            _weigh(graph, trail, rules, scratch, here, velocity)
+            heading = _choose(mask, scratch.weights, 0, heading, rules.q0, random)
         # A cohort of velocity v keeps straight on for up to v cells.
         for _ in range(velocity):
             here += graph.offsets[heading]

@@ -42,6 +42,7 @@ class Scratch(NamedTuple):
         came_from: int8 (n,), direction by which it was reached.
         queue: int32 (n,).
         searches: int32 (1,), how many searches there were.
+        weights: float64 (1, 4), how much each direction attracts.
     """
 
     open_steps: NDArray[np.uint8]
@@ -49,6 +50,7 @@ class Scratch(NamedTuple):
     came_from: NDArray[np.int8]
     queue: NDArray[np.int32]
     searches: NDArray[np.int32]
+    weights: NDArray[np.float64]
 
 
 @kernel

@@ -179,13 +179,13 @@ def _circuit(blocks: Blocks, row: int, col: int) -> NDArray[np.int32]:
     stack = np.empty(length + 1, np.int64)
     heading = np.empty(length + 1, np.int64)
     circuit = np.empty((length + 1, 2), np.int32)
-    stack[0], heading[0] = row * cols + col, NORTH
+    stack[0], heading[0] = row * cols + col, EAST
     depth, done = 1, 0
     while depth:
         here_row, here_col = stack[depth - 1] // cols, stack[depth - 1] % cols
         moved = False
-        # To the right first: once around the tree, clockwise.
-        for turn in (3, 0, 1, 2):
+        # To the left first: clockwise around the tree, where there is a choice.
+        for turn in (1, 0, 3, 2):
             direction = (heading[depth - 1] + turn) & 3
             if _has_step(blocks, here_row, here_col, direction) and _times(
                 blocks, here_row, here_col, direction

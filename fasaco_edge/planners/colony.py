@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from fasaco_edge.errors import BadConfiguration
 
+VISIBILITIES = ("neighbour", "distance", "fewest-open")
+
 
 @dataclass(frozen=True, slots=True)
 class Cohort:
@@ -26,6 +28,10 @@ class ColonyConfig:
         alpha: weight of new pheromone, equations (7) and (8).
         tau0: pheromone every move starts with, equation (7).
         seed: seed of all random streams.
+        visibility: what eta of equation (5) is 1 over: the distance to the "neighbour",
+            which is 1, as in the paper; the "distance" an ant goes at its velocity; or
+            one more than the neighbour's own open neighbours, "fewest-open".
+        beta: weight of eta, equations (4) and (6); without effect for "neighbour".
     """
 
     ants: int = 1000
@@ -34,6 +40,8 @@ class ColonyConfig:
     alpha: float = 0.1
     tau0: float = 0.1
     seed: int = 0
+    visibility: str = "neighbour"
+    beta: float = 2.0
 
     def __post_init__(self) -> None:
         _require(bool(self.velocities), "velocities", "name at least one", self.velocities)
@@ -47,7 +55,12 @@ class ColonyConfig:
         )
         _require(0.0 <= self.q0 <= 1.0, "q0", "be in [0, 1]", self.q0)
         _require(0.0 < self.alpha <= 1.0, "alpha", "be in (0, 1]", self.alpha)
-        _require(0.0 < self.tau0 <= 1e6, "tau0", "be in (0, 1e6]", self.tau0)
+        _require(1e-12 <= self.tau0 <= 1e6, "tau0", "be in [1e-12, 1e6]", self.tau0)
+        names = ", ".join(VISIBILITIES)
+        _require(
+            self.visibility in VISIBILITIES, "visibility", f"be one of {names}", self.visibility
+        )
+        _require(0.0 <= self.beta <= 10.0, "beta", "be in [0, 10]", self.beta)
         _require(0 <= self.seed < 2**63, "seed", "be in 0..2^63 - 1", self.seed)
 
     def cohorts(self) -> tuple[Cohort, ...]:

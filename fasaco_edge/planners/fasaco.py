@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.colony import Rules, deposit, settle, walk_ants
 from fasaco_edge.kernels.search import Graph
-from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.graph import cells_of, flat_start, graph_of, scratch_for
 from fasaco_edge.planners.observation import ColonySnapshot, Observer
 from fasaco_edge.planners.path import CoveragePath
@@ -93,7 +93,7 @@ class _Colony:
         self.trail = np.full((graph.steps.size, 4), config.tau0)
         self.best = np.empty(0, np.int32)
         self._graph = graph
-        self._rules = Rules(config.q0, config.alpha, config.tau0, problem.return_home)
+        self._rules = _rules(config, problem.return_home)
         self._start = flat_start(problem)
         self._pool = pool
         self._scratches = [scratch_for(graph) for _ in range(threads)]
@@ -136,6 +136,14 @@ class _Colony:
         share(0)
         for other in others:
             other.result()
+
+
+def _rules(config: ColonyConfig, return_home: bool) -> Rules:
+    # An ant goes as far as it is fast; a cell has three open neighbours at most.
+    reach = max(*config.velocities, 4)
+    powers = np.array([(1.0 / (index + 1)) ** config.beta for index in range(reach)])
+    visibility = VISIBILITIES.index(config.visibility)
+    return Rules(config.q0, config.alpha, config.tau0, return_home, visibility, powers)
 
 
 def _streams(seed: int, cohort: int, ants: int) -> NDArray[np.int64]:

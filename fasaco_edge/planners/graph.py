@@ -33,6 +33,7 @@ def scratch_for(graph: Graph) -> Scratch:
         came_from=np.zeros(size, np.int8),
         queue=np.empty(size, np.int32),
         searches=np.zeros(1, np.int32),
+        weights=np.zeros((1, 4)),
     )
 
 

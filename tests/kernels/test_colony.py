@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fasaco_edge.kernels.colony import Rules, deposit, settle, walk_ants
+from fasaco_edge.kernels.colony import NEIGHBOUR, Rules, deposit, settle, walk_ants
 from fasaco_edge.planners.graph import graph_of, scratch_for
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.planners.grids import lattice
@@ -27,7 +27,7 @@ class Ground:
             words = np.random.SeedSequence(seed).generate_state(4 * ants)
             streams = words.astype(np.int64).reshape(ants, 4)
         walks, lengths = np.empty((ants, 64), np.int32), np.empty(ants, np.int64)
-        rules = Rules(q0, ALPHA, TAU0, return_home)
+        rules = Rules(q0, ALPHA, TAU0, return_home, NEIGHBOUR, np.ones(4))
         walk_ants(
             self.graph,
             self.trail,
@@ -122,7 +122,7 @@ def test_a_walk_longer_than_its_room_is_cut_but_counted():
     ground = Ground("....")
     streams = np.ones((1, 4), np.int64)
     walks, lengths = np.full((1, 3), -7, np.int32), np.empty(1, np.int64)
-    rules = Rules(1.0, ALPHA, TAU0, True)
+    rules = Rules(1.0, ALPHA, TAU0, True, NEIGHBOUR, np.ones(4))
     scratch = scratch_for(ground.graph)
     walk_ants(ground.graph, ground.trail, rules, scratch, 0, 4, streams, walks, lengths)
     assert lengths.tolist() == [7]

@@ -91,7 +91,7 @@ def test_warm_up_names_each_stage_once():
 def test_every_planner_of_the_table_plans():
     problem = CoverageProblem.of(GROUND, (-2, 6))
     for name, make in PLANNERS.items():
-        path = make(ColonyConfig(ants=8)).plan(problem, never, ignore)
+        path = make(ColonyConfig(ants=8), 1).plan(problem, never, ignore)
         assert path.planner == name
         walk = [tuple(cell) for cell in path.cells.tolist()]
         assert walk[0] == (-2, 6)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.problem import CoverageProblem
 from tests import naive
@@ -40,9 +40,18 @@ def test_twin_walks_the_same_in_rooms(room, velocities, return_home):
     assert_same_walk(problem, ColonyConfig(ants=17, velocities=velocities, seed=7))
 
 
+@pytest.mark.parametrize("visibility", VISIBILITIES)
+@pytest.mark.parametrize("room", ROOMS)
+def test_twin_walks_the_same_in_several_groups(room, visibility):
+    lattice, start = ROOMS[room]
+    config = ColonyConfig(ants=150, velocities=(3, 1), seed=5, visibility=visibility, beta=1.7)
+    assert_same_walk(CoverageProblem.of(lattice, start), config)
+
+
 @settings(max_examples=200, deadline=None)
 @given(
     ground=problems(),
+    visibility=st.sampled_from(VISIBILITIES),
     velocities=st.sampled_from(list(VELOCITIES.values())),
     return_home=st.booleans(),
     q0=st.sampled_from((0.0, 0.3, 0.7, 1.0)),
@@ -52,13 +61,13 @@ def test_twin_walks_the_same_in_rooms(room, velocities, return_home):
     covered=st.floats(0, 0.6),
 )
 def test_twin_walks_the_same_anywhere(
-    ground, velocities, return_home, q0, alpha, tau0, seed, covered
+    ground, visibility, velocities, return_home, q0, alpha, tau0, seed, covered
 ):
     lattice, start = ground
     done = np.random.default_rng(seed).random(lattice.states.shape) < covered
     done[lattice.local(start)] = False
     problem = CoverageProblem.of(lattice, start, covered=done, return_home=return_home)
-    config = ColonyConfig(24, velocities, q0, alpha, tau0, seed)
+    config = ColonyConfig(24, velocities, q0, alpha, tau0, seed, visibility)
     assert_same_walk(problem, config)
 
 

@@ -1,0 +1,150 @@
+"""The paper's planners beside FaSACO: what each promises, and what its authors measured."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.path import walk_figures
+from fasaco_edge.planners.planner import ignore, never
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.stc import SpanningTree
+from fasaco_edge.planners.sweeps import spiral_stc, zigzag
+from fasaco_edge.planners.table import PLANNERS
+from tests import naive
+from tests.planners.grids import ROOMS, lattice, problems, reference
+
+
+def assert_answers(problem, path):
+    """The walk begins at the start, makes legal steps only and visits all it is asked to."""
+    ground = problem.lattice
+    walk = [ground.local(cell) for cell in path.cells.tolist()]
+    around = naive.neighbours(ground.steps)
+    assert walk[0] == ground.local(problem.start)
+    assert all(there in around[here].values() for here, there in itertools.pairwise(walk))
+    assert {(int(r), int(c)) for r, c in np.argwhere(problem.to_cover)} <= set(walk)
+    if problem.return_home:
+        assert walk[-1] == walk[0]
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+@settings(max_examples=1000, deadline=None)
+@given(
+    ground=problems(),
+    return_home=st.booleans(),
+    covered=st.floats(0, 0.6),
+    seed=st.integers(0, 1000),
+)
+def test_every_planner_covers_all_that_can_be_reached(name, ground, return_home, covered, seed):
+    lattice, start = ground
+    done = np.random.default_rng(seed).random(lattice.states.shape) < covered
+    done[lattice.local(start)] = False
+    problem = CoverageProblem.of(lattice, start, covered=done, return_home=return_home)
+    planner = PLANNERS[name](ColonyConfig(ants=8, seed=seed), 1)
+    path = planner.plan(problem, never, ignore)
+    assert path.planner == name
+    assert_answers(problem, path)
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_aco_is_fasaco_with_one_cohort_of_velocity_1_bit_for_bit(room):
+    ground, start = ROOMS[room]
+    problem = CoverageProblem.of(ground, start)
+    aco = PLANNERS["aco"](ColonyConfig(ants=40, seed=6), 1).plan(problem, never, ignore)
+    fasaco = Fasaco(ColonyConfig(ants=40, velocities=(1,), seed=6)).plan(problem)
+    assert aco.cells.tobytes() == fasaco.cells.tobytes()
+    assert (aco.planner, fasaco.planner) == ("aco", "fasaco")
+
+
+@pytest.mark.parametrize(("planner", "rule"), [
+    (spiral_stc(), naive.SPIRAL), (zigzag(), naive.ZIGZAG),
+], ids=["spiral-stc", "zigzag"])  # fmt: skip
+@settings(max_examples=200, deadline=None)
+@given(ground=problems(), return_home=st.booleans())
+def test_twin_sweeps_the_same_anywhere(planner, rule, ground, return_home):
+    lattice, start = ground
+    problem = CoverageProblem.of(lattice, start, return_home=return_home)
+    walk = naive.sweep(
+        lattice.steps, problem.to_cover, lattice.local(start), rule, return_home=return_home
+    )
+    window = lattice.window
+    expected = [[row + window.row0, col + window.col0] for row, col in walk]
+    assert planner.plan(problem).cells.tolist() == expected
+
+
+@settings(max_examples=300, deadline=None)
+@given(blocks=st.lists(st.lists(st.booleans(), min_size=4, max_size=4), min_size=1, max_size=5))
+def test_stc_visits_every_cell_once_where_all_blocks_are_whole(blocks):
+    """Gabriely and Rimon's theorem: a Hamiltonian cycle."""
+    whole = np.kron(np.array(blocks), np.ones((2, 2), bool)).astype(bool)
+    if not whole.any():
+        return
+    ground = CoverageLattice.from_free(whole)
+    start = tuple(np.argwhere(whole)[0].tolist())
+    problem = CoverageProblem.of(ground, start, return_home=True)
+    path = SpanningTree().plan(problem)
+    assert path.steps == problem.cells
+
+
+@settings(max_examples=300, deadline=None)
+@given(ground=problems())
+def test_stc_is_no_longer_than_its_bound(ground):
+    """Twice around any tree at most: 2 (k - 1) steps in a node of k cells, 2 for each join."""
+    lattice, start = ground
+    problem = CoverageProblem.of(lattice, start, return_home=True)
+    path = SpanningTree().plan(problem)
+    assert path.steps <= 2 * (problem.cells - 1)
+
+
+def test_stc_goes_clockwise_around_its_tree():
+    problem = CoverageProblem.of(lattice("....", "...."), (0, 0), return_home=True)
+    walk = SpanningTree().plan(problem).cells.tolist()
+    assert walk == [[0, 0], [1, 0], [1, 1], [1, 2], [1, 3], [0, 3], [0, 2], [0, 1], [0, 0]]
+
+
+def test_stc_ends_an_open_walk_with_the_last_cell_that_wants_a_visit():
+    ground = lattice("....", "....")
+    covered = np.zeros((2, 4), bool)
+    covered[0, 1:] = True
+    problem = CoverageProblem.of(ground, (0, 0), covered=covered)
+    path = SpanningTree().plan(problem)
+    assert path.cells[-1].tolist() == [1, 3]
+
+
+@pytest.mark.parametrize(
+    ("name", "planner", "most"),
+    [
+        # What the authors' code drives, start to start; see bench/RESULTS.md.
+        ("paper_simulated", "spiral-stc", 80),
+        ("paper_basement", "spiral-stc", 249),
+        ("paper_simulated", "zigzag", 84),
+        ("paper_basement", "zigzag", 271),
+    ],
+)
+def test_baselines_are_no_worse_than_the_authors_own(name, planner, most):
+    found = reference(name)
+    if found is None:
+        pytest.skip("the paper's grids are not at hand")
+    ground, start = found
+    problem = CoverageProblem.of(ground, start, return_home=True)
+    path = PLANNERS[planner](ColonyConfig(), 1).plan(problem, never, ignore)
+    assert walk_figures(ground, path.cells).revisits <= most
+
+
+def test_ants_that_see_open_neighbours_revisit_less():
+    """Why the option exists; the paper's own ants see 1 everywhere."""
+    hall = CoverageLattice.from_free(np.kron(np.ones((6, 6)), [[1, 1, 1], [1, 0, 1]]).astype(bool))
+    problem = CoverageProblem.of(hall, (0, 0))
+    plain, seeing = (
+        np.median([
+            Fasaco(ColonyConfig(ants=64, seed=seed, visibility=visibility)).plan(problem).steps
+            for seed in range(5)
+        ])
+        for visibility in ("neighbour", "fewest-open")
+    )  # fmt: skip
+    assert seeing < plain
