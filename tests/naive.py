@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections import deque
+from collections import Counter, deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -421,3 +421,97 @@ def _turned(direction: Cell, heading: Cell) -> Cell:
     """Return ``direction`` as seen by who heads east, in the map's frame."""
     quarters = DIRECTIONS.index(direction) + DIRECTIONS.index(heading)
     return DIRECTIONS[quarters % 4]
+
+
+def stc(steps: NDArray[np.uint8], ground: NDArray[np.bool_], start: Cell) -> list[Cell]:
+    """Spanning-tree coverage: a closed walk around a tree of 2 x 2 blocks, or parts of them."""
+    inside = {(int(row), int(col)) for row, col in np.argwhere(ground)}
+    around = {
+        cell: {way: after for way, after in ways.items() if after in inside}
+        for cell, ways in neighbours(steps).items()
+        if cell in inside
+    }
+    walked: Counter[frozenset[Cell]] = Counter()
+    node: dict[Cell, frozenset[Cell]] = {}
+    for cell in sorted(inside):
+        if cell not in node:
+            part = _part_of_block(around, cell, walked)
+            node.update(dict.fromkeys(part, part))
+    stack, reached = [node[start]], {node[start]}
+    while stack:
+        leaving = (
+            (cell, way)
+            for way in DIRECTIONS
+            for cell in sorted(stack[-1])
+            if way in around[cell] and node[around[cell][way]] not in reached
+        )
+        cell, way = next(leaving, (None, None))
+        if cell is None:
+            stack.pop()
+            continue
+        _join(around, walked, cell, way)
+        stack.append(node[around[cell][way]])
+        reached.add(stack[-1])
+    return _circuit(around, walked, start)
+
+
+def _part_of_block(
+    around: dict[Cell, dict[Cell, Cell]], cell: Cell, walked: Counter[frozenset[Cell]]
+) -> frozenset[Cell]:
+    """Return the part of its 2 x 2 block that hangs together with ``cell``; walk around it."""
+    block = {(row, col) for row in _pair(cell[0]) for col in _pair(cell[1])}
+    part, tree = [cell], []
+    for here in part:
+        row_first = sorted(set(around[here].values()) & block, key=lambda to: abs(to[0] - here[0]))
+        for after in row_first:
+            if after not in part:
+                part.append(after)
+                tree.append(frozenset((here, after)))
+    sides = {frozenset((here, after)) for here in part for after in around[here].values()}
+    inner = [side for side in sides if side <= block]
+    walked.update(inner if len(inner) == 4 else tree * 2)
+    return frozenset(part)
+
+
+def _pair(index: int) -> tuple[int, int]:
+    return index // 2 * 2, index // 2 * 2 + 1
+
+
+def _join(
+    around: dict[Cell, dict[Cell, Cell]], walked: Counter[frozenset[Cell]], cell: Cell, way: Cell
+) -> None:
+    """Make one closed walk of two: side by side at no cost, else there and back."""
+    after = around[cell][way]
+    across = frozenset((cell, after))
+    for beside in around[cell].values():
+        opposite = beside[0] + way[0], beside[1] + way[1]
+        if beside[0] // 2 != cell[0] // 2 or beside[1] // 2 != cell[1] // 2:
+            continue
+        if _difference(cell, beside) in (way, (-way[0], -way[1])):
+            continue
+        near, far = frozenset((cell, beside)), frozenset((after, opposite))
+        parallel = opposite in around[beside].values() and opposite in around[after].values()
+        if parallel and walked[near] and walked[far]:
+            walked.subtract((near, far))
+            walked.update((across, frozenset((beside, opposite))))
+            return
+    walked[across] += 2
+
+
+def _circuit(
+    around: dict[Cell, dict[Cell, Cell]], walked: Counter[frozenset[Cell]], start: Cell
+) -> list[Cell]:
+    """Walk every step as often as it is counted: Hierholzer, the leftmost first."""
+    stack, circuit = [(start, EAST)], []
+    while stack:
+        here, heading = stack[-1]
+        for turn in (NORTH, EAST, SOUTH, WEST):
+            way = _turned(turn, heading)
+            step = frozenset((here, around[here].get(way, here)))
+            if walked[step] > 0:
+                walked[step] -= 1
+                stack.append((around[here][way], way))
+                break
+        else:
+            circuit.append(stack.pop()[0])
+    return circuit[::-1]

@@ -78,6 +78,17 @@ def test_twin_sweeps_the_same_anywhere(planner, rule, ground, return_home):
 
 
 @settings(max_examples=300, deadline=None)
+@given(ground=problems())
+def test_twin_goes_around_the_same_tree(ground):
+    lattice, start = ground
+    problem = CoverageProblem.of(lattice, start, return_home=True)
+    walk = naive.stc(lattice.steps, problem.to_cover, lattice.local(start))
+    window = lattice.window
+    expected = [[row + window.row0, col + window.col0] for row, col in walk]
+    assert SpanningTree().plan(problem).cells.tolist() == expected
+
+
+@settings(max_examples=300, deadline=None)
 @given(blocks=st.lists(st.lists(st.booleans(), min_size=4, max_size=4), min_size=1, max_size=5))
 def test_stc_visits_every_cell_once_where_all_blocks_are_whole(blocks):
     """Gabriely and Rimon's theorem: a Hamiltonian cycle."""
