@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 Sample = TypeVar("Sample")
@@ -49,6 +50,15 @@ class Goal:
 
 
 @dataclass(frozen=True, slots=True)
+class ResultTable:
+    """A title, the columns' names, and rows of as many cells as there are columns."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Report:
     """What came out, for people and for machines.
 
@@ -59,6 +69,7 @@ class Report:
         figures: the same, and more, as JSON values.
         goals: what it is judged by.
         remarks: sentences below the table.
+        further: tables after the first.
     """
 
     title: str
@@ -67,6 +78,17 @@ class Report:
     figures: dict[str, Any]
     goals: tuple[Goal, ...] = ()
     remarks: tuple[str, ...] = ()
+    further: tuple[ResultTable, ...] = ()
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """All tables, in order."""
+        return (ResultTable(self.title, self.header, self.rows), *self.further)
+
+
+def write_nothing(args: argparse.Namespace, samples: Sequence[Any]) -> tuple[Path, ...]:
+    """Leave no files behind."""
+    return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +104,7 @@ class Benchmark(Generic[Sample]):
         measure: yields samples; what it opened it closes, also when it is closed early.
         report: sums up the samples there are, even none.
         epilog: examples.
+        write: writes the files that the options ask for, and names them.
     """
 
     name: str
@@ -92,6 +115,7 @@ class Benchmark(Generic[Sample]):
     measure: Callable[[argparse.Namespace, Say], Generator[Sample, None, None]]
     report: Callable[[argparse.Namespace, Sequence[Sample]], Report]
     epilog: str = field(default="")
+    write: Callable[[argparse.Namespace, Sequence[Sample]], tuple[Path, ...]] = write_nothing
 
 
 def positive(text: str) -> int:

@@ -52,7 +52,9 @@ class Sheet:
         lines: caption, small.
         key: symbols and their meaning.
         bar: labels at the beginning and the end of the colour bar.
-        scale: pixels per metre of the plot.
+        scale: pixels per unit of the plot.
+        framed: whether a line goes around the plot.
+        unit: what the scale bar counts.
     """
 
     title: str
@@ -60,6 +62,8 @@ class Sheet:
     key: Sequence[KeyEntry]
     bar: tuple[str, str]
     scale: float
+    framed: bool = True
+    unit: str = "m"
 
     def around(self, plot: Image.Image) -> Image.Image:
         """Return the finished picture, RGB, with ``plot`` in its middle."""
@@ -84,7 +88,8 @@ class Sheet:
             y += LINE_PX
         x, y = MARGIN + (inner - plot.width) // 2, MARGIN + head
         sheet.paste(plot, (x, y))
-        draw.rectangle((x - 1, y - 1, x + plot.width, y + plot.height), outline=palette.RULE)
+        if self.framed:
+            draw.rectangle((x - 1, y - 1, x + plot.width, y + plot.height), outline=palette.RULE)
         y += plot.height + 18
         self._scale_bar(draw, MARGIN, y, plot.width)
         self._colour_bar(sheet, draw, MARGIN + inner, y)
@@ -97,15 +102,17 @@ class Sheet:
         return sheet
 
     def _scale_bar(self, draw: ImageDraw.ImageDraw, x: int, y: int, plot_width: int) -> None:
-        metres = _round_length(min(plot_width, 4 * BAR_PX[0]) / 4 / self.scale)
-        right = x + round(metres * self.scale)
+        length = _round_length(min(plot_width, 4 * BAR_PX[0]) / 4 / self.scale)
+        right = x + round(length * self.scale)
         for left_end, upper, right_end, lower in (
             (x, y + 4, right, y + 5),
             (x, y, x + 1, y + 9),
             (right - 1, y, right, y + 9),
         ):
             draw.rectangle((left_end, upper, right_end, lower), palette.INK)
-        draw.text((right + 10, y + 5), f"{metres:g} m", palette.INK, _font(TEXT_PX), anchor="lm")
+        draw.text(
+            (right + 10, y + 5), f"{length:g} {self.unit}", palette.INK, _font(TEXT_PX), anchor="lm"
+        )
 
     def _colour_bar(
         self, sheet: Image.Image, draw: ImageDraw.ImageDraw, right: int, y: int
@@ -118,6 +125,18 @@ class Sheet:
         colours = palette.gradient(np.linspace(0, 1, width))
         sheet.paste(Image.fromarray(np.tile(colours, (height, 1, 1))), (end - width, y))
         draw.text((end - width - 10, y + 5), before, palette.INK, font, anchor="rm")
+
+
+def headed(plot: Image.Image, label: str, caption: str) -> Image.Image:
+    """Return ``plot``, RGB, with a label and a caption over it: one of several on a sheet."""
+    lines = [(line, palette.INK) for line in _wrapped([label], TEXT_PX, plot.width)]
+    lines += [(line, palette.FAINT_INK) for line in _wrapped([caption], TEXT_PX, plot.width)]
+    panel = Image.new("RGB", (plot.width, plot.height + len(lines) * LINE_PX), palette.PAPER)
+    draw = ImageDraw.Draw(panel)
+    for row, (line, colour) in enumerate(lines):
+        draw.text((0, row * LINE_PX), line, colour, _font(TEXT_PX))
+    panel.paste(plot, (0, panel.height - plot.height))
+    return panel
 
 
 @functools.cache
@@ -186,7 +205,7 @@ def _symbol(entry: KeyEntry) -> Image.Image:
     return image.reduce(OVERSAMPLING)
 
 
-def _round_length(metres: float) -> float:
-    """Return the largest of 1, 2, 5, 10, 20, ... (and 0.5, 0.2, ...) not above ``metres``."""
-    power = 10.0 ** math.floor(math.log10(metres))
-    return power * max(step for step in (1, 2, 5) if step * power <= metres * (1 + 1e-9))
+def _round_length(most: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20, ... (and 0.5, 0.2, ...) not above ``most``."""
+    power = 10.0 ** math.floor(math.log10(most))
+    return power * max(step for step in (1, 2, 5) if step * power <= most * (1 + 1e-9))

@@ -42,12 +42,24 @@ class View:
     oversampling: int
 
     @classmethod
-    def over(cls, bounds: Bounds, cell_m: float) -> View:
-        """Return a view of ``bounds`` (x0, y0, x1, y1) [m], with a margin around."""
+    def over(
+        cls,
+        bounds: Bounds,
+        cell_m: float,
+        widest: int = MAX_WIDTH,
+        highest: int = MAX_HEIGHT,
+    ) -> View:
+        """Return a view of ``bounds`` (x0, y0, x1, y1) [m], with a margin around.
+
+        Args:
+            bounds: what to show.
+            cell_m: edge of a cell [m], the width of the margin.
+            widest, highest: the most room there is [px].
+        """
         margin = MARGIN_CELLS * cell_m
         x0, y0, x1, y1 = bounds
         wide, high = x1 - x0 + 2 * margin, y1 - y0 + 2 * margin
-        scale = min(MAX_CELL / cell_m, MAX_WIDTH / wide, MAX_HEIGHT / high)
+        scale = min(MAX_CELL / cell_m, widest / wide, highest / high)
         width, height = max(round(wide * scale), 1), max(round(high * scale), 1)
         oversampling = FINE if width * height <= FINE_UP_TO else COARSE
         return cls(x0 - margin, y1 + margin, scale, width, height, oversampling)
@@ -73,6 +85,13 @@ def bounds_of(
     x0, y0 = everything.min(axis=0)
     x1, y1 = everything.max(axis=0)
     return float(x0), float(y0), float(x1), float(y1)
+
+
+def bounds_around(centres: NDArray[np.float64], cell_m: float) -> Bounds:
+    """Return the bounds [m] of cells, n >= 1, by their centres, float64 (n, 2)."""
+    x0, y0 = (centres.min(axis=0) - cell_m / 2).tolist()
+    x1, y1 = (centres.max(axis=0) + cell_m / 2).tolist()
+    return x0, y0, x1, y1
 
 
 def _known_corners(source: OccupancyGrid | CoverageLattice) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from PIL import Image
 
 from fasaco_edge.drawing.lanes import arrow_places, directions, lanes
 from fasaco_edge.drawing.plot import Plot
-from fasaco_edge.drawing.sheet import Sheet
+from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.drawing.view import View, bounds_of
 from fasaco_edge.drawing.visits import draw_visits
 from fasaco_edge.grid.lattice import CoverageLattice
@@ -47,12 +47,20 @@ def draw_walk(
     centres = lattice.centres(cells)
     plot = Plot(View.over(bounds_of(grid, lattice, centres), lattice.cell_m))
     plot.ground(lattice if grid is None else grid)
-    key = draw_visits(plot, lattice, _visits(lattice, cells), tuple(cells[0].tolist()))
-    _draw_line(plot, centres, lattice.cell_m)
-    plot.end_mark(centres[-1])
-    plot.start_mark(centres[0])
+    key = plot_walk(plot, lattice, cells)
     bar = ("0", f"{len(cells) - 1:,} steps")
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
+
+
+def plot_walk(plot: Plot, lattice: CoverageLattice, cells: NDArray[np.int32]) -> list[KeyEntry]:
+    """Draw a walk, int32 (n, 2) as in ``draw_walk``; return what its tints and marks mean."""
+    centres = lattice.centres(cells)
+    key = draw_visits(plot, lattice, _visits(lattice, cells), tuple(cells[0].tolist()))
+    _draw_line(plot, centres, lattice.cell_m)
+    if (cells[0] != cells[-1]).any():
+        plot.end_mark(centres[-1])
+    plot.start_mark(centres[0])
+    return key
 
 
 def _visits(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.int64]:

@@ -1,0 +1,145 @@
+"""The rows of Table I and our own ones, and how they are measured."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fasaco_edge.bench.benchmark import Say
+from fasaco_edge.bench.grids import NamedGrid, read_grid
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.observation import Observer
+from fasaco_edge.planners.path import CoveragePath, WalkFigures, walk_figures
+from fasaco_edge.planners.planner import ignore, never
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.table import PLANNERS
+from fasaco_edge.planners.warmup import warm_up
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """A planner as a row has it.
+
+    Attributes:
+        name: its name in figures.
+        planner: its name in ``PLANNERS``.
+        velocities: of its cohorts [cells/step]; () where there are no ants.
+    """
+
+    name: str
+    planner: str
+    velocities: tuple[int, ...] = ()
+
+    def plan(
+        self, problem: CoverageProblem, ants: int, seed: int, observe: Observer = ignore
+    ) -> CoveragePath:
+        """Return its walk; by one thread."""
+        colony = ColonyConfig(ants=ants, velocities=self.velocities or (1,), seed=seed)
+        return PLANNERS[self.planner](colony, 1).plan(problem, never, observe)
+
+
+RISING = tuple(range(1, 9))
+FALLING = RISING[::-1]
+
+VARIANTS = {
+    variant.name: variant
+    for variant in (
+        *(Variant(f"velocity-{velocity}", "fasaco", (velocity,)) for velocity in RISING),
+        Variant("rising", "fasaco", RISING),
+        Variant("falling", "fasaco", FALLING),
+        Variant("aco-8-cohorts", "fasaco", (1,) * 8),
+        Variant("spiral-stc", "spiral-stc"),
+        Variant("zigzag", "zigzag"),
+        Variant("stc", "stc"),
+    )
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One planner's walk on one grid, start to start.
+
+    Attributes:
+        grid: name of the grid.
+        cells: cells to cover.
+        variant: name of the variant.
+        seed: seed of its colony, if it has one.
+        walk: the walk's figures.
+        cpu_s: time of the one thread on a processor [s].
+    """
+
+    grid: str
+    cells: int
+    variant: str
+    seed: int
+    walk: WalkFigures
+    cpu_s: float
+
+
+def grid_name(name_or_path: str) -> str:
+    """Return what a grid is called in results: where its file lies is nobody's business."""
+    return Path(name_or_path).stem
+
+
+def check_names(grids: Sequence[str]) -> None:
+    """Make sure that names tell grids apart.
+
+    Raises:
+        BadConfiguration: two grids have the same name.
+    """
+    names = [grid_name(grid) for grid in grids]
+    for name in names:
+        if names.count(name) > 1:
+            raise BadConfiguration(f"grids must have different names, got {name!r} twice")
+
+
+def check_drawn(drawn: Sequence[str], grids: Sequence[str]) -> None:
+    """Make sure that what is to be drawn is measured.
+
+    Raises:
+        BadConfiguration: a grid is not among those measured.
+    """
+    names = [grid_name(grid) for grid in grids]
+    for name in drawn:
+        if name not in names:
+            raise BadConfiguration(f"--png-of must name measured grids, {', '.join(names)}: {name}")
+
+
+def pose(grid: NamedGrid) -> CoverageProblem:
+    """Return the problem of Table I on a grid: from its start back to its start."""
+    return CoverageProblem.of(grid.lattice, grid.start, return_home=True)
+
+
+def measure(grids: Sequence[str], ants: int, seeds: int, say: Say) -> Generator[Run, None, None]:
+    """Yield every variant's run on each grid with each seed, kernels warm.
+
+    Raises:
+        FasacoError: a grid cannot be read or planned on, or the colony is impossible.
+    """
+    check_names(grids)
+    # Read first: a wrong name should not be found out after minutes.
+    read = [read_grid(grid) for grid in grids]
+    ColonyConfig(ants=ants)
+    say("loading kernels")
+    warm_up()
+    for grid in read:
+        problem = pose(grid)
+        for variant in VARIANTS.values():
+            variant.plan(problem, max(len(variant.velocities), 1), 0)
+        for seed in range(seeds):
+            say(f"{grid_name(grid.name)}: seed {seed}")
+            for variant in VARIANTS.values():
+                yield _timed(grid, problem, variant, ants, seed)
+
+
+def _timed(
+    grid: NamedGrid, problem: CoverageProblem, variant: Variant, ants: int, seed: int
+) -> Run:
+    before = time.thread_time()
+    path = variant.plan(problem, ants, seed)
+    cpu_s = time.thread_time() - before
+    figures = walk_figures(grid.lattice, path.cells)
+    return Run(grid_name(grid.name), problem.cells, variant.name, seed, figures, cpu_s)

@@ -1,0 +1,85 @@
+"""Several walks over one lattice, side by side on one sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from fasaco_edge.drawing import palette
+from fasaco_edge.drawing.plot import Plot
+from fasaco_edge.drawing.sheet import KeyEntry, Sheet, headed
+from fasaco_edge.drawing.view import View, bounds_around
+from fasaco_edge.drawing.walk import plot_walk
+from fasaco_edge.grid.lattice import CoverageLattice
+
+PANEL_PX = 500
+GAP_PX = 24
+COLUMNS = 2
+
+TIMES = ("2 times", "3 times", "4 times or more")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelledWalk:
+    """A walk, int32 (n, 2) as in ``draw_walk``, and two lines to stand over it."""
+
+    label: str
+    caption: str
+    cells: NDArray[np.int32]
+
+
+def draw_walks(
+    lattice: CoverageLattice, walks: Sequence[LabelledWalk], *, title: str, lines: Sequence[str]
+) -> Image.Image:
+    """Return a picture, RGB, of walks, at least one, over the same lattice.
+
+    Args:
+        lattice: the planning grid.
+        walks: what to show, to the right first, then down.
+        title: heading.
+        lines: caption below it.
+    """
+    centres = np.concatenate([lattice.centres(walk.cells) for walk in walks])
+    view = View.over(bounds_around(centres, lattice.cell_m), lattice.cell_m, PANEL_PX, PANEL_PX)
+    panels = _arranged([_panel(view, lattice, walk) for walk in walks])
+    scale = view.scale * lattice.cell_m
+    sheet = Sheet(title, lines, _key(walks), ("start", "end"), scale, framed=False, unit="cells")
+    return sheet.around(panels)
+
+
+def _key(walks: Sequence[LabelledWalk]) -> tuple[KeyEntry, ...]:
+    closed = all((walk.cells[0] == walk.cells[-1]).all() for walk in walks)
+    return (
+        KeyEntry("disc", palette.START, "start and end" if closed else "start"),
+        *(() if closed else (KeyEntry("square", palette.END, "end"),)),
+        KeyEntry("tile", palette.COVERED, "covered once"),
+        *(
+            KeyEntry("tile", colour, times)
+            for colour, times in zip(palette.RECOVERED, TIMES, strict=True)
+        ),
+    )
+
+
+def _panel(view: View, lattice: CoverageLattice, walk: LabelledWalk) -> Image.Image:
+    plot = Plot(view)
+    plot.ground(lattice)
+    plot_walk(plot, lattice, walk.cells)
+    return headed(plot.finished(), walk.label, walk.caption)
+
+
+def _arranged(panels: Sequence[Image.Image]) -> Image.Image:
+    width, height = max(p.width for p in panels), max(p.height for p in panels)
+    columns = min(COLUMNS, len(panels))
+    rows = -(-len(panels) // columns)
+    size = (columns * (width + GAP_PX) - GAP_PX, rows * (height + GAP_PX) - GAP_PX)
+    together = Image.new("RGB", size, palette.PAPER)
+    for index, panel in enumerate(panels):
+        row, column = divmod(index, columns)
+        # Against the row's lower edge: a longer caption must not move a map.
+        below = height - panel.height
+        together.paste(panel, (column * (width + GAP_PX), row * (height + GAP_PX) + below))
+    return together
