@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from fasaco_edge import __version__
 from fasaco_edge.cli import bench, demo, maps, plan, record, run, simulate, warmup
+from fasaco_edge.cli.arguments import with_negative_pairs
 from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
@@ -22,7 +23,8 @@ EXIT_INTERRUPTED = 130
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the process's exit code."""
-    args = _parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    args = _parser().parse_args(with_negative_pairs(words))
     logging.basicConfig(level=args.log_level.upper(), format="%(levelname)s %(name)s: %(message)s")
     if args.with_parent:
         end_with_parent()
@@ -32,6 +34,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(error)
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
+    except SystemError as error:
+        # What numba makes of Ctrl-C while a kernel runs.
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            return EXIT_INTERRUPTED
+        raise
     except BrokenPipeError:
         # The reader has seen enough (``| head``); nothing is left to be flushed to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -90,5 +90,6 @@ def _command(config: DaemonConfig, folder: Path) -> list[str]:
     endpoints = config.bus.listen or config.bus.connect
     connect = [word for endpoint in endpoints for word in ("--connect", endpoint)]
     robot = ["--robot", config.robot.name, "--base", config.bus.base]
+    pose = ["--pose-schema", config.pose.schema]
     program = [sys.executable, "-m", "fasaco_edge", "record", "--with-parent"]
-    return [*program, "--out", str(folder), *connect, *robot]
+    return [*program, "--out", str(folder), *connect, *robot, *pose]
