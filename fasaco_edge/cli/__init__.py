@@ -26,8 +26,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else argv
     args = _parser().parse_args(with_negative_pairs(words))
     logging.basicConfig(level=args.log_level.upper(), format="%(levelname)s %(name)s: %(message)s")
-    if args.with_parent:
-        end_with_parent()
+    if args.with_parent is not None:
+        end_with_parent(args.with_parent)
     try:
         code: int = args.command(args)
     except FasacoError as error:
@@ -61,7 +61,7 @@ def _parser() -> argparse.ArgumentParser:
         help="how much to say on standard error (default: %(default)s)",
     )
     # For the processes that other commands start: they end when those do.
-    common.add_argument("--with-parent", action="store_true", help=argparse.SUPPRESS)
+    common.add_argument("--with-parent", type=int, metavar="PID", help=argparse.SUPPRESS)
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for module in COMMANDS:
         module.add_to(commands, common)

@@ -35,7 +35,7 @@ def make_mailbox() -> Mailbox[object]:
     Poses are queued: each tells what the tool passed over. Some seconds of them
     are plenty. A map does not clear the updates before it here: it may be broken.
     """
-    return Mailbox(queued={"map_update": 256, "pose": 1024, "snapshot": 64}, clears={})
+    return Mailbox({"map_update": 256, "pose": 1024, "snapshot": 64})
 
 
 class Inbox:

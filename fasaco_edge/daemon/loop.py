@@ -77,6 +77,10 @@ class Loop:
                 self._publish_coverage(mission, started)
             self._publish_status(started)
 
+    def announce(self) -> None:
+        """Publish a first status, so that who asks gets one from the beginning."""
+        self._publish_status(time.monotonic())
+
     def close(self, timeout_s: float) -> None:
         """End the planning thread."""
         if self._worker is not None:

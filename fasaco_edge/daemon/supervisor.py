@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import subprocess
 import sys
 import time
@@ -91,5 +92,6 @@ def _command(config: DaemonConfig, folder: Path) -> list[str]:
     connect = [word for endpoint in endpoints for word in ("--connect", endpoint)]
     robot = ["--robot", config.robot.name, "--base", config.bus.base]
     pose = ["--pose-schema", config.pose.schema]
-    program = [sys.executable, "-m", "fasaco_edge", "record", "--with-parent"]
-    return [*program, "--out", str(folder), *connect, *robot, *pose]
+    program = [sys.executable, "-m", "fasaco_edge", "record"]
+    parent = ["--with-parent", str(os.getpid())]
+    return [*program, *parent, "--out", str(folder), *connect, *robot, *pose]
