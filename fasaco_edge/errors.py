@@ -36,7 +36,7 @@ class MapTooLarge(FasacoError):
     """The map, or the lattice over it, is beyond the configured limit."""
 
     code = "map_too_large"
-    hint = "check resolution and origin, or raise limits.max_lattice_cells"
+    hint = "check resolution and origin, or raise map.max_lattice_cells"
 
 
 class MapFileError(FasacoError):

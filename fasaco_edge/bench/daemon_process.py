@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import signal
 import socket
@@ -73,7 +74,9 @@ class DaemonProcess:
         with self._log.open("wb") as log:
             self._started = time.monotonic()
             self._process = subprocess.Popen(
-                [*PROGRAM, "run", "--config", str(file), "--with-parent"], stdout=log, stderr=log
+                [*PROGRAM, "run", "--config", str(file), "--with-parent", str(os.getpid())],
+                stdout=log,
+                stderr=log,
             )
         return self
 

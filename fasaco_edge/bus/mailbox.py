@@ -1,8 +1,8 @@
 """Between Zenoh's threads and a loop: a post costs O(1) and never blocks.
 
-What is newer makes the older of its kind worthless, except for map updates:
-each patches the map before it, so they stay in order, until a full map clears
-them.
+What is newer makes the older of its kind worthless, except where each item
+counts: a map update patches the map before it, a pose tells what the tool
+passed over. Those stay in order.
 """
 
 from __future__ import annotations
@@ -40,23 +40,18 @@ class Mailbox(Generic[Item]):
     """Collects items of several kinds until the loop takes them all.
 
     Of a kind only the newest is kept, unless it was declared ``queued`` with the
-    length of its queue; a full queue loses its oldest. Posting a kind declared in
-    ``clears`` drops what is queued of the other.
+    length of its queue; a full queue loses its oldest.
     """
 
-    def __init__(self, *, queued: dict[str, int], clears: dict[str, str]) -> None:
+    def __init__(self, queued: dict[str, int]) -> None:
         self._changed = threading.Condition()
         self._newest: dict[str, Item] = {}
         self._queued = {kind: deque[Item](maxlen=length) for kind, length in queued.items()}
-        self._clears = clears
         self._lost = dict.fromkeys(queued, 0)
 
     def post(self, kind: str, item: Item) -> None:
         """Leave an item; safe from any thread."""
         with self._changed:
-            if kind in self._clears:
-                self._queued[self._clears[kind]].clear()
-                self._lost[self._clears[kind]] = 0
             if kind not in self._queued:
                 self._newest[kind] = item
             else:

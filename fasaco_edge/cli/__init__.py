@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from fasaco_edge import __version__
 from fasaco_edge.cli import bench, demo, maps, plan, record, run, simulate, warmup
+from fasaco_edge.cli.arguments import with_negative_pairs
 from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
@@ -22,16 +23,22 @@ EXIT_INTERRUPTED = 130
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the process's exit code."""
-    args = _parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    args = _parser().parse_args(with_negative_pairs(words))
     logging.basicConfig(level=args.log_level.upper(), format="%(levelname)s %(name)s: %(message)s")
-    if args.with_parent:
-        end_with_parent()
+    if args.with_parent is not None:
+        end_with_parent(args.with_parent)
     try:
         code: int = args.command(args)
     except FasacoError as error:
         return _fail(error)
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
+    except SystemError as error:
+        # What numba makes of Ctrl-C while a kernel runs.
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            return EXIT_INTERRUPTED
+        raise
     except BrokenPipeError:
         # The reader has seen enough (``| head``); nothing is left to be flushed to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -54,7 +61,7 @@ def _parser() -> argparse.ArgumentParser:
         help="how much to say on standard error (default: %(default)s)",
     )
     # For the processes that other commands start: they end when those do.
-    common.add_argument("--with-parent", action="store_true", help=argparse.SUPPRESS)
+    common.add_argument("--with-parent", type=int, metavar="PID", help=argparse.SUPPRESS)
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for module in COMMANDS:
         module.add_to(commands, common)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
+from fasaco_edge.wire.limits import MAX_COORDINATE_M
 
 if TYPE_CHECKING:
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -16,14 +19,37 @@ DEFAULT_RADIUS_M = 0.18
 
 def pair_of_ints(text: str) -> tuple[int, int]:
     """Read ``R,C``."""
-    row, col = text.split(",")
-    return int(row), int(col)
+    try:
+        row, col = (int(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be row,column, got {text!r}") from None
+    return row, col
 
 
 def pair_of_floats(text: str) -> tuple[float, float]:
     """Read ``X,Y``."""
-    x, y = text.split(",")
-    return float(x), float(y)
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be x,y in metres, got {text!r}") from None
+    # A negated comparison, so that NaN is caught too.
+    if not (abs(x) <= MAX_COORDINATE_M and abs(y) <= MAX_COORDINATE_M):
+        raise argparse.ArgumentTypeError(f"must be within {MAX_COORDINATE_M:g} m of 0, got {text}")
+    return x, y
+
+
+def with_negative_pairs(words: Sequence[str]) -> list[str]:
+    """Return the words of a command line with ``--start -1,2`` as ``--start=-1,2``.
+
+    argparse takes negative numbers for values, but ``-1,2`` for an option.
+    """
+    joined: list[str] = []
+    for word in words:
+        if joined and joined[-1] in ("--start", "--start-xy") and re.match(r"-[\d.]", word):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 def add_robot_on_bus(parser: argparse.ArgumentParser) -> None:

@@ -37,7 +37,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.set_defaults(
-        command=run, benchmark=None, usage=parser, log_level="warning", with_parent=False
+        command=run, benchmark=None, usage=parser, log_level="warning", with_parent=None
     )
     benchmarks = parser.add_subparsers(title="benchmarks", metavar="BENCHMARK")
     for benchmark in BENCHMARKS:

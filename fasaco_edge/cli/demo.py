@@ -52,11 +52,18 @@ def run(args: argparse.Namespace) -> int:
     """Run the mission; 0 if every reachable cell was covered."""
     from fasaco_edge.cli.demo_mission import DemoMission
     from fasaco_edge.cli.demo_summary import print_summary, summarise
+    from fasaco_edge.cli.outputs import writing
     from fasaco_edge.cli.terminal import err
     from fasaco_edge.cli.warmup import compile_kernels
+    from fasaco_edge.errors import BadConfiguration
+    from fasaco_edge.grid.map_files import find_map
 
+    find_map(args.map)
+    if not args.speed > 0:
+        raise BadConfiguration(f"--speed must be above 0, got {args.speed}")
     out: Path = args.out or Path("runs") / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
-    out.mkdir(parents=True, exist_ok=True)
+    with writing(out):
+        out.mkdir(parents=True, exist_ok=True)
     seconds = compile_kernels()
     err().print(f"kernels ready ({seconds:.1f} s); results go to {out}")
     with DemoMission(args, out) as mission:

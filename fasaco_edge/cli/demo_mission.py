@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import socket
 import subprocess
@@ -119,7 +120,8 @@ class DemoMission:
         }
 
     def _spawn(self, name: str, words: list[str]) -> None:
-        program = [sys.executable, "-m", "fasaco_edge", *words, "--with-parent"]
+        program = [sys.executable, "-m", "fasaco_edge", *words]
+        program += ["--with-parent", str(os.getpid())]
         with (self._out / f"{name}.log").open("wb") as log:
             process = subprocess.Popen(program, stdout=log, stderr=log)
         self._processes.append((name, process))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.cli.demo_mission import Ending
 from fasaco_edge.drawing import draw_mission
+from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
@@ -96,7 +97,10 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
 def _truth(args: argparse.Namespace, out: Path) -> _Truth:
     grid = read_map(find_map(args.map))
     lattice = CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius))
-    trail = np.loadtxt(out / "trail.csv", delimiter=",", skiprows=1, ndmin=2)
+    file = out / "trail.csv"
+    if not file.exists():
+        raise ProcessEnded("the robot never drove", hint=f"see {out / 'robot.log'}")
+    trail = np.loadtxt(file, delimiter=",", skiprows=1, ndmin=2)
     ledger = CoverageLedger(args.cell)
     for x, y in trail:
         ledger.record(Pose2D(float(x), float(y)))

@@ -10,9 +10,8 @@ import time
 LOOK_EVERY_S = 0.5
 
 
-def end_with_parent() -> None:
-    """Send this process SIGTERM once its parent is gone."""
-    parent = os.getppid()
+def end_with_parent(parent: int) -> None:
+    """Send this process SIGTERM once its parent, process ``parent``, is gone."""
 
     def watch() -> None:
         while os.getppid() == parent:

@@ -81,7 +81,9 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
 
 
 def _add_planner(group: argparse._ArgumentGroup) -> None:
-    group.add_argument("--planner", choices=("fasaco",), default="fasaco")
+    group.add_argument(
+        "--planner", choices=("fasaco",), default="fasaco", help="(default: %(default)s)"
+    )
     group.add_argument("--ants", type=int, default=1000, metavar="N", help="(default: %(default)s)")
     group.add_argument(
         "--velocities",
@@ -106,13 +108,18 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, print the figures, write what was asked for."""
+    from fasaco_edge.cli.outputs import check_output, writing
     from fasaco_edge.cli.warmup import compile_kernels
+    from fasaco_edge.grid.map_files import find_map
     from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
     from fasaco_edge.planners.problem import CoverageProblem
 
     colony = ColonyConfig(
         ants=args.ants, velocities=parse_velocities(args.velocities), seed=args.seed
     )
+    find_map(args.map)
+    check_output(args.path_out)
+    check_output(args.png)
     compile_kernels()
     lattice, grid, file = _read(args)
     start = _start(args, lattice, file)
@@ -120,9 +127,11 @@ def run(args: argparse.Namespace) -> int:
     path, wall_s, cpu_s = _plan(args.planner, colony, problem)
     figures = _figures(args, problem, path, wall_s, cpu_s)
     if args.path_out is not None:
-        np.savetxt(args.path_out, path.cells, "%d", ",", header="row,col", comments="")
+        with writing(args.path_out):
+            np.savetxt(args.path_out, path.cells, "%d", ",", header="row,col", comments="")
     if args.png is not None:
-        _draw(args.png, lattice, grid, path, figures)
+        with writing(args.png):
+            _draw(args.png, lattice, grid, path, figures)
     _print(args, figures)
     return 0
 
@@ -218,7 +227,7 @@ def _draw(
         f"{figures['steps']} steps, {figures['revisits']} revisits, "
         f"{figures['turns_90']} quarter-turns",
     ]
-    draw_walk(lattice, path.cells, grid=grid, title=title, lines=lines).save(file)
+    draw_walk(lattice, path.cells, grid=grid, title=title, lines=lines).save(file, "PNG")
 
 
 def _print(args: argparse.Namespace, figures: dict[str, Any]) -> None:

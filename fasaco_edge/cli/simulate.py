@@ -55,6 +55,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Drive until told to stop."""
+    from fasaco_edge.cli.outputs import check_output, writing
     from fasaco_edge.cli.places import start_point
     from fasaco_edge.grid.geometry import Pose2D
     from fasaco_edge.grid.map_files import find_map, read_map
@@ -64,6 +65,7 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.wire.keys import Keys
 
     path = find_map(args.map)
+    check_output(args.trail_out)
     config = SimulationConfig(
         robot_radius_m=args.robot_radius, range_m=args.range, map_hz=args.map_hz
     )
@@ -73,7 +75,8 @@ def run(args: argparse.Namespace) -> int:
         world, Keys(args.robot, args.base), client_settings(args), speed=args.speed, report=_report
     )
     if args.trail_out is not None:
-        np.savetxt(args.trail_out, result.trail, "%.4f", ",", header="x,y", comments="")
+        with writing(args.trail_out):
+            np.savetxt(args.trail_out, result.trail, "%.4f", ",", header="x,y", comments="")
     print(
         f"drove {result.distance_m:.1f} m in {result.sim_s:.0f} simulated s, "
         f"{result.collisions} collisions"

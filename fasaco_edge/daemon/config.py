@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import msgspec
 import yaml
@@ -12,6 +12,7 @@ from msgspec import Meta
 
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import Keys
 
@@ -77,6 +78,22 @@ class PlannerConfig(_Section, frozen=True):
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.5
 
+    def colony(self) -> ColonyConfig:
+        """Return these as a colony.
+
+        Raises:
+            BadConfiguration: the velocities cannot be read, or there are fewer ants
+                than cohorts.
+        """
+        return ColonyConfig(
+            ants=self.ants,
+            velocities=parse_velocities(self.velocities),
+            q0=self.q0,
+            alpha=self.alpha,
+            tau0=self.tau0,
+            seed=self.seed,
+        )
+
 
 class DaemonConfig(_Section, frozen=True):
     """The whole configuration."""
@@ -109,7 +126,9 @@ def load_config(path: Path | None) -> DaemonConfig:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BadConfiguration(f"{path}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except RecursionError as error:
+        raise BadConfiguration(f"{path}: not YAML: nested too deeply") from error
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, no such date
         raise BadConfiguration(f"{path}: not YAML: {error}") from error
     try:
         config = msgspec.convert(document if document is not None else {}, DaemonConfig)
@@ -131,11 +150,17 @@ def _check_together(config: DaemonConfig) -> None:
     if not (config.bus.listen or config.bus.connect):
         raise BadConfiguration("bus.listen and bus.connect must not both be empty")
     config.keys()
+    try:
+        config.planner.colony()
+    except BadConfiguration as error:
+        raise BadConfiguration(f"planner.{error}") from error
 
 
 def _explain(message: str, document: object) -> str:
     """Turn ``Expected `int` >= 1 - at `$.planner.ants``` into key, expectation and value."""
-    match = re.fullmatch(r"(?P<what>.*?)(?: - at `\$\.?(?P<key>[^`]*)`)?", message, re.DOTALL)
+    match = re.fullmatch(
+        r"(?P<what>.*?)(?: - at (?P<as_key>`key` in )?`\$\.?(?P<key>[^`]*)`)?", message, re.DOTALL
+    )
     assert match is not None
     what, key = match["what"].replace("`", ""), match["key"] or ""
     unknown = re.fullmatch(r"Object contains unknown field (?P<name>.*)", what)
@@ -144,5 +169,20 @@ def _explain(message: str, document: object) -> str:
     value: Any = document
     for part in re.findall(r"[^.\[\]]+", key):
         value = value[int(part)] if isinstance(value, list) else value[part]
-    expected = what[0].lower() + what[1:].partition(", got")[0]
+    expected = _choices(key) or what[0].lower() + what[1:].partition(", got")[0]
+    if match["as_key"]:
+        expected += " as key"
+    elif expected == "expected str":
+        expected += ", in quotes"  # YAML 1.1 takes 8:1 for a number
     return f"{key or 'the file'}: {expected}, got {value!r}"
+
+
+def _choices(key: str) -> str:
+    """Return what a key may be where that is one of a few names, else ""."""
+    kind: Any = DaemonConfig
+    for part in key.split("."):
+        kind = get_type_hints(kind).get(part) if isinstance(kind, type) else None
+    if get_origin(kind) is not Literal:
+        return ""
+    *others, last = get_args(kind)
+    return "expected " + (f"{', '.join(others)} or {last}" if others else str(last))

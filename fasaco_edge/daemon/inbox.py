@@ -33,11 +33,9 @@ def make_mailbox() -> Mailbox[object]:
     """Return the mailbox of a daemon.
 
     Poses are queued: each tells what the tool passed over. Some seconds of them
-    are plenty.
+    are plenty. A map does not clear the updates before it here: it may be broken.
     """
-    return Mailbox(
-        queued={"map_update": 256, "pose": 1024, "snapshot": 64}, clears={"map": "map_update"}
-    )
+    return Mailbox({"map_update": 256, "pose": 1024, "snapshot": 64})
 
 
 class Inbox:
@@ -51,15 +49,31 @@ class Inbox:
     def decode(
         self, items: Sequence[tuple[str, object]], patches_lost: int
     ) -> tuple[list[Event], list[FasacoError]]:
-        """Return the events in ``items``; a malformed sample costs that sample alone."""
-        events: list[Event] = [PatchesLost(patches_lost)] if patches_lost else []
+        """Return the events in ``items``; a malformed sample costs that sample alone.
+
+        A map that can be read makes the updates before it worthless, those that were
+        lost too.
+        """
+        events: list[Event] = []
         faults: list[FasacoError] = []
+        map_at = float("-inf")
         for kind, item in items:
-            if isinstance(item, Received):
-                try:
-                    events.append(self._event(kind, item.sample))
-                except FasacoError as error:
-                    faults.append(error)
+            if not isinstance(item, Received):
+                continue
+            if kind == "map_update" and item.at < map_at:
+                patches_lost = 0  # they were older still
+                continue
+            if kind == "map_update" and patches_lost:
+                events.append(PatchesLost(patches_lost))
+                patches_lost = 0
+            try:
+                events.append(self._event(kind, item.sample))
+            except FasacoError as error:
+                faults.append(error)
+            else:
+                map_at = item.at if kind == "map" else map_at
+        if patches_lost:
+            events.append(PatchesLost(patches_lost))
         return events, faults
 
     def _event(self, kind: str, sample: Sample) -> Event:

@@ -45,7 +45,6 @@ class Loader:
         from fasaco_edge.daemon.worker import PlanningWorker  # noqa: PLC0415
         from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
         from fasaco_edge.mission.mission import Mission, MissionConfig  # noqa: PLC0415
-        from fasaco_edge.planners.colony import ColonyConfig, parse_velocities  # noqa: PLC0415
         from fasaco_edge.planners.table import PLANNERS  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
@@ -54,16 +53,8 @@ class Loader:
         footprint = Footprint(
             robot.tool_width_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least
         )
-        colony = ColonyConfig(
-            ants=planner.ants,
-            velocities=parse_velocities(planner.velocities),
-            q0=planner.q0,
-            alpha=planner.alpha,
-            tau0=planner.tau0,
-            seed=planner.seed,
-        )
         worker = PlanningWorker(
-            PLANNERS[planner.name](colony), planner.budget_s, self._mailbox.post
+            PLANNERS[planner.name](planner.colony()), planner.budget_s, self._mailbox.post
         )
         return Mission(MissionConfig(footprint, maps.max_lattice_cells)), worker
 

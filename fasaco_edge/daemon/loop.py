@@ -13,6 +13,7 @@ from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.daemon.outbox import Outbox
 from fasaco_edge.daemon.status import StatusBoard
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
+from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.mission.events import (
     Decision,
     Event,
@@ -76,6 +77,10 @@ class Loop:
                 self._publish_coverage(mission, started)
             self._publish_status(started)
 
+    def announce(self) -> None:
+        """Publish a first status, so that who asks gets one from the beginning."""
+        self._publish_status(time.monotonic())
+
     def close(self, timeout_s: float) -> None:
         """End the planning thread."""
         if self._worker is not None:
@@ -95,9 +100,7 @@ class Loop:
     def _load(self, events: list[Event]) -> Mission | None:
         """Hold events until the kernels are there; the first map sends for them."""
         for event in events:
-            if isinstance(event, MapReceived | PoseReceived):
-                self._held = [held for held in self._held if type(held) is not type(event)]
-            self._held.append(event)
+            self._hold(event)
         if self._loader is None:
             if any(isinstance(event, MapReceived) for event in events):
                 self._loader = Loader(self._config, self._mailbox)
@@ -107,6 +110,19 @@ class Loop:
             self._mission, self._worker = loaded
         events.clear()
         return self._mission
+
+    def _hold(self, event: Event) -> None:
+        """Keep the newest map with the updates after it, and the newest pose."""
+        match event:
+            case MapReceived():
+                self._held = [held for held in self._held if isinstance(held, PoseReceived)]
+            case PoseReceived():
+                self._held = [held for held in self._held if not isinstance(held, PoseReceived)]
+            case _ if not any(isinstance(held, MapReceived) for held in self._held):
+                why = "map update refused: there is no map yet"
+                self._status.faults.count([PatchWithoutBase(why)])
+                return
+        self._held.append(event)
 
     def _perform(self, mission: Mission, decision: Decision) -> None:
         self._status.faults.count(decision.faults)

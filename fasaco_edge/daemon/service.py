@@ -47,6 +47,7 @@ def _serve(
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
     loop = Loop(config, mailbox, inbox, outbox, recorder)
     try:
+        loop.announce()
         bus.token(keys.alive)
         LOG.info("ready after %.2f s on %s", time.monotonic() - started, keys.prefix)
         loop.run(stop)

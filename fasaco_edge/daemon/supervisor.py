@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import subprocess
 import sys
 import time
@@ -90,5 +91,7 @@ def _command(config: DaemonConfig, folder: Path) -> list[str]:
     endpoints = config.bus.listen or config.bus.connect
     connect = [word for endpoint in endpoints for word in ("--connect", endpoint)]
     robot = ["--robot", config.robot.name, "--base", config.bus.base]
-    program = [sys.executable, "-m", "fasaco_edge", "record", "--with-parent"]
-    return [*program, "--out", str(folder), *connect, *robot]
+    pose = ["--pose-schema", config.pose.schema]
+    program = [sys.executable, "-m", "fasaco_edge", "record"]
+    parent = ["--with-parent", str(os.getpid())]
+    return [*program, *parent, "--out", str(folder), *connect, *robot, *pose]

@@ -18,14 +18,8 @@ from fasaco_edge.errors import MapTooLarge
 from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.directions import ALL_STEPS, EAST, NORTH, SOUTH, WEST
-from fasaco_edge.kernels.footprint import (
-    BLOCKED,
-    COVERABLE,
-    UNKNOWN,
-    Placement,
-    Thresholds,
-    classify_cells,
-)
+from fasaco_edge.kernels.footprint import Placement, Thresholds, classify_cells
+from fasaco_edge.kernels.states import BLOCKED, COVERABLE, UNKNOWN
 
 __all__ = ["BLOCKED", "COVERABLE", "UNKNOWN", "Cell", "CoverageLattice", "Footprint"]
 

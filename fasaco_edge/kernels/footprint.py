@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.directions import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.jit import kernel
-
-UNKNOWN, BLOCKED, COVERABLE = 0, 1, 2
+from fasaco_edge.kernels.states import BLOCKED, COVERABLE, UNKNOWN
 
 
 class Placement(NamedTuple):

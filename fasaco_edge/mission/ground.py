@@ -31,13 +31,13 @@ class GroundChange:
         return bool(self.gained or self.lost or self.rewired)
 
     def __str__(self) -> str:
-        parts = []
-        if self.gained:
-            parts.append(f"{self.gained} cells more")
-        if self.lost:
-            parts.append(f"{self.lost} cells fewer")
-        if self.rewired and not parts:
-            parts.append(f"passages changed at {self.rewired} cells")
+        parts = [
+            f"{count} {'cell' if count == 1 else 'cells'} {what}"
+            for count, what in ((self.gained, "more"), (self.lost, "fewer"))
+            if count
+        ]
+        if not parts:
+            parts = [f"passages changed at {self.rewired} cells"]
         return "map: " + ", ".join(parts)
 
 

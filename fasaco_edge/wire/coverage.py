@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels import states as cell
 
 UNKNOWN = -1
 TO_COVER = 0
@@ -39,12 +40,9 @@ def coverage_grid(
         frame: name of the map frame.
         stamp_ns: time of the coverage [ns].
     """
-    # Here, for those who only read coverage: the lattice brings the compiler along.
-    from fasaco_edge.grid import lattice  # noqa: PLC0415
-
     values = np.full(states.shape, UNKNOWN, np.int8)
-    values[states == lattice.BLOCKED] = BLOCKED
-    coverable = states == lattice.COVERABLE
+    values[states == cell.BLOCKED] = BLOCKED
+    coverable = states == cell.COVERABLE
     values[coverable] = TO_COVER
     values[coverable & (visits == 1)] = COVERED
     values[coverable & (visits > 1)] = RECOVERED

@@ -11,7 +11,7 @@ from fasaco_edge.bus.mailbox import LatestSlot, Mailbox
 
 
 def mailbox(length=3):
-    return Mailbox(queued={"update": length}, clears={"map": "update"})
+    return Mailbox({"update": length})
 
 
 def test_of_a_kind_only_the_newest_is_kept():
@@ -30,16 +30,6 @@ def test_updates_stay_in_order_and_come_after_their_map():
     box.post("pose", "here")
     box.post("update", 2)
     assert box.take(0) == [("map", "base"), ("pose", "here"), ("update", 1), ("update", 2)]
-
-
-def test_a_full_map_makes_the_updates_before_it_worthless():
-    box = mailbox()
-    for number in range(5):
-        box.post("update", number)
-    box.post("map", "new")
-    box.post("update", "after")
-    assert box.take(0) == [("map", "new"), ("update", "after")]
-    assert box.take_lost("update") == 0
 
 
 def test_a_full_queue_loses_its_oldest_and_says_how_many():
@@ -99,7 +89,6 @@ def test_what_is_taken_is_what_a_plain_list_would_keep(kinds):
             continue
         newest = {name: item for name, item in posted if name != "update"}
         updates = [(name, item) for name, item in posted if name == "update"]
-        updates = [(name, item) for name, item in updates if item > newest.get("map", -1)]
         taken = box.take(0)
         assert dict(taken[: len(newest)]) == newest
         assert taken[len(newest) :] == updates[-4:]

@@ -249,7 +249,7 @@ def test_a_plan_for_a_map_that_has_changed_elsewhere_is_driven_until_a_better_on
     drive.request = None
     decision = drive.tell(stale)
     assert decision.path.cells[-1].tolist() == [1, 9]
-    assert decision.plan.reason == "map: 1 cells more"
+    assert decision.plan.reason == "map: 1 cell more"
 
 
 def test_a_plan_leaves_out_what_was_driven_while_it_was_made():

@@ -1,0 +1,252 @@
+"""Our session beside plain Zenoh: what leaves here arrives there, and the other way round."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from queue import Queue
+
+import pytest
+import zenoh
+import zenoh.ext
+
+from fasaco_edge.bus.session import BusSettings, Reply, Sample, open_bus
+from fasaco_edge.errors import BusUnavailable
+from tests.daemon.outsider import Ear, open_client
+from tests.daemon.processes import free_endpoint
+
+KEY = "test/@v1/key"
+SCHEMA = "nav_msgs/msg/Path"
+TIMEOUT_S = 10.0
+
+
+@pytest.fixture
+def endpoint():
+    return free_endpoint()
+
+
+@pytest.fixture
+def bus(endpoint):
+    with open_bus(BusSettings("peer", (), (endpoint,))) as session:
+        yield session
+
+
+@pytest.fixture
+def client(bus, endpoint):
+    session = open_client(endpoint)
+    yield session
+    session.close()
+
+
+@pytest.fixture
+def samples():
+    return Queue()
+
+
+def until(holds):
+    """Wait for what spreads in its own time: declarations."""
+    deadline = time.monotonic() + TIMEOUT_S
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def history():
+    return zenoh.ext.HistoryConfig(max_samples=1, detect_late_publishers=True)
+
+
+def test_a_sample_goes_out_with_type_and_attachment(bus, client):
+    ear = Ear()
+    client.declare_subscriber(KEY, ear)
+    publisher = bus.publisher(KEY, SCHEMA)
+    until(publisher.has_listeners)
+    publisher.put(b"payload", b"attached")
+    publisher.put(b"")
+    first, second = ear.wait(lambda h: h.payload != b""), ear.wait(lambda h: h.payload == b"")
+    assert (first.payload, first.attachment) == (b"payload", b"attached")
+    assert first.encoding == f"application/cdr;{SCHEMA}"
+    assert second.attachment is None
+
+
+def test_without_a_schema_it_is_json(bus, client):
+    ear = Ear()
+    client.declare_subscriber(KEY, ear)
+    publisher = bus.publisher(KEY)
+    until(publisher.has_listeners)
+    publisher.put(b"{}")
+    assert ear.wait(lambda h: True).encoding == "application/json"
+
+
+@pytest.mark.parametrize("latched", [False, True])
+def test_a_sample_comes_in_with_type_and_attachment(bus, client, samples, latched):
+    bus.subscribe(KEY, samples.put, latched)
+    cdr = zenoh.Encoding.APPLICATION_CDR
+    client.put(KEY, b"one", encoding=cdr.with_schema(SCHEMA), attachment=b"attached")
+    assert samples.get(timeout=TIMEOUT_S) == Sample(KEY, b"one", SCHEMA, b"attached")
+    # As under ROS 2: no encoding at all.
+    client.put(KEY, b"two")
+    assert samples.get(timeout=TIMEOUT_S) == Sample(KEY, b"two", "", b"")
+    client.put(KEY, b"three", encoding=cdr)
+    assert samples.get(timeout=TIMEOUT_S) == Sample(KEY, b"three", "", b"")
+
+
+def test_who_comes_late_gets_the_newest_of_a_latched_key(bus, client):
+    publisher = bus.publisher(KEY, SCHEMA, latched=True)
+    for number in range(5):
+        publisher.put(b"%d" % number, b"attached")
+    ear = Ear()
+    zenoh.ext.declare_advanced_subscriber(client, KEY, ear, history=history())
+    ear.wait(lambda h: h.payload == b"4" and h.attachment == b"attached")
+    assert len(ear.heard) == 1
+    plain = Ear()
+    client.declare_subscriber(KEY, plain)
+    publisher.put(b"5")
+    plain.wait(lambda h: h.payload == b"5")
+    assert len(plain.heard) == 1
+
+
+def test_a_latched_subscription_hears_what_was_said_before_it(bus, endpoint, samples):
+    text = {"mode": "client", "connect": {"endpoints": [endpoint]}}
+    # Without time stamps Zenoh refuses to keep samples.
+    text["timestamping"] = {"enabled": True}
+    cache = zenoh.ext.CacheConfig(max_samples=1)
+    with zenoh.open(zenoh.Config.from_json5(json.dumps(text))) as client:
+        publisher = zenoh.ext.declare_advanced_publisher(
+            client, KEY, cache=cache, publisher_detection=True
+        )
+        publisher.put(b"before")
+        bus.subscribe(KEY, samples.put, latched=True)
+        assert samples.get(timeout=TIMEOUT_S).payload == b"before"
+
+
+def test_it_knows_whether_anybody_listens(bus, client):
+    for latched in (False, True):
+        publisher = bus.publisher(f"{KEY}/{latched}", latched=latched)
+        assert not publisher.has_listeners()
+        subscriber = client.declare_subscriber(f"{KEY}/{latched}", Ear())
+        until(publisher.has_listeners)
+        subscriber.undeclare()
+        until(lambda publisher=publisher: not publisher.has_listeners())
+
+
+def test_questions_are_answered_with_their_parameters(bus, client):
+    bus.serve(KEY, lambda asked: Reply(json.dumps(asked).encode(), SCHEMA, b"attached"))
+    (reply,) = client.get(f"{KEY}?a=1;b=two", timeout=TIMEOUT_S)
+    assert json.loads(reply.ok.payload.to_bytes()) == {"a": "1", "b": "two"}
+    assert str(reply.ok.encoding) == f"application/cdr;{SCHEMA}"
+    assert reply.ok.attachment.to_bytes() == b"attached"
+    (reply,) = client.get(KEY, timeout=TIMEOUT_S)
+    assert reply.ok.payload.to_bytes() == b"{}"
+
+
+def test_an_error_is_an_error_there_too(bus, client):
+    bus.serve(KEY, lambda _: Reply(b'{"code":"not_yet"}', is_error=True))
+    (reply,) = client.get(KEY, timeout=TIMEOUT_S)
+    assert reply.ok is None
+    assert reply.err.payload.to_bytes() == b'{"code":"not_yet"}'
+    assert str(reply.err.encoding) == "application/json"
+
+
+def test_answers_of_others_come_in_whole(bus, client):
+    def answer(query):
+        if str(query.selector).endswith("?bad"):
+            query.reply_err(b"no", encoding="application/json")
+        else:
+            cdr = zenoh.Encoding.APPLICATION_CDR.with_schema(SCHEMA)
+            query.reply(KEY, b"yes", encoding=cdr, attachment=b"attached")
+
+    client.declare_queryable(KEY, answer)
+    until(lambda: bus.get(KEY))
+    assert bus.get(KEY) == [Reply(b"yes", SCHEMA, b"attached")]
+    assert bus.get(f"{KEY}?bad") == [Reply(b"no", is_error=True)]
+    assert bus.get("test/@v1/nobody", timeout_s=0.5) == []
+
+
+def test_a_token_stands_while_its_session_does(bus, client, endpoint):
+    with open_bus(BusSettings("client", (endpoint,))) as other:
+        other.token(f"{KEY}/alive")
+        until(lambda: bus.alive(f"{KEY}/*") == [f"{KEY}/alive"])
+    until(lambda: bus.alive(f"{KEY}/*") == [])
+
+
+@pytest.mark.parametrize("mode", ["peer", "router"])
+def test_who_finds_the_port_taken_joins(endpoint, samples, mode):
+    settings = BusSettings(mode, (), (endpoint,))
+    with open_bus(settings) as first, open_bus(settings) as second:
+        first.subscribe(KEY, samples.put)
+        publisher = second.publisher(KEY)
+        until(publisher.has_listeners)
+        publisher.put(b"from the second")
+        assert samples.get(timeout=TIMEOUT_S).payload == b"from the second"
+
+
+def test_two_clients_meet_in_a_peer(bus, endpoint, samples):
+    client = BusSettings("client", (endpoint,))
+    with open_bus(client) as one, open_bus(client) as other:
+        one.subscribe(KEY, samples.put)
+        publisher = other.publisher(KEY)
+        until(publisher.has_listeners)
+        publisher.put(b"hello")
+        assert samples.get(timeout=TIMEOUT_S).payload == b"hello"
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        BusSettings("client", ("tcp/127.0.0.1:1",)),
+        BusSettings("client", ("tcp/127.0.0.1",)),
+        BusSettings("client", ("nonsense",)),
+        BusSettings("client", ("carrier-pigeon/127.0.0.1:7447",)),
+        BusSettings("peer", (), ("tcp/127.0.0.1:notaport",)),
+        BusSettings("peer", (), ("tcp/192.0.2.1:7447",)),
+        BusSettings("nonsense"),
+    ],
+)
+def test_where_there_is_nobody_or_nothing_it_says_so_at_once(settings):
+    started = time.monotonic()
+    with pytest.raises(BusUnavailable) as caught:
+        open_bus(settings)
+    assert time.monotonic() - started < TIMEOUT_S
+    assert str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert ".rs:" not in str(caught.value)
+
+
+def test_a_frozen_subscriber_does_not_hold_a_publisher(bus, endpoint):
+    """Puts drop on congestion: ten times 16 MB into a process that reads nothing."""
+    code = f"""
+import time
+from fasaco_edge.bus.session import BusSettings, open_bus
+with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
+    bus.subscribe({KEY!r}, lambda sample: None)
+    print("listening", flush=True)
+    time.sleep(60)
+"""
+    publisher = bus.publisher(KEY, latched=True)
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as listener:
+        try:
+            assert listener.stdout.readline() == b"listening\n"
+            until(publisher.has_listeners)
+            listener.send_signal(signal.SIGSTOP)
+            started = time.monotonic()
+            for _ in range(10):
+                publisher.put(bytes(16_000_000))
+            # One blocking put alone would take the five seconds Zenoh waits.
+            assert time.monotonic() - started < 5.0
+        finally:
+            listener.kill()
+
+
+def test_a_process_that_closes_its_session_ends(endpoint):
+    """Without close() a process with a subscription may hang at its exit."""
+    code = f"""
+from fasaco_edge.bus.session import BusSettings, open_bus
+with open_bus(BusSettings("peer", (), ({endpoint!r},))) as bus:
+    bus.subscribe({KEY!r}, lambda sample: None, latched=True)
+    bus.serve({KEY!r}, lambda asked: None)
+    bus.publisher({KEY!r}, latched=True).put(b"")
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=20)

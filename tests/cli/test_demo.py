@@ -1,0 +1,135 @@
+"""The demo to its end, and what it left behind checked against the building."""
+
+from __future__ import annotations
+
+import json
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fasaco_edge.grid.map_files import find_map, read_map
+from tests.cli.commands import fasaco_edge
+from tests.daemon.processes import is_running
+
+CELL_M, RADIUS_M = 0.3, 0.18
+
+
+@pytest.mark.timeout(200)
+def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path):
+    pytest.importorskip("rerun")
+    out = tmp_path / "demo"
+    options = ("--map", "office", "--speed", 60, "--timeout", 80)
+    ended = fasaco_edge("demo", *options, "--out", out, "--json")
+    assert ended.code == 0, ended.err
+    summary = json.loads(ended.out)
+    print(summary)
+    assert summary == json.loads((out / "summary.json").read_text())
+    assert summary["complete"] is True
+    assert summary["errors"] == 0
+    assert summary["plans"] >= 1
+
+    grid = read_map(find_map("office"))
+    trail = np.loadtxt(out / "trail.csv", delimiter=",", skiprows=1)
+    reachable = reachable_cells(grid, trail[0])
+    assert reachable - visited_cells(trail) == set()
+    assert summary["reachable_cells"] == summary["covered_cells"] == len(reachable)
+    driven = sum(math.dist(a, b) for a, b in pairwise(trail))
+    assert summary["driven_m"] == pytest.approx(driven, abs=0.1)
+    check_clearance(grid, trail)
+
+    assert summary["recording"]
+    for file in summary["recording"]:
+        with open(file, "rb") as recording:
+            assert recording.read(4) == b"RRF2"
+    with Image.open(summary["picture"]) as picture:
+        assert picture.format == "PNG"
+        assert min(picture.size) > 200
+    for name in ("daemon.log", "robot.log"):
+        assert "Traceback" not in (out / name).read_text()
+    assert not [pid for pid in processes_of(out) if is_running(pid)]
+
+
+def processes_of(out):
+    """Return the process ids of what still has the demo's folder on its command line."""
+    pids = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                words = (entry / "cmdline").read_bytes()
+            except OSError:
+                continue
+            if str(out).encode() in words:
+                pids.append(int(entry.name))
+    return pids
+
+
+def bad_pixels(grid):
+    """Return the lower left corners (x, y) [m] of all pixels that are not free, (n, 2)."""
+    rows, cols = np.nonzero(grid.cells != 0)
+    geometry = grid.geometry
+    assert geometry.origin.yaw == 0.0
+    return np.column_stack((cols, rows)) * geometry.resolution + (
+        geometry.origin.x,
+        geometry.origin.y,
+    )
+
+
+def clearance(grid, points):
+    """Return how far each point (n, 2) [m] is from what is not free [m]."""
+    corners, size = bad_pixels(grid), grid.geometry.resolution
+    gaps = []
+    for point in points:
+        beside = np.maximum(np.maximum(corners - point, point - corners - size), 0.0)
+        gaps.append(np.hypot(*beside.T).min())
+    return np.array(gaps)
+
+
+def reachable_cells(grid, start):
+    """Return the cells (row, col) where the robot fits, step by step from ``start`` [m]."""
+    x0, y0, x1, y1 = grid.geometry.bounds()
+    fits = {
+        (row, col)
+        for row in range(math.floor(y0 / CELL_M), math.ceil(y1 / CELL_M))
+        for col in range(math.floor(x0 / CELL_M), math.ceil(x1 / CELL_M))
+        if fits_at(grid, ((col + 0.5) * CELL_M, (row + 0.5) * CELL_M))
+    }
+    first = (math.floor(start[1] / CELL_M), math.floor(start[0] / CELL_M))
+    found, edge = {first}, [first]
+    while edge:
+        row, col = edge.pop()
+        for cell in ((row + 1, col), (row - 1, col), (row, col + 1), (row, col - 1)):
+            if cell in fits - found and fits_between(grid, (row, col), cell):
+                found.add(cell)
+                edge.append(cell)
+    return found
+
+
+def fits_at(grid, point):
+    return clearance(grid, [np.array(point)])[0] > RADIUS_M
+
+
+def fits_between(grid, a, b):
+    """Tell whether the robot fits all along the step from cell to cell."""
+    ends = [np.array(((col + 0.5) * CELL_M, (row + 0.5) * CELL_M)) for row, col in (a, b)]
+    return clearance(grid, np.linspace(*ends, 7)).min() > RADIUS_M
+
+
+def visited_cells(trail):
+    """Return the cells whose centre the tool, a disc as wide as a cell, passed over."""
+    visited = set()
+    for a, b in pairwise(trail):
+        steps = max(2, math.ceil(math.dist(a, b) / 0.02))
+        for x, y in np.linspace(a, b, steps):
+            row, col = math.floor(y / CELL_M), math.floor(x / CELL_M)
+            if math.dist((x, y), ((col + 0.5) * CELL_M, (row + 0.5) * CELL_M)) < CELL_M / 2:
+                visited.add((row, col))
+    return visited
+
+
+def check_clearance(grid, trail):
+    """Check that the robot touched nothing."""
+    assert clearance(grid, trail[:: max(1, len(trail) // 500)]).min() > RADIUS_M - 0.01

@@ -1,0 +1,57 @@
+"""Each command explains itself."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from fasaco_edge import __version__
+from fasaco_edge.cli import COMMANDS, main
+from tests.cli.commands import fasaco_edge
+
+NAMES = [module.__name__.rpartition(".")[2] for module in COMMANDS]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_help_explains(capsys, name):
+    with pytest.raises(SystemExit, match="0"):
+        main([name, "--help"])
+    told = capsys.readouterr()
+    assert told.err == ""
+    assert told.out.startswith(f"usage: fasaco-edge {name}")
+    description = told.out.split("\n\n")[1]
+    assert len(description) > 30
+    # Each option is followed by its explanation, on its line or below.
+    options = told.out.partition("positional arguments:")[2] or told.out
+    for entry in re.split(r"\n(?=  -)", options)[1:]:
+        explained = re.split(r"\s{2,}|\n", entry.strip(), maxsplit=1)
+        assert len(explained) == 2, f"not explained: {entry}"
+
+
+def test_help_names_every_command(capsys):
+    with pytest.raises(SystemExit, match="0"):
+        main(["--help"])
+    told = capsys.readouterr().out
+    for name in NAMES:
+        assert re.search(rf"^    {name} +\w", told, re.MULTILINE), name
+
+
+def test_the_version_is_told(capsys):
+    with pytest.raises(SystemExit, match="0"):
+        main(["--version"])
+    assert capsys.readouterr().out == f"fasaco-edge {__version__}\n"
+
+
+def test_the_maps_are_listed_and_can_be_planned_on(capsys):
+    assert main(["maps"]) == 0
+    told = capsys.readouterr().out
+    for name in ("office", "flat", "basement", "warehouse"):
+        assert name in told
+
+
+def test_warmup_says_where_the_kernels_are():
+    ended = fasaco_edge("warmup")
+    assert ended.code == 0
+    assert "kernels ready after" in ended.err
+    assert "kernels-" in ended.err

@@ -1,0 +1,178 @@
+"""What users get wrong: told on standard error, with a way out, and never by a traceback."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+
+from fasaco_edge.cli import main
+from tests.cli.commands import ENVIRONMENT, PROGRAM, fasaco_edge
+from tests.daemon.processes import free_endpoint
+
+NOBODY = "tcp/127.0.0.1:1"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with a good grid, a bad one, and a file that is none."""
+    monkeypatch.chdir(tmp_path)
+    np.save("good.npy", np.ones((6, 6), bool))
+    blocked = np.ones((6, 6), bool)
+    blocked[2, 2] = False
+    np.save("blocked.npy", blocked)
+    np.save("walls.npy", np.zeros((6, 6), bool))
+    np.save("empty.npy", np.zeros((0, 6), bool))
+    np.save("numbers.npy", np.ones((6, 6)))
+    (tmp_path / "text.yaml").write_text("image: nowhere.pgm\n")
+    (tmp_path / "text.npy").write_text("no grid")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ("plan nowhere.yaml", 1, "no map 'nowhere.yaml'"),
+        ("plan .", 1, "no map '.'"),
+        ("plan text.yaml", 1, "text.yaml"),
+        ("plan text.npy", 1, "not readable as a .npy file"),
+        ("plan numbers.npy", 1, "expected a bool array of two dimensions, got float64"),
+        ("plan empty.npy", 1, "got 6 x 0"),
+        ("plan walls.npy", 1, "no cell of the map is coverable"),
+        ("plan walls.npy --start 1,1", 1, "start cell (1, 1) is blocked"),
+        ("plan blocked.npy --start 2,2", 1, "start cell (2, 2) is blocked"),
+        ("plan good.npy --start 6,0", 1, "start cell (6, 0) lies outside rows 0..5"),
+        ("plan good.npy --start -1,0", 1, "start cell (-1, 0) lies outside"),
+        ("plan good.npy --start-xy 99,0", 1, "lies outside"),
+        ("plan office --cell 0.0001", 1, "exceeds 4000000 cells"),
+        ("plan office --cell 1e-300", 1, "exceeds 4000000 cells"),
+        ("plan office --cell 0", 78, "--cell must be in (0, 10] m, got 0.0"),
+        ("plan office --cell nan", 78, "--cell must be in (0, 10] m, got nan"),
+        ("plan office --robot-radius -1", 78, "--robot-radius must be in (0, 10] m, got -1.0"),
+        ("plan good.npy --ants 0", 78, "ants must be in 8..1000000"),
+        ("plan good.npy --ants 7", 78, "one for each cohort at least, got 7"),
+        ("plan good.npy --velocities 8:x", 78, "velocities must look like 8:1, 1:8, 4 or 8,4,1"),
+        ("plan good.npy --velocities 65", 78, "velocities must be in 1..64, got 65"),
+        ("plan good.npy --seed -1", 78, "seed must be in 0..2^63 - 1, got -1"),
+        ("plan good.npy --png no/walk.png", 78, "cannot write no/walk.png: there is no folder no"),
+        ("plan good.npy --png .", 78, "cannot write .: that is a folder"),
+        ("plan good.npy --path-out no/w.csv", 78, "cannot write no/w.csv: there is no folder no"),
+        ("plan good.npy --path-out /proc/w.csv", 78, "cannot write /proc/w.csv"),
+        (f"simulate office --connect {NOBODY}", 1, "Unable to connect to any of"),
+        (f"simulate nowhere --connect {NOBODY}", 1, "no map 'nowhere'"),
+        (f"simulate office --speed 0 --connect {NOBODY}", 78, "speed must be above 0, got 0.0"),
+        (f"simulate office --start-xy 999,9 --connect {NOBODY}", 1, "(999, 9) m is not on the map"),
+        (f"simulate office --robot a/b --connect {NOBODY}", 78, "got 'a/b'"),
+        ("simulate office --trail-out no/trail.csv", 78, "there is no folder no"),
+        ("simulate office --connect office", 1, "office"),
+        (f"record --out . --connect {NOBODY}", 1, "Unable to connect to any of"),
+        (f"record --out . --base /x --connect {NOBODY}", 78, "base must be chunks"),
+        ("demo --map nowhere --out o", 1, "no map 'nowhere'"),
+        ("demo --speed 0 --out o", 78, "--speed must be above 0, got 0.0"),
+        ("demo --speed nan --out o", 78, "--speed must be above 0, got nan"),
+        ("demo --out good.npy", 78, "cannot write good.npy: File exists"),
+        ("run --config nowhere.yaml", 78, "nowhere.yaml: No such file or directory"),
+    ],
+)
+def test_a_mistake_is_told_with_a_hint(folder, capsys, words, code, said):
+    assert main(words.split()) == code
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert said in told.err
+    assert "\n  hint: " in told.err
+    assert "Traceback" not in told.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("", "the following arguments are required: COMMAND"),
+        ("dance", "invalid choice: 'dance'"),
+        ("plan", "the following arguments are required: MAP"),
+        ("plan office --start here", "argument --start: must be row,column, got 'here'"),
+        ("plan office --start 1,2,3", "argument --start: must be row,column, got '1,2,3'"),
+        ("plan office --start 1.5,2", "argument --start: must be row,column, got '1.5,2'"),
+        ("plan office --start-xy 1", "argument --start-xy: must be x,y in metres, got '1'"),
+        ("plan office --start-xy nan,1", "must be within 1e+06 m of 0, got nan,1"),
+        ("plan office --start-xy 1,1e300", "must be within 1e+06 m of 0, got 1,1e300"),
+        ("plan office --start 1,1 --start-xy 1,1", "not allowed with argument --start"),
+        ("plan office --cell wide", "argument --cell: invalid float value: 'wide'"),
+        ("plan office --planner best", "argument --planner: invalid choice: 'best'"),
+        ("record", "the following arguments are required: --out"),
+        ("record --out . --pose-schema tf", "argument --pose-schema: invalid choice: 'tf'"),
+        ("maps --log-level loud", "argument --log-level: invalid choice: 'loud'"),
+    ],
+)
+def test_a_word_nobody_understands_is_named(folder, capsys, words, said):
+    with pytest.raises(SystemExit, match="2"):
+        main(words.split())
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert said in told.err
+
+
+def test_a_mistake_ends_a_process_in_order(folder):
+    ended = fasaco_edge("plan", "nowhere.yaml")
+    assert ended.code == 1
+    assert ended.out == ""
+    assert ended.err.startswith("fasaco-edge: no map 'nowhere.yaml'")
+    assert "  hint: " in ended.err
+
+
+def test_a_full_disk_is_named(capsys, folder):
+    assert main(["plan", "good.npy", "--ants", "8", "--path-out", "/dev/full"]) == 78
+    assert "cannot write /dev/full: No space left on device" in capsys.readouterr().err
+
+
+def test_a_reader_that_has_seen_enough_is_no_error(folder):
+    """As in ``fasaco-edge plan ... --json | head -c 1``."""
+    command = [*PROGRAM, "plan", "good.npy", "--ants", "8", "--json"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT
+    ) as process:
+        process.stdout.close()
+        said = process.stderr.read()
+        process.wait(60)
+    assert "Traceback" not in said
+    assert "Exception ignored" not in said
+
+
+def test_ctrl_c_ends_a_plan(folder):
+    np.save("large.npy", np.ones((900, 900), bool))
+    command = [*PROGRAM, "plan", "large.npy", "--ants", "1000000"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT) as process:
+        # Not before it is at work: Python's own start cannot be interrupted in order.
+        time.sleep(4.0)
+        process.send_signal(signal.SIGINT)
+        said = process.stderr.read()
+        code = process.wait(20)
+    assert "Traceback" not in said
+    assert code == 130
+
+
+def test_a_demo_that_runs_out_of_time_says_so(folder):
+    ended = fasaco_edge("demo", "--map", "office", "--timeout", 0.1, "--out", "o")
+    assert ended.code == 1
+    assert "hint: see" in ended.err or "NOT ALL WAS COVERED" in ended.out
+
+
+def test_a_demo_whose_daemon_refuses_shows_why(folder):
+    ended = fasaco_edge("demo", "--map", "office", "--cell", 20, "--out", "o")
+    assert ended.code == 1
+    assert "the daemon ended with 78" in ended.err
+    assert "robot.tool_width_m: expected float <= 10.0, got 20.0" in ended.err
+
+
+def test_a_recorder_without_a_folder_says_so(folder):
+    pytest.importorskip("rerun")
+    from tests.daemon.outsider import Outsider
+    from tests.daemon.processes import daemon_process
+
+    endpoint = free_endpoint()
+    with daemon_process(folder, bus={"listen": [endpoint]}), Outsider(endpoint):
+        ended = fasaco_edge("record", "--out", "good.npy", "--connect", endpoint)
+    assert ended.code == 78
+    assert "cannot record into good.npy" in ended.err

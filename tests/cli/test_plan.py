@@ -1,0 +1,184 @@
+"""``fasaco-edge plan``: its figures are counted again here, from the walk it wrote."""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fasaco_edge.cli import main
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.map_files import write_map
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from tests.cli.commands import fasaco_edge
+from tests.daemon.rooms import coverable_cells, pillared_room
+
+KEYS = {
+    *("planner", "seed", "ants", "velocities", "map", "cell_m", "start", "end", "cells", "steps"),
+    *("revisits", "recovered_cells", "n_r_paper", "turns_90", "turns_180", "length_m"),
+    *("unreachable_cells", "complete", "wall_s", "cpu_s"),
+}
+
+
+@pytest.fixture
+def plan(tmp_path, capsys):
+    """Plan in this process; return the figures and the walk, a list of cells."""
+
+    def run(*words):
+        csv = tmp_path / "walk.csv"
+        words = [str(word) for word in words]
+        assert main(["plan", *words, "--json", "--path-out", str(csv)]) == 0
+        figures = json.loads(capsys.readouterr().out)
+        header, *rows = csv.read_text().splitlines()
+        assert header == "row,col"
+        return figures, [tuple(int(part) for part in row.split(",")) for row in rows]
+
+    return run
+
+
+@pytest.fixture
+def grid_file(tmp_path):
+    """A coverage grid with two areas that do not touch."""
+    free = np.ones((9, 12), bool)
+    free[:, 8] = False
+    free[3:5, 2:4] = False
+    file = tmp_path / "grid.npy"
+    np.save(file, free)
+    return file
+
+
+def area_of(free, start):
+    """Return the cells that can be reached from ``start``."""
+    found, edge = {start}, deque([start])
+    while edge:
+        row, col = edge.popleft()
+        for cell in ((row + 1, col), (row - 1, col), (row, col + 1), (row, col - 1)):
+            if cell in free and cell not in found:
+                found.add(cell)
+                edge.append(cell)
+    return found
+
+
+def way_length(free, start, goal):
+    """Return the number of steps of a shortest way."""
+    distance, edge = {start: 0}, deque([start])
+    while goal not in distance:
+        row, col = edge.popleft()
+        for cell in ((row + 1, col), (row - 1, col), (row, col + 1), (row, col - 1)):
+            if cell in free and cell not in distance:
+                distance[cell] = distance[row, col] + 1
+                edge.append(cell)
+    return distance[goal]
+
+
+def check(figures, walk, free, start):
+    """Count the figures of a walk again."""
+    area = area_of(free, start)
+    visits = {cell: walk.count(cell) for cell in set(walk)}
+    moves = [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(walk)]
+    turns = [a[0] * b[0] + a[1] * b[1] for a, b in pairwise(moves)]
+    assert walk[0] == start == tuple(figures["start"])
+    assert walk[-1] == tuple(figures["end"])
+    assert set(walk) == area
+    assert all(abs(row) + abs(col) == 1 for row, col in moves)
+    assert figures["cells"] == len(area)
+    assert figures["steps"] == len(moves)
+    assert figures["revisits"] == len(walk) - len(area)
+    assert figures["recovered_cells"] == sum(count > 1 for count in visits.values())
+    assert figures["n_r_paper"] == len(walk) - len(area) + way_length(free, walk[-1], walk[0])
+    assert figures["turns_90"] == turns.count(0)
+    assert figures["turns_180"] == turns.count(-1)
+    assert figures["unreachable_cells"] == len(free) - len(area)
+    assert figures["length_m"] == pytest.approx(len(moves) * figures["cell_m"], abs=1e-3)
+    assert figures["complete"] is True
+    assert figures["wall_s"] > 0
+    assert figures["cpu_s"] > 0
+
+
+def cells_in(file):
+    return {(int(row), int(col)) for row, col in np.argwhere(np.load(file))}
+
+
+def test_the_figures_of_a_coverage_grid_are_right(plan, grid_file):
+    figures, walk = plan(grid_file, "--start", "2,5", "--ants", 40, "--seed", 3)
+    assert set(figures) == KEYS
+    assert (figures["planner"], figures["seed"], figures["ants"]) == ("fasaco", 3, 40)
+    check(figures, walk, cells_in(grid_file), (2, 5))
+
+
+def test_the_figures_of_a_map_are_right(plan, tmp_path):
+    pixels = pillared_room()
+    geometry = GridGeometry(*pixels.shape, 0.05, Pose2D(0.0, 0.0))
+    write_map(OccupancyGrid(geometry, pixels), tmp_path / "room.yaml")
+    options = ("--cell", 0.3, "--robot-radius", 0.18, "--ants", 40)
+    figures, walk = plan(tmp_path / "room.yaml", *options, "--start-xy", "0.75,0.45")
+    check(figures, walk, coverable_cells(pixels), (1, 2))
+
+
+def test_a_start_may_be_negative(plan, tmp_path):
+    pixels = pillared_room()
+    geometry = GridGeometry(*pixels.shape, 0.05, Pose2D(-3.0, -3.0))
+    write_map(OccupancyGrid(geometry, pixels), tmp_path / "room.yaml")
+    for option, value in (("--start", "-9,-8"), ("--start-xy", "-2.25,-2.55")):
+        figures, walk = plan(tmp_path / "room.yaml", option, value, "--ants", 8)
+        assert tuple(figures["start"]) == walk[0] == (-9, -8)
+
+
+def test_without_a_start_the_larger_area_is_covered(plan, grid_file):
+    figures, walk = plan(grid_file, "--ants", 20)
+    check(figures, walk, cells_in(grid_file), (0, 0))
+
+
+def test_the_same_seed_gives_the_same_walk(plan):
+    (_, first), (_, again), (_, other) = (
+        plan("office", "--ants", 30, "--seed", seed) for seed in (5, 5, 6)
+    )
+    assert first == again
+    assert first != other
+
+
+def test_return_home_ends_at_the_start(plan, grid_file):
+    figures, walk = plan(grid_file, "--start", "8,0", "--return-home", "--ants", 40)
+    check(figures, walk, cells_in(grid_file), (8, 0))
+    assert walk[-1] == walk[0]
+    assert figures["n_r_paper"] == figures["revisits"]
+
+
+@pytest.mark.parametrize("velocities", ["8:1", "1:8", "4", "8,4,1", "1"])
+def test_velocities_may_be_written_in_several_ways(plan, grid_file, velocities):
+    figures, walk = plan(grid_file, "--velocities", velocities, "--ants", 24)
+    check(figures, walk, cells_in(grid_file), (0, 0))
+    assert figures["velocities"] == velocities
+
+
+def test_one_cell_is_a_walk_without_a_step(plan, tmp_path):
+    np.save(tmp_path / "one.npy", np.ones((1, 1), bool))
+    figures, walk = plan(tmp_path / "one.npy", "--ants", 8)
+    assert walk == [(0, 0)]
+    assert (figures["steps"], figures["cells"], figures["revisits"]) == (0, 1, 0)
+
+
+@pytest.mark.parametrize("name", ["walk.png", "walk", "walk.jpeg"])
+def test_a_picture_is_a_png_whatever_its_name(grid_file, tmp_path, capsys, name):
+    picture = tmp_path / name
+    assert main(["plan", str(grid_file), "--ants", "8", "--png", str(picture)]) == 0
+    assert f"wrote {picture}" in capsys.readouterr().out.replace("\n", "")
+    with Image.open(picture) as image:
+        assert image.format == "PNG"
+        assert min(image.size) > 100
+
+
+def test_figures_are_printed_for_people_too(grid_file):
+    ended = fasaco_edge("plan", grid_file, "--ants", 8)
+    assert ended.code == 0
+    for key in KEYS:
+        assert key.replace("_", " ") in ended.out
+
+
+def test_json_is_all_there_is_on_standard_output(grid_file):
+    ended = fasaco_edge("plan", grid_file, "--ants", 8, "--json")
+    assert set(json.loads(ended.out)) == KEYS

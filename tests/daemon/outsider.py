@@ -1,0 +1,159 @@
+"""A program of somebody else on the bus: plain Zenoh, payloads by rosbags, no code of ours."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Self
+
+import zenoh
+import zenoh.ext
+
+TIMEOUT_S = 40.0
+
+MAP = "nav_msgs/msg/OccupancyGrid"
+MAP_UPDATE = "map_msgs/msg/OccupancyGridUpdate"
+POSE = "geometry_msgs/msg/PoseStamped"
+SCHEMAS = {"map": MAP, "map_update": MAP_UPDATE, "pose": POSE}
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A sample or an answer."""
+
+    payload: bytes
+    encoding: str
+    attachment: bytes | None
+
+    def json(self) -> Any:
+        """Return the payload's document."""
+        return json.loads(self.payload)
+
+
+class Ear:
+    """What came in on one key, in order."""
+
+    def __init__(self) -> None:
+        self.heard: list[Heard] = []
+        self._came = threading.Condition()
+
+    def __call__(self, sample: zenoh.Sample) -> None:
+        """Take a sample in, on a Zenoh thread."""
+        with self._came:
+            self.heard.append(_heard(sample))
+            self._came.notify_all()
+
+    def wait(self, holds: Callable[[Heard], bool], since: int = 0) -> Heard:
+        """Return the first sample from number ``since`` on for which ``holds``."""
+        deadline = time.monotonic() + TIMEOUT_S
+        with self._came:
+            while True:
+                for heard in self.heard[since:]:
+                    if holds(heard):
+                        return heard
+                left = deadline - time.monotonic()
+                assert left > 0, f"never came; the last was {self.heard[-1:]}"
+                self._came.wait(left)
+
+
+class Outsider:
+    """A client session; close it before the daemon goes."""
+
+    def __init__(self, endpoint: str, robot: str = "robot") -> None:
+        self.prefix = f"fasaco/@v1/{robot}"
+        self.session = open_client(endpoint)
+        deadline = time.monotonic() + TIMEOUT_S
+        # The port is open a moment before anything is subscribed to.
+        while not self.alive():
+            assert time.monotonic() < deadline, f"no {robot} at {endpoint}"
+            time.sleep(0.02)
+        self.status = self.listen("status")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.session.close()  # type: ignore[no-untyped-call]
+
+    def listen(self, name: str, *, late: bool = True) -> Ear:
+        """Subscribe; ``late``: and get what was said last."""
+        ear = Ear()
+        key = f"{self.prefix}/{name}"
+        if late:
+            history = zenoh.ext.HistoryConfig(max_samples=1, detect_late_publishers=True)
+            zenoh.ext.declare_advanced_subscriber(self.session, key, ear, history=history)
+        else:
+            self.session.declare_subscriber(key, ear)
+        return ear
+
+    def put(self, name: str, payload: bytes, schema: str | None = None) -> None:
+        """Publish; with the schema of the native contract, another one, or "" for none."""
+        schema = SCHEMAS[name] if schema is None else schema
+        encoding = zenoh.Encoding(f"application/cdr;{schema}") if schema else None
+        block = zenoh.CongestionControl.BLOCK
+        self.session.put(
+            f"{self.prefix}/{name}", payload, encoding=encoding, congestion_control=block
+        )
+
+    def get(self, name: str, timeout_s: float = 5.0) -> list[zenoh.Reply]:
+        """Ask; return all answers."""
+        return list(self.session.get(f"{self.prefix}/{name}", timeout=timeout_s))
+
+    def ask(self, name: str) -> Heard:
+        """Ask, and return the one answer there has to be."""
+        replies = [reply.ok for reply in self.get(name)]
+        assert len(replies) == 1, replies
+        assert replies[0] is not None
+        return _heard(replies[0])
+
+    def ask_status(self) -> dict[str, Any]:
+        """Return the newest status, once there is one."""
+        self.status.wait(lambda heard: True)
+        document: dict[str, Any] = self.ask("@rpc/status").json()
+        return document
+
+    def wait_status(self, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """Return the first status from now on for which ``holds``."""
+        since = len(self.status.heard)
+        if holds(newest := self.ask_status()):
+            return newest
+        document: dict[str, Any] = self.status.wait(lambda h: holds(h.json()), since).json()
+        return document
+
+    def alive(self, timeout_s: float = 2.0) -> bool:
+        """Tell whether the daemon's liveliness token stands."""
+        replies = self.session.liveliness().get(f"{self.prefix}/alive", timeout=timeout_s)
+        return any(reply.ok is not None for reply in replies)
+
+
+def open_client(endpoint: str) -> zenoh.Session:
+    """Open a session as somebody's client would, once there is somebody."""
+    config = zenoh.Config.from_json5(
+        json.dumps(
+            {
+                "mode": "client",
+                "connect": {"endpoints": [endpoint], "timeout_ms": 0},
+                "scouting": {"multicast": {"enabled": False}},
+                "transport": {"shared_memory": {"enabled": False}},
+            }
+        )
+    )
+    deadline = time.monotonic() + TIMEOUT_S
+    while True:
+        try:
+            return zenoh.open(config)
+        except zenoh.ZError:
+            assert time.monotonic() < deadline, f"nobody listens at {endpoint}"
+            time.sleep(0.05)
+
+
+def _heard(sample: zenoh.Sample) -> Heard:
+    attachment = sample.attachment
+    return Heard(
+        sample.payload.to_bytes(),
+        str(sample.encoding),
+        None if attachment is None else attachment.to_bytes(),
+    )

@@ -1,0 +1,111 @@
+"""Daemon processes: started as a service manager would, ended, and watched for what they leave."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+import fasaco_edge
+
+# What a daemon may take from SIGTERM to its end [s].
+STOP_S = 2.0
+PROGRAM = (sys.executable, "-m", "fasaco_edge")
+# Found from any folder, installed or not.
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(fasaco_edge.__file__).parents[1])}
+
+
+def free_endpoint() -> str:
+    """Return a Zenoh endpoint nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@dataclass
+class Daemon:
+    """A running daemon."""
+
+    process: subprocess.Popen[bytes]
+    endpoint: str
+    log: Path
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        return self.process.pid
+
+    def log_text(self) -> str:
+        """Return what it has said on standard error."""
+        return self.log.read_text(errors="replace")
+
+    def stop(self, number: signal.Signals = signal.SIGTERM) -> float:
+        """Ask it to end, check that it did in order and in time; return the seconds it took."""
+        asked = time.monotonic()
+        self.process.send_signal(number)
+        try:
+            code = self.process.wait(STOP_S)
+        except subprocess.TimeoutExpired as error:
+            raise AssertionError(f"still there after {STOP_S} s:\n{self.log_text()}") from error
+        assert code == 0, f"ended with {code}:\n{self.log_text()}"
+        assert "Traceback" not in self.log_text(), self.log_text()
+        return time.monotonic() - asked
+
+    def kill(self) -> None:
+        """End it whatever it does."""
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+
+
+@contextmanager
+def daemon_process(
+    folder: Path, *words: str, env: dict[str, str] | None = None, **sections: Any
+) -> Iterator[Daemon]:
+    """Run a daemon with these sections of configuration; end it, and check how it ended."""
+    sections.setdefault("bus", {}).setdefault("listen", [free_endpoint()])
+    endpoint = sections["bus"]["listen"][0]
+    number = len(list(folder.glob("daemon*.yaml")))
+    config, log = folder / f"daemon{number}.yaml", folder / f"daemon{number}.log"
+    config.write_text(yaml.safe_dump(sections))
+    with log.open("wb") as stderr:
+        command = [*PROGRAM, "run", "--config", str(config), *words]
+        process = subprocess.Popen(command, stderr=stderr, env=ENVIRONMENT | (env or {}))
+    daemon = Daemon(process, endpoint, log)
+    try:
+        yield daemon
+        if process.poll() is None:
+            daemon.stop()
+        else:
+            assert process.returncode in (0, -signal.SIGKILL), daemon.log_text()
+    finally:
+        daemon.kill()
+
+
+def resident_mb(pid: int) -> float:
+    """Return the resident memory of a process [MB]."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def mapped_files(pid: int) -> str:
+    """Return the names of all files a process has mapped."""
+    return Path(f"/proc/{pid}/maps").read_text()
+
+
+def is_running(pid: int) -> bool:
+    """Tell whether a process exists and is no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

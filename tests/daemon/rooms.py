@@ -1,0 +1,124 @@
+"""Rooms drawn pixel by pixel, and plain arithmetic about where a robot fits in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from tests.wire import oracle
+
+RESOLUTION_M = 0.05
+TOOL_M = 0.3
+RADIUS_M = 0.18
+FREE, WALL, UNKNOWN = 0, 100, -1
+
+Pixels = NDArray[np.int8]
+Cell = tuple[int, int]
+
+
+def room(width_m: float, height_m: float) -> Pixels:
+    """Return an empty room within walls one pixel thick, its outer corner at the origin."""
+    rows, cols = round(height_m / RESOLUTION_M), round(width_m / RESOLUTION_M)
+    pixels = np.full((rows, cols), FREE, np.int8)
+    pixels[[0, -1]] = WALL
+    pixels[:, [0, -1]] = WALL
+    return pixels
+
+
+def fill(pixels: Pixels, x0: float, y0: float, x1: float, y1: float, value: int) -> Pixels:
+    """Return ``pixels`` with a rectangle, given in metres, of ``value``."""
+    filled = pixels.copy()
+    columns, rows = _span(x0, x1), _span(y0, y1)
+    filled[rows, columns] = value
+    return filled
+
+
+def pillared_room() -> Pixels:
+    """Return a room of 4 x 3 m with a pillar in it."""
+    return fill(room(4.0, 3.0), 2.0, 1.0, 2.4, 1.4, WALL)
+
+
+def two_rooms(*, door: bool) -> Pixels:
+    """Return two rooms of 3 x 3 m; between them a wall, with a door of 1 m or without."""
+    closed = fill(room(6.0, 3.0), 3.0, 0.0, 3.1, 3.0, WALL)
+    return fill(closed, 3.0, 1.0, 3.1, 2.0, FREE) if door else closed
+
+
+def coverable_cells(
+    pixels: Pixels, cell_m: float = TOOL_M, radius_m: float = RADIUS_M
+) -> set[Cell]:
+    """Return the cells (row, col) at whose centre the robot's disc touches free pixels only."""
+    rows, cols = pixels.shape
+    bad = [(float(c), float(r)) for r, c in np.argwhere(pixels != FREE)]
+    # Beyond the map nobody knows: a ring of pixels around it stands for that.
+    bad += [(float(c), float(r)) for r in (-1, rows) for c in range(-1, cols + 1)]
+    bad += [(float(c), float(r)) for c in (-1, cols) for r in range(rows)]
+    return {
+        cell
+        for cell in _cells_over(pixels, cell_m)
+        if all(_distance(cell, pixel, cell_m) > radius_m for pixel in bad)
+    }
+
+
+def cells_of(points: NDArray[np.float64], cell_m: float = TOOL_M) -> list[Cell]:
+    """Return the cell (row, col) of each point (x, y) [m]."""
+    return [(math.floor(y / cell_m), math.floor(x / cell_m)) for x, y in points]
+
+
+def map_bytes(pixels: Pixels, stamp_ns: int = 1, frame: str = "map") -> bytes:
+    """Return the room as a nav_msgs/OccupancyGrid, by rosbags."""
+    rows, cols = pixels.shape
+    geometry = GridGeometry(rows, cols, RESOLUTION_M, Pose2D(0.0, 0.0))
+    message = oracle.occupancy_grid(frame, stamp_ns, geometry, pixels)
+    return oracle.to_bytes("nav_msgs/msg/OccupancyGrid", message)
+
+
+def update_bytes(
+    pixels: Pixels, x0: float, y0: float, x1: float, y1: float, frame: str = "map"
+) -> bytes:
+    """Return a rectangle of ``pixels``, given in metres, as a map_msgs/OccupancyGridUpdate."""
+    columns, rows = _span(x0, x1), _span(y0, y1)
+    message = oracle.update(frame, 1, (columns.start, rows.start), pixels[rows, columns])
+    return oracle.to_bytes("map_msgs/msg/OccupancyGridUpdate", message)
+
+
+def pose_bytes(x: float, y: float, frame: str = "map") -> bytes:
+    """Return a geometry_msgs/PoseStamped, by rosbags."""
+    message = oracle.pose_stamped(frame, 1, oracle.pose(Pose2D(x, y)))
+    return oracle.to_bytes("geometry_msgs/msg/PoseStamped", message)
+
+
+def covariant_bytes(x: float, y: float) -> bytes:
+    """Return a geometry_msgs/PoseWithCovarianceStamped that knows no covariance."""
+    where, unknown = oracle.pose(Pose2D(x, y)), np.full(36, np.nan)
+    message = oracle.pose_with_covariance_stamped("map", 1, where, unknown)
+    return oracle.to_bytes("geometry_msgs/msg/PoseWithCovarianceStamped", message)
+
+
+def odometry_bytes(x: float, y: float) -> bytes:
+    """Return a nav_msgs/Odometry."""
+    where, zeros = oracle.pose(Pose2D(x, y)), np.zeros(36)
+    message = oracle.odometry("map", 1, "base_link", where, zeros, np.zeros(6), zeros)
+    return oracle.to_bytes("nav_msgs/msg/Odometry", message)
+
+
+def _span(low: float, high: float) -> slice:
+    return slice(round(low / RESOLUTION_M), round(high / RESOLUTION_M))
+
+
+def _cells_over(pixels: Pixels, cell_m: float) -> Iterator[Cell]:
+    rows, cols = (math.ceil(size * RESOLUTION_M / cell_m) for size in pixels.shape)
+    return ((row, col) for row in range(rows) for col in range(cols))
+
+
+def _distance(cell: Cell, pixel: tuple[float, float], cell_m: float) -> float:
+    """Return how far the centre of a cell is from the nearest point of a pixel [m]."""
+    x, y = (cell[1] + 0.5) * cell_m / RESOLUTION_M, (cell[0] + 0.5) * cell_m / RESOLUTION_M
+    left, bottom = pixel
+    beside = max(left - x, 0.0, x - left - 1.0)
+    above = max(bottom - y, 0.0, y - bottom - 1.0)
+    return RESOLUTION_M * math.hypot(beside, above)

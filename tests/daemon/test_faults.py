@@ -1,0 +1,86 @@
+"""What comes in broken costs that sample, and nothing else."""
+
+from __future__ import annotations
+
+import random
+import socket
+import time
+
+import pytest
+
+from fasaco_edge.errors import MalformedMessage
+from tests.daemon.fuzz_campaign import KINDS, run_campaign
+from tests.daemon.mutations import GOOD, REFUSES, mutant
+from tests.daemon.outsider import Outsider
+from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, room, update_bytes
+
+# The full campaign, ten thousand, is a command: see fuzz_campaign.py.
+SAMPLES = 600
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_mutants_are_broken_and_their_model_is_not(kind):
+    rng = random.Random(kind)
+    REFUSES[kind](GOOD[kind])
+    for _ in range(100):
+        with pytest.raises(MalformedMessage):
+            REFUSES[kind](mutant(rng, kind))
+
+
+def test_broken_samples_change_nothing(daemon):
+    pid = daemon.pid
+    figures = run_campaign(daemon, SAMPLES, seed=time.time_ns() % 1000)
+    print(figures)
+    assert daemon.pid == pid
+    assert figures["counted"]["map_update"] == figures["sent"]["map_update"] == SAMPLES // 3
+    assert figures["counted"]["pose"] == figures["sent"]["pose"] == SAMPLES // 3
+    assert figures["rss_mb_after"] < figures["rss_mb_before"] + 50
+
+
+def test_a_deleted_key_is_no_message(outsider):
+    """Zenoh has DELETE beside PUT: it carries no payload."""
+    total = outsider.ask_status()["errors"]["total"]
+    outsider.session.delete(f"{outsider.prefix}/map")
+    outsider.session.delete(f"{outsider.prefix}/pose")
+    outsider.wait_status(lambda status: status["errors"]["total"] == total + 2)
+
+
+@pytest.mark.parametrize("schema", ["nav_msgs/msg/Path", "geometry_msgs/PoseStamped", "x;y;z"])
+def test_a_pose_of_no_known_type_is_named(outsider, schema):
+    total = outsider.ask_status()["errors"]["total"]
+    outsider.put("pose", pose_bytes(0.75, 0.75), schema)
+    status = outsider.wait_status(lambda status: status["errors"]["total"] == total + 1)
+    assert "a pose must come as one of" in status["errors"]["last"]
+    assert repr(schema) in status["errors"]["last"]
+
+
+def test_updates_that_do_not_fit_the_map_are_counted_apart(outsider):
+    revision = (outsider.ask_status()["map"] or {"revision": 0})["revision"] + 1
+    outsider.put("map", map_bytes(pillared_room()))
+    status = outsider.wait_status(lambda status: (status["map"] or {}).get("revision") == revision)
+    counted = status["errors"]["by_code"].get("patch_without_base", 0)
+    larger = room(9.0, 9.0)
+    outsider.put("map_update", update_bytes(larger, 5.0, 5.0, 6.0, 6.0))
+    outsider.put("map_update", update_bytes(larger, 1.0, 1.0, 2.0, 2.0, frame="odom"))
+    after = outsider.wait_status(
+        lambda status: status["errors"]["by_code"].get("patch_without_base") == counted + 2
+    )
+    assert after["map"]["revision"] == status["map"]["revision"]
+
+
+def test_queries_with_junk_are_answered_or_not_but_harm_nothing(outsider):
+    for selector in ("@rpc/status?a=b;c;;=", "@rpc/path?" + "x" * 5000, "*", "**", "@rpc/*"):
+        for reply in outsider.get(selector, timeout_s=2.0):
+            assert reply.ok is not None or reply.err is not None
+    assert outsider.ask_status()["state"]
+
+
+def test_noise_on_the_port_harms_nobody(daemon, outsider):
+    host, _, port = daemon.endpoint.removeprefix("tcp/").partition(":")
+    rng = random.Random(0)
+    for size in (1, 100, 70_000):
+        with socket.create_connection((host, int(port)), timeout=5) as wire:
+            wire.sendall(rng.randbytes(size))
+    assert outsider.ask_status()["state"]
+    with Outsider(daemon.endpoint) as another:
+        assert another.alive()

@@ -1,0 +1,90 @@
+"""Before the first map: small, reachable, and beside others."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import Daemon, daemon_process, mapped_files, resident_mb
+from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
+
+IDLE_MB = 60.0
+
+
+@pytest.fixture(scope="module")
+def waiting(daemon: Daemon) -> Daemon:
+    """A daemon that has said who it is, and has heard no map."""
+    with Outsider(daemon.endpoint) as outsider:
+        outsider.wait_status(lambda status: status["state"] == "waiting for map")
+    return daemon
+
+
+def test_it_is_ready_when_its_token_stands(tmp_path):
+    started = time.monotonic()
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        print(f"ready {1e3 * (time.monotonic() - started):.0f} ms after its start")
+        assert "ready after" in running.log_text()
+        running.stop()
+        assert not outsider.alive(timeout_s=0.5)
+
+
+def test_neither_compiler_nor_viewer_is_loaded(waiting):
+    mapped = mapped_files(waiting.pid)
+    assert [name for name in ("numba", "llvmlite", "rerun", "PIL") if name in mapped] == []
+
+
+def test_it_is_small(waiting):
+    resident = resident_mb(waiting.pid)
+    print(f"idle: {resident:.1f} MB")
+    assert resident < IDLE_MB
+
+
+def test_poses_and_broken_samples_do_not_wake_it(waiting):
+    with Outsider(waiting.endpoint) as outsider:
+        outsider.put("pose", pose_bytes(1.0, 1.0))
+        outsider.put("pose", b"no pose")
+        outsider.put("map", b"no map")
+        status = outsider.wait_status(lambda status: status["errors"]["total"] == 2)
+    assert status["errors"]["by_code"] == {"malformed_message": 2}
+    assert status["state"] == "waiting for map"
+    assert "numba" not in mapped_files(waiting.pid)
+
+
+def test_an_update_of_no_map_is_refused_at_once(waiting):
+    """Held until a map comes, they would fill the memory of a daemon that never gets one."""
+    with Outsider(waiting.endpoint) as outsider:
+        before = outsider.ask_status()["errors"]["by_code"].get("patch_without_base", 0)
+        outsider.put("map_update", update_bytes(pillared_room(), 1.0, 1.0, 2.0, 2.0))
+        outsider.wait_status(
+            lambda status: status["errors"]["by_code"].get("patch_without_base") == before + 1
+        )
+
+
+def test_a_second_robot_joins_where_one_listens(daemon, tmp_path):
+    bus = {"listen": [daemon.endpoint]}
+    with daemon_process(tmp_path, bus=bus, robot={"name": "second"}) as second:
+        first_client, client = Outsider(daemon.endpoint), Outsider(daemon.endpoint, "second")
+        with first_client, client:
+            client.wait_status(lambda status: status["robot"] == "second")
+            assert client.alive()
+            assert first_client.ask_status()["robot"] == "robot"
+            path, other_path = client.listen("path"), first_client.listen("path")
+            client.put("map", map_bytes(pillared_room()))
+            client.put("pose", pose_bytes(1.0, 1.0))
+            path.wait(lambda heard: len(heard.payload) > 100)
+            assert other_path.heard == []
+            assert first_client.ask_status()["map"] is None
+        second.stop()
+    with Outsider(daemon.endpoint) as first_client:
+        assert first_client.ask_status()["robot"] == "robot"
+        assert daemon.process.poll() is None
+
+
+def test_an_endpoint_that_is_none_is_an_error_and_no_traceback(tmp_path):
+    with daemon_process(tmp_path, bus={"listen": ["tcp/127.0.0.1:notaport"]}) as running:
+        assert running.process.wait(20) != 0
+        assert "Traceback" not in running.log_text()
+        assert "fasaco-edge: " in running.log_text()
+        running.process.returncode = 0

@@ -1,0 +1,111 @@
+"""From samples to events: what a broken map, or too many updates, must not cost."""
+
+from __future__ import annotations
+
+import pytest
+
+from fasaco_edge.bus.session import BusSettings, Sample, open_bus
+from fasaco_edge.daemon.inbox import Inbox, Received, make_mailbox
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.mission.events import MapReceived, PatchesLost, PatchReceived, PoseReceived
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.schemas import POSE_STAMPED
+from tests.daemon.processes import free_endpoint
+from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
+
+MAP = map_bytes(pillared_room())
+UPDATE = update_bytes(pillared_room(), 1.0, 1.0, 2.0, 2.0)
+
+
+class Arrivals:
+    """A mailbox with its inbox; samples come in one after the other."""
+
+    def __init__(self, bus):
+        self.mailbox = make_mailbox()
+        self.inbox = Inbox(bus, Keys(), self.mailbox, POSE_STAMPED)
+        self.clock = 0.0
+
+    def post(self, kind, payload):
+        self.clock += 1.0
+        sample = Sample(f"fasaco/@v1/robot/{kind}", payload)
+        self.mailbox.post(kind, Received(sample, self.clock))
+
+    def decode(self):
+        """Return the types of the events, and the faults."""
+        items = self.mailbox.take(0.0)
+        events, faults = self.inbox.decode(items, self.mailbox.take_lost("map_update"))
+        return [type(event) for event in events], faults
+
+
+@pytest.fixture
+def arrivals():
+    with open_bus(BusSettings("peer", (), (free_endpoint(),))) as bus:
+        yield Arrivals(bus)
+
+
+def test_the_newest_map_comes_first_and_updates_in_order(arrivals):
+    arrivals.post("pose", pose_bytes(1.0, 1.0))
+    arrivals.post("map", MAP)
+    arrivals.post("map", MAP)
+    arrivals.post("map_update", UPDATE)
+    arrivals.post("map_update", UPDATE)
+    events, faults = arrivals.decode()
+    assert sorted(events, key=str) == sorted(
+        [MapReceived, PatchReceived, PatchReceived, PoseReceived], key=str
+    )
+    assert events[0] is MapReceived
+    assert faults == []
+
+
+def test_a_map_makes_the_updates_before_it_worthless(arrivals):
+    arrivals.post("map_update", UPDATE)
+    arrivals.post("map", MAP)
+    assert arrivals.decode() == ([MapReceived], [])
+
+
+def test_a_broken_map_costs_no_update(arrivals):
+    """Updates have no revision: one that went missing unseen would leave the map wrong."""
+    arrivals.post("map_update", UPDATE)
+    arrivals.post("map", b"junk")
+    arrivals.post("map_update", UPDATE)
+    events, faults = arrivals.decode()
+    assert events == [PatchReceived, PatchReceived]
+    assert [type(fault) for fault in faults] == [MalformedMessage]
+
+
+def test_lost_updates_are_told_before_those_that_came_through(arrivals):
+    for _ in range(300):
+        arrivals.post("map_update", UPDATE)
+    events, _ = arrivals.decode()
+    assert events == [PatchesLost] + [PatchReceived] * 256
+
+
+def test_updates_lost_after_a_map_are_told_after_it(arrivals):
+    arrivals.post("map", MAP)
+    for _ in range(300):
+        arrivals.post("map_update", UPDATE)
+    events, _ = arrivals.decode()
+    assert events == [MapReceived, PatchesLost] + [PatchReceived] * 256
+
+
+def test_updates_lost_before_a_map_matter_no_more(arrivals):
+    for _ in range(300):
+        arrivals.post("map_update", UPDATE)
+    arrivals.post("map", MAP)
+    arrivals.post("map_update", UPDATE)
+    assert arrivals.decode() == ([MapReceived, PatchReceived], [])
+
+
+def test_a_broken_sample_costs_that_sample_alone(arrivals):
+    for kind in ("map_update", "pose", "pose"):
+        arrivals.post(kind, b"")
+    arrivals.post("pose", pose_bytes(1.0, 1.0))
+    events, faults = arrivals.decode()
+    assert events == [PoseReceived]
+    assert len(faults) == 3
+
+
+def test_what_is_no_sample_is_not_its_business(arrivals):
+    arrivals.mailbox.post("plan", object())
+    arrivals.mailbox.post("failed", RuntimeError())
+    assert arrivals.decode() == ([], [])

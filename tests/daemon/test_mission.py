@@ -1,0 +1,360 @@
+"""A mission over the bus, as a program that shares no code with the daemon lives it."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import daemon_process
+from tests.daemon.rooms import (
+    FREE,
+    RADIUS_M,
+    TOOL_M,
+    UNKNOWN,
+    WALL,
+    cells_of,
+    covariant_bytes,
+    coverable_cells,
+    fill,
+    map_bytes,
+    odometry_bytes,
+    pillared_room,
+    pose_bytes,
+    room,
+    two_rooms,
+    update_bytes,
+)
+from tests.wire import oracle
+
+START = (0.75, 0.75)
+
+
+def planned(heard):
+    """Return points (n, 2) and yaws (n,) of a path, as rosbags reads it."""
+    message = oracle.from_bytes("nav_msgs/msg/Path", heard.payload)
+    assert message.header.frame_id == "map"
+    poses = [stamped.pose for stamped in message.poses]
+    yaws = [2 * math.atan2(pose.orientation.z, pose.orientation.w) for pose in poses]
+    return np.array([(pose.position.x, pose.position.y) for pose in poses]), np.array(yaws)
+
+
+def about(heard):
+    return json.loads(heard.attachment)
+
+
+def covers(heard, pixels):
+    """Tell whether a path visits exactly the cells where the robot fits."""
+    points, _ = planned(heard)
+    return len(points) > 0 and set(cells_of(points)) == coverable_cells(pixels)
+
+
+@pytest.fixture(scope="module")
+def pixels():
+    return pillared_room()
+
+
+@pytest.fixture(scope="module")
+def path(daemon, pixels):
+    """The path of the room with the pillar."""
+    with Outsider(daemon.endpoint) as outsider:
+        ear = outsider.listen("path")
+        outsider.put("map", map_bytes(pixels, stamp_ns=12_000_000_034))
+        outsider.put("pose", pose_bytes(*START))
+        heard = ear.wait(lambda heard: True)
+        # The robot does not move: this path stays.
+        outsider.wait_status(lambda status: status["state"] == "covering")
+        return heard
+
+
+def test_before_there_is_a_path_the_answer_is_an_error(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        for name in ("@rpc/path", "@rpc/coverage", "path", "coverage"):
+            (reply,) = outsider.get(name)
+            assert reply.ok is None
+            error = json.loads(reply.err.payload.to_bytes())
+            assert error["code"] == "not_yet"
+            assert name.removeprefix("@rpc/") in error["message"]
+            assert error["hint"]
+            assert "json" in str(reply.err.encoding)
+        assert outsider.get("@rpc/nothing_of_that_name", timeout_s=1.0) == []
+
+
+def test_the_path_covers_every_cell_the_robot_fits_in(path, pixels):
+    assert covers(path, pixels)
+    points, _ = planned(path)
+    assert cells_of(points)[0] == cells_of(np.array([START]))[0]
+    assert np.hypot(*np.diff(points, axis=0).T) == pytest.approx(TOOL_M)
+
+
+def test_the_robot_touches_no_wall_on_the_way(path, pixels):
+    points, _ = planned(path)
+    rows, cols = np.nonzero(pixels != FREE)
+    between = np.linspace(points[:-1], points[1:], 7).reshape(-1, 2)
+    beside = np.abs(between[:, None, 0] / 0.05 - (cols + 0.5)) - 0.5
+    above = np.abs(between[:, None, 1] / 0.05 - (rows + 0.5)) - 0.5
+    gap = 0.05 * np.hypot(beside.clip(0), above.clip(0)).min()
+    assert gap > RADIUS_M
+
+
+def test_each_pose_looks_to_the_next(path):
+    points, yaws = planned(path)
+    ahead = np.diff(points, axis=0)
+    assert np.cos(yaws[:-1]) == pytest.approx(ahead[:, 0] / TOOL_M, abs=1e-9)
+    assert np.sin(yaws[:-1]) == pytest.approx(ahead[:, 1] / TOOL_M, abs=1e-9)
+    assert yaws[-1] == yaws[-2]
+
+
+def test_encoding_and_attachment_say_what_it_is(path):
+    assert path.encoding == "application/cdr;nav_msgs/msg/Path"
+    note = about(path)
+    points, _ = planned(path)
+    assert note["revision"] == 1
+    assert note["map_revision"] == 1
+    assert note["map_stamp_ns"] == 12_000_000_034
+    assert note["reason"] == "first plan"
+    assert note["steps"] == len(points) - 1
+    assert (note["planner"], note["seed"], note["ants"]) == ("fasaco", 0, 200)
+    assert note["plan_ms"] > 0
+    stamp = oracle.from_bytes("nav_msgs/msg/Path", path.payload).header.stamp
+    assert (stamp.sec, stamp.nanosec) == (12, 34)
+
+
+def test_who_asks_gets_the_same_bytes(path, outsider):
+    for name in ("@rpc/path", "path"):
+        answer = outsider.ask(name)
+        assert answer == path
+    for name in ("@rpc/status", "status"):
+        assert outsider.ask(name).json()["state"] == "covering"
+
+
+def test_who_comes_late_gets_it_at_once(path, outsider):
+    ear = outsider.listen("path")
+    assert ear.wait(lambda heard: True) == path
+    assert len(ear.heard) == 1
+
+
+def test_the_coverage_tells_what_is_where(path, pixels, outsider):
+    heard = outsider.listen("coverage").wait(lambda heard: True)
+    assert heard.encoding == "application/cdr;nav_msgs/msg/OccupancyGrid"
+    grid = oracle.from_bytes("nav_msgs/msg/OccupancyGrid", heard.payload)
+    assert grid.header.frame_id == "map"
+    assert grid.info.resolution == pytest.approx(TOOL_M)
+    cells = grid.data.reshape(grid.info.height, grid.info.width)
+    row0 = round(grid.info.origin.position.y / TOOL_M)
+    col0 = round(grid.info.origin.position.x / TOOL_M)
+    where = {
+        value: {(int(r) + row0, int(c) + col0) for r, c in np.argwhere(cells == value)}
+        for value in (-1, 0, 50, 75, 100)
+    }
+    start = cells_of(np.array([START]))[0]
+    assert where[50] == {start}
+    assert where[0] | where[50] == coverable_cells(pixels)
+    assert where[75] == where[-1] == set()
+    assert len(where[100]) == cells.size - len(coverable_cells(pixels))
+
+
+def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
+    status = outsider.wait_status(lambda status: status["coverage"] is not None)
+    count = len(coverable_cells(pixels))
+    assert set(status) == {
+        *("robot", "version", "state", "reason", "uptime_s", "map", "pose", "coverage", "path"),
+        *("plan", "latency_ms", "errors", "recorder", "rss_mb", "config"),
+    }
+    assert (status["robot"], status["state"], status["reason"]) == ("robot", "covering", "path 1")
+    assert status["map"] == {
+        "rows": pixels.shape[0],
+        "cols": pixels.shape[1],
+        "resolution_m": 0.05,
+        "revision": 1,
+        "stamp_ns": 12_000_000_034,
+    }
+    assert status["pose"] == {"x": START[0], "y": START[1], "yaw": 0.0}
+    assert status["coverage"] == {
+        "coverable": count,
+        "covered": 1,
+        "recovered": 0,
+        "remaining": count - 1,
+        "unreachable": 0,
+        "covered_m2": pytest.approx(TOOL_M**2),
+        "fraction": pytest.approx(1 / count, abs=1e-4),
+    }
+    steps = about(path)["steps"]
+    assert status["path"] == {
+        "revision": 1,
+        "steps": steps,
+        "remaining_steps": steps,
+        "reason": "first plan",
+        "planner": "fasaco",
+        "seed": 0,
+        "ants": 200,
+    }
+    assert status["plan"] == {"plans": 1, "planning": False}
+    assert status["latency_ms"]["plan"] > 0
+    assert status["errors"] == {"total": 0, "last": "", "by_code": {}}
+    assert status["recorder"] is None
+    assert 50 < status["rss_mb"] < 400
+    assert status["config"]["bus"]["listen"] == [daemon.endpoint]
+    assert status["config"]["planner"]["velocities"] == "8:1"
+
+
+def test_the_status_comes_once_a_second(path, outsider):
+    first = outsider.wait_status(lambda status: True)["uptime_s"]
+    later = outsider.wait_status(lambda status: status["uptime_s"] > first + 1.5)["uptime_s"]
+    said = sorted({heard.json()["uptime_s"] for heard in outsider.status.heard})
+    assert later - first < 3.5
+    assert max(np.diff(said)) < 1.5
+
+
+# What follows changes the mission: each test brings its own daemon.
+
+
+@pytest.fixture
+def fresh(tmp_path):
+    """An outsider of a daemon of its own."""
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+        yield client
+
+
+def test_an_update_that_opens_a_door_leads_to_a_new_path(fresh):
+    closed, opened = two_rooms(door=False), two_rooms(door=True)
+    ear = fresh.listen("path")
+    fresh.put("map", map_bytes(closed))
+    fresh.put("pose", pose_bytes(*START))
+    first = ear.wait(lambda heard: True)
+    west = {cell for cell in coverable_cells(closed) if cell[1] < 10}
+    assert set(cells_of(planned(first)[0])) == west
+    status = fresh.wait_status(lambda status: status["coverage"] is not None)
+    assert status["coverage"]["unreachable"] == len(coverable_cells(closed)) - len(west)
+
+    fresh.put("map_update", update_bytes(opened, 2.5, 0.5, 3.5, 2.5))
+    second = ear.wait(lambda heard: True, since=1)
+    assert set(cells_of(planned(second)[0])) >= coverable_cells(opened) - set(
+        cells_of(np.array([START]))
+    )
+    assert about(second)["revision"] == 2
+    assert about(second)["map_revision"] == 2
+    assert "cells more" in about(second)["reason"]
+
+    # A door that is shut again cuts the path off, and a new one stays on this side.
+    fresh.put("map_update", update_bytes(closed, 2.5, 0.5, 3.5, 2.5))
+    third = ear.wait(lambda heard: set(cells_of(planned(heard)[0])) <= west, since=2)
+    assert about(third)["map_revision"] == 3
+
+
+def test_a_change_that_touches_no_coverable_cell_changes_no_path(fresh):
+    pixels = pillared_room()
+    ear = fresh.listen("path")
+    fresh.put("map", map_bytes(pixels))
+    fresh.put("pose", pose_bytes(*START))
+    ear.wait(lambda heard: True)
+    # Inside the pillar; and more of the unknown around.
+    hollow = fill(pixels, 2.15, 1.15, 2.25, 1.25, UNKNOWN)
+    wider = np.full((pixels.shape[0] + 30, pixels.shape[1] + 30), UNKNOWN, np.int8)
+    wider[: pixels.shape[0], : pixels.shape[1]] = pixels
+    for revision, changed in enumerate((hollow, wider, pixels), start=2):
+        fresh.put("map", map_bytes(changed, stamp_ns=revision))
+        fresh.wait_status(
+            lambda status, revision=revision: (status["map"] or {}).get("revision") == revision
+        )
+    status = fresh.wait_status(lambda status: True)
+    assert status["plan"]["plans"] == 1
+    assert len(ear.heard) == 1
+
+
+def test_poses_may_come_as_other_messages_that_say_so(fresh):
+    ear = fresh.listen("path")
+    fresh.put("map", map_bytes(room(3.0, 3.0)))
+    fresh.put("pose", covariant_bytes(0.75, 0.75), "geometry_msgs/msg/PoseWithCovarianceStamped")
+    ear.wait(lambda heard: True)
+    fresh.put("pose", odometry_bytes(1.05, 0.75), "nav_msgs/msg/Odometry")
+    status = fresh.wait_status(lambda status: (status["pose"] or {}).get("x") == 1.05)
+    assert status["errors"]["total"] == 0
+    # Without a schema it has to be what the configuration says, a PoseStamped.
+    fresh.put("pose", odometry_bytes(1.35, 0.75), "")
+    fresh.wait_status(lambda status: status["errors"]["by_code"] == {"malformed_message": 1})
+    fresh.put("pose", pose_bytes(1.35, 0.75), "")
+    fresh.wait_status(lambda status: status["pose"]["x"] == 1.35)
+
+
+@pytest.mark.parametrize("name", ["PoseWithCovarianceStamped", "Odometry"])
+def test_poses_that_do_not_say_are_what_the_configuration_says(tmp_path, name):
+    make = {"Odometry": odometry_bytes, "PoseWithCovarianceStamped": covariant_bytes}[name]
+    package = "nav_msgs" if name == "Odometry" else "geometry_msgs"
+    with (
+        daemon_process(tmp_path, pose={"schema": f"{package}/msg/{name}"}) as running,
+        Outsider(running.endpoint) as client,
+    ):
+        client.put("pose", make(0.75, 1.05), "")
+        client.put("map", map_bytes(room(3.0, 3.0)), "")
+        status = client.wait_status(lambda status: status["state"] == "covering")
+        assert (status["pose"]["x"], status["pose"]["y"]) == (0.75, 1.05)
+        assert status["errors"]["total"] == 0
+
+
+def test_a_robot_that_covers_all_is_done(fresh):
+    pixels = room(1.5, 1.2)
+    ear = fresh.listen("path")
+    fresh.put("map", map_bytes(pixels))
+    fresh.put("pose", pose_bytes(0.45, 0.45))
+    points, _ = planned(ear.wait(lambda heard: True))
+    for x, y in points:
+        fresh.put("pose", pose_bytes(x, y))
+    status = fresh.wait_status(lambda status: status["state"] == "done")
+    assert status["coverage"]["remaining"] == 0
+    assert status["coverage"]["covered"] == len(coverable_cells(pixels)) == len(points)
+    last = ear.wait(lambda heard: True, since=1)
+    assert len(planned(last)[0]) == 0
+    assert about(last)["reason"] == "every reachable cell is covered"
+
+
+def test_a_robot_in_a_wall_is_blocked_until_it_stands_well(fresh):
+    pixels = fill(room(4.0, 3.0), 2.0, 0.0, 4.0, 3.0, WALL)
+    fresh.put("map", map_bytes(pixels))
+    fresh.put("pose", pose_bytes(3.3, 1.5))
+    status = fresh.wait_status(lambda status: status["state"] == "blocked")
+    assert "(3.30, 1.50) m" in status["reason"]
+    fresh.put("pose", pose_bytes(0.75, 0.75))
+    status = fresh.wait_status(lambda status: status["state"] == "covering")
+    assert status["coverage"]["coverable"] == len(coverable_cells(pixels))
+
+
+def test_another_frame_is_refused_and_counted(fresh):
+    fresh.put("map", map_bytes(room(3.0, 3.0)))
+    fresh.put("pose", pose_bytes(*START))
+    fresh.wait_status(lambda status: status["state"] == "covering")
+    fresh.put("pose", pose_bytes(1.05, 1.05, frame="odom"))
+    fresh.put("map", map_bytes(room(6.0, 6.0), frame="odom"))
+    status = fresh.wait_status(lambda status: status["errors"]["total"] == 2)
+    assert status["errors"]["by_code"] == {"wrong_frame": 2}
+    assert status["map"]["rows"] == 60
+    assert status["pose"]["x"] == START[0]
+
+
+def test_a_map_beyond_the_limit_is_refused_and_counted(tmp_path):
+    with (
+        daemon_process(tmp_path, map={"max_lattice_cells": 200}) as running,
+        Outsider(running.endpoint) as client,
+    ):
+        client.put("pose", pose_bytes(*START))
+        client.put("map", map_bytes(room(6.0, 6.0)))
+        status = client.wait_status(lambda status: status["errors"]["total"] == 1)
+        assert status["errors"]["by_code"] == {"map_too_large": 1}
+        assert "exceeds 200 cells" in status["errors"]["last"]
+        client.put("map", map_bytes(room(3.0, 3.0)))
+        client.wait_status(lambda status: status["state"] == "covering")
+
+
+def test_the_pheromone_is_sent_only_to_who_listens(fresh):
+    ear = fresh.listen("pheromone", late=False)
+    fresh.put("map", map_bytes(room(3.0, 3.0)))
+    fresh.put("pose", pose_bytes(*START))
+    heard = ear.wait(lambda heard: True)
+    assert heard.encoding == "application/cdr;fasaco_msgs/msg/PheromoneGrid"
+    grid = oracle.from_bytes("fasaco_msgs/msg/PheromoneGrid", heard.payload)
+    assert grid.header.frame_id == "map"
+    assert grid.levels.size == grid.info.width * grid.info.height
+    assert grid.levels.max() > 0

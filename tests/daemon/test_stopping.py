@@ -1,0 +1,114 @@
+"""Ends in order and in time, whatever it is doing; and leaves nothing behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import daemon_process, is_running
+from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, room
+
+# 400 x 400 cells of the tool's width [m].
+HUGE_M = 120.0
+ENDLESS = {"ants": 1_000_000, "budget_s": 3600.0}
+
+
+def cluttered(size_m: float) -> np.ndarray:
+    """Return a room with a pillar every two metres: long walks, many dead ends."""
+    pixels = room(size_m, size_m)
+    for row in range(4):
+        for col in range(4):
+            pixels[20 + row :: 40, 20 + col :: 40] = 100
+    return pixels
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_it_while_it_waits(tmp_path, number):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        outsider.ask_status()
+        print(f"ended after {1e3 * running.stop(number):.0f} ms")
+        assert "stopped" in running.log_text()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_it_while_it_plans(tmp_path, number):
+    with (
+        daemon_process(tmp_path, planner=ENDLESS) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        outsider.put("map", map_bytes(cluttered(HUGE_M)))
+        outsider.put("pose", pose_bytes(0.75, 0.75))
+        status = outsider.wait_status(lambda status: status["plan"]["planning"])
+        assert status["coverage"]["coverable"] > 100_000
+        time.sleep(0.5)
+        print(f"ended after {1e3 * running.stop(number):.0f} ms")
+
+
+def test_a_signal_ends_it_while_it_compiles(tmp_path):
+    """A fresh cache takes many seconds; nobody waits for it."""
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    for loading_s in (0.5, 2.0):
+        with (
+            daemon_process(tmp_path, env=cache) as running,
+            Outsider(running.endpoint) as outsider,
+        ):
+            outsider.put("map", map_bytes(pillared_room()))
+            outsider.wait_status(lambda status: status["state"] == "loading")
+            time.sleep(loading_s)
+            assert outsider.ask_status()["state"] == "loading"
+            running.stop()
+
+
+def test_it_answers_while_it_plans(tmp_path):
+    with (
+        daemon_process(tmp_path, planner=ENDLESS) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        outsider.put("map", map_bytes(cluttered(HUGE_M)))
+        outsider.put("pose", pose_bytes(0.75, 0.75))
+        outsider.wait_status(lambda status: status["plan"]["planning"])
+        since = outsider.ask_status()["uptime_s"]
+        later = outsider.wait_status(lambda status: status["uptime_s"] > since + 2.0)
+        assert later["plan"] == {"plans": 0, "planning": True}
+        said = sorted({heard.json()["uptime_s"] for heard in outsider.status.heard})
+        assert max(np.diff([moment for moment in said if moment >= since])) < 2.0
+
+
+def test_a_killed_daemon_leaves_no_recorder(tmp_path):
+    pytest.importorskip("rerun")
+    with (
+        daemon_process(tmp_path, "--record", str(tmp_path)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        status = outsider.wait_status(
+            lambda status: (status["recorder"] or {}).get("state") == "recording"
+        )
+        recorder = status["recorder"]["pid"]
+        assert is_running(recorder)
+        running.process.send_signal(signal.SIGKILL)
+        running.process.wait()
+        deadline = time.monotonic() + 10.0
+        while is_running(recorder):
+            assert time.monotonic() < deadline, "the recorder outlives its daemon"
+            time.sleep(0.05)
+    assert list(tmp_path.glob("*.rrd"))
+
+
+def test_a_recorder_that_hangs_does_not_hold_the_end_up(tmp_path):
+    pytest.importorskip("rerun")
+    with (
+        daemon_process(tmp_path, "--record", str(tmp_path)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        status = outsider.wait_status(
+            lambda status: (status["recorder"] or {}).get("state") == "recording"
+        )
+        recorder = status["recorder"]["pid"]
+        os.kill(recorder, signal.SIGSTOP)
+        print(f"ended after {1e3 * running.stop():.0f} ms")
+        assert not is_running(recorder)
