@@ -1,4 +1,4 @@
-"""Time the compiled colony, and beside it the naive twin of the tests."""
+"""Time the compiled planners, and beside them the naive twins of the tests."""
 
 from __future__ import annotations
 
@@ -13,13 +13,20 @@ from fasaco_edge.bench.grids import NamedGrid, read_grid
 from fasaco_edge.bench.naive_twin import load_naive, naive_file
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.table import PLANNERS
 from fasaco_edge.planners.warmup import warm_up
+
+BASELINES = ("stc", "spiral-stc", "zigzag")
+# They take less than a millisecond: one run says nothing.
+BASELINE_RUNS = 20
+_NO_COLONY = ColonyConfig()
 
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """One colony's run.
+    """One planner's run.
 
     Attributes:
         grid: name of the grid.
@@ -29,8 +36,10 @@ class Timing:
         wall_s: time by the clock [s].
         cpu_s: time of the one thread on a processor [s].
         compiled: False for the naive twin.
-        same_walk: of the twin, whether the compiled colony of as many ants finds the
-            same walk, cell by cell.
+        same_walk: of the twin, whether the compiled planner (with as many ants) finds the
+            same walk, cell by cell; of several threads, whether one finds it.
+        planner: its name.
+        threads: on how many threads the ants walked.
     """
 
     grid: str
@@ -41,6 +50,8 @@ class Timing:
     cpu_s: float
     compiled: bool = True
     same_walk: bool | None = None
+    planner: str = "fasaco"
+    threads: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +64,7 @@ class TimingPlan:
         repeats: runs of the compiled colony on each grid.
         return_home: whether walks end where they begin.
         naive_s: about how long the naive twin may run on each grid [s]; 0 for not at all.
+        threads: how many threads are tried against one; 1 for no trial.
     """
 
     grids: tuple[str, ...]
@@ -60,6 +72,7 @@ class TimingPlan:
     repeats: int
     return_home: bool
     naive_s: float
+    threads: int
 
 
 def time_colony(plan: TimingPlan, say: Say) -> Generator[Timing, None, None]:
@@ -79,15 +92,67 @@ def time_colony(plan: TimingPlan, say: Say) -> Generator[Timing, None, None]:
         say(f"{grid.name}: compiled")
         Fasaco(_smallest(plan.colony)).plan(problem)
         for _ in range(plan.repeats):
+            # In turn, so that a machine that slows down does so for both.
             yield _time_compiled(grid, problem, plan.colony)
+            if plan.threads > 1:
+                yield _time_threads(grid, problem, plan)
         if naive is not None:
             say(f"{grid.name}: naive twin")
             yield _time_naive(naive, grid, problem, plan)
+            for name in BASELINES:
+                say(f"{grid.name}: {name}")
+                yield from _time_baseline(naive, grid, problem, name)
 
 
 def _time_compiled(grid: NamedGrid, problem: CoverageProblem, colony: ColonyConfig) -> Timing:
     path, wall_s, cpu_s = _timed(lambda: Fasaco(colony).plan(problem))
     return Timing(grid.name, problem.cells, path.steps, path.ants, wall_s, cpu_s)
+
+
+def _time_threads(grid: NamedGrid, problem: CoverageProblem, plan: TimingPlan) -> Timing:
+    together, wall_s, cpu_s = _timed(lambda: Fasaco(plan.colony, plan.threads).plan(problem))
+    same = together.cells.tobytes() == Fasaco(plan.colony).plan(problem).cells.tobytes()
+    return Timing(
+        grid=grid.name,
+        cells=problem.cells,
+        steps=together.steps,
+        ants=together.ants,
+        wall_s=wall_s,
+        cpu_s=cpu_s,
+        same_walk=same,
+        threads=plan.threads,
+    )
+
+
+def _time_baseline(
+    naive: ModuleType, grid: NamedGrid, problem: CoverageProblem, name: str
+) -> Generator[Timing, None, None]:
+    """Yield the compiled baseline's quickest run, and its twin's."""
+    planner = PLANNERS[name](_NO_COLONY, 1)
+    runs = [_timed(lambda: planner.plan(problem, never, ignore)) for _ in range(BASELINE_RUNS)]
+    path, wall_s, cpu_s = min(runs, key=lambda run: run[1])
+    yield Timing(grid.name, problem.cells, path.steps, 0, wall_s, cpu_s, planner=name)
+    # The twin walks home in any case, as spanning-tree coverage does.
+    closed = CoverageProblem.of(problem.lattice, problem.start, return_home=True)
+    walk, wall_s, cpu_s = _timed(lambda: _naive_baseline(naive, closed, name))
+    window = problem.lattice.window
+    cells = planner.plan(closed, never, ignore).cells - (window.row0, window.col0)
+    same = cells.tolist() == [list(cell) for cell in walk]
+    steps = len(walk) - 1
+    yield Timing(grid.name, problem.cells, steps, 0, wall_s, cpu_s, False, same, name)
+
+
+def _naive_baseline(
+    naive: ModuleType, problem: CoverageProblem, name: str
+) -> list[tuple[int, int]]:
+    steps, start = problem.lattice.steps, problem.lattice.local(problem.start)
+    walk: list[tuple[int, int]]
+    if name == "stc":
+        walk = naive.stc(steps, problem.to_cover, start)
+    else:
+        rule = {"spiral-stc": naive.SPIRAL, "zigzag": naive.ZIGZAG}[name]
+        walk = naive.sweep(steps, problem.to_cover, start, rule, return_home=True)
+    return walk
 
 
 def _time_naive(

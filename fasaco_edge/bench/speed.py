@@ -7,7 +7,15 @@ from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seconds
+from fasaco_edge.bench.benchmark import (
+    Benchmark,
+    Goal,
+    Report,
+    ResultTable,
+    Say,
+    positive,
+    seconds,
+)
 from fasaco_edge.bench.machine import machine, peak_mb
 from fasaco_edge.bench.naive_twin import naive_file
 from fasaco_edge.bench.spread import Spread, document
@@ -19,10 +27,14 @@ DEFAULT_MAPS = ("office", "flat", "basement")
 # For 1,000 ants on the paper's basement, 520 cells; smaller grids are held to it too.
 GOAL_CELLS, GOAL_ANTS, GOAL_WALL_S = 520, 1000, 0.25
 GOAL_RATIO = 300.0
+GOAL_BASELINE_RATIO = 50.0
+# Threads pay where a group of ants takes its time.
+GOAL_SPEEDUP, GOAL_SPEEDUP_CELLS = 1.6, 2000
 HEADER = (
-    "grid", "cells", "steps", "wall [ms]", "CPU [ms]", "ants/s", "naive [ms]",
+    "grid", "cells", "steps", "wall [ms]", "ants/s", "threads", "naive [ms]",
     "ratio", "same",
 )  # fmt: skip
+BASELINE_HEADER = ("baselines", "planner", "compiled [ms]", "naive [ms]", "ratio", "same")
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -55,6 +67,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="how long the naive twin may run on each grid [s], 0 to leave it out "
         "(default: %(default)g)",
     )
+    parser.add_argument(
+        "--threads",
+        type=positive,
+        default=2,
+        metavar="N",
+        help="threads to try against one, 1 to leave it out (default: %(default)s)",
+    )
 
 
 def _names(args: argparse.Namespace) -> tuple[str, ...]:
@@ -62,8 +81,10 @@ def _names(args: argparse.Namespace) -> tuple[str, ...]:
 
 
 def _count(args: argparse.Namespace) -> int:
-    runs: int = args.repeats + (1 if args.naive_s else 0)
-    return len(_names(args)) * runs
+    runs: int = args.repeats * (2 if args.threads > 1 else 1)
+    # The twin's colony, and both runs of three baselines.
+    naive = 1 + 2 * 3 if args.naive_s and naive_file() else 0
+    return len(_names(args)) * (runs + naive)
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[Timing, None, None]:
@@ -74,7 +95,9 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Timing, None, None
     colony = ColonyConfig(
         ants=args.ants, velocities=parse_velocities(args.velocities), seed=args.seed
     )
-    plan = TimingPlan(_names(args), colony, args.repeats, args.return_home, args.naive_s)
+    plan = TimingPlan(
+        _names(args), colony, args.repeats, args.return_home, args.naive_s, args.threads
+    )
     return time_colony(plan, say)
 
 
@@ -97,10 +120,11 @@ def _report(args: argparse.Namespace, timings: Sequence[Timing]) -> Report:
             "machine": machine(),
         },
         goals=tuple(goal for figures in grids for goal in _goals(figures)),
+        further=_baseline_tables(grids),
         remarks=(
             "below a time its range, below the naive twin's time per ant its ants; ratio: "
             "processor time per ant, naive to compiled; same: the walks of the naive colony "
-            "and a compiled one of as many ants",
+            "and a compiled one of as many ants; threads: how much faster so many are than one",
             f"peak memory of this process {peak_mb()} MB",
         ),
     )
@@ -108,13 +132,15 @@ def _report(args: argparse.Namespace, timings: Sequence[Timing]) -> Report:
 
 def _figures(timings: Sequence[Timing]) -> dict[str, Any]:
     """Sum up the runs on one grid as JSON values."""
-    compiled = [timing for timing in timings if timing.compiled]
+    colonies = [timing for timing in timings if timing.planner == "fasaco"]
+    compiled = [timing for timing in colonies if timing.compiled and timing.threads == 1]
+    parallel = [timing for timing in colonies if timing.threads > 1]
     first = compiled[0]
     wall = Spread.of([timing.wall_s for timing in compiled])
     cpu = Spread.of([timing.cpu_s for timing in compiled])
     assert wall is not None
     assert cpu is not None
-    naive = next((timing for timing in timings if not timing.compiled), None)
+    naive = next((timing for timing in colonies if not timing.compiled), None)
     return {
         "grid": first.grid,
         "cells": first.cells,
@@ -124,8 +150,36 @@ def _figures(timings: Sequence[Timing]) -> dict[str, Any]:
         "wall_s": document(wall),
         "cpu_s": document(cpu),
         "ants_per_s": round(first.ants / wall.median, 1),
+        "parallel": _parallel_figures(parallel, wall.median) if parallel else None,
         "naive": _naive_figures(naive, cpu.median / first.ants) if naive else None,
+        "baselines": list(_baseline_figures(timings)),
     }
+
+
+def _parallel_figures(parallel: Sequence[Timing], alone_s: float) -> dict[str, Any]:
+    wall = Spread.of([timing.wall_s for timing in parallel])
+    assert wall is not None
+    return {
+        "threads": parallel[0].threads,
+        "wall_s": document(wall),
+        "speedup": round(alone_s / wall.median, 2),
+        "same_walk": all(timing.same_walk for timing in parallel),
+    }
+
+
+def _baseline_figures(timings: Sequence[Timing]) -> Iterator[dict[str, Any]]:
+    runs = {(timing.planner, timing.compiled): timing for timing in timings}
+    for (planner, compiled), naive in runs.items():
+        if compiled or planner == "fasaco":
+            continue
+        quick = runs[planner, True]
+        yield {
+            "planner": planner,
+            "wall_s": round(quick.wall_s, 6),
+            "naive_wall_s": round(naive.wall_s, 6),
+            "ratio": round(naive.wall_s / quick.wall_s, 1),
+            "same_walk": naive.same_walk,
+        }
 
 
 def _naive_figures(naive: Timing, compiled_s_per_ant: float) -> dict[str, Any]:
@@ -146,10 +200,33 @@ def _row(args: argparse.Namespace, figures: dict[str, Any]) -> tuple[str, ...]:
         str(figures["cells"]),
         str(figures["steps"]),
         _milliseconds(figures["wall_s"]),
-        _milliseconds(figures["cpu_s"]),
         f"{figures['ants_per_s']:.0f}",
+        _speedup(figures["parallel"]),
         *_naive_columns(args, figures["naive"]),
     )
+
+
+def _speedup(parallel: dict[str, Any] | None) -> str:
+    if parallel is None:
+        return "-"
+    same = "" if parallel["same_walk"] else "\nOTHER WALK"
+    return f"{parallel['threads']}: x{parallel['speedup']}{same}"
+
+
+def _baseline_tables(grids: Sequence[dict[str, Any]]) -> tuple[ResultTable, ...]:
+    rows = tuple(
+        (
+            Path(figures["grid"]).stem,
+            baseline["planner"],
+            f"{1e3 * baseline['wall_s']:.3f}",
+            f"{1e3 * baseline['naive_wall_s']:.1f}",
+            f"{baseline['ratio']:.0f}",
+            "yes" if baseline["same_walk"] else "NO",
+        )
+        for figures in grids
+        for baseline in figures["baselines"]
+    )
+    return (ResultTable("baselines, least of 20 runs", BASELINE_HEADER, rows),) if rows else ()
 
 
 def _milliseconds(spread: dict[str, float]) -> str:
@@ -179,7 +256,14 @@ def _goals(figures: dict[str, Any]) -> Iterator[Goal]:
         yield Goal(f"{name}: wall time of {GOAL_ANTS} ants", round(wall_s, 4), GOAL_WALL_S, "s")
     if figures["naive"] is not None:
         ratio = figures["naive"]["ratio"]
-        yield Goal(f"{name}: ratio naive to compiled", ratio, GOAL_RATIO, at_least=True)
+        yield Goal(f"{name}, fasaco: ratio", ratio, GOAL_RATIO, at_least=True)
+    for baseline in figures["baselines"]:
+        what = f"{name}, {baseline['planner']}: ratio"
+        yield Goal(what, baseline["ratio"], GOAL_BASELINE_RATIO, at_least=True)
+    parallel = figures["parallel"]
+    if parallel and parallel["threads"] == 2 and figures["cells"] >= GOAL_SPEEDUP_CELLS:
+        what = f"{name}: two threads against one"
+        yield Goal(what, parallel["speedup"], GOAL_SPEEDUP, at_least=True)
 
 
 SPEED = Benchmark(

@@ -27,17 +27,26 @@ class Variant:
         name: its name in figures.
         planner: its name in ``PLANNERS``.
         velocities: of its cohorts [cells/step]; () where there are no ants.
+        q0, visibility: of the colony; the faithful rows have the defaults.
     """
 
     name: str
     planner: str
     velocities: tuple[int, ...] = ()
+    q0: float = 0.7
+    visibility: str = "neighbour"
 
     def plan(
         self, problem: CoverageProblem, ants: int, seed: int, observe: Observer = ignore
     ) -> CoveragePath:
         """Return its walk; by one thread."""
-        colony = ColonyConfig(ants=ants, velocities=self.velocities or (1,), seed=seed)
+        colony = ColonyConfig(
+            ants=ants,
+            velocities=self.velocities or (1,),
+            q0=self.q0,
+            seed=seed,
+            visibility=self.visibility,
+        )
         return PLANNERS[self.planner](colony, 1).plan(problem, never, observe)
 
 
@@ -54,6 +63,10 @@ VARIANTS = {
         Variant("spiral-stc", "spiral-stc"),
         Variant("zigzag", "zigzag"),
         Variant("stc", "stc"),
+        Variant("falling-distance", "fasaco", FALLING, visibility="distance"),
+        Variant("falling-open", "fasaco", FALLING, visibility="fewest-open"),
+        Variant("falling-open-q98", "fasaco", FALLING, q0=0.98, visibility="fewest-open"),
+        Variant("aco-8-cohorts-open-q98", "fasaco", (1,) * 8, q0=0.98, visibility="fewest-open"),
     )
 }
 

@@ -17,6 +17,9 @@ from fasaco_edge.cli.arguments import (
     pair_of_floats,
     pair_of_ints,
 )
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.planners.colony import VISIBILITIES
+from fasaco_edge.planners.names import PLANNER_NAMES
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
@@ -82,17 +85,42 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
 
 def _add_planner(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
-        "--planner", choices=("fasaco",), default="fasaco", help="(default: %(default)s)"
+        "--planner",
+        choices=PLANNER_NAMES,
+        default="fasaco",
+        help="fasaco; aco is fasaco at velocity 1; stc is spanning-tree coverage; spiral-stc and "
+        "zigzag are the paper's baselines (default: %(default)s)",
     )
     group.add_argument("--ants", type=int, default=1000, metavar="N", help="(default: %(default)s)")
     group.add_argument(
         "--velocities",
         default="8:1",
         metavar="V",
-        help="cohorts' velocities [cells/step]: 8:1 falling, 1:8 rising, 4 constant, 8,4,1; "
-        "1 is plain ACO (default: %(default)s)",
+        help="cohorts' velocities [cells/step]: 8:1 falling, 1:8 rising, 4 constant, 8,4,1 "
+        "(default: %(default)s)",
+    )
+    group.add_argument(
+        "--q0", type=float, default=0.7, help="equation (4)'s threshold (default: %(default)s)"
+    )
+    group.add_argument(
+        "--visibility",
+        choices=VISIBILITIES,
+        default="neighbour",
+        help="what eta of equation (5) is 1 over: the distance to the neighbour, 1, as in the "
+        "paper; the distance an ant will go; the neighbour's open neighbours "
+        "(default: %(default)s)",
+    )
+    group.add_argument(
+        "--beta", type=float, default=2.0, help="weight of visibility (default: %(default)s)"
     )
     group.add_argument("--seed", type=int, default=0, metavar="N", help="(default: %(default)s)")
+    group.add_argument(
+        "--threads",
+        type=int,
+        default=1,
+        metavar="N",
+        help="ants walk on so many; the path is the same for any number (default: %(default)s)",
+    )
     group.add_argument(
         "--no-local-search", action="store_true", help="the colony alone (it is alone as yet)"
     )
@@ -114,8 +142,15 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
     from fasaco_edge.planners.problem import CoverageProblem
 
+    if not 1 <= args.threads <= 64:
+        raise BadConfiguration(f"--threads must be in 1..64, got {args.threads}")
     colony = ColonyConfig(
-        ants=args.ants, velocities=parse_velocities(args.velocities), seed=args.seed
+        ants=args.ants,
+        velocities=parse_velocities(args.velocities),
+        q0=args.q0,
+        seed=args.seed,
+        visibility=args.visibility,
+        beta=args.beta,
     )
     find_map(args.map)
     check_output(args.path_out)
@@ -124,7 +159,7 @@ def run(args: argparse.Namespace) -> int:
     lattice, grid, file = _read(args)
     start = _start(args, lattice, file)
     problem = CoverageProblem.of(lattice, start, return_home=args.return_home)
-    path, wall_s, cpu_s = _plan(args.planner, colony, problem)
+    path, wall_s, cpu_s = _plan(args, colony, problem)
     figures = _figures(args, problem, path, wall_s, cpu_s)
     if args.path_out is not None:
         with writing(args.path_out):
@@ -137,7 +172,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _read(args: argparse.Namespace) -> tuple[CoverageLattice, OccupancyGrid | None, Path]:
-    from fasaco_edge.errors import BadConfiguration
     from fasaco_edge.grid.lattice import CoverageLattice, Footprint
     from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
 
@@ -163,7 +197,7 @@ def _start(args: argparse.Namespace, lattice: CoverageLattice, file: Path) -> Ce
 
 
 def _plan(
-    name: str, colony: ColonyConfig, problem: CoverageProblem
+    args: argparse.Namespace, colony: ColonyConfig, problem: CoverageProblem
 ) -> tuple[CoveragePath, float, float]:
     """Plan with a progress bar; return the path, wall and processor seconds."""
     from fasaco_edge.cli.terminal import progress
@@ -178,7 +212,7 @@ def _plan(
             return False
 
         wall, cpu = time.perf_counter(), time.process_time()
-        path = PLANNERS[name](colony).plan(problem, watch, ignore)
+        path = PLANNERS[args.planner](colony, args.threads).plan(problem, watch, ignore)
         return path, time.perf_counter() - wall, time.process_time() - cpu
 
 
@@ -196,7 +230,7 @@ def _figures(
         "planner": path.planner,
         "seed": path.seed,
         "ants": path.ants,
-        "velocities": args.velocities,
+        "velocities": {"fasaco": args.velocities, "aco": "1"}.get(path.planner),
         "map": str(args.map),
         "cell_m": args.cell,
         "start": list(problem.start),
@@ -221,7 +255,8 @@ def _draw(
 ) -> None:
     from fasaco_edge.drawing import draw_walk
 
-    title = f"{path.planner} {figures['velocities']}, {figures['ants']} ants, seed {path.seed}"
+    colony = f" {figures['velocities']}, {path.ants} ants, seed {path.seed}" if path.ants else ""
+    title = path.planner + colony
     lines = [
         f"{Path(figures['map']).name}: {figures['cells']} cells of {figures['cell_m']} m, "
         f"{figures['steps']} steps, {figures['revisits']} revisits, "

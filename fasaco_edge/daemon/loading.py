@@ -53,9 +53,8 @@ class Loader:
         footprint = Footprint(
             robot.tool_width_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least
         )
-        worker = PlanningWorker(
-            PLANNERS[planner.name](planner.colony()), planner.budget_s, self._mailbox.post
-        )
+        chosen = PLANNERS[planner.name](planner.colony(), planner.threads)
+        worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
         return Mission(MissionConfig(footprint, maps.max_lattice_cells)), worker
 
     def _report(self, stage: str) -> None:

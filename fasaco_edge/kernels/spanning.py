@@ -32,13 +32,13 @@ class Blocks(NamedTuple):
     Attributes:
         steps: step masks, uint8.
         node: int32, number of the cell's node; NO_NODE where nothing is to be covered.
-        times: uint8 (rows, cols, 2), how often the steps east and north of the cell are
+        times: int8 (rows, cols, 2), how often the steps east and north of the cell are
             walked, both ways together.
     """
 
     steps: NDArray[np.uint8]
     node: NDArray[np.int32]
-    times: NDArray[np.uint8]
+    times: NDArray[np.int8]
 
 
 @kernel
@@ -219,7 +219,7 @@ def spanning_tree_walk(
     # A node of its own for "to be covered, not yet labelled".
     waiting = rows * cols
     node = np.where(to_cover == 1, waiting, NO_NODE).astype(np.int32)
-    blocks = Blocks(steps, node, np.zeros((rows, cols, 2), np.uint8))
+    blocks = Blocks(steps, node, np.zeros((rows, cols, 2), np.int8))
     nodes = 0
     for cell_row in range(rows):
         for cell_col in range(cols):

@@ -10,12 +10,13 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
+from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.table import PLANNERS
 
-LATTICE, REACH, WALKS, COLONY = "lattice", "reachability", "shortest walks", "colony"
-STAGES = (LATTICE, REACH, WALKS, COLONY)
+LATTICE, REACH, WALKS = "lattice", "reachability", "shortest walks"
+STAGES = (LATTICE, REACH, WALKS, *PLANNERS)
 
 
 def warm_up(report: Callable[[str], None] | None = None) -> None:
@@ -35,5 +36,6 @@ def _stages() -> Iterator[str]:
     problem = CoverageProblem.of(lattice, (0, 0))
     yield WALKS
     walk_figures(lattice, np.array([[0, 0], [0, 1]], np.int32))
-    yield COLONY
-    Fasaco(ColonyConfig(ants=1, velocities=(1,))).plan(problem)
+    for name, make in PLANNERS.items():
+        yield name
+        make(ColonyConfig(ants=1, velocities=(1,)), 1).plan(problem, never, ignore)

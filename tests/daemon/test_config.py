@@ -112,7 +112,10 @@ def test_every_section_is_read(load):
             "geometry_msgs/msg/PoseWithCovarianceStamped or nav_msgs/msg/Odometry, "
             "got 'nav_msgs/msg/Path'",
         ),
-        ("planner: {name: best}", "planner.name: expected fasaco, got 'best'"),
+        (
+            "planner: {name: best}",
+            "planner.name: expected fasaco, aco, stc, spiral-stc or zigzag, got 'best'",
+        ),
         ("planner: {ants: 0}", "planner.ants: expected int >= 1, got 0"),
         ("planner: {ants: 1.5}", "planner.ants: expected int, got 1.5"),
         ("planner: {ants: 1e7}", "planner.ants: expected int, got '1e7'"),

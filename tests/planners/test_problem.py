@@ -2,14 +2,17 @@
 
 import threading
 import time
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
 
+from fasaco_edge.daemon.config import PlannerConfig
 from fasaco_edge.errors import NothingToCover, StartBlocked, StartOutsideMap
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
 from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.names import PLANNER_NAMES
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
@@ -86,6 +89,12 @@ def test_warm_up_names_each_stage_once():
     heard = []
     warm_up(heard.append)
     assert tuple(heard) == STAGES
+
+
+def test_the_planners_names_are_those_of_the_table_and_of_the_configuration():
+    assert tuple(PLANNERS) == PLANNER_NAMES
+    names = get_args(get_type_hints(PlannerConfig)["name"])
+    assert names == PLANNER_NAMES
 
 
 def test_every_planner_of_the_table_plans():
