@@ -32,6 +32,7 @@ OTHERS = {
 }
 # Never in the faithful rows: ants that see more than the paper's, beta = 2.
 BEYOND = {
+    "falling-anywhere": "end anywhere",
     "falling-distance": "distance",
     "falling-open": "open",
     "falling-open-q98": "open, q0 .98",
@@ -53,11 +54,12 @@ REMARKS = (
     "profit from it; this row sets the effect of velocity apart from that of the number of "
     "updates. STC: spanning-tree coverage of Gabriely and Rimon, which the paper's Spiral-STC, "
     "a backtracking spiral, is not.",
-    "Beyond the paper, never in its rows: FaSACO 8 -> 1 whose visibility, eta of equation (5), is "
-    "1 over the distance an ant is about to go (distance), or 1 over one more than the "
-    "neighbour's own open neighbours (open, Warnsdorff's rule), squared; the same with q0 = 0.98; "
-    "and that in 8 cohorts of velocity 1 (v 1), which shows what velocity is worth to ants "
-    "that see what will soon be cut off.",
+    "Beyond the paper, never in its rows: FaSACO 8 -> 1 that may end anywhere (n_r_paper counts "
+    "the shortest way home, revisits do not); FaSACO whose visibility, eta of equation (5), is 1 "
+    "over the distance an ant is about to go (distance), or 1 over one more than the neighbour's "
+    "own open neighbours (open, Warnsdorff's rule), squared; the same with q0 = 0.98; and that in "
+    "8 cohorts of velocity 1 (v 1), which shows what velocity is worth to ants that see what will "
+    "soon be cut off.",
 )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fasaco_edge.bench.benchmark import Say
@@ -28,6 +28,7 @@ class Variant:
         planner: its name in ``PLANNERS``.
         velocities: of its cohorts [cells/step]; () where there are no ants.
         q0, visibility: of the colony; the faithful rows have the defaults.
+        return_home: whether its walk ends where it began, as all the faithful ones do.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Variant:
     velocities: tuple[int, ...] = ()
     q0: float = 0.7
     visibility: str = "neighbour"
+    return_home: bool = True
 
     def plan(
         self, problem: CoverageProblem, ants: int, seed: int, observe: Observer = ignore
@@ -47,7 +49,8 @@ class Variant:
             seed=seed,
             visibility=self.visibility,
         )
-        return PLANNERS[self.planner](colony, 1).plan(problem, never, observe)
+        posed = replace(problem, return_home=self.return_home)
+        return PLANNERS[self.planner](colony, 1).plan(posed, never, observe)
 
 
 RISING = tuple(range(1, 9))
@@ -63,6 +66,7 @@ VARIANTS = {
         Variant("spiral-stc", "spiral-stc"),
         Variant("zigzag", "zigzag"),
         Variant("stc", "stc"),
+        Variant("falling-anywhere", "fasaco", FALLING, return_home=False),
         Variant("falling-distance", "fasaco", FALLING, visibility="distance"),
         Variant("falling-open", "fasaco", FALLING, visibility="fewest-open"),
         Variant("falling-open-q98", "fasaco", FALLING, q0=0.98, visibility="fewest-open"),
