@@ -14,7 +14,8 @@ PHEROMONE = "pheromone after the last cohort"
 COUNTS = """\
 ## What is counted
 
-Every walk ends where it begins, but for the row that says otherwise. Three counts, each with a name of its own:
+Every walk ends where it begins, but for the row that says otherwise. Three counts, each with a
+name of its own:
 
 - `revisits`: steps + 1 - distinct cells, that is visits beyond each cell's first.
 - `recovered_cells`: distinct cells visited twice or more, which is what the paper's text defines.

@@ -58,8 +58,10 @@ def test_every_variant_runs_with_every_seed(made):
         assert run.walk.cells == run.cells
         assert run.walk.revisits == run.walk.steps + 1 - run.cells
         # Start to start, but for the one variant that may end anywhere.
-        closed = run.variant != "falling-anywhere"
-        assert (run.walk.n_r_paper == run.walk.revisits) == closed
+        if run.variant == "falling-anywhere":
+            assert run.walk.n_r_paper >= run.walk.revisits
+        else:
+            assert run.walk.n_r_paper == run.walk.revisits
         assert 1 <= run.walk.recovered_cells <= run.walk.revisits
         assert run.cpu_s > 0
     fixed = [run.walk for run in runs if (run.grid, run.variant) == ("office", "zigzag")]
