@@ -61,8 +61,9 @@ def test_every_variant_runs_with_every_seed(made):
         if run.variant == "falling-anywhere":
             assert run.walk.n_r_paper >= run.walk.revisits
         else:
-            assert run.walk.n_r_paper == run.walk.revisits
-        assert 1 <= run.walk.recovered_cells <= run.walk.revisits
+            # The start at least is visited twice.
+            assert run.walk.n_r_paper == run.walk.revisits >= 1
+        assert run.walk.recovered_cells <= run.walk.revisits
         assert run.cpu_s > 0
     fixed = [run.walk for run in runs if (run.grid, run.variant) == ("office", "zigzag")]
     assert fixed[0] == fixed[1]
