@@ -12,8 +12,8 @@ from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, 
 from fasaco_edge.bench.building import building, robot_pose, with_crate
 from fasaco_edge.bench.daemon_process import DaemonProcess, MapSource, warm_kernels
 from fasaco_edge.bench.machine import machine, peak_mb
-from fasaco_edge.bench.process_memory import peak_mb as peak_mb_of
 from fasaco_edge.bench.spread import percentile
+from fasaco_edge.process_memory import peak_mb as peak_mb_of
 
 GOAL_REST_P99_MS = 20.0
 # The first paths come with the kernels and the first plan of all.

@@ -16,6 +16,7 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds,
 )
+from fasaco_edge.bench.grid_options import add_grid_options, grid_names
 from fasaco_edge.bench.machine import machine, peak_mb
 from fasaco_edge.bench.naive_twin import naive_file
 from fasaco_edge.bench.spread import Spread, document
@@ -38,22 +39,7 @@ BASELINE_HEADER = ("baselines", "planner", "compiled [ms]", "naive [ms]", "ratio
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--grids",
-        nargs="+",
-        default=[],
-        metavar="FILE.npy",
-        help="coverage grids (bool, True = free); FILE.json beside one may name "
-        'the start: {"start": [row, col]}',
-    )
-    parser.add_argument(
-        "--maps",
-        nargs="+",
-        default=[],
-        metavar="MAP",
-        help="map_server YAMLs or names from `maps`, in cells of 0.3 m for a robot of 0.18 m "
-        f"radius (default, without --grids: {' '.join(DEFAULT_MAPS)})",
-    )
+    add_grid_options(parser, DEFAULT_MAPS)
     parser.add_argument("--ants", type=positive, default=1000, help="(default: %(default)s)")
     parser.add_argument("--velocities", default="8:1", help="as in `plan` (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="(default: %(default)s)")
@@ -77,7 +63,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _names(args: argparse.Namespace) -> tuple[str, ...]:
-    return (*args.grids, *args.maps) or DEFAULT_MAPS
+    return grid_names(args, DEFAULT_MAPS)
 
 
 def _count(args: argparse.Namespace) -> int:

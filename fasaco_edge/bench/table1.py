@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bench.benchmark import Benchmark, Report, Say, positive
+from fasaco_edge.bench.grid_options import add_grid_options, grid_names
 
 if TYPE_CHECKING:
     from fasaco_edge.bench.table1_runs import Run
@@ -16,22 +17,7 @@ DEFAULT_MAPS = ("office", "flat", "walled_grid", "basement")
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--grids",
-        nargs="+",
-        default=[],
-        metavar="FILE.npy",
-        help="coverage grids (bool, True = free); FILE.json beside one may name "
-        'the start: {"start": [row, col]}',
-    )
-    parser.add_argument(
-        "--maps",
-        nargs="+",
-        default=[],
-        metavar="MAP",
-        help="map_server YAMLs or names from `maps`, in cells of 0.3 m for a robot of 0.18 m "
-        f"radius (default, without --grids: {' '.join(DEFAULT_MAPS)})",
-    )
+    add_grid_options(parser, DEFAULT_MAPS)
     parser.add_argument("--ants", type=positive, default=1000, help="(default: %(default)s)")
     parser.add_argument(
         "--seeds", type=positive, default=10, metavar="N", help="0 to N - 1 (default: %(default)s)"
@@ -44,7 +30,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _names(args: argparse.Namespace) -> tuple[str, ...]:
-    return (*args.grids, *args.maps) or DEFAULT_MAPS
+    return grid_names(args, DEFAULT_MAPS)
 
 
 def _count(args: argparse.Namespace) -> int:

@@ -12,6 +12,7 @@ import msgspec
 from fasaco_edge import __version__
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.errors import FasacoError
+from fasaco_edge.process_memory import resident_mb
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.events import PathUpdate
@@ -113,12 +114,6 @@ class StatusBoard:
             "seed": plan.seed if plan else None,
             "ants": plan.ants if plan else None,
         }
-
-
-def resident_mb() -> float:
-    """Return the resident memory of this process [MB]."""
-    with open("/proc/self/statm", encoding="ascii") as statm:
-        return round(int(statm.read().split()[1]) * 4096 / 1e6, 1)
 
 
 def _state(mission: Mission | None, loading: str) -> tuple[str, str]:

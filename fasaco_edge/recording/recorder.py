@@ -19,12 +19,13 @@ from types import FrameType
 
 from fasaco_edge.bus.session import Bus, Publisher, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, FasacoError
+from fasaco_edge.process_memory import resident_mb
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.inbox import Arrival, Inbox
 from fasaco_edge.recording.journal import Journal, Room
 from fasaco_edge.recording.repair import repair_folder
-from fasaco_edge.recording.report import RecorderReport, resident_mb
+from fasaco_edge.recording.report import RecorderReport
 from fasaco_edge.recording.runcard import RunDescription
 from fasaco_edge.recording.scene import Scene
 from fasaco_edge.recording.settings import RecorderSettings

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
-from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +30,3 @@ class RecorderReport:
     malformed: int
     rss_mb: float
     pid: int
-
-
-def resident_mb() -> float:
-    """Return this process's resident memory [MB] (proc(5), statm)."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return round(pages * os.sysconf("SC_PAGE_SIZE") / 1e6, 1)

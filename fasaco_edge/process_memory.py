@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path, PurePath
 
 
-def resident_mb(pid: int) -> float:
-    """Return the resident memory of a process now [MB]."""
+def resident_mb(pid: int | str = "self") -> float:
+    """Return the resident memory of a process now [MB]; without ``pid`` of this one."""
     return _field_mb(pid, "VmRSS")
 
 
@@ -31,10 +31,10 @@ def _below_packages(file: PurePath) -> tuple[str, ...]:
     return ()
 
 
-def _field_mb(pid: int, name: str) -> float:
+def _field_mb(pid: int | str, name: str) -> float:
     for line in Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines():
         key, _, value = line.partition(":")
         if key == name:
-            return round(int(value.split()[0]) * 1024 / 1e6, 2)
+            return round(int(value.split()[0]) * 1024 / 1e6, 1)
     # A process that has ended and not been waited for has no memory.
     return 0.0
