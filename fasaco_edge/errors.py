@@ -36,7 +36,7 @@ class MapTooLarge(FasacoError):
     """The map, or the lattice over it, is beyond the configured limit."""
 
     code = "map_too_large"
-    hint = "check resolution and origin, or raise map.max_lattice_cells"
+    hint = "check the map's resolution and origin; larger cells or map.max_lattice_cells may help"
 
 
 class MapFileError(FasacoError):
@@ -85,7 +85,7 @@ class BadConfiguration(FasacoError):
     """A configuration key is unknown or its value impossible."""
 
     code = "bad_configuration"
-    hint = "correct the named key"
+    hint = "correct the named key or option"
 
 
 class BusUnavailable(FasacoError):

@@ -33,7 +33,13 @@ EPILOG = """\
 examples:
   fasaco-edge plan basement --png basement.png
   fasaco-edge plan site.yaml --cell 0.35 --robot-radius 0.2 --start-xy 1.5,-2 --json
-  fasaco-edge plan grid.npy --start 8,8 --velocities 1 --return-home --path-out path.csv
+  fasaco-edge plan grid.npy --start 8,8 --planner aco --return-home --path-out path.csv
+
+figures:
+  revisits         steps + 1 - distinct cells
+  recovered_cells  distinct cells visited twice or more
+  n_r_paper        revisits with the way home, to compare with the paper's Table I
+The colony's options are for fasaco; aco takes all but the velocities, the others none.
 """
 
 
@@ -240,7 +246,6 @@ def _figures(
         "cells": problem.cells,
         "length_m": round(path.steps * args.cell, 3),
         "unreachable_cells": int(np.count_nonzero(problem.unreachable)),
-        "complete": path.complete,
         "wall_s": round(wall_s, 6),
         "cpu_s": round(cpu_s, 6),
     }

@@ -50,7 +50,7 @@ class MapConfig(_Section, frozen=True):
 
     free_at_most: Percent = 25
     occupied_at_least: Percent = 65
-    max_lattice_cells: Annotated[int, Meta(ge=1, le=100_000_000)] = 4_000_000
+    max_lattice_cells: Annotated[int, Meta(ge=1, le=100_000_000)] = 500_000
 
 
 class PoseConfig(_Section, frozen=True):

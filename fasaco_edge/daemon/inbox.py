@@ -33,9 +33,9 @@ def make_mailbox() -> Mailbox[object]:
     """Return the mailbox of a daemon.
 
     Poses are queued: each tells what the tool passed over. Some seconds of them
-    are plenty. A map does not clear the updates before it here: it may be broken.
+    are plenty. A map does not clear what was before it: it may be broken.
     """
-    return Mailbox({"map_update": 256, "pose": 1024, "snapshot": 64})
+    return Mailbox({"map": 4, "map_update": 256, "pose": 1024, "snapshot": 8})
 
 
 class Inbox:
@@ -54,11 +54,9 @@ class Inbox:
         A map that can be read makes the updates before it worthless, those that were
         lost too.
         """
-        events: list[Event] = []
-        faults: list[FasacoError] = []
-        map_at = float("-inf")
+        events, faults, map_at = self._newest_map(items)
         for kind, item in items:
-            if not isinstance(item, Received):
+            if not isinstance(item, Received) or kind == "map":
                 continue
             if kind == "map_update" and item.at < map_at:
                 patches_lost = 0  # they were older still
@@ -70,11 +68,22 @@ class Inbox:
                 events.append(self._event(kind, item.sample))
             except FasacoError as error:
                 faults.append(error)
-            else:
-                map_at = item.at if kind == "map" else map_at
         if patches_lost:
             events.append(PatchesLost(patches_lost))
         return events, faults
+
+    def _newest_map(
+        self, items: Sequence[tuple[str, object]]
+    ) -> tuple[list[Event], list[FasacoError], float]:
+        """Return the newest map that can be read, if any, and when it came in."""
+        faults: list[FasacoError] = []
+        for kind, item in reversed(items):
+            if kind == "map" and isinstance(item, Received):
+                try:
+                    return [self._event(kind, item.sample)], faults, item.at
+                except FasacoError as error:
+                    faults.append(error)
+        return [], faults, float("-inf")
 
     def _event(self, kind: str, sample: Sample) -> Event:
         match kind:

@@ -13,7 +13,7 @@ from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.daemon.outbox import Outbox
 from fasaco_edge.daemon.status import StatusBoard
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
-from fasaco_edge.errors import PatchWithoutBase
+from fasaco_edge.errors import FasacoError, PatchWithoutBase
 from fasaco_edge.mission.events import (
     Decision,
     Event,
@@ -55,7 +55,10 @@ class Loop:
         self._worker: PlanningWorker | None = None
         self._held: list[Event] = []
         self._map_arrived: float | None = None
-        self._asked_map_arrived: float | None = None
+        # Arrival of the oldest map that no plan was asked for yet, and of the one
+        # that the plan under way was asked for.
+        self._unanswered_map: float | None = None
+        self._asked_map: float | None = None
         self._coverage_at = float("-inf")
         self._coverage_key: tuple[int, int] = (0, 0)
 
@@ -69,13 +72,24 @@ class Loop:
             self._note(items)
             mission = self._mission or self._load(events)
             if mission is not None:
-                decision = mission.step([*self._held, *events, *_plans(items)], started)
-                self._held.clear()
-                if self._map_arrived is not None:
-                    self._status.ingest_s = time.monotonic() - started
-                self._perform(mission, decision)
-                self._publish_coverage(mission, started)
+                self._turn(mission, [*self._held, *events, *_plans(items)], started)
             self._publish_status(started)
+
+    def _turn(self, mission: Mission, events: list[Event], started: float) -> None:
+        """Step the mission and do what it decides."""
+        self._held.clear()
+        maps = mission.map_revision
+        decision = mission.step(events, started)
+        if mission.map_revision > maps:
+            self._status.ingest_s = time.monotonic() - started
+            if decision.plan is not None or mission.wants_plan:
+                self._unanswered_map = self._unanswered_map or self._map_arrived
+        try:
+            self._perform(mission, decision)
+            self._publish_coverage(mission, started)
+        except FasacoError as error:
+            # What cannot be said in the protocol's limits costs this message alone.
+            self._status.faults.count([error])
 
     def announce(self) -> None:
         """Publish a first status, so that who asks gets one from the beginning."""
@@ -94,6 +108,8 @@ class Loop:
                 self._publish_snapshot(item)
             elif isinstance(item, BaseException):
                 raise item
+            elif isinstance(item, PlanReady):
+                self._status.plan_s = item.seconds
             elif kind in ("map", "map_update") and isinstance(item, Received):
                 self._map_arrived = item.at
 
@@ -103,7 +119,7 @@ class Loop:
             self._hold(event)
         if self._loader is None:
             if any(isinstance(event, MapReceived) for event in events):
-                self._loader = Loader(self._config, self._mailbox)
+                self._loader = Loader(self._config, self._mailbox, self._outbox.is_watched)
             return None
         loaded = self._loader.poll()
         if loaded is not None:
@@ -127,17 +143,17 @@ class Loop:
     def _perform(self, mission: Mission, decision: Decision) -> None:
         self._status.faults.count(decision.faults)
         if decision.plan is not None and self._worker is not None:
-            self._asked_map_arrived = self._map_arrived
+            self._asked_map, self._unanswered_map = self._unanswered_map, None
             self._worker.submit(decision.plan)
         if decision.path is not None:
+            if decision.plan is None and decision.path.plan is None and self._worker is not None:
+                self._worker.interrupt()  # the robot had to stop: its plan is for another map
             self._publish_path(mission, decision.path)
 
     def _publish_path(self, mission: Mission, update: PathUpdate) -> None:
         assert mission.grid is not None
         assert mission.lattice is not None
         plan = update.plan
-        if plan is not None:
-            self._status.plan_s = update.plan_s
         about: dict[str, Any] = {
             "revision": update.revision,
             "map_stamp_ns": mission.grid.stamp_ns,
@@ -152,8 +168,8 @@ class Loop:
         xy = mission.lattice.centres(update.cells)
         self._outbox.path(xy, mission.grid.frame, mission.grid.stamp_ns, about)
         self._status.path = update
-        if plan is not None and self._asked_map_arrived is not None:
-            self._status.map_to_path_s = time.monotonic() - self._asked_map_arrived
+        if plan is not None and self._asked_map is not None:
+            self._status.map_to_path_s = time.monotonic() - self._asked_map
 
     def _publish_coverage(self, mission: Mission, now: float) -> None:
         key = (mission.ledger.total, mission.map_revision)

@@ -72,9 +72,13 @@ class Outbox:
         self._remember("coverage", Reply(payload, schemas.OCCUPANCY_GRID))
         self._coverage.put(payload)
 
+    def is_watched(self) -> bool:
+        """Tell whether anyone listens to the pheromone field; safe from any thread."""
+        return self._pheromone.has_listeners()
+
     def pheromone(self, snapshot: ColonySnapshot, frame: str) -> None:
         """Publish the pheromone field, if anyone listens."""
-        if self._pheromone.has_listeners():
+        if self.is_watched():
             self._pheromone.put(encode_pheromone(snapshot, frame, time.time_ns()))
 
     def _remember(self, name: str, reply: Reply) -> None:

@@ -37,16 +37,18 @@ class RecorderSupervisor:
         self._start_at: float | None = None
         self._death = ""
         bus.subscribe(config.keys().recorder, self._word.put, latched=True)
-        self._process = subprocess.Popen(self._command)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._launch()
 
     def poll(self, now: float) -> dict[str, Any]:
         """Look after the process; return its state for the daemon's status."""
         self._listen(now)
-        code = self._process.poll()
-        if code is None:
+        code = self._process.poll() if self._process is not None else None
+        if self._process is not None and code is None:
             return self._running(now)
         if self._start_at is None:
-            self._death = f"died by signal {-code}" if code < 0 else f"exited with {code}"
+            if code is not None:
+                self._death = f"died by signal {-code}" if code < 0 else f"exited with {code}"
             LOG.warning("recorder %s; again in %.0f s", self._death, self._pause_s)
             self._start_at = now + self._pause_s
             self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
@@ -54,11 +56,20 @@ class RecorderSupervisor:
             self._start_at = None
             self._restarts += 1
             self._heard, self._heard_at = {}, now
-            self._process = subprocess.Popen(self._command)
+            self._launch()
         return {"state": "restarting", "reason": self._death, "restarts": self._restarts}
+
+    def _launch(self) -> None:
+        """Start the process; a machine without memory or processes left may refuse."""
+        try:
+            self._process = subprocess.Popen(self._command)
+        except OSError as error:
+            self._process, self._death = None, f"could not be started: {error.strerror}"
 
     def close(self, timeout_s: float) -> None:
         """Ask the recorder to end, wait for its footer, and insist if it hangs."""
+        if self._process is None:
+            return
         self._process.terminate()
         try:
             self._process.wait(timeout_s)
@@ -75,12 +86,15 @@ class RecorderSupervisor:
             heard = decode_json(sample.payload)
         except MalformedMessage:
             return
-        if heard.get("pid") == self._process.pid:
+        if self._process is not None and heard.get("pid") == self._process.pid:
             self._heard, self._heard_at = heard, now
             self._pause_s = FIRST_PAUSE_S
 
     def _running(self, now: float) -> dict[str, Any]:
         if now - self._heard_at > SILENT_AFTER_S:
+            # It hangs: what follows is the way of a recorder that died.
+            assert self._process is not None
+            self._process.kill()
             state = {"state": "silent", "reason": f"no word for {SILENT_AFTER_S:.0f} s"}
         else:
             state = self._heard or {"state": "starting"}

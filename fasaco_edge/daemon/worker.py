@@ -9,7 +9,7 @@ from collections.abc import Callable
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.mission.events import PlanReady, PlanRequest
 from fasaco_edge.planners.observation import ColonySnapshot
-from fasaco_edge.planners.planner import CoveragePlanner
+from fasaco_edge.planners.planner import CoveragePlanner, ignore
 from fasaco_edge.planners.stopping import Interrupt, TimeBudget
 
 
@@ -17,13 +17,19 @@ class PlanningWorker:
     """Plans one request at a time and posts the result."""
 
     def __init__(
-        self, planner: CoveragePlanner, budget_s: float, post: Callable[[str, object], None]
+        self,
+        planner: CoveragePlanner,
+        budget_s: float,
+        post: Callable[[str, object], None],
+        is_watched: Callable[[], bool],
     ) -> None:
         self._planner = planner
         self._budget_s = budget_s
         self._post = post
+        self._is_watched = is_watched
         self._requests = LatestSlot[PlanRequest]()
         self._stopping = threading.Event()
+        self._interrupt = threading.Event()
         self._thread = threading.Thread(target=self._run, name="planner", daemon=True)
         self._thread.start()
 
@@ -31,9 +37,14 @@ class PlanningWorker:
         """Plan ``request`` next."""
         self._requests.put(request)
 
+    def interrupt(self) -> None:
+        """End the search under way with the best walk it has: something newer came."""
+        self._interrupt.set()
+
     def close(self, timeout_s: float) -> None:
         """Interrupt the search and end the thread."""
         self._stopping.set()
+        self._interrupt.set()
         self._thread.join(timeout_s)
 
     def _run(self) -> None:
@@ -47,8 +58,13 @@ class PlanningWorker:
 
     def _plan(self, request: PlanRequest) -> None:
         started = time.monotonic()
-        interrupt = Interrupt(TimeBudget(self._budget_s), self._stopping)
-        path = self._planner.plan(request.problem, interrupt, self._observe)
+        self._interrupt.clear()
+        if self._stopping.is_set():
+            return
+        stop = Interrupt(TimeBudget(self._budget_s), self._interrupt)
+        # To look at the trail costs time: only where somebody does.
+        observe = self._observe if self._is_watched() else ignore
+        path = self._planner.plan(request.problem, stop, observe)
         self._post("plan", PlanReady(request.number, path, time.monotonic() - started))
 
     def _observe(self, snapshot: ColonySnapshot) -> None:

@@ -14,6 +14,8 @@ from fasaco_edge.grid.lattice import Cell
 # knows what lay under the tool in between.
 JUMP_CELLS = 2.0
 
+TILE = 64
+
 
 class CoverageLedger:
     """Visits of the tool to each cell.
@@ -26,8 +28,8 @@ class CoverageLedger:
     def __init__(self, cell_m: float) -> None:
         self.total = 0
         self._cell_m = cell_m
-        self._window = Window(0, 0, 0, 0)
-        self._visits = np.zeros((0, 0), np.uint16)
+        # By tile, so that a map that jumps far away costs nothing in between.
+        self._tiles: dict[Cell, NDArray[np.uint16]] = {}
         self._under_tool: frozenset[Cell] = frozenset()
         self._last: Pose2D | None = None
 
@@ -39,10 +41,11 @@ class CoverageLedger:
         swept = self._swept(last, pose)
         entered = swept - self._under_tool
         for row, col in entered:
-            self._include(row, col)
-            index = row - self._window.row0, col - self._window.col0
             self.total += 1
-            self._visits[index] = min(int(self._visits[index]) + 1, 65535)
+            tile = self._tiles.setdefault(
+                (row // TILE, col // TILE), np.zeros((TILE, TILE), np.uint16)
+            )
+            tile[row % TILE, col % TILE] = min(int(tile[row % TILE, col % TILE]) + 1, 65535)
         self._under_tool = self._swept(pose, pose)
         self._last = pose
         return entered
@@ -50,10 +53,19 @@ class CoverageLedger:
     def visits(self, window: Window) -> NDArray[np.uint16]:
         """Return the number of visits, uint16 (rows, cols), of the cells of ``window``."""
         result = np.zeros((window.rows, window.cols), np.uint16)
-        common = window.intersection(self._window)
-        if common is not None:
-            result[common.slices_in(window)] = self._visits[common.slices_in(self._window)]
+        for (tile_row, tile_col), tile in self._tiles.items():
+            row, col = tile_row * TILE, tile_col * TILE
+            place = Window(row, col, row + TILE, col + TILE)
+            common = window.intersection(place)
+            if common is not None:
+                result[common.slices_in(window)] = tile[common.slices_in(place)]
         return result
+
+    def has_visited(self, cell: Cell) -> bool:
+        """Tell whether the tool has passed over ``cell``."""
+        row, col = cell
+        tile = self._tiles.get((row // TILE, col // TILE))
+        return tile is not None and bool(tile[row % TILE, col % TILE])
 
     def _swept(self, start: Pose2D, end: Pose2D) -> frozenset[Cell]:
         """Return the cells whose centre is within half a cell of the segment."""
@@ -70,22 +82,6 @@ class CoverageLedger:
                 if math.hypot(px - along * dx, py - along * dy) < half:
                     cells.append((row, col))
         return frozenset(cells)
-
-    def _include(self, row: int, col: int) -> None:
-        """Make the array span the cell, with room to grow."""
-        window = self._window
-        if window.row0 <= row < window.row1 and window.col0 <= col < window.col1:
-            return
-        if not self._visits.size:
-            window = Window(row, col, row, col)
-        room = 32
-        grown = Window(
-            min(window.row0, row - room),
-            min(window.col0, col - room),
-            max(window.row1, row + room),
-            max(window.col1, col + room),
-        )
-        self._visits, self._window = self.visits(grown), grown
 
 
 def _span(low: float, high: float, cell_m: float) -> range:

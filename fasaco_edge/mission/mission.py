@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FasacoError, NothingToCover, PatchWithoutBase, WrongFrame
-from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
+from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import MAX_LATTICE_CELLS, Cell, CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.events import (
@@ -30,7 +30,7 @@ from fasaco_edge.mission.events import (
 )
 from fasaco_edge.mission.ground import Ground, anchor_cell
 from fasaco_edge.mission.ledger import CoverageLedger
-from fasaco_edge.mission.progress import Coverage, DrivenPath, State
+from fasaco_edge.mission.progress import Coverage, DrivenPath, LeftOver, State
 from fasaco_edge.planners.problem import CoverageProblem
 
 # A robot that left its path, or stands still at its end, gets a new one, but not
@@ -68,6 +68,7 @@ class Mission:
         self._asked: PlanRequest | None = None
         self._now = 0.0
         self._published_at = 0.0
+        self._left_over = LeftOver()
 
     def step(self, events: Iterable[Event], now: float) -> Decision:
         """Take events in order and decide.
@@ -105,6 +106,11 @@ class Mission:
     def planning(self) -> bool:
         """Whether a plan has been asked for and is not there yet."""
         return self._asked is not None
+
+    @property
+    def wants_plan(self) -> bool:
+        """Whether a plan will be asked for once the one under way is there."""
+        return bool(self._wanted)
 
     def _take(self, event: Event) -> PathUpdate | None:
         match event:
@@ -147,7 +153,7 @@ class Mission:
             raise WrongFrame(f"pose in frame {pose.frame!r}, map in {self.grid.frame!r}")
         self.pose = pose
         x, y = pose.pose.x, pose.pose.y
-        # A pose kilometres astray would make the ledger span all the way there.
+        # A pose kilometres astray is no drive.
         if self._lattice is not None and self._lattice.contains(self._lattice.cell_at(x, y)):
             self.ledger.record(pose.pose)
         cell = self._cell()
@@ -155,7 +161,7 @@ class Mission:
             return
         if self._ground is None or not self._ground.holds(cell):
             self._survey()
-        self.path = self.path.driven_to(cell)
+        self.path = self.path.driven_to(cell, self.ledger.has_visited)
 
     def _cell(self) -> Cell | None:
         """Return the coverable cell the robot is in, or next to."""
@@ -224,12 +230,15 @@ class Mission:
             return self._rest(State.WAITING_FOR_POSE, "no pose yet")
         cell = self._cell()
         if cell is None or self._ground is None:
-            return self._blocked(self.pose.pose)
+            return self._blocked()
         update = self._cut_off()
         self._look_for_stray(cell)
-        if self._wanted and self._asked is None:
-            return self._ask(cell, update)
-        if self._asked is not None and not len(self.path.cells):
+        if self._left_over.given_up(self.ledger.total) and not self._wanted:
+            reason = "the robot stands at its path's end, but not all cells are covered"
+            self._enter(State.BLOCKED, reason)
+        elif self._wanted and self._asked is None:
+            return Decision(path=update) if self._too_soon() else self._ask(cell, update)
+        elif self._asked is not None and not len(self.path.cells):
             self._enter(State.PLANNING, self._asked.reason)
         elif self.state is not State.DONE:
             self._enter(State.COVERING, f"path {self.revision}")
@@ -239,14 +248,17 @@ class Mission:
         self._enter(state, reason)
         return Decision()
 
-    def _blocked(self, pose: Pose2D) -> Decision:
+    def _too_soon(self) -> bool:
+        """Tell whether a robot that had to stop should stand a moment before a new plan."""
+        return self.state is State.BLOCKED and self._now - self._published_at < PATIENCE_S
+
+    def _blocked(self) -> Decision:
         """Stop: the robot is where it cannot be; look again with the next map or pose."""
-        reason = f"robot at ({pose.x:.2f}, {pose.y:.2f}) m is not on coverable ground"
-        self._enter(State.BLOCKED, reason)
+        self._enter(State.BLOCKED, "robot is not on coverable ground")
         self._ground = None  # to be surveyed anew once it stands well
         if not len(self.path.cells):
             return Decision()
-        return Decision(path=self._publish(np.empty((0, 2), np.int32), reason))
+        return Decision(path=self._publish(np.empty((0, 2), np.int32), self.reason))
 
     def _cut_off(self) -> PathUpdate | None:
         """Shorten a path that a new map blocks, at once; a new plan follows."""
@@ -266,14 +278,12 @@ class Mission:
         if self._asked is not None or self._wanted or self.state is not State.COVERING:
             return
         waited = self._now - self._published_at >= PATIENCE_S
-        if self.path.finished and (waited or self._is_covered(self.path.cells[-1])):
+        last = tuple(self.path.cells[-1].tolist()) if len(self.path.cells) else None
+        if self.path.finished and (waited or (last and self.ledger.has_visited(last))):
+            self._left_over.tried(self.ledger.total)
             self._wanted = "cells left over"
         elif waited and self.path.is_far(cell):
             self._wanted = "robot left the path"
-
-    def _is_covered(self, cell: NDArray[np.int32]) -> bool:
-        row, col = int(cell[0]), int(cell[1])
-        return bool(self.ledger.visits(Window(row, col, row + 1, col + 1))[0, 0])
 
     def _ask(self, cell: Cell, update: PathUpdate | None) -> Decision:
         assert self._lattice is not None

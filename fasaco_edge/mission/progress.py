@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Self
@@ -15,6 +16,10 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 # path may come back to the same cell for another reason.
 LOOK_AHEAD = 16
 FAR_CELLS = 4
+
+# A robot that stops short of its path's end, out of the tool's reach of the last
+# cell, is sent there so often and no more.
+MOST_TRIES = 3
 
 
 class State(StrEnum):
@@ -103,11 +108,21 @@ class DrivenPath:
         """Whether the robot is at the end."""
         return self.index >= len(self.cells) - 1
 
-    def driven_to(self, cell: Cell) -> DrivenPath:
-        """Return the path with the robot in ``cell``, if that is a little way ahead."""
-        near = self.cells[self.index : self.index + LOOK_AHEAD]
-        hits = np.flatnonzero((near == cell).all(axis=1))
-        return replace(self, index=self.index + int(hits[0])) if len(hits) else self
+    def driven_to(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> DrivenPath:
+        """Return the path with the robot in ``cell``, if it drove there along the path.
+
+        The path may come back beside itself: a pose that flickers into the next lane
+        is no reason to leave out what lies between.
+        """
+        near: list[Cell] = [
+            (row, col) for row, col in self.cells[self.index : self.index + LOOK_AHEAD].tolist()
+        ]
+        if cell not in near:
+            return self
+        ahead = near.index(cell)
+        if not all(has_visited(between) for between in near[1:ahead]):
+            return self
+        return replace(self, index=self.index + ahead)
 
     def is_far(self, cell: Cell) -> bool:
         """Tell whether ``cell`` is too far from the robot's place on the path."""
@@ -115,3 +130,20 @@ class DrivenPath:
             return False
         row, col = self.cells[self.index]
         return bool(abs(int(row) - cell[0]) + abs(int(col) - cell[1]) > FAR_CELLS)
+
+
+@dataclass(slots=True)
+class LeftOver:
+    """How often plans for left-over cells came to nothing: not a cell more was visited."""
+
+    visits: int = -1
+    tries: int = 0
+
+    def tried(self, visits: int) -> None:
+        """Note another try, begun after so many visits."""
+        self.tries = self.tries + 1 if visits == self.visits else 1
+        self.visits = visits
+
+    def given_up(self, visits: int) -> bool:
+        """Tell whether there is no point in trying again before something is visited."""
+        return visits == self.visits and self.tries > MOST_TRIES

@@ -6,8 +6,8 @@ line 7: the best walk so far is strengthened by equation (8); line 9: the
 shortest walk is returned. A colony whose only velocity is 1 is plain ACO.
 
 Deviations: delta phi of equation (8) is ``cells / steps``, proportional to 1
-over the length as the paper has it and in (0, 1] on any map, so that tau0 needs
-no tuning to the map's size.
+over the length as the paper has it and about 1 at best on any map, so that tau0
+needs no tuning to the map's size.
 """
 
 from __future__ import annotations
@@ -70,7 +70,10 @@ class Fasaco:
                 deposit(
                     graph, colony.trail, config.alpha, problem.cells / max(steps, 1), colony.best
                 )
-                observe(_snapshot(problem, colony.trail, number, cohort.velocity, walked, steps))
+                if observe is not ignore:
+                    observe(
+                        _snapshot(problem, colony.trail, number, cohort.velocity, walked, steps)
+                    )
             return self._path(problem, colony.best, walked)
 
     def _path(self, problem: CoverageProblem, walk: NDArray[np.int32], ants: int) -> CoveragePath:

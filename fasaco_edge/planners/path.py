@@ -20,14 +20,12 @@ class CoveragePath:
         planner: name of the planner.
         seed: seed it was run with.
         ants: how many ants walked for it; with seed and problem this repeats the path.
-        complete: whether every cell asked for is on it.
     """
 
     cells: NDArray[np.int32]
     planner: str
     seed: int
     ants: int = 0
-    complete: bool = True
 
     def __post_init__(self) -> None:
         self.cells.flags.writeable = False

@@ -102,22 +102,43 @@ def test_a_robot_two_cells_from_anything_is_nowhere():
     assert anchor_cell(room, Pose2D(2.5, 3.5)) is None
 
 
+def everywhere(cell):
+    """The tool has passed over every cell."""
+    return True
+
+
+def test_a_pose_in_the_lane_beside_leaves_out_nothing():
+    lanes = DrivenPath(
+        path(*[(0, col) for col in range(6)], *[(1, col) for col in range(5, -1, -1)])
+    )
+    beside = lanes.driven_to((1, 3), lambda cell: cell == (0, 0))
+    assert beside.index == 0
+    assert beside.driven_to((0, 1), lambda cell: False).index == 1, "the next cell needs no proof"
+    assert lanes.driven_to((1, 3), lambda cell: cell[0] == 0 or cell[1] > 3).index == 8
+
+
 def test_a_driven_path_follows_the_robot_a_little_way_ahead():
     line = DrivenPath(path(*[(0, col) for col in range(40)]))
-    assert line.driven_to((0, 3)).index == 3
-    assert line.driven_to((0, LOOK_AHEAD - 1)).index == LOOK_AHEAD - 1
-    assert line.driven_to((0, LOOK_AHEAD)).index == 0
-    assert line.driven_to((0, 3)).driven_to((0, 1)).index == 3, "never backwards"
-    assert line.driven_to((5, 5)) is line
-    assert line.driven_to((0, 3)).ahead[0].tolist() == [0, 3]
+    assert line.driven_to((0, 3), everywhere).index == 3
+    assert line.driven_to((0, LOOK_AHEAD - 1), everywhere).index == LOOK_AHEAD - 1
+    assert line.driven_to((0, LOOK_AHEAD), everywhere).index == 0
+    assert line.driven_to((0, 3), everywhere).driven_to((0, 1), everywhere).index == 3, (
+        "never backwards"
+    )
+    assert line.driven_to((5, 5), everywhere) is line
+    assert line.driven_to((0, 3), everywhere).ahead[0].tolist() == [0, 3]
 
 
 def test_a_path_that_comes_back_is_followed_once_each_way():
     spike = DrivenPath(path((0, 0), (0, 1), (0, 0), (1, 0)))
-    out = spike.driven_to((0, 1))
-    assert (spike.driven_to((0, 0)).index, out.index, out.driven_to((0, 0)).index) == (0, 1, 2)
+    out = spike.driven_to((0, 1), everywhere)
+    assert (
+        spike.driven_to((0, 0), everywhere).index,
+        out.index,
+        out.driven_to((0, 0), everywhere).index,
+    ) == (0, 1, 2)
     assert not out.finished
-    assert out.driven_to((1, 0)).finished
+    assert out.driven_to((1, 0), everywhere).finished
 
 
 def test_a_robot_is_far_from_its_path_beyond_some_cells():
@@ -127,4 +148,4 @@ def test_a_robot_is_far_from_its_path_beyond_some_cells():
     nothing = DrivenPath.none()
     assert not nothing.is_far((9, 9))
     assert nothing.finished
-    assert nothing.driven_to((0, 0)) is nothing
+    assert nothing.driven_to((0, 0), everywhere) is nothing

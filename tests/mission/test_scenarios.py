@@ -1,12 +1,20 @@
 """A mission told by plain values: what happens, and what it decides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fasaco_edge.errors import MapTooLarge, PatchWithoutBase, WrongFrame
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.events import Decision, MapReceived, PatchesLost, PlanReady
+from fasaco_edge.mission.events import (
+    Decision,
+    MapReceived,
+    PatchesLost,
+    PlanReady,
+    PoseReceived,
+)
 from fasaco_edge.mission.mission import PATIENCE_S
 from fasaco_edge.mission.progress import State
 from fasaco_edge.planners.path import CoveragePath
@@ -171,13 +179,15 @@ def test_a_robot_inside_a_wall_stops_and_says_why_and_recovers():
         drive.go()
     decision = drive.tell(pose_at(1, 3))
     assert drive.mission.state is State.BLOCKED
-    reason = "robot at (0.88, 0.38) m is not on coverable ground"
+    reason = "robot is not on coverable ground"
     assert drive.mission.reason == decision.path.reason == reason
     assert decision.path.cells.shape == (0, 2)
     assert decision.plan is None
     assert drive.tell(pose_at(1, 3)) == Decision(), "one empty path is enough"
     drive.cell = (5, 5)
-    decision = drive.tell(pose_at(5, 5))
+    assert drive.tell(pose_at(5, 5)).plan is None, "a flickering pose keeps no planner busy"
+    assert drive.mission.state is State.BLOCKED
+    decision = drive.tell(pose_at(5, 5), after=PATIENCE_S)
     assert decision.plan.reason == "robot is on coverable ground again"
     assert decision.plan.problem.start == (5, 5)
     assert drive.mission.state is State.PLANNING
@@ -191,8 +201,40 @@ def test_a_wall_around_the_robot_blocks_it_and_its_removal_frees_it():
     drive = started(*ROOM)
     assert drive.tell(MapReceived(building(*["######"] * 4))).path.cells.shape == (0, 2)
     assert drive.mission.state is State.BLOCKED
-    assert drive.tell(MapReceived(building(*ROOM))).plan is not None
+    assert drive.tell(MapReceived(building(*ROOM)), after=PATIENCE_S).plan is not None
     drive.finish()
+
+
+def test_a_robot_that_stops_short_of_its_path_s_end_is_not_sent_there_for_ever():
+    drive = started("...")
+    drive.go()
+    x, y = (drive.cell[1] + 1) * 0.25 + 0.01, 0.01  # in the last cell's corner
+    short = PoseReceived(StampedPose(Pose2D(x, y)))
+    plans = 0
+    for _ in range(100):
+        plans += drive.tell(short, after=PATIENCE_S).plan is not None
+        if drive.request is not None:
+            request, drive.request = drive.request, None
+            drive.tell(answer(request))
+    assert plans <= 4
+    assert drive.mission.state is State.BLOCKED
+    assert "not all cells are covered" in drive.mission.reason
+    drive.tell(pose_at(0, 2))
+    drive.tell(after=PATIENCE_S)
+    assert drive.mission.state is State.DONE
+
+
+def test_a_map_that_jumps_far_away_costs_no_memory_in_between():
+    """As when a mapper adopts UTM coordinates."""
+    drive = started(*ROOM)
+    drive.go()
+    grid = building(*ROOM)
+    far = replace(grid.geometry, origin=Pose2D(500_000.0, 800_000.0))
+    moved = OccupancyGrid(far, grid.cells)
+    pose = PoseReceived(StampedPose(Pose2D(500_000.3, 800_000.3)))
+    drive.tell(MapReceived(moved), pose, after=PATIENCE_S)
+    assert drive.tell(after=2 * PATIENCE_S).faults == ()
+    assert drive.mission.ledger.total >= 2
 
 
 def test_a_plan_that_comes_while_blocked_is_not_published():
