@@ -57,6 +57,15 @@ def test_the_newest_map_comes_first_and_updates_in_order(arrivals):
     assert faults == []
 
 
+def test_a_broken_map_costs_no_map_before_it(arrivals):
+    arrivals.post("map", MAP)
+    arrivals.post("map_update", UPDATE)
+    arrivals.post("map", MAP[:-1])
+    events, faults = arrivals.decode()
+    assert events == [MapReceived, PatchReceived]
+    assert [type(fault) for fault in faults] == [MalformedMessage]
+
+
 def test_a_map_makes_the_updates_before_it_worthless(arrivals):
     arrivals.post("map_update", UPDATE)
     arrivals.post("map", MAP)
