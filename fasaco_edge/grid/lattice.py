@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import MapTooLarge
 from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.kernels.directions import ALL_STEPS, EAST, NORTH, SOUTH, WEST
+from fasaco_edge.kernels.directions import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.footprint import Placement, Thresholds, classify_cells
 from fasaco_edge.kernels.states import BLOCKED, COVERABLE, UNKNOWN
 
@@ -106,7 +106,6 @@ class CoverageLattice:
         steps[:-1] |= north.astype(np.uint8) << NORTH
         steps[1:] |= north.astype(np.uint8) << SOUTH
         states = np.where(free, COVERABLE, BLOCKED).astype(np.uint8)
-        assert int(steps.max(initial=0)) <= ALL_STEPS
         return cls(Window(0, 0, rows, cols), cell_m, states, steps)
 
     @property

@@ -7,4 +7,3 @@ Row 0 is the row with the smallest y, so north is towards larger rows. Bit
 EAST, NORTH, WEST, SOUTH = 0, 1, 2, 3
 ROW_STEP = (0, 1, 0, -1)
 COL_STEP = (1, 0, -1, 0)
-ALL_STEPS = 0b1111
