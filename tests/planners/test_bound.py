@@ -1,0 +1,86 @@
+"""The bound of a problem against walks that planners found and optima proven elsewhere."""
+
+import json
+
+import numpy as np
+import pytest
+
+from fasaco_edge.bench.grids import read_grid
+from fasaco_edge.grid.map_files import builtin_maps
+from fasaco_edge.planners.bound import lower_bound_steps
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.stc import SpanningTree
+from fasaco_edge.planners.sweeps import spiral_stc, zigzag
+from tests.planners.grids import REFERENCE, lattice, placed, reference
+
+MAPS = [name for name, _ in builtin_maps()]
+
+
+def known_grids():
+    """What is known of the paper's and other grids, by name."""
+    file = REFERENCE / "results.json"
+    return json.loads(file.read_text()) if file.exists() else {}
+
+
+@pytest.mark.parametrize("end", ["anywhere", "home", "elsewhere"])
+@pytest.mark.parametrize("covered", [0.0, 0.6])
+@pytest.mark.parametrize("name", MAPS)
+def test_no_planner_beats_the_bound_on_the_maps_that_come_along(name, covered, end):
+    grid = read_grid(name)
+    lattice, start = grid.lattice, grid.start
+    # From the south on, as far as a robot may have come.
+    done = np.zeros(lattice.states.shape, bool)
+    done[: int(covered * len(done))] = True
+    reachable = CoverageProblem.of(lattice, start).to_cover
+    last = np.argwhere(reachable)[-1] + (lattice.window.row0, lattice.window.col0)
+    goal = {"anywhere": None, "home": start, "elsewhere": tuple(last.tolist())}[end]
+    problem = CoverageProblem.of(lattice, start, covered=done, end=goal)
+    least = lower_bound_steps(problem)
+    assert problem.cells - 1 <= least
+    walks = [planner.plan(problem).steps for planner in (SpanningTree(), spiral_stc(), zigzag())]
+    assert least <= min(walks)
+    if not covered:
+        # Close enough to tell a good walk from a poor one.
+        assert least > 0.8 * min(walks)
+
+
+def test_start_and_end_are_cells_of_the_map_frame():
+    ground = placed(lattice("......."), -3, 40)
+    for end, steps in ((None, 8), ((-3, 40), 10), ((-3, 42), 12), ((-3, 46), 8)):
+        problem = CoverageProblem.of(ground, (-3, 42), end=end)
+        assert lower_bound_steps(problem) == steps
+
+
+def test_what_is_covered_needs_no_visit():
+    ground = lattice("....", "#.##", "#.##")
+    done = np.zeros((3, 4), bool)
+    done[:2] = True
+    assert lower_bound_steps(CoverageProblem.of(ground, (2, 1), covered=done)) == 4
+    assert lower_bound_steps(CoverageProblem.of(ground, (0, 1), covered=done)) == 6
+
+
+@pytest.mark.parametrize("name", known_grids())
+def test_known_grids_are_bound_as_closely_as_ever_and_no_walk_beats_that(name):
+    known = known_grids()[name]
+    ground, start = reference(name)
+    for goal, kind in ((None, "open"), (start, "closed")):
+        least = lower_bound_steps(CoverageProblem.of(ground, start, end=goal))
+        assert least >= known["bounds"].get(f"block_{kind}", 0)
+        assert least <= known.get("proven_optimum", {}).get(f"{kind}_steps", least)
+        walks = [
+            walk["steps"]
+            for planner, walk in known["results"].items()
+            if walk["full"] and (kind == "open" or planner.endswith("closed"))
+        ]
+        assert least <= min(walks, default=least)
+
+
+@pytest.mark.skipif(not known_grids(), reason="the reference grids are not at hand")
+@pytest.mark.parametrize(
+    ("name", "anywhere", "home"),
+    [("paper_simulated", 186, 214), ("mmu_office_148a_c30", 233, 238), ("tb3_world_c30", 173, 176)],
+)
+def test_the_bound_is_the_optimum_or_one_below_on_small_grids(name, anywhere, home):
+    ground, start = reference(name)
+    assert lower_bound_steps(CoverageProblem.of(ground, start)) == anywhere
+    assert lower_bound_steps(CoverageProblem.of(ground, start, end=start)) == home
