@@ -67,6 +67,27 @@ class StartBlocked(FasacoError):
     hint = "choose a free start, or check the robot radius"
 
 
+class EndOutsideMap(FasacoError):
+    """The cell to end in is not on the lattice at all."""
+
+    code = "end_outside_map"
+    hint = "choose an end inside the map, or none"
+
+
+class EndBlocked(FasacoError):
+    """The robot does not fit at the end, or the end is unknown."""
+
+    code = "end_blocked"
+    hint = "choose a free end, or none, or check the robot radius"
+
+
+class EndUnreachable(FasacoError):
+    """No walk leads from the start to the end."""
+
+    code = "end_unreachable"
+    hint = "choose an end in the area of the start, or none"
+
+
 class NothingToCover(FasacoError):
     """No cell is left that is coverable, uncovered and reachable."""
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter, deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.grid.lattice import TOUCH_TOLERANCE_PX, Footprint
 from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.cost import CoverageCost
 
 UNKNOWN, BLOCKED, COVERABLE = 0, 1, 2
 
@@ -88,8 +90,9 @@ class Colony:
     around: dict[Cell, dict[Cell, Cell]]
     to_cover: set[Cell]
     config: ColonyConfig
-    return_home: bool
+    end: Cell | None
     trail: dict[Move, float]
+    cost: CoverageCost = field(default_factory=CoverageCost)
 
     def walk(self, start: Cell, velocity: int, random: Xoshiro128PlusPlus) -> list[Cell]:
         """Let one ant walk until every cell is covered (Algorithm 1, lines 3 to 5)."""
@@ -112,9 +115,11 @@ class Colony:
                     walk.append(ahead)
                     uncovered.discard(ahead)
             uncovered.discard(walk[-1])
-        if self.return_home and walk[-1] != start:
-            walk += self.shortest(walk[-1], {start})[1:]
-        return walk
+        return walk + self.way_to_end(walk[-1])
+
+    def way_to_end(self, here: Cell) -> list[Cell]:
+        """Return the steps that are left when all is covered."""
+        return [] if self.end in (None, here) else self.shortest(here, {self.end})[1:]
 
     def choose(
         self,
@@ -183,9 +188,9 @@ class Colony:
             self.trail[move] = (1.0 - alpha) * self.trail[move] + alpha * tau0
 
     def strengthen(self, best: list[Cell]) -> None:
-        """Global update, equation (8), with delta phi = cells / steps."""
-        alpha = self.config.alpha
-        amount = len(self.to_cover) / max(len(best) - 1, 1)
+        """Global update, equation (8), with delta phi = cells / steps; turns count as steps do."""
+        alpha, step = self.config.alpha, self.cost.step_us
+        amount = float(Fraction(len(self.to_cover) * step, max(walk_us(best, self.cost), step)))
         for move in itertools.pairwise(best):
             self.trail[move] = (1.0 - alpha) * self.trail[move] + alpha * amount
 
@@ -195,9 +200,10 @@ def fasaco(
     to_cover: NDArray[np.bool_],
     start: Cell,
     config: ColonyConfig,
-    return_home: bool = False,
+    end: Cell | None = None,
+    cost: CoverageCost | None = None,
 ) -> list[Cell]:
-    """Algorithm 1: return the shortest walk a colony finds.
+    """Algorithm 1: return the cheapest walk a colony finds.
 
     Args:
         steps: step masks, uint8 (rows, cols), bit ``1 << direction``, east first,
@@ -205,12 +211,14 @@ def fasaco(
         to_cover: bool (rows, cols), cells that need a visit, all reachable from the start.
         start: index (row, col) in the arrays.
         config: the colony.
-        return_home: end every walk where it began.
+        end: index (row, col) where every walk ends; None for anywhere.
+        cost: of steps and turns; None for steps alone.
     """
     around = neighbours(steps)
     trail = {(here, there): config.tau0 for here in around for there in around[here].values()}
     wanted = {(int(row), int(col)) for row, col in np.argwhere(to_cover)}
-    colony = Colony(around, wanted, config, return_home, trail)
+    cost = cost or CoverageCost()
+    colony = Colony(around, wanted, config, end, trail, cost)
     group_size = min(max(64_000 // len(wanted), 2), 32)
     best: list[Cell] = []
     for number, cohort in enumerate(config.cohorts()):
@@ -223,10 +231,22 @@ def fasaco(
                 walks.append(colony.walk(start, cohort.velocity, random))
             for walk in walks:
                 colony.settle(walk)
-                if not best or len(walk) < len(best):
+                if not best or walk_us(walk, cost) < walk_us(best, cost):
                     best = walk
         colony.strengthen(best)
     return best
+
+
+def walk_us(walk: list[Cell], cost: CoverageCost) -> int:
+    """Return what a walk costs [us], turn by turn."""
+    headings = [
+        DIRECTIONS.index(_difference(here, there)) for here, there in itertools.pairwise(walk)
+    ]
+    total = len(headings) * cost.step_us
+    for before, after in itertools.pairwise(headings):
+        to_left = (after - before) % 4
+        total += min(to_left, 4 - to_left) * cost.quarter_turn_us
+    return total
 
 
 def figures(steps: NDArray[np.uint8], walk: list[Cell]) -> dict[str, int]:
@@ -397,13 +417,13 @@ def sweep(
     start: Cell,
     rule: tuple[tuple[Cell, ...], bool],
     *,
-    return_home: bool = False,
+    end: Cell | None = None,
 ) -> list[Cell]:
     """Take the first open neighbour in the rule's order, else go to the nearest open cell."""
     order, from_heading = rule
     around = neighbours(steps)
     uncovered = {(int(row), int(col)) for row, col in np.argwhere(to_cover)} - {start}
-    searcher = Colony(around, uncovered, ColonyConfig(), return_home, {})
+    searcher = Colony(around, uncovered, ColonyConfig(), end, {})
     walk, heading = [start], EAST
     while uncovered:
         tried = [_turned(direction, heading) for direction in order] if from_heading else order
@@ -412,9 +432,7 @@ def sweep(
         walk += [first] if first else searcher.shortest(walk[-1], uncovered)[1:]
         heading = _difference(walk[-2], walk[-1])
         uncovered.discard(walk[-1])
-    if return_home and walk[-1] != start:
-        walk += searcher.shortest(walk[-1], {start})[1:]
-    return walk
+    return walk + searcher.way_to_end(walk[-1])
 
 
 def _turned(direction: Cell, heading: Cell) -> Cell:
@@ -453,6 +471,25 @@ def stc(steps: NDArray[np.uint8], ground: NDArray[np.bool_], start: Cell) -> lis
         stack.append(node[around[cell][way]])
         reached.add(stack[-1])
     return _circuit(around, walked, start)
+
+
+def stc_led_to_end(
+    steps: NDArray[np.uint8],
+    to_cover: NDArray[np.bool_],
+    closed: list[Cell],
+    end: Cell,
+    cost: CoverageCost,
+) -> list[Cell]:
+    """Cut a closed walk where all is covered and go to the end; the cheaper way around."""
+    wanted = {(int(row), int(col)) for row, col in np.argwhere(to_cover)}
+    searcher = Colony(neighbours(steps), wanted, ColonyConfig(), end, {})
+    readings = []
+    for walk in (closed, closed[::-1]):
+        length = 1
+        while not wanted <= set(walk[:length]):
+            length += 1
+        readings.append(walk[:length] + searcher.way_to_end(walk[length - 1]))
+    return min(readings, key=lambda walk: walk_us(walk, cost))
 
 
 def _part_of_block(

@@ -62,7 +62,7 @@ class TimingPlan:
         grids: coverage grids, maps, or names of built-in maps.
         colony: the colony.
         repeats: runs of the compiled colony on each grid.
-        return_home: whether walks end where they begin.
+        closed: whether walks end where they begin.
         naive_s: about how long the naive twin may run on each grid [s]; 0 for not at all.
         threads: how many threads are tried against one; 1 for no trial.
     """
@@ -70,7 +70,7 @@ class TimingPlan:
     grids: tuple[str, ...]
     colony: ColonyConfig
     repeats: int
-    return_home: bool
+    closed: bool
     naive_s: float
     threads: int
 
@@ -88,7 +88,8 @@ def time_colony(plan: TimingPlan, say: Say) -> Generator[Timing, None, None]:
     say("loading kernels")
     warm_up()
     for grid in grids:
-        problem = CoverageProblem.of(grid.lattice, grid.start, return_home=plan.return_home)
+        end = grid.start if plan.closed else None
+        problem = CoverageProblem.of(grid.lattice, grid.start, end=end)
         say(f"{grid.name}: compiled")
         Fasaco(_smallest(plan.colony)).plan(problem)
         for _ in range(plan.repeats):
@@ -106,7 +107,7 @@ def time_colony(plan: TimingPlan, say: Say) -> Generator[Timing, None, None]:
 
 def _time_compiled(grid: NamedGrid, problem: CoverageProblem, colony: ColonyConfig) -> Timing:
     path, wall_s, cpu_s = _timed(lambda: Fasaco(colony).plan(problem))
-    return Timing(grid.name, problem.cells, path.steps, path.ants, wall_s, cpu_s)
+    return Timing(grid.name, problem.cells, path.steps, path.work.ants, wall_s, cpu_s)
 
 
 def _time_threads(grid: NamedGrid, problem: CoverageProblem, plan: TimingPlan) -> Timing:
@@ -116,7 +117,7 @@ def _time_threads(grid: NamedGrid, problem: CoverageProblem, plan: TimingPlan) -
         grid=grid.name,
         cells=problem.cells,
         steps=together.steps,
-        ants=together.ants,
+        ants=together.work.ants,
         wall_s=wall_s,
         cpu_s=cpu_s,
         same_walk=same,
@@ -133,7 +134,7 @@ def _time_baseline(
     path, wall_s, cpu_s = min(runs, key=lambda run: run[1])
     yield Timing(grid.name, problem.cells, path.steps, 0, wall_s, cpu_s, planner=name)
     # The twin walks home in any case, as spanning-tree coverage does.
-    closed = CoverageProblem.of(problem.lattice, problem.start, return_home=True)
+    closed = CoverageProblem.of(problem.lattice, problem.start, end=problem.start)
     walk, wall_s, cpu_s = _timed(lambda: _naive_baseline(naive, closed, name))
     window = problem.lattice.window
     cells = planner.plan(closed, never, ignore).cells - (window.row0, window.col0)
@@ -151,7 +152,7 @@ def _naive_baseline(
         walk = naive.stc(steps, problem.to_cover, start)
     else:
         rule = {"spiral-stc": naive.SPIRAL, "zigzag": naive.ZIGZAG}[name]
-        walk = naive.sweep(steps, problem.to_cover, start, rule, return_home=True)
+        walk = naive.sweep(steps, problem.to_cover, start, rule, end=start)
     return walk
 
 
@@ -183,7 +184,8 @@ def _timed_naive(
     naive: ModuleType, problem: CoverageProblem, colony: ColonyConfig
 ) -> tuple[list[tuple[int, int]], float, float]:
     steps, start = problem.lattice.steps, problem.lattice.local(problem.start)
-    return _timed(lambda: naive.fasaco(steps, problem.to_cover, start, colony, problem.return_home))
+    end = start if problem.closed else None
+    return _timed(lambda: naive.fasaco(steps, problem.to_cover, start, colony, end))
 
 
 def _affordable(plan: TimingPlan, s_per_ant: float) -> int:

@@ -28,7 +28,7 @@ class Variant:
         planner: its name in ``PLANNERS``.
         velocities: of its cohorts [cells/step]; () where there are no ants.
         q0, visibility: of the colony; the faithful rows have the defaults.
-        return_home: whether its walk ends where it began, as all the faithful ones do.
+        closed: whether its walk ends where it began, as all the faithful ones do.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Variant:
     velocities: tuple[int, ...] = ()
     q0: float = 0.7
     visibility: str = "neighbour"
-    return_home: bool = True
+    closed: bool = True
 
     def plan(
         self, problem: CoverageProblem, ants: int, seed: int, observe: Observer = ignore
@@ -49,7 +49,7 @@ class Variant:
             seed=seed,
             visibility=self.visibility,
         )
-        posed = replace(problem, return_home=self.return_home)
+        posed = replace(problem, end=problem.start if self.closed else None)
         return PLANNERS[self.planner](colony, 1).plan(posed, never, observe)
 
 
@@ -66,7 +66,7 @@ VARIANTS = {
         Variant("spiral-stc", "spiral-stc"),
         Variant("zigzag", "zigzag"),
         Variant("stc", "stc"),
-        Variant("falling-anywhere", "fasaco", FALLING, return_home=False),
+        Variant("falling-anywhere", "fasaco", FALLING, closed=False),
         Variant("falling-distance", "fasaco", FALLING, visibility="distance"),
         Variant("falling-open", "fasaco", FALLING, visibility="fewest-open"),
         Variant("falling-open-q98", "fasaco", FALLING, q0=0.98, visibility="fewest-open"),
@@ -127,7 +127,7 @@ def check_drawn(drawn: Sequence[str], grids: Sequence[str]) -> None:
 
 def pose(grid: NamedGrid) -> CoverageProblem:
     """Return the problem of Table I on a grid: from its start back to its start."""
-    return CoverageProblem.of(grid.lattice, grid.start, return_home=True)
+    return CoverageProblem.of(grid.lattice, grid.start, end=grid.start)
 
 
 def measure(grids: Sequence[str], ants: int, seeds: int, say: Say) -> Generator[Run, None, None]:

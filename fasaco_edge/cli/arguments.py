@@ -45,7 +45,11 @@ def with_negative_pairs(words: Sequence[str]) -> list[str]:
     """
     joined: list[str] = []
     for word in words:
-        if joined and joined[-1] in ("--start", "--start-xy") and re.match(r"-[\d.]", word):
+        if (
+            joined
+            and joined[-1] in ("--start", "--start-xy", "--end")
+            and re.match(r"-[\d.]", word)
+        ):
             joined[-1] += f"={word}"
         else:
             joined.append(word)

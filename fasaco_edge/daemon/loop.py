@@ -162,7 +162,7 @@ class Loop:
             "steps": max(len(update.cells) - 1, 0),
             "planner": plan.planner if plan else None,
             "seed": plan.seed if plan else None,
-            "ants": plan.ants if plan else None,
+            "ants": plan.work.ants if plan else None,
             "plan_ms": round(1e3 * update.plan_s, 3),
         }
         xy = mission.lattice.centres(update.cells)

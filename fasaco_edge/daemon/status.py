@@ -112,7 +112,7 @@ class StatusBoard:
             "reason": update.reason,
             "planner": plan.planner if plan else None,
             "seed": plan.seed if plan else None,
-            "ants": plan.ants if plan else None,
+            "ants": plan.work.ants if plan else None,
         }
 
 

@@ -10,7 +10,7 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.mission.events import PlanReady, PlanRequest
 from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.planners.planner import CoveragePlanner, ignore
-from fasaco_edge.planners.stopping import Interrupt, TimeBudget
+from fasaco_edge.planners.stopping import AnyOf, Interrupt, TimeBudget
 
 
 class PlanningWorker:
@@ -61,7 +61,7 @@ class PlanningWorker:
         self._interrupt.clear()
         if self._stopping.is_set():
             return
-        stop = Interrupt(TimeBudget(self._budget_s), self._interrupt)
+        stop = AnyOf(TimeBudget(self._budget_s), Interrupt(self._interrupt))
         # To look at the trail costs time: only where somebody does.
         observe = self._observe if self._is_watched() else ignore
         path = self._planner.plan(request.problem, stop, observe)

@@ -29,6 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.kernels.costs import walk_cost
 from fasaco_edge.kernels.jit import kernel
 from fasaco_edge.kernels.search import Graph, Scratch, append_way, begin, close, find, open_steps_of
 
@@ -41,11 +42,12 @@ NEIGHBOUR, DISTANCE, FEWEST_OPEN = 0, 1, 2
 
 
 class Rules(NamedTuple):
-    """Constants of equations (4) to (8), and the end of the walk.
+    """Constants of equations (4) to (8), the end of the walk, and what makes one the best.
 
     Attributes:
         q0, alpha, tau0: as in the equations.
-        return_home: whether the walk ends at its start.
+        end: the cell the walk ends in, -1 for anywhere.
+        step_us, quarter_turn_us: what they cost [us].
         visibility: NEIGHBOUR, DISTANCE or FEWEST_OPEN.
         powers: float64, ``(1 / (i + 1)) ** beta`` at index i, as far as it is needed.
     """
@@ -53,7 +55,9 @@ class Rules(NamedTuple):
     q0: float
     alpha: float
     tau0: float
-    return_home: bool
+    end: int
+    step_us: int
+    quarter_turn_us: int
     visibility: int
     powers: NDArray[np.float64]
 
@@ -180,9 +184,9 @@ def _walk_one(
             remaining -= 1
             if not open_steps_of(graph, scratch, here) >> heading & 1:
                 break
-    if rules.return_home and here != start:
-        find(graph, scratch, here, start)
-        length = append_way(graph, scratch, walk, length, here, start)
+    if rules.end >= 0 and here != rules.end:
+        find(graph, scratch, here, rules.end)
+        length = append_way(graph, scratch, walk, length, here, rules.end)
     return length
 
 
@@ -201,7 +205,7 @@ def walk_ants(
     """Let ants walk on a trail that stays as it is.
 
     Args:
-        graph: where they walk; all that is wanted can be reached from the start.
+        graph: where they walk; all that is wanted, and the end, can be reached from the start.
         trail: pheromone on the move out of a cell in each direction, float64 (n, 4), > 0.
         rules: constants.
         scratch: working memory.
@@ -239,14 +243,20 @@ def settle(
     rules: Rules,
     walks: NDArray[np.int32],
     lengths: NDArray[np.int64],
-) -> int:
-    """Apply the local update (7) for every move, ant by ant; return the shortest walk's index."""
-    best = 0
+) -> tuple[int, int]:
+    """Apply the local update (7) for every move, ant by ant.
+
+    Returns:
+        The index of the cheapest walk, of equals the first, and its cost [us].
+    """
+    best, least = 0, 0
     for ant in range(lengths.size):
-        _pull(graph, trail, walks[ant, : lengths[ant]], rules.alpha, rules.tau0)
-        if lengths[ant] < lengths[best]:
-            best = ant
-    return best
+        walk = walks[ant, : lengths[ant]]
+        _pull(graph, trail, walk, rules.alpha, rules.tau0)
+        cost = walk_cost(walk, rules.step_us, rules.quarter_turn_us)
+        if ant == 0 or cost < least:
+            best, least = ant, cost
+    return best, least
 
 
 @kernel

@@ -27,18 +27,18 @@ def sweep(
     start: int,
     order: tuple[int, int, int, int],
     turns_along: bool,
-    return_home: bool,
+    end: int,
     walk: NDArray[np.int32],
 ) -> int:
     """Walk over all wanted cells; return the walk's whole length.
 
     Args:
-        graph: where to walk; all that is wanted can be reached from the start.
+        graph: where to walk; all that is wanted, and the end, can be reached from the start.
         scratch: working memory.
         start: the cell to start from.
         order: directions in the order they are tried.
         turns_along: whether the order is counted from the heading, east at first.
-        return_home: end at the start.
+        end: the cell to end in, -1 for anywhere.
         walk: out, int32 (room,); a longer walk is cut.
     """
     remaining = begin(graph, scratch, start)
@@ -62,7 +62,7 @@ def sweep(
             length += 1
         close(graph, scratch, here)
         remaining -= 1
-    if return_home and here != start:
-        find(graph, scratch, here, start)
-        length = append_way(graph, scratch, walk, length, here, start)
+    if end >= 0 and here != end:
+        find(graph, scratch, here, end)
+        length = append_way(graph, scratch, walk, length, here, end)
     return length

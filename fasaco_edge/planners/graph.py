@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.kernels.search import Graph, Scratch
 from fasaco_edge.planners.problem import CoverageProblem
 
@@ -39,8 +40,12 @@ def scratch_for(graph: Graph) -> Scratch:
 
 def flat_start(problem: CoverageProblem) -> int:
     """Return the start as a flat index."""
-    row, col = problem.lattice.local(problem.start)
-    return row * problem.lattice.window.cols + col
+    return _flat(problem, problem.start)
+
+
+def flat_end(problem: CoverageProblem) -> int:
+    """Return the end as a flat index, -1 for anywhere."""
+    return -1 if problem.end is None else _flat(problem, problem.end)
 
 
 def cells_of(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -48,3 +53,8 @@ def cells_of(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[np.in
     window = problem.lattice.window
     rows, cols = np.divmod(walk, window.cols)
     return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
+
+
+def _flat(problem: CoverageProblem, cell: Cell) -> int:
+    row, col = problem.lattice.local(cell)
+    return row * problem.lattice.window.cols + col

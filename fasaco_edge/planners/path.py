@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.walks import shortest_walk
+from fasaco_edge.planners.cost import count_turns
+from fasaco_edge.planners.work import NO_WORK, SearchWork, gap_to
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,13 +21,21 @@ class CoveragePath:
         cells: int32 (n, 2), read-only: cells (row, col) in order, the start first.
         planner: name of the planner.
         seed: seed it was run with.
-        ants: how many ants walked for it; with seed and problem this repeats the path.
+        work: what was done for it; with planner, seed and problem this repeats the path.
+        cost_s: what it costs by the problem's cost [s].
+        lower_bound_steps: no walk that solves the problem has fewer steps; 0 where no
+            bound is known.
+        first_walk_s: how long the search took to its first complete walk [s]: measured,
+            so the one thing here that a repetition does not repeat.
     """
 
     cells: NDArray[np.int32]
     planner: str
     seed: int
-    ants: int = 0
+    work: SearchWork = NO_WORK
+    cost_s: float = 0.0
+    lower_bound_steps: int = 0
+    first_walk_s: float = field(default=0.0, compare=False)
 
     def __post_init__(self) -> None:
         self.cells.flags.writeable = False
@@ -34,6 +44,16 @@ class CoveragePath:
     def steps(self) -> int:
         """Number of steps."""
         return max(len(self.cells) - 1, 0)
+
+    @property
+    def ants(self) -> int:
+        """How many ants walked for it."""
+        return self.work.ants
+
+    @property
+    def gap(self) -> float | None:
+        """How much longer than the bound it is (``steps / bound - 1``); None without a bound."""
+        return gap_to(self.lower_bound_steps, self.steps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +85,7 @@ def walk_figures(lattice: CoverageLattice, cells: NDArray[np.int32]) -> WalkFigu
     """Return the figures of a walk, int32 (n, 2) with n >= 1, over ``lattice``."""
     visits = np.unique(cells, axis=0, return_counts=True)[1]
     steps = len(cells) - 1
-    moves = np.diff(cells, axis=0)
-    along = (moves[1:] * moves[:-1]).sum(axis=1)
+    turns = count_turns(cells)
     # Plain integers, or the kernel is compiled a second time for numpy's.
     (first_row, first_col), (last_row, last_col) = cells[0].tolist(), cells[-1].tolist()
     last, first = lattice.local((last_row, last_col)), lattice.local((first_row, first_col))
@@ -78,6 +97,6 @@ def walk_figures(lattice: CoverageLattice, cells: NDArray[np.int32]) -> WalkFigu
         revisits=revisits,
         recovered_cells=int(np.count_nonzero(visits > 1)),
         n_r_paper=revisits + way_home,
-        turns_90=int(np.count_nonzero(along == 0)),
-        turns_180=int(np.count_nonzero(along < 0)),
+        turns_90=turns.quarter,
+        turns_180=turns.half,
     )

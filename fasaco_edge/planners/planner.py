@@ -8,10 +8,11 @@ from typing import Protocol
 from fasaco_edge.planners.observation import ColonySnapshot, Observer
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.work import SearchProgress
 
-# Asked again and again while a search runs, with the ants that have walked so
-# far; True ends the search with the best walk it has. There always is one.
-StoppingCriterion = Callable[[int], bool]
+# Asked again and again while a search runs, with how far it is; True ends the
+# search with the best walk it has. There always is one.
+StoppingCriterion = Callable[[SearchProgress], bool]
 
 
 class CoveragePlanner(Protocol):
@@ -30,7 +31,7 @@ class CoveragePlanner(Protocol):
         ...
 
 
-def never(ants: int) -> bool:
+def never(progress: SearchProgress) -> bool:
     """Let a search run to its end."""
     return False
 

@@ -7,9 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import NothingToCover, StartBlocked, StartOutsideMap
+from fasaco_edge.errors import (
+    EndBlocked,
+    EndOutsideMap,
+    EndUnreachable,
+    FasacoError,
+    NothingToCover,
+    StartBlocked,
+    StartOutsideMap,
+)
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.walks import reachable_from
+from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,14 +32,17 @@ class CoverageProblem:
             the start and still to be covered.
         unreachable: bool (rows, cols), read-only: coverable cells that are asked for but
             cannot be reached; reported, never attempted.
-        return_home: whether the walk ends where it began.
+        end: the cell (row, col) the walk ends in, which need not be one to cover; the
+            start itself for a walk back home; None for anywhere.
+        cost: what a walk is to have little of.
     """
 
     lattice: CoverageLattice
     start: Cell
     to_cover: NDArray[np.bool_]
     unreachable: NDArray[np.bool_]
-    return_home: bool = False
+    end: Cell | None = None
+    cost: CoverageCost = STEPS_ALONE
 
     @classmethod
     def of(
@@ -39,7 +51,8 @@ class CoverageProblem:
         start: Cell,
         *,
         covered: NDArray[np.bool_] | None = None,
-        return_home: bool = False,
+        end: Cell | None = None,
+        cost: CoverageCost = STEPS_ALONE,
     ) -> CoverageProblem:
         """Pose the problem of covering what is reachable and not yet ``covered``.
 
@@ -47,36 +60,53 @@ class CoverageProblem:
             lattice: the planning grid.
             start: cell (row, col).
             covered: bool (rows, cols), cells that need no visit; None for none.
-            return_home: end the walk at the start.
+            end: cell (row, col) to end in; the start for home, None for anywhere.
+            cost: of steps and turns; by default of steps alone.
 
         Raises:
-            StartOutsideMap: the lattice does not span the start.
-            StartBlocked: the robot does not fit there, or the place is unknown.
+            StartOutsideMap, EndOutsideMap: the lattice does not span the start, or the end.
+            StartBlocked, EndBlocked: the robot does not fit there, or the place is unknown.
+            EndUnreachable: no walk leads from the start to the end.
             NothingToCover: no cell is left to cover.
         """
-        _check_start(lattice, start)
-        wanted = lattice.coverable if covered is None else lattice.coverable & ~covered
+        _check_cell(lattice, start, "start", StartOutsideMap, StartBlocked)
         reachable = reachable_from(lattice.steps, *lattice.local(start)).astype(bool)
+        if end is not None:
+            _check_cell(lattice, end, "end", EndOutsideMap, EndBlocked)
+            if not reachable[lattice.local(end)]:
+                raise EndUnreachable(f"no walk leads from start cell {start} to end cell {end}")
+        wanted = lattice.coverable if covered is None else lattice.coverable & ~covered
         to_cover, unreachable = wanted & reachable, wanted & ~reachable
         if not to_cover.any():
             raise NothingToCover("every reachable cell is covered")
         to_cover.flags.writeable = unreachable.flags.writeable = False
-        return cls(lattice, start, to_cover, unreachable, return_home)
+        return cls(lattice, start, to_cover, unreachable, end, cost)
 
     @property
     def cells(self) -> int:
         """Number of cells to cover."""
         return int(np.count_nonzero(self.to_cover))
 
+    @property
+    def closed(self) -> bool:
+        """Whether the walk ends where it begins."""
+        return self.end == self.start
 
-def _check_start(lattice: CoverageLattice, start: Cell) -> None:
+
+def _check_cell(
+    lattice: CoverageLattice,
+    cell: Cell,
+    role: str,
+    outside: type[FasacoError],
+    blocked: type[FasacoError],
+) -> None:
     window = lattice.window
-    if not lattice.contains(start):
-        raise StartOutsideMap(
-            f"start cell {start} lies outside rows {window.row0}..{window.row1 - 1}, "
+    if not lattice.contains(cell):
+        raise outside(
+            f"{role} cell {cell} lies outside rows {window.row0}..{window.row1 - 1}, "
             f"columns {window.col0}..{window.col1 - 1}"
         )
-    state = lattice.states[lattice.local(start)]
+    state = lattice.states[lattice.local(cell)]
     if state != COVERABLE:
         why = "is unknown" if state == UNKNOWN else "is blocked: the robot does not fit there"
-        raise StartBlocked(f"start cell {start} {why}")
+        raise blocked(f"{role} cell {cell} {why}")

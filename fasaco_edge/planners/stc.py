@@ -1,17 +1,20 @@
 """Spanning-tree coverage, Gabriely and Rimon 2001; see ``kernels.spanning`` for any grid.
 
-The walk is closed. Where it need not return, it ends with the last cell that
-still wants a visit.
+The walk is closed. Where it may end anywhere, it ends with the last cell that still
+wants a visit; from there a shortest way leads to an end that is not the start. Read
+backwards the same walk may come out nearer to that end: the cheaper reading is taken.
 """
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fasaco_edge.kernels.spanning import spanning_tree_walk
-from fasaco_edge.kernels.walks import reachable_from
+from fasaco_edge.kernels.walks import reachable_from, shortest_walk
 from fasaco_edge.planners.observation import Observer
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import StoppingCriterion, ignore, never
@@ -26,18 +29,39 @@ class SpanningTree:
         self, problem: CoverageProblem, stop: StoppingCriterion = never, observe: Observer = ignore
     ) -> CoveragePath:
         """Return the walk around the tree; it takes too little time to be stopped."""
+        began = time.perf_counter()
         lattice = problem.lattice
         row, col = lattice.local(problem.start)
         # The tree spans covered ground too: what is left of it need not hang together.
         ground = reachable_from(lattice.steps, row, col)
         walk = spanning_tree_walk(lattice.steps, ground, row, col)
-        if not problem.return_home:
+        if problem.end is None:
             walk = walk[: _last_needed(problem, walk) + 1]
-        corner = np.array((lattice.window.row0, lattice.window.col0), np.int32)
-        return CoveragePath(walk + corner, planner="stc", seed=0)
+        elif not problem.closed:
+            readings = (_led_to_end(problem, walk), _led_to_end(problem, walk[::-1]))
+            walk = min(readings, key=problem.cost.of_walk)
+        cells = walk + np.array((lattice.window.row0, lattice.window.col0), np.int32)
+        return CoveragePath(
+            cells,
+            planner="stc",
+            seed=0,
+            cost_s=problem.cost.of_walk(cells),
+            first_walk_s=time.perf_counter() - began,
+        )
 
 
-def _last_needed(problem: CoverageProblem, walk: np.ndarray) -> int:
+def _led_to_end(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return a walk up to the last cell that is needed, and from there on to the end."""
+    assert problem.end is not None
+    needed = walk[: _last_needed(problem, walk) + 1]
+    lattice = problem.lattice
+    # Plain integers, or the kernel is compiled a second time for numpy's.
+    row, col = needed[-1].tolist()
+    way = shortest_walk(lattice.steps, (row, col), lattice.local(problem.end))
+    return np.concatenate((needed, way[1:]))
+
+
+def _last_needed(problem: CoverageProblem, walk: NDArray[np.int32]) -> int:
     """Return the index of the walk's last first visit to a cell that is to be covered."""
     flat = walk[:, 0].astype(np.int64) * problem.to_cover.shape[1] + walk[:, 1]
     first_visits = np.unique(flat, return_index=True)[1]

@@ -1,10 +1,13 @@
-"""When a search ends: by the clock, by its work, or because something newer came."""
+"""When a search ends: by the clock, its work, its quality, or because something newer came."""
 
 from __future__ import annotations
 
 import threading
 import time
 from dataclasses import dataclass, field
+
+from fasaco_edge.planners.planner import StoppingCriterion
+from fasaco_edge.planners.work import SearchProgress, SearchWork
 
 
 @dataclass(slots=True)
@@ -14,29 +17,56 @@ class TimeBudget:
     seconds: float
     started: float = field(default_factory=time.monotonic)
 
-    def __call__(self, ants: int) -> bool:
+    def __call__(self, progress: SearchProgress) -> bool:
         """Tell whether the budget is used up."""
         return time.monotonic() - self.started >= self.seconds
 
 
 @dataclass(frozen=True, slots=True)
 class WorkLimit:
-    """Stop after as many ants as an earlier search needed: this repeats its path."""
+    """Stop after as much work as an earlier search did: this repeats its path."""
 
-    ants: int
+    work: SearchWork
 
-    def __call__(self, ants: int) -> bool:
-        """Tell whether the work is done."""
-        return ants >= self.ants
+    def __call__(self, progress: SearchProgress) -> bool:
+        """Tell whether every count of the work is reached."""
+        return progress.work.reaches(self.work)
+
+
+@dataclass(frozen=True, slots=True)
+class GapReached:
+    """Stop when the walk is proven to be at most ``target`` longer than the shortest: 0.01, 1 %.
+
+    Without a bound this never stops a search.
+    """
+
+    target: float
+
+    def __call__(self, progress: SearchProgress) -> bool:
+        """Tell whether the walk is near enough to the bound."""
+        gap = progress.gap
+        return gap is not None and gap <= self.target
 
 
 @dataclass(frozen=True, slots=True)
 class Interrupt:
-    """Stop when another thread asks for it, or at the end of the budget."""
+    """Stop when another thread asks for it."""
 
-    budget: TimeBudget
     asked: threading.Event = field(default_factory=threading.Event)
 
-    def __call__(self, ants: int) -> bool:
-        """Tell whether to stop."""
-        return self.asked.is_set() or self.budget(ants)
+    def __call__(self, progress: SearchProgress) -> bool:
+        """Tell whether somebody asked."""
+        return self.asked.is_set()
+
+
+class AnyOf:
+    """Stop when one of several criteria says so; with none, never."""
+
+    __slots__ = ("criteria",)
+
+    def __init__(self, *criteria: StoppingCriterion) -> None:
+        self.criteria = criteria
+
+    def __call__(self, progress: SearchProgress) -> bool:
+        """Tell whether any says so."""
+        return any(criterion(progress) for criterion in self.criteria)

@@ -10,12 +10,15 @@ steps that their code makes at dead ends, which Table I counts too; see
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fasaco_edge.kernels.search import Graph
 from fasaco_edge.kernels.sweeps import sweep
-from fasaco_edge.planners.graph import cells_of, flat_start, graph_of, scratch_for
+from fasaco_edge.planners.graph import cells_of, flat_end, flat_start, graph_of, scratch_for
 from fasaco_edge.planners.observation import Observer
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import StoppingCriterion, ignore, never
@@ -39,16 +42,25 @@ class _Sweep:
         self, problem: CoverageProblem, stop: StoppingCriterion = never, observe: Observer = ignore
     ) -> CoveragePath:
         """Return the one walk there is; it takes too little time to be stopped."""
-        graph = graph_of(problem)
-        scratch, start = scratch_for(graph), flat_start(problem)
+        began = time.perf_counter()
+        cells = cells_of(problem, self.walk(problem, graph_of(problem)))
+        return CoveragePath(
+            cells,
+            planner=self.name,
+            seed=0,
+            cost_s=problem.cost.of_walk(cells),
+            first_walk_s=time.perf_counter() - began,
+        )
+
+    def walk(self, problem: CoverageProblem, graph: Graph) -> NDArray[np.int32]:
+        """Return the walk as flat cells, int32 (n,)."""
+        scratch, start, end = scratch_for(graph), flat_start(problem), flat_end(problem)
         length = room = 2 * problem.cells
         while length >= room:
             room = 2 * length
             walk = np.empty(room, np.int32)
-            length = sweep(
-                graph, scratch, start, self.order, self.turns_along, problem.return_home, walk
-            )
-        return CoveragePath(cells_of(problem, walk[:length]), planner=self.name, seed=0)
+            length = sweep(graph, scratch, start, self.order, self.turns_along, end, walk)
+        return walk[:length]
 
 
 def spiral_stc() -> _Sweep:

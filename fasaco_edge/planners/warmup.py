@@ -9,14 +9,15 @@ import numpy as np
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.table import PLANNERS
 
-LATTICE, REACH, WALKS = "lattice", "reachability", "shortest walks"
-STAGES = (LATTICE, REACH, WALKS, *PLANNERS)
+LATTICE, REACH, WALKS, BOUND = "lattice", "reachability", "shortest walks", "lower bound"
+STAGES = (LATTICE, REACH, WALKS, BOUND, *PLANNERS)
 
 
 def warm_up(report: Callable[[str], None] | None = None) -> None:
@@ -36,6 +37,8 @@ def _stages() -> Iterator[str]:
     problem = CoverageProblem.of(lattice, (0, 0))
     yield WALKS
     walk_figures(lattice, np.array([[0, 0], [0, 1]], np.int32))
+    yield BOUND
+    lower_bound_steps(problem)
     for name, make in PLANNERS.items():
         yield name
         make(ColonyConfig(ants=1, velocities=(1,)), 1).plan(problem, never, ignore)

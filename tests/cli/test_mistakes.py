@@ -24,6 +24,9 @@ def folder(tmp_path, monkeypatch):
     blocked = np.ones((6, 6), bool)
     blocked[2, 2] = False
     np.save("blocked.npy", blocked)
+    halves = np.ones((6, 6), bool)
+    halves[3] = False
+    np.save("halves.npy", halves)
     np.save("walls.npy", np.zeros((6, 6), bool))
     np.save("empty.npy", np.zeros((0, 6), bool))
     np.save("numbers.npy", np.ones((6, 6)))
@@ -47,6 +50,20 @@ def folder(tmp_path, monkeypatch):
         ("plan good.npy --start 6,0", 1, "start cell (6, 0) lies outside rows 0..5"),
         ("plan good.npy --start -1,0", 1, "start cell (-1, 0) lies outside"),
         ("plan good.npy --start-xy 99,0", 1, "lies outside"),
+        ("plan good.npy --end 6,0", 1, "end cell (6, 0) lies outside rows 0..5"),
+        ("plan good.npy --end -1,0", 1, "end cell (-1, 0) lies outside"),
+        ("plan blocked.npy --end 2,2", 1, "end cell (2, 2) is blocked"),
+        ("plan halves.npy --end 5,5", 1, "no walk leads from start cell (0, 0) to end cell (5, 5)"),
+        ("plan good.npy --speed-m-s 0", 78, "--speed-m-s must be in (0, 10] m/s, got 0.0"),
+        ("plan good.npy --speed-m-s nan", 78, "--speed-m-s must be in (0, 10] m/s, got nan"),
+        ("plan good.npy --turn-s -1", 78, "--turn-s must be in [0, 3600] s, got -1.0"),
+        ("plan good.npy --turn-s inf", 78, "--turn-s must be in [0, 3600] s, got inf"),
+        ("plan good.npy --cell 1e-5", 78, "cell_m / speed_m_s must be in [0.001, 3600] s"),
+        ("plan good.npy --budget 0", 78, "--budget must be above 0 s, got 0.0"),
+        ("plan good.npy --budget nan", 78, "--budget must be above 0 s, got nan"),
+        ("plan good.npy --target-gap -1", 78, "--target-gap must be in [0, 10], got -1.0"),
+        ("plan good.npy --target-gap nan", 78, "--target-gap must be in [0, 10], got nan"),
+        ("plan good.npy --threads 0", 78, "--threads must be in 1..64, got 0"),
         ("plan office --cell 0.0001", 1, "exceeds 4000000 cells"),
         ("plan office --cell 1e-300", 1, "exceeds 4000000 cells"),
         ("plan office --cell 0", 78, "--cell must be in (0, 10] m, got 0.0"),
@@ -99,6 +116,8 @@ def test_a_mistake_is_told_with_a_hint(folder, capsys, words, code, said):
         ("plan office --start-xy nan,1", "must be within 1e+06 m of 0, got nan,1"),
         ("plan office --start-xy 1,1e300", "must be within 1e+06 m of 0, got 1,1e300"),
         ("plan office --start 1,1 --start-xy 1,1", "not allowed with argument --start"),
+        ("plan office --end there", "--end: must be anywhere, home or row,column, got 'there'"),
+        ("plan office --end home --return-home", "not allowed with argument --end"),
         ("plan office --cell wide", "argument --cell: invalid float value: 'wide'"),
         ("plan office --planner best", "argument --planner: invalid choice: 'best'"),
         ("record", "the following arguments are required: --out"),

@@ -14,12 +14,15 @@ from fasaco_edge.cli import main
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.map_files import write_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.planners.names import PLANNER_NAMES
+from fasaco_edge.simulation.config import SimulationConfig
 from tests.cli.commands import fasaco_edge
 from tests.daemon.rooms import coverable_cells, pillared_room
 
 KEYS = {
     *("planner", "seed", "ants", "velocities", "map", "cell_m", "start", "end", "cells", "steps"),
     *("revisits", "recovered_cells", "n_r_paper", "turns_90", "turns_180", "length_m"),
+    *("kicks", "proposals", "cost_s", "lower_bound_steps", "gap", "first_walk_ms"),
     *("unreachable_cells", "wall_s", "cpu_s"),
 }
 
@@ -75,7 +78,7 @@ def way_length(free, start, goal):
     return distance[goal]
 
 
-def check(figures, walk, free, start):
+def check(figures, walk, free, start, speed_m_s=0.25, turn_s=0.0):
     """Count the figures of a walk again."""
     area = area_of(free, start)
     visits = {cell: walk.count(cell) for cell in set(walk)}
@@ -94,6 +97,15 @@ def check(figures, walk, free, start):
     assert figures["turns_180"] == turns.count(-1)
     assert figures["unreachable_cells"] == len(free) - len(area)
     assert figures["length_m"] == pytest.approx(len(moves) * figures["cell_m"], abs=1e-3)
+    quarters = turns.count(0) + 2 * turns.count(-1)
+    cost_s = len(moves) * figures["cell_m"] / speed_m_s + quarters * turn_s
+    assert figures["cost_s"] == pytest.approx(cost_s)
+    assert 0 < figures["first_walk_ms"] <= 1e3 * figures["wall_s"]
+    assert 0 <= figures["lower_bound_steps"] <= len(moves)
+    assert figures["lower_bound_steps"] >= len(area) - 1
+    if len(area) > 1:
+        gap = len(moves) / figures["lower_bound_steps"] - 1
+        assert figures["gap"] == pytest.approx(gap, abs=1e-6)
     assert figures["wall_s"] > 0
     assert figures["cpu_s"] > 0
 
@@ -145,6 +157,56 @@ def test_return_home_ends_at_the_start(plan, grid_file):
     check(figures, walk, cells_in(grid_file), (8, 0))
     assert walk[-1] == walk[0]
     assert figures["n_r_paper"] == figures["revisits"]
+
+
+def test_return_home_is_short_for_an_end_at_home(plan, grid_file):
+    options = ("--start", "8,0", "--ants", 40)
+    _, short = plan(grid_file, *options, "--return-home")
+    _, long = plan(grid_file, *options, "--end", "home")
+    _, cell = plan(grid_file, *options, "--end", "8,0")
+    assert short == long == cell
+
+
+@pytest.mark.parametrize("planner", PLANNER_NAMES)
+def test_a_walk_ends_in_the_cell_asked_for(plan, grid_file, planner):
+    options = ("--start", "8,0", "--end", "2,6", "--planner", planner, "--ants", 16)
+    figures, walk = plan(grid_file, *options)
+    check(figures, walk, cells_in(grid_file), (8, 0))
+    assert walk[-1] == (2, 6)
+
+
+def test_anywhere_is_where_a_walk_ends_unless_asked(plan, grid_file):
+    _, asked = plan(grid_file, "--end", "anywhere", "--ants", 24)
+    _, default = plan(grid_file, "--ants", 24)
+    assert asked == default
+
+
+def test_turns_cost_what_they_take(plan, grid_file):
+    cells, options = cells_in(grid_file), ("--ants", 400, "--velocities", 1, "--seed", 2)
+    robot = ("--speed-m-s", 0.5, "--turn-s", 4)
+    plain, walk = plan(grid_file, *options)
+    check(plain, walk, cells, (0, 0))
+    turning, walk = plan(grid_file, *options, *robot)
+    check(turning, walk, cells, (0, 0), speed_m_s=0.5, turn_s=4.0)
+    # As the simulated robot drives where nobody says.
+    assert SimulationConfig().speed_m_s == 0.25
+    assert turning["turns_90"] < plain["turns_90"]
+
+
+def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
+    figures, walk = plan(grid_file, "--ants", 1_000_000, "--budget", 0.05)
+    check(figures, walk, cells_in(grid_file), (0, 0))
+    assert figures["ants"] < 1_000_000
+    assert 0.05 <= figures["wall_s"] < 20
+
+
+def test_a_target_gap_ends_the_search_at_the_first_walk_that_is_good_enough(plan, grid_file):
+    options = ("--start", "0,0", "--seed", 1, "--velocities", 1, "--visibility", "fewest-open")
+    whole, _ = plan(grid_file, *options, "--ants", 4000)
+    figures, walk = plan(grid_file, *options, "--ants", 4000, "--target-gap", whole["gap"])
+    check(figures, walk, cells_in(grid_file), (0, 0))
+    assert figures["gap"] == whole["gap"]
+    assert figures["ants"] < whole["ants"] == 4000
 
 
 @pytest.mark.parametrize("velocities", ["8:1", "1:8", "4", "8,4,1", "1"])

@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from fasaco_edge.kernels.colony import NEIGHBOUR, Rules, deposit, settle, walk_ants
+from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.graph import graph_of, scratch_for
 from fasaco_edge.planners.problem import CoverageProblem
+from tests import naive
 from tests.planners.grids import lattice
 
 ALPHA, TAU0 = 0.25, 0.5
+STEP_US = 1_000_000
 
 
 class Ground:
@@ -20,14 +23,14 @@ class Ground:
         self.graph = graph_of(CoverageProblem.of(drawn, (row, col)))
         self.trail = np.full((drawn.steps.size, 4), TAU0)
 
-    def walks(self, start, velocity=1, q0=1.0, return_home=False, ants=1, seed=None):
+    def walks(self, start, velocity=1, q0=1.0, end=-1, ants=1, seed=None, turn_us=0):
         """Return the ants' walks; then their trail is settled."""
         streams = np.arange(1, 4 * ants + 1, dtype=np.int64).reshape(ants, 4)
         if seed is not None:
             words = np.random.SeedSequence(seed).generate_state(4 * ants)
             streams = words.astype(np.int64).reshape(ants, 4)
         walks, lengths = np.empty((ants, 64), np.int32), np.empty(ants, np.int64)
-        rules = Rules(q0, ALPHA, TAU0, return_home, NEIGHBOUR, np.ones(4))
+        rules = Rules(q0, ALPHA, TAU0, end, STEP_US, turn_us, NEIGHBOUR, np.ones(4))
         walk_ants(
             self.graph,
             self.trail,
@@ -39,7 +42,7 @@ class Ground:
             walks,
             lengths,
         )
-        self.shortest = settle(self.graph, self.trail, rules, walks, lengths)
+        self.best, self.least_us = settle(self.graph, self.trail, rules, walks, lengths)
         return [walk[:length].tolist() for walk, length in zip(walks, lengths, strict=True)]
 
     def walk(self, start, **options):
@@ -65,7 +68,7 @@ def test_equation_6_draws_in_proportion_to_the_trail():
 def test_equation_7_pulls_the_trail_of_every_move_towards_tau0():
     ground = Ground("...")
     ground.trail[:] = 4.0
-    assert ground.walk(1, return_home=True) == [1, 2, 1, 0, 1]
+    assert ground.walk(1, end=1) == [1, 2, 1, 0, 1]
     once = (1 - ALPHA) * 4.0 + ALPHA * TAU0
     # East out of 0 and 1, west out of 2 and 1: one move each; no other trail moves.
     moved = {(0, 0), (1, 0), (1, 2), (2, 2)}
@@ -111,18 +114,38 @@ def test_the_shortest_walk_of_a_group_is_found_the_first_of_equals():
     ground = Ground("...")
     walks = ground.walks(1, ants=40, q0=0.0, seed=1)
     assert {len(walk) for walk in walks} == {4}
-    assert ground.shortest == 0
+    assert (ground.best, ground.least_us) == (0, 3 * STEP_US)
     ground = Ground("...", "...", "...")
     lengths = [len(walk) for walk in ground.walks(1, ants=40, q0=0.0, seed=1)]
     assert len(set(lengths)) > 1
-    assert ground.shortest == lengths.index(min(lengths))
+    assert ground.best == lengths.index(min(lengths))
+    assert ground.least_us == (min(lengths) - 1) * STEP_US
+
+
+def test_the_cheapest_walk_of_a_group_need_not_be_the_shortest():
+    cost = CoverageCost(1.0, 2.5)
+    ground = Ground(".....", "..#..", ".....", ".....")
+    walks = ground.walks(0, ants=60, q0=0.0, seed=0, turn_us=cost.quarter_turn_us)
+    costs = [naive.walk_us([divmod(cell, 5) for cell in walk], cost) for walk in walks]
+    assert (ground.best, ground.least_us) == (costs.index(min(costs)), min(costs))
+    assert len(walks[ground.best]) > min(map(len, walks))
+
+
+def test_a_walk_ends_where_it_is_asked_to():
+    ground = Ground("....", "#.#.")
+    # Row 0 is the last line, of which 1 and 3 can be entered; above them lie 4 to 7.
+    there = [4, 5, 6, 7, 3, 7, 6, 5, 1]
+    ends = {-1: [], 1: [], 5: [5], 6: [5, 6], 4: [5, 4], 3: [5, 6, 7, 3]}
+    assert {end: ground.walk(4, end=end) for end in ends} == {
+        end: there + way for end, way in ends.items()
+    }
 
 
 def test_a_walk_longer_than_its_room_is_cut_but_counted():
     ground = Ground("....")
     streams = np.ones((1, 4), np.int64)
     walks, lengths = np.full((1, 3), -7, np.int32), np.empty(1, np.int64)
-    rules = Rules(1.0, ALPHA, TAU0, True, NEIGHBOUR, np.ones(4))
+    rules = Rules(1.0, ALPHA, TAU0, 0, STEP_US, 0, NEIGHBOUR, np.ones(4))
     scratch = scratch_for(ground.graph)
     walk_ants(ground.graph, ground.trail, rules, scratch, 0, 4, streams, walks, lengths)
     assert lengths.tolist() == [7]

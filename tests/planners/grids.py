@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
+from tests import naive
 
 # The paper's own grids are not ours to ship: looked for beside the checkout.
 BESIDE = Path(__file__).parents[3] / "shared" / "reference"
@@ -56,6 +57,21 @@ def problems(draw, max_side=9):
     ground = with_passages_closed(ground, draw(st.sampled_from((0.0, 0.1, 0.4))), random)
     row0, col0 = draw(st.sampled_from(((0, 0), (-3, 2), (40, -17))))
     return placed(ground, row0, col0), (start[0] + row0, start[1] + col0)
+
+
+# Where a walk ends: "anywhere", "home", or a draw among the cells that can be reached.
+ENDS = st.one_of(st.sampled_from(("anywhere", "home")), st.integers(0, 80))
+
+
+def end_of(drawn, lattice, start):
+    """The end as a problem has it."""
+    if drawn == "anywhere":
+        return None
+    if drawn == "home":
+        return start
+    reachable = sorted(naive.distances(lattice.steps, lattice.local(start)))
+    row, col = reachable[drawn % len(reachable)]
+    return row + lattice.window.row0, col + lattice.window.col0
 
 
 def reference(name):

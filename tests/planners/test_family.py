@@ -4,11 +4,12 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ignore, never
@@ -17,7 +18,7 @@ from fasaco_edge.planners.stc import SpanningTree
 from fasaco_edge.planners.sweeps import spiral_stc, zigzag
 from fasaco_edge.planners.table import PLANNERS
 from tests import naive
-from tests.planners.grids import ROOMS, lattice, problems, reference
+from tests.planners.grids import ENDS, ROOMS, end_of, lattice, problems, reference
 
 
 def assert_answers(problem, path):
@@ -28,23 +29,27 @@ def assert_answers(problem, path):
     assert walk[0] == ground.local(problem.start)
     assert all(there in around[here].values() for here, there in itertools.pairwise(walk))
     assert {(int(r), int(c)) for r, c in np.argwhere(problem.to_cover)} <= set(walk)
-    if problem.return_home:
-        assert walk[-1] == walk[0]
+    if problem.end is not None:
+        assert walk[-1] == ground.local(problem.end)
+    assert path.cost_s == naive.walk_us(walk, problem.cost) / 1e6
 
 
 @pytest.mark.parametrize("name", PLANNERS)
 @settings(max_examples=1000, deadline=None)
 @given(
     ground=problems(),
-    return_home=st.booleans(),
+    end=ENDS,
+    turn_s=st.sampled_from((0.0, 2.0)),
     covered=st.floats(0, 0.6),
     seed=st.integers(0, 1000),
 )
-def test_every_planner_covers_all_that_can_be_reached(name, ground, return_home, covered, seed):
+def test_every_planner_covers_all_and_ends_where_asked(name, ground, end, turn_s, covered, seed):
     lattice, start = ground
     done = np.random.default_rng(seed).random(lattice.states.shape) < covered
     done[lattice.local(start)] = False
-    problem = CoverageProblem.of(lattice, start, covered=done, return_home=return_home)
+    end = end_of(end, lattice, start)
+    cost = CoverageCost(1.2, turn_s)
+    problem = CoverageProblem.of(lattice, start, covered=done, end=end, cost=cost)
     planner = PLANNERS[name](ColonyConfig(ants=8, seed=seed), 1)
     path = planner.plan(problem, never, ignore)
     assert path.planner == name
@@ -65,13 +70,13 @@ def test_aco_is_fasaco_with_one_cohort_of_velocity_1_bit_for_bit(room):
     (spiral_stc(), naive.SPIRAL), (zigzag(), naive.ZIGZAG),
 ], ids=["spiral-stc", "zigzag"])  # fmt: skip
 @settings(max_examples=200, deadline=None)
-@given(ground=problems(), return_home=st.booleans())
-def test_twin_sweeps_the_same_anywhere(planner, rule, ground, return_home):
+@given(ground=problems(), end=ENDS)
+def test_twin_sweeps_the_same_anywhere(planner, rule, ground, end):
     lattice, start = ground
-    problem = CoverageProblem.of(lattice, start, return_home=return_home)
-    walk = naive.sweep(
-        lattice.steps, problem.to_cover, lattice.local(start), rule, return_home=return_home
-    )
+    end = end_of(end, lattice, start)
+    problem = CoverageProblem.of(lattice, start, end=end)
+    end = None if end is None else lattice.local(end)
+    walk = naive.sweep(lattice.steps, problem.to_cover, lattice.local(start), rule, end=end)
     window = lattice.window
     expected = [[row + window.row0, col + window.col0] for row, col in walk]
     assert planner.plan(problem).cells.tolist() == expected
@@ -81,8 +86,36 @@ def test_twin_sweeps_the_same_anywhere(planner, rule, ground, return_home):
 @given(ground=problems())
 def test_twin_goes_around_the_same_tree(ground):
     lattice, start = ground
-    problem = CoverageProblem.of(lattice, start, return_home=True)
+    problem = CoverageProblem.of(lattice, start, end=start)
     walk = naive.stc(lattice.steps, problem.to_cover, lattice.local(start))
+    window = lattice.window
+    expected = [[row + window.row0, col + window.col0] for row, col in walk]
+    assert SpanningTree().plan(problem).cells.tolist() == expected
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    ground=problems(),
+    end=st.integers(0, 80),
+    turn_s=st.sampled_from((0.0, 3.0)),
+    covered=st.floats(0, 0.9),
+    seed=st.integers(0, 1000),
+)
+def test_twin_leads_the_tree_s_walk_to_the_same_end(ground, end, turn_s, covered, seed):
+    lattice, start = ground
+    end = end_of(end, lattice, start)
+    assume(end != start)
+    done = np.random.default_rng(seed).random(lattice.states.shape) < covered
+    done[lattice.local(start)] = False
+    cost = CoverageCost(1.0, turn_s)
+    problem = CoverageProblem.of(lattice, start, covered=done, end=end, cost=cost)
+    local, around = lattice.local(start), naive.distances(lattice.steps, lattice.local(start))
+    ground = np.zeros(lattice.states.shape, bool)
+    ground[tuple(zip(*around, strict=True))] = True
+    closed = naive.stc(lattice.steps, ground, local)
+    walk = naive.stc_led_to_end(
+        lattice.steps, problem.to_cover, closed, lattice.local(end), problem.cost
+    )
     window = lattice.window
     expected = [[row + window.row0, col + window.col0] for row, col in walk]
     assert SpanningTree().plan(problem).cells.tolist() == expected
@@ -97,7 +130,7 @@ def test_stc_visits_every_cell_once_where_all_blocks_are_whole(blocks):
         return
     ground = CoverageLattice.from_free(whole)
     start = tuple(np.argwhere(whole)[0].tolist())
-    problem = CoverageProblem.of(ground, start, return_home=True)
+    problem = CoverageProblem.of(ground, start, end=start)
     path = SpanningTree().plan(problem)
     assert path.steps == problem.cells
 
@@ -107,15 +140,24 @@ def test_stc_visits_every_cell_once_where_all_blocks_are_whole(blocks):
 def test_stc_is_no_longer_than_its_bound(ground):
     """Twice around any tree at most: 2 (k - 1) steps in a node of k cells, 2 for each join."""
     lattice, start = ground
-    problem = CoverageProblem.of(lattice, start, return_home=True)
+    problem = CoverageProblem.of(lattice, start, end=start)
     path = SpanningTree().plan(problem)
     assert path.steps <= 2 * (problem.cells - 1)
 
 
 def test_stc_goes_clockwise_around_its_tree():
-    problem = CoverageProblem.of(lattice("....", "...."), (0, 0), return_home=True)
+    problem = CoverageProblem.of(lattice("....", "...."), (0, 0), end=(0, 0))
     walk = SpanningTree().plan(problem).cells.tolist()
     assert walk == [[0, 0], [1, 0], [1, 1], [1, 2], [1, 3], [0, 3], [0, 2], [0, 1], [0, 0]]
+
+
+def test_stc_is_read_the_way_around_that_ends_nearer():
+    ground = lattice("....", "....")
+    beside = {end: SpanningTree().plan(CoverageProblem.of(ground, (0, 0), end=end))
+              for end in ((0, 1), (1, 0))}  # fmt: skip
+    assert {end: path.steps for end, path in beside.items()} == {(0, 1): 7, (1, 0): 7}
+    assert beside[0, 1].cells[1].tolist() == [1, 0]
+    assert beside[1, 0].cells[1].tolist() == [0, 1]
 
 
 def test_stc_ends_an_open_walk_with_the_last_cell_that_wants_a_visit():
@@ -142,7 +184,7 @@ def test_baselines_are_no_worse_than_the_authors_own(name, planner, most):
     if found is None:
         pytest.skip("the paper's grids are not at hand")
     ground, start = found
-    problem = CoverageProblem.of(ground, start, return_home=True)
+    problem = CoverageProblem.of(ground, start, end=start)
     path = PLANNERS[planner](ColonyConfig(), 1).plan(problem, never, ignore)
     assert walk_figures(ground, path.cells).revisits <= most
 

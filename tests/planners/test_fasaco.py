@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import time
 
 import numpy as np
 import pytest
@@ -9,13 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.fasaco import LARGEST_GROUP, Fasaco
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.ants import LARGEST_GROUP
+from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.stopping import TimeBudget, WorkLimit
+from fasaco_edge.planners.work import SearchProgress, SearchWork
 from tests import naive
-from tests.planners.grids import ROOMS, lattice, problems, reference
+from tests.planners.grids import ENDS, ROOMS, end_of, lattice, problems, reference
 
 HALL = lattice(*["." * 40] * 30)
 
@@ -29,8 +33,8 @@ def assert_answers(problem, path):
     assert all(there in around[here].values() for here, there in itertools.pairwise(walk))
     wanted = {tuple(cell) for cell in np.argwhere(problem.to_cover).tolist()}
     assert wanted <= set(walk)
-    if problem.return_home:
-        assert walk[-1] == walk[0]
+    if problem.end is not None:
+        assert walk[-1] == ground.local(problem.end)
     else:
         assert walk[-1] in wanted or len(walk) == 1
     assert path.cells.dtype == np.int32
@@ -40,17 +44,15 @@ def assert_answers(problem, path):
 @given(
     ground=problems(max_side=20),
     velocities=st.lists(st.integers(1, 64), min_size=1, max_size=5).map(tuple),
-    return_home=st.booleans(),
+    end=ENDS,
     seed=st.integers(0, 2**63 - 1),
     covered=st.floats(0, 1),
 )
-def test_every_reachable_cell_is_covered_by_legal_steps(
-    ground, velocities, return_home, seed, covered
-):
+def test_every_reachable_cell_is_covered_by_legal_steps(ground, velocities, end, seed, covered):
     ground, start = ground
     done = np.random.default_rng(seed).random(ground.states.shape) < covered
     done[ground.local(start)] = False
-    problem = CoverageProblem.of(ground, start, covered=done, return_home=return_home)
+    problem = CoverageProblem.of(ground, start, covered=done, end=end_of(end, ground, start))
     path = Fasaco(ColonyConfig(ants=10, velocities=velocities, seed=seed)).plan(problem)
     assert_answers(problem, path)
     reachable = naive.distances(ground.steps, ground.local(start))
@@ -73,27 +75,28 @@ def test_the_same_seed_gives_the_same_path_and_another_seed_another():
 
 
 def test_a_longer_search_is_never_worse():
-    problem = CoverageProblem.of(*ROOMS["rooms"], return_home=True)
-    steps = [plan(problem, ants=200, velocities=(1,), stop=WorkLimit(1)).steps]
+    problem = CoverageProblem.of(*ROOMS["rooms"], end=(0, 0))
+    steps = [plan(problem, ants=200, velocities=(1,), stop=WorkLimit(SearchWork(ants=1))).steps]
     steps.append(plan(problem, ants=200, velocities=(1,)).steps)
     assert steps[1] <= steps[0]
 
 
 @pytest.mark.parametrize("groups", [1, 2, 5, 15])
 def test_a_path_stopped_anywhere_is_complete_and_repeats_from_its_work(groups):
-    problem = CoverageProblem.of(HALL, (3, 5), return_home=True)
+    problem = CoverageProblem.of(HALL, (3, 5), end=(3, 5))
     assert problem.cells == 1200
     looks = itertools.count(1)
-    stopped = plan(problem, ants=400, seed=4, stop=lambda ants: next(looks) >= groups)
+    stopped = plan(problem, ants=400, seed=4, stop=lambda progress: next(looks) >= groups)
     # 400 ants are 50 in each cohort: groups end with their cohort.
     group = LARGEST_GROUP
     expected = [min(first + group, 50) + 50 * cohort for cohort in range(8)
                 for first in range(0, 50, group)]  # fmt: skip
-    assert stopped.ants == expected[groups - 1] < 400
+    assert stopped.work.ants == expected[groups - 1] < 400
     assert_answers(problem, stopped)
-    again = plan(problem, ants=400, seed=4, stop=WorkLimit(stopped.ants))
+    again = plan(problem, ants=400, seed=4, stop=WorkLimit(stopped.work))
     assert again.cells.tobytes() == stopped.cells.tobytes()
-    assert again.ants == stopped.ants
+    assert again.work == stopped.work
+    assert again.cost_s == stopped.cost_s
 
 
 @pytest.mark.parametrize("threads", [2, 3, 7])
@@ -106,25 +109,57 @@ def test_any_number_of_threads_finds_the_same_path(threads):
 
 
 def test_a_walk_that_needs_more_room_is_walked_again(monkeypatch):
-    problem = CoverageProblem.of(HALL, (3, 5), return_home=True)
+    problem = CoverageProblem.of(HALL, (3, 5), end=(3, 5))
     config = ColonyConfig(ants=40, seed=3)
     roomy = Fasaco(config).plan(problem)
-    monkeypatch.setattr("fasaco_edge.planners.fasaco.STEPS_PER_CELL", 0)
+    monkeypatch.setattr("fasaco_edge.planners.ants.STEPS_PER_CELL", 0)
     assert Fasaco(config).plan(problem).cells.tobytes() == roomy.cells.tobytes()
 
 
 def test_a_budget_that_is_gone_still_gives_a_whole_walk():
     problem = CoverageProblem.of(HALL, (0, 0))
     path = plan(problem, stop=TimeBudget(0.0))
-    assert 0 < path.ants <= LARGEST_GROUP
+    assert 0 < path.work.ants <= LARGEST_GROUP
     assert_answers(problem, path)
 
 
-def test_the_stopping_criterion_hears_how_many_ants_have_walked():
+def test_the_stopping_criterion_hears_how_far_the_search_is():
     heard = []
-    path = plan(CoverageProblem.of(HALL, (0, 0)), stop=lambda ants: bool(heard.append(ants)))
-    assert heard == sorted(set(heard))
-    assert heard[-1] == path.ants == 96
+    problem = CoverageProblem.of(*ROOMS["rooms"], cost=CoverageCost(0.5, 2.0))
+    listen = {"stop": lambda progress: bool(heard.append(progress))}
+    path = plan(problem, **listen, velocities=(1,), seed=3)
+    ants = [progress.work.ants for progress in heard]
+    assert ants == sorted(set(ants))
+    costs = [progress.cost_s for progress in heard]
+    assert costs == sorted(costs, reverse=True)
+    assert len(set(costs)) == len(costs) == 3
+    assert heard[-1] == SearchProgress(SearchWork(ants=96), path.cost_s, path.steps)
+    assert path.work.ants == 96
+
+
+def test_the_time_to_the_first_walk_is_a_part_of_the_time_to_the_last():
+    before = time.perf_counter()
+    path = plan(CoverageProblem.of(HALL, (0, 0)), ants=400)
+    assert 0.0 < path.first_walk_s < (time.perf_counter() - before) / 2
+
+
+def test_ants_that_pay_for_turns_turn_less():
+    turns = []
+    for turn_s in (0.0, 5.0):
+        cost = CoverageCost(1.0, turn_s)
+        problem = CoverageProblem.of(*ROOMS["rooms"], cost=cost)
+        paths = [plan(problem, ants=400, seed=seed) for seed in range(3)]
+        turns.append(sum(walk_figures(problem.lattice, path.cells).turns_90 for path in paths))
+    assert turns[1] < turns[0]
+
+
+@pytest.mark.parametrize("step_s", [0.001, 0.3, 1200.0])
+def test_the_price_of_a_step_changes_no_walk(step_s):
+    problem = CoverageProblem.of(HALL, (3, 5), cost=CoverageCost(step_s))
+    path = plan(problem)
+    plain = plan(CoverageProblem.of(HALL, (3, 5)))
+    assert path.cells.tobytes() == plain.cells.tobytes()
+    assert path.cost_s == pytest.approx(path.steps * step_s)
 
 
 @pytest.mark.parametrize("room", ROOMS)
@@ -148,23 +183,28 @@ def test_the_observer_is_offered_one_snapshot_after_each_cohort(room):
     assert len({id(shot.trail) for shot in snapshots}) == 8
 
 
-def test_a_snapshot_shows_the_mean_trail_of_the_moves_into_a_cell():
+@pytest.mark.parametrize(("turn_s", "delta_phi"), [(0.0, 1.0), (1.5, 0.4)])
+def test_a_snapshot_shows_the_mean_trail_of_the_moves_into_a_cell(turn_s, delta_phi):
     """One ant, q0 = 1: out of the corner it walks east along the row and back west."""
     snapshots = []
     config = {"ants": 1, "velocities": (1,), "q0": 1.0, "alpha": 0.5, "tau0": 0.1}
-    plan(CoverageProblem.of(lattice("...", "#.#"), (1, 0)), observe=snapshots.append, **config)
-    # Walk: (1,0) (1,1) (1,2) (1,1) (0,1): 4 cells, 4 steps, so delta phi is 1; the local
-    # update keeps 0.1, the global one makes 0.55 of each move on the walk.
-    into_middle = (0.55 + 0.55 + 0.1) / 3
-    expected = np.array([[0, 0.55, 0], [0.1, into_middle, 0.55]], np.float32)
+    cost = CoverageCost(0.75, turn_s)
+    problem = CoverageProblem.of(lattice("...", "#.#"), (1, 0), cost=cost)
+    plan(problem, observe=snapshots.append, **config)
+    # Walk: (1,0) (1,1) (1,2) (1,1) (0,1): 4 cells, 4 steps, and a half turn and a quarter, which
+    # are as much as 6 steps or nothing. So delta phi is 4 / 4 or 4 / 10; the local update
+    # keeps 0.1, the global one pulls each move on the walk half of the way.
+    walked = 0.5 * 0.1 + 0.5 * delta_phi
+    into_middle = (walked + walked + 0.1) / 3
+    expected = np.array([[0, walked, 0], [0.1, into_middle, walked]], np.float32)
     assert snapshots[0].trail == pytest.approx(expected)
 
 
 @settings(max_examples=100, deadline=None)
-@given(ground=problems(), seed=st.integers(0, 100), return_home=st.booleans())
-def test_figures_are_what_counting_gives(ground, seed, return_home):
+@given(ground=problems(), seed=st.integers(0, 100), end=ENDS)
+def test_figures_are_what_counting_gives(ground, seed, end):
     ground, start = ground
-    problem = CoverageProblem.of(ground, start, return_home=return_home)
+    problem = CoverageProblem.of(ground, start, end=end_of(end, ground, start))
     path = plan(problem, ants=8, seed=seed)
     local = [ground.local(cell) for cell in path.cells.tolist()]
     counted = naive.figures(ground.steps, local)
@@ -179,7 +219,7 @@ def test_the_paper_s_table_is_reached(name, cells, at_most):
     if (given_grid := reference(name)) is None:
         pytest.skip("the paper's grids are not at hand")
     ground, start = given_grid
-    problem = CoverageProblem.of(ground, start, return_home=True)
+    problem = CoverageProblem.of(ground, start, end=start)
     path = plan(problem, ants=1000)
     assert_answers(problem, path)
     figures = walk_figures(ground, path.cells)

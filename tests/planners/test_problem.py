@@ -1,22 +1,27 @@
-"""What cannot be planned is refused by name, and what is planned ends when asked."""
+"""What cannot be planned is refused by name; what can is posed and answered."""
 
-import threading
-import time
+import dataclasses
 from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
 
 from fasaco_edge.daemon.config import PlannerConfig
-from fasaco_edge.errors import NothingToCover, StartBlocked, StartOutsideMap
+from fasaco_edge.errors import (
+    EndBlocked,
+    EndOutsideMap,
+    EndUnreachable,
+    NothingToCover,
+    StartBlocked,
+    StartOutsideMap,
+)
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
+from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, CoverageLattice
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.names import PLANNER_NAMES
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import Interrupt, TimeBudget, WorkLimit
 from fasaco_edge.planners.table import PLANNERS
 from fasaco_edge.planners.warmup import STAGES, warm_up
 from tests.planners.grids import lattice, placed
@@ -43,9 +48,56 @@ def test_an_unknown_start_is_refused():
         CoverageProblem.of(unknown, (1, 0))
 
 
+@pytest.mark.parametrize("end", [(-3, 5), (2, 5), (-2, 8)])
+def test_an_end_off_the_lattice_is_refused(end):
+    with pytest.raises(EndOutsideMap) as caught:
+        CoverageProblem.of(GROUND, (-2, 5), end=end)
+    assert str(caught.value) == f"end cell {end} lies outside rows -2..1, columns 5..7"
+    assert (caught.value.code, bool(caught.value.hint)) == ("end_outside_map", True)
+
+
+def test_a_blocked_end_is_refused():
+    with pytest.raises(EndBlocked) as caught:
+        CoverageProblem.of(GROUND, (-2, 5), end=(-1, 5))
+    assert str(caught.value) == "end cell (-1, 5) is blocked: the robot does not fit there"
+    assert (caught.value.code, bool(caught.value.hint)) == ("end_blocked", True)
+
+
+def test_an_unknown_end_is_refused():
+    states = np.array([[COVERABLE, UNKNOWN]], np.uint8)
+    unknown = CoverageLattice(Window(0, 0, 1, 2), 1.0, states, np.zeros((1, 2), np.uint8))
+    with pytest.raises(EndBlocked, match=r"end cell \(0, 1\) is unknown"):
+        CoverageProblem.of(unknown, (0, 0), end=(0, 1))
+
+
+def test_an_end_in_another_area_is_refused():
+    with pytest.raises(EndUnreachable) as caught:
+        CoverageProblem.of(GROUND, (-2, 5), end=(1, 6))
+    assert str(caught.value) == "no walk leads from start cell (-2, 5) to end cell (1, 6)"
+    assert (caught.value.code, bool(caught.value.hint)) == ("end_unreachable", True)
+
+
+def test_an_end_may_be_a_covered_cell():
+    covered = np.zeros((4, 3), bool)
+    covered[0, 2] = True
+    problem = CoverageProblem.of(GROUND, (-2, 5), covered=covered, end=(-2, 7))
+    assert problem.cells == 2
+    for name, make in PLANNERS.items():
+        walk = make(ColonyConfig(ants=8), 1).plan(problem, never, ignore).cells.tolist()
+        assert walk == [[-2, 5], [-2, 6], [-2, 7]], name
+
+
+def test_a_problem_is_closed_if_it_ends_where_it_starts():
+    assert CoverageProblem.of(GROUND, (-2, 5), end=(-2, 5)).closed
+    assert not CoverageProblem.of(GROUND, (-2, 5), end=(-2, 6)).closed
+    assert not CoverageProblem.of(GROUND, (-2, 5)).closed
+
+
 def test_nothing_is_left_to_cover():
     with pytest.raises(NothingToCover, match="every reachable cell is covered"):
         CoverageProblem.of(GROUND, (-2, 5), covered=np.ones((4, 3), bool))
+    with pytest.raises(NothingToCover):
+        CoverageProblem.of(GROUND, (-2, 5), covered=np.ones((4, 3), bool), end=(-2, 6))
     # What the robot cannot come to is not left to cover either.
     covered = np.zeros((4, 3), bool)
     covered[0] = True
@@ -66,23 +118,11 @@ def test_what_cannot_be_reached_is_reported_and_not_asked_for():
 def test_a_path_is_read_only_and_counts_its_steps():
     path = CoveragePath(np.array([[0, 0], [0, 1], [0, 2]], np.int32), "fasaco", 0)
     assert path.steps == 2
+    assert path.gap is None
+    assert dataclasses.replace(path, lower_bound_steps=2).gap == 0.0
     assert CoveragePath(np.empty((0, 2), np.int32), "fasaco", 0).steps == 0
     with pytest.raises(ValueError, match="read-only"):
         path.cells[0] = 1
-
-
-def test_an_interrupt_ends_a_search_at_once_or_with_its_budget():
-    assert not TimeBudget(60.0)(1)
-    assert TimeBudget(60.0, started=time.monotonic() - 60.0)(1)
-    assert [WorkLimit(5)(ants) for ants in (4, 5, 6)] == [False, True, True]
-    interrupt = Interrupt(TimeBudget(60.0))
-    assert not interrupt(1)
-    interrupt.asked.set()
-    assert interrupt(1)
-    assert Interrupt(TimeBudget(0.0))(1)
-    # An event of one's own, as a worker shares it between searches.
-    stopping = threading.Event()
-    assert Interrupt(TimeBudget(60.0), stopping).asked is stopping
 
 
 def test_warm_up_names_each_stage_once():
@@ -102,6 +142,7 @@ def test_every_planner_of_the_table_plans():
     for name, make in PLANNERS.items():
         path = make(ColonyConfig(ants=8), 1).plan(problem, never, ignore)
         assert path.planner == name
+        assert path.first_walk_s > 0.0
         walk = [tuple(cell) for cell in path.cells.tolist()]
         assert walk[0] == (-2, 6)
         assert set(walk) == {(-2, 5), (-2, 6), (-2, 7)}

@@ -7,10 +7,12 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.colony import VISIBILITIES, ColonyConfig
+from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.work import SearchWork
 from tests import naive
-from tests.planners.grids import ROOMS, problems
+from tests.planners.grids import ENDS, ROOMS, end_of, problems
 
 VELOCITIES = {
     "1": (1,),
@@ -23,20 +25,26 @@ VELOCITIES = {
 def assert_same_walk(problem, config):
     lattice = problem.lattice
     walk = naive.fasaco(
-        lattice.steps, problem.to_cover, lattice.local(problem.start), config, problem.return_home
+        lattice.steps,
+        problem.to_cover,
+        lattice.local(problem.start),
+        config,
+        None if problem.end is None else lattice.local(problem.end),
+        problem.cost,
     )
     path = Fasaco(config).plan(problem)
     window = lattice.window
     assert path.cells.tolist() == [[row + window.row0, col + window.col0] for row, col in walk]
-    assert path.ants == config.ants
+    assert path.work == SearchWork(ants=config.ants)
+    assert path.cost_s == naive.walk_us(walk, problem.cost) / 1e6
 
 
-@pytest.mark.parametrize("return_home", [False, True], ids=["open", "home"])
+@pytest.mark.parametrize("home", [False, True], ids=["open", "home"])
 @pytest.mark.parametrize("velocities", VELOCITIES.values(), ids=VELOCITIES)
 @pytest.mark.parametrize("room", ROOMS)
-def test_twin_walks_the_same_in_rooms(room, velocities, return_home):
+def test_twin_walks_the_same_in_rooms(room, velocities, home):
     lattice, start = ROOMS[room]
-    problem = CoverageProblem.of(lattice, start, return_home=return_home)
+    problem = CoverageProblem.of(lattice, start, end=start if home else None)
     assert_same_walk(problem, ColonyConfig(ants=17, velocities=velocities, seed=7))
 
 
@@ -51,9 +59,10 @@ def test_twin_walks_the_same_in_several_groups(room, visibility):
 @settings(max_examples=200, deadline=None)
 @given(
     ground=problems(),
+    end=ENDS,
+    turn_s=st.sampled_from((0.0, 0.0, 0.3, 1.5)),
     visibility=st.sampled_from(VISIBILITIES),
     velocities=st.sampled_from(list(VELOCITIES.values())),
-    return_home=st.booleans(),
     q0=st.sampled_from((0.0, 0.3, 0.7, 1.0)),
     alpha=st.floats(0.01, 1.0),
     tau0=st.floats(1e-6, 1e3),
@@ -61,12 +70,14 @@ def test_twin_walks_the_same_in_several_groups(room, visibility):
     covered=st.floats(0, 0.6),
 )
 def test_twin_walks_the_same_anywhere(
-    ground, visibility, velocities, return_home, q0, alpha, tau0, seed, covered
+    ground, end, turn_s, visibility, velocities, q0, alpha, tau0, seed, covered
 ):
     lattice, start = ground
     done = np.random.default_rng(seed).random(lattice.states.shape) < covered
     done[lattice.local(start)] = False
-    problem = CoverageProblem.of(lattice, start, covered=done, return_home=return_home)
+    cost = CoverageCost(0.7, turn_s)
+    end = end_of(end, lattice, start)
+    problem = CoverageProblem.of(lattice, start, covered=done, end=end, cost=cost)
     config = ColonyConfig(24, velocities, q0, alpha, tau0, seed, visibility)
     assert_same_walk(problem, config)
 
@@ -77,7 +88,7 @@ def test_twin_walks_the_same_when_the_walk_outgrows_its_array():
     covered = np.ones((1, 68), bool)
     covered[tuple(zip(*left_over, strict=True))] = False
     corridor = CoverageLattice.from_free(np.ones((1, 68), bool))
-    problem = CoverageProblem.of(corridor, (0, 45), covered=covered, return_home=True)
+    problem = CoverageProblem.of(corridor, (0, 45), covered=covered, end=(0, 45))
     config = ColonyConfig(ants=2, velocities=(1,))
     assert_same_walk(problem, config)
     assert Fasaco(config).plan(problem).steps == 1 + 3 + 7 + 15 + 32 + 67 + 45

@@ -1,0 +1,88 @@
+"""What ``fasaco-edge plan`` says about a walk: figures, and a picture."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from fasaco_edge.grid.lattice import CoverageLattice
+    from fasaco_edge.grid.occupancy import OccupancyGrid
+    from fasaco_edge.planners.path import CoveragePath
+    from fasaco_edge.planners.problem import CoverageProblem
+
+
+def figures_of(
+    args: argparse.Namespace,
+    problem: CoverageProblem,
+    path: CoveragePath,
+    wall_s: float,
+    cpu_s: float,
+) -> dict[str, Any]:
+    """Return the figures of a walk that took so long to find, as JSON values."""
+    from fasaco_edge.planners.path import walk_figures
+
+    walk = asdict(walk_figures(problem.lattice, path.cells))
+    return {
+        "planner": path.planner,
+        "seed": path.seed,
+        "ants": path.work.ants,
+        "kicks": path.work.kicks,
+        "proposals": path.work.proposals,
+        "velocities": {"fasaco": args.velocities, "aco": "1"}.get(path.planner),
+        "map": str(args.map),
+        "cell_m": args.cell,
+        "start": list(problem.start),
+        "end": path.cells[-1].tolist(),
+        **walk,
+        # What there is to cover; the walk may pass over no other cells.
+        "cells": problem.cells,
+        "length_m": round(path.steps * args.cell, 3),
+        "cost_s": path.cost_s,
+        "lower_bound_steps": path.lower_bound_steps,
+        "gap": None if path.gap is None else round(path.gap, 6),
+        "unreachable_cells": int(np.count_nonzero(problem.unreachable)),
+        "first_walk_ms": round(1e3 * path.first_walk_s, 3),
+        "wall_s": round(wall_s, 6),
+        "cpu_s": round(cpu_s, 6),
+    }
+
+
+def draw(
+    file: Path,
+    lattice: CoverageLattice,
+    grid: OccupancyGrid | None,
+    path: CoveragePath,
+    figures: dict[str, Any],
+) -> None:
+    """Draw the walk."""
+    from fasaco_edge.drawing import draw_walk
+
+    ants = path.work.ants
+    colony = f" {figures['velocities']}, {ants} ants, seed {path.seed}" if ants else ""
+    title = path.planner + colony
+    lines = [
+        f"{Path(figures['map']).name}: {figures['cells']} cells of {figures['cell_m']} m, "
+        f"{figures['steps']} steps, {figures['revisits']} revisits, "
+        f"{figures['turns_90']} quarter-turns",
+    ]
+    draw_walk(lattice, path.cells, grid=grid, title=title, lines=lines).save(file, "PNG")
+
+
+def print_figures(args: argparse.Namespace, figures: dict[str, Any]) -> None:
+    """Print the figures as JSON or as a table."""
+    from fasaco_edge.cli import terminal
+
+    if args.json:
+        print(json.dumps(figures))
+        return
+    rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
+    terminal.out().print(terminal.figures(rows))
+    for file in (args.path_out, args.png):
+        if file is not None:
+            terminal.out().print(f"wrote {file}")

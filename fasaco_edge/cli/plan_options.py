@@ -1,0 +1,202 @@
+"""The options of ``fasaco-edge plan``."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from fasaco_edge.cli.arguments import (
+    DEFAULT_CELL_M,
+    DEFAULT_RADIUS_M,
+    pair_of_floats,
+    pair_of_ints,
+)
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.planners.colony import VISIBILITIES
+from fasaco_edge.planners.names import PLANNER_NAMES
+from fasaco_edge.simulation.config import SimulationConfig
+
+ANYWHERE, HOME = "anywhere", "home"
+
+EPILOG = """\
+examples:
+  fasaco-edge plan basement --png basement.png
+  fasaco-edge plan site.yaml --cell 0.35 --robot-radius 0.2 --start-xy 1.5,-2 --json
+  fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
+  fasaco-edge plan office --turn-s 2 --budget 1 --end 12,3
+
+figures:
+  revisits         steps + 1 - distinct cells
+  recovered_cells  distinct cells visited twice or more
+  n_r_paper        revisits with the way home, to compare with the paper's Table I
+  cost_s           seconds the robot drives and turns
+  gap              steps / lower_bound_steps - 1; none where no bound is known
+The colony's options are for fasaco; aco takes all but the velocities, the others none.
+"""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add all options."""
+    parser.add_argument(
+        "map",
+        metavar="MAP",
+        help="map_server YAML, a name from `maps`, or a coverage grid .npy (bool, True = free)",
+    )
+    _add_problem(parser.add_argument_group("problem"))
+    _add_planner(parser.add_argument_group("planner"))
+    _add_output(parser.add_argument_group("output"))
+
+
+def check(args: argparse.Namespace) -> None:
+    """Check the numbers that nothing below checks by the option's name.
+
+    Raises:
+        BadConfiguration: one is impossible.
+    """
+    for option, value in (("--cell", args.cell), ("--robot-radius", args.robot_radius)):
+        _require(0.0 < value <= 10.0, option, "be in (0, 10] m", value)
+    _require(0.0 < args.speed_m_s <= 10.0, "--speed-m-s", "be in (0, 10] m/s", args.speed_m_s)
+    _require(0.0 <= args.turn_s <= 3600.0, "--turn-s", "be in [0, 3600] s", args.turn_s)
+    _require(1 <= args.threads <= 64, "--threads", "be in 1..64", args.threads)
+    if args.budget is not None:
+        possible = math.isfinite(args.budget) and args.budget > 0.0
+        _require(possible, "--budget", "be above 0 s", args.budget)
+    if args.target_gap is not None:
+        _require(0.0 <= args.target_gap <= 10.0, "--target-gap", "be in [0, 10]", args.target_gap)
+
+
+def _add_problem(group: argparse._ArgumentGroup) -> None:
+    start = group.add_mutually_exclusive_group()
+    start.add_argument(
+        "--start", type=pair_of_ints, metavar="R,C", help="cell to start in; row 0 has smallest y"
+    )
+    start.add_argument(
+        "--start-xy", type=pair_of_floats, metavar="X,Y", help="point to start at [m]"
+    )
+    group.add_argument(
+        "--cell",
+        type=float,
+        default=DEFAULT_CELL_M,
+        metavar="M",
+        help="edge of a cell, the width of the tool [m] (default: %(default)s)",
+    )
+    group.add_argument(
+        "--robot-radius",
+        type=float,
+        default=DEFAULT_RADIUS_M,
+        metavar="M",
+        help="radius of the robot [m]; no part in a .npy grid (default: %(default)s)",
+    )
+    end = group.add_mutually_exclusive_group()
+    end.add_argument(
+        "--end",
+        type=_end,
+        default=ANYWHERE,
+        metavar="anywhere|home|R,C",
+        help="where the walk ends: anywhere, at its start, or in a cell (default: %(default)s)",
+    )
+    end.add_argument(
+        "--return-home",
+        dest="end",
+        action="store_const",
+        const=HOME,
+        default=argparse.SUPPRESS,
+        help="short for --end home",
+    )
+    group.add_argument(
+        "--speed-m-s",
+        type=float,
+        default=SimulationConfig().speed_m_s,
+        metavar="V",
+        help="speed of the robot [m/s] (default: %(default)s)",
+    )
+    group.add_argument(
+        "--turn-s",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="a quarter-turn on the spot [s]; 0 looks for the fewest steps, as the paper does "
+        "(default: %(default)s)",
+    )
+
+
+def _add_planner(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--planner",
+        choices=PLANNER_NAMES,
+        default="fasaco",
+        help="fasaco; aco is fasaco at velocity 1; stc is spanning-tree coverage; spiral-stc and "
+        "zigzag are the paper's baselines (default: %(default)s)",
+    )
+    group.add_argument("--ants", type=int, default=1000, metavar="N", help="(default: %(default)s)")
+    group.add_argument(
+        "--velocities",
+        default="8:1",
+        metavar="V",
+        help="cohorts' velocities [cells/step]: 8:1 falling, 1:8 rising, 4 constant, 8,4,1 "
+        "(default: %(default)s)",
+    )
+    group.add_argument(
+        "--q0", type=float, default=0.7, help="equation (4)'s threshold (default: %(default)s)"
+    )
+    group.add_argument(
+        "--visibility",
+        choices=VISIBILITIES,
+        default="neighbour",
+        help="what eta of equation (5) is 1 over: the distance to the neighbour, 1, as in the "
+        "paper; the distance an ant will go; the neighbour's open neighbours "
+        "(default: %(default)s)",
+    )
+    group.add_argument(
+        "--beta", type=float, default=2.0, help="weight of visibility (default: %(default)s)"
+    )
+    group.add_argument("--seed", type=int, default=0, metavar="N", help="(default: %(default)s)")
+    group.add_argument(
+        "--threads",
+        type=int,
+        default=1,
+        metavar="N",
+        help="ants walk on so many; the path is the same for any number (default: %(default)s)",
+    )
+    group.add_argument(
+        "--no-local-search", action="store_true", help="the colony alone (it is alone as yet)"
+    )
+    group.add_argument(
+        "--budget",
+        type=float,
+        metavar="S",
+        help="end the search after so long with the best walk it has [s] (default: none)",
+    )
+    group.add_argument(
+        "--target-gap",
+        type=float,
+        metavar="G",
+        help="end it once the walk is proven to be at most so much longer than the shortest, "
+        "0.01 for 1 %% (default: none)",
+    )
+
+
+def _add_output(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--path-out", type=Path, metavar="FILE.csv", help="write the walk: header row,col"
+    )
+    group.add_argument("--png", type=Path, metavar="FILE", help="draw the walk")
+    group.add_argument("--json", action="store_true", help="print the figures as JSON")
+
+
+def _end(text: str) -> str | tuple[int, int]:
+    """Read where to end."""
+    if text in (ANYWHERE, HOME):
+        return text
+    try:
+        return pair_of_ints(text)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(
+            f"must be {ANYWHERE}, {HOME} or row,column, got {text!r}"
+        ) from None
+
+
+def _require(condition: bool, option: str, expectation: str, value: object) -> None:
+    if not condition:
+        raise BadConfiguration(f"{option} must {expectation}, got {value}")

@@ -1,0 +1,100 @@
+"""What a walk costs: seconds for its steps and for its quarter-turns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import BadConfiguration
+
+if TYPE_CHECKING:
+    from typing import Self
+
+MICROSECONDS = 1_000_000
+# A step below a millisecond would be rounded away in part; and the cost of a walk of 10^8
+# steps of an hour each still fits into 64 bits of microseconds.
+SHORTEST_STEP_S, LONGEST_S = 1e-3, 3600.0
+
+
+class Turns(NamedTuple):
+    """How often a walk changes its direction: to a side, and straight back."""
+
+    quarter: int
+    half: int
+
+
+@dataclass(frozen=True, slots=True)
+class CoverageCost:
+    """Seconds a robot needs for a step and for a quarter-turn; a half turn is two of these.
+
+    Searches compare whole microseconds: sums of them are exact, in whatever order they
+    are added, so the same search always finds the same walk. With the default a walk
+    costs its steps, and turns are free.
+
+    Attributes:
+        step_s: a step to a neighbouring cell [s].
+        quarter_turn_s: a turn by 90 degrees on the spot [s].
+    """
+
+    step_s: float = 1.0
+    quarter_turn_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require("step_s", self.step_s, SHORTEST_STEP_S, LONGEST_S, "s")
+        _require("quarter_turn_s", self.quarter_turn_s, 0.0, LONGEST_S, "s")
+
+    @classmethod
+    def for_robot(cls, cell_m: float, speed_m_s: float, quarter_turn_s: float) -> Self:
+        """Return the cost for a robot on cells of ``cell_m`` [m] that drives ``speed_m_s`` [m/s].
+
+        Raises:
+            BadConfiguration: a value is not finite or impossible, or a step would take less
+                than a millisecond or more than an hour.
+        """
+        _require("cell_m", cell_m, 1e-6, 1e3, "m")
+        _require("speed_m_s", speed_m_s, 1e-6, 1e3, "m/s")
+        step_s = cell_m / speed_m_s
+        _require("cell_m / speed_m_s", step_s, SHORTEST_STEP_S, LONGEST_S, "s")
+        return cls(step_s, quarter_turn_s)
+
+    @property
+    def step_us(self) -> int:
+        """A step in whole microseconds."""
+        return round(self.step_s * MICROSECONDS)
+
+    @property
+    def quarter_turn_us(self) -> int:
+        """A quarter-turn in whole microseconds."""
+        return round(self.quarter_turn_s * MICROSECONDS)
+
+    def of_walk(self, cells: NDArray[np.int32]) -> float:
+        """Return what a walk costs [s].
+
+        The robot is taken to stand in the direction of the first step.
+
+        Args:
+            cells: int32 (n, 2), cells (row, col), each a step from the one before.
+        """
+        turns = count_turns(cells)
+        steps = max(len(cells) - 1, 0)
+        quarters = turns.quarter + 2 * turns.half
+        return (steps * self.step_us + quarters * self.quarter_turn_us) / MICROSECONDS
+
+
+def count_turns(cells: NDArray[np.int32]) -> Turns:
+    """Count the turns of a walk, int32 (n, 2), cells (row, col) each a step from the last."""
+    moves = np.diff(cells, axis=0)
+    along = (moves[1:] * moves[:-1]).sum(axis=1)
+    return Turns(int(np.count_nonzero(along == 0)), int(np.count_nonzero(along < 0)))
+
+
+def _require(name: str, value: float, least: float, most: float, unit: str) -> None:
+    # A negated comparison, so that NaN is caught too.
+    if not least <= value <= most:
+        raise BadConfiguration(f"{name} must be in [{least:g}, {most:g}] {unit}, got {value!r}")
+
+
+STEPS_ALONE = CoverageCost()

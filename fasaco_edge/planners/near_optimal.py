@@ -1,0 +1,47 @@
+"""FaSACO with local search: a complete walk at once, then ever better ones.
+
+1. An ant without a trail walks: the first complete walk, within milliseconds.
+2. Local search improves it, region by region where the ground is large.
+3. Kicks, each followed by local search, go on from there.
+4. Where kicks gain nothing any more, the next ants of the colony walk; the walk of
+   the best of them goes through 2 and 3, and the trail is strengthened along the
+   best walk of all, by equation (8): ants begin where the search has been good.
+
+The search ends when it is told to, when the walk meets its lower bound, or when
+all ants have walked. Its work is counted; the same counts give the same walk.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.observation import Observer
+from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import StoppingCriterion, ignore, never
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.search import Search
+
+
+@dataclass(frozen=True, slots=True)
+class NearOptimal:
+    """The colony with local search; ants walk on ``threads`` threads."""
+
+    config: ColonyConfig = field(default_factory=ColonyConfig)
+    threads: int = 1
+    name: str = "fasaco-ls"
+
+    def plan(
+        self,
+        problem: CoverageProblem,
+        stop: StoppingCriterion = never,
+        observe: Observer = ignore,
+    ) -> CoveragePath:
+        """Return the cheapest walk found; see ``CoveragePlanner.plan``."""
+        with ThreadPoolExecutor(self.threads) as pool:
+            search = Search(self.name, self.config, self.threads, problem, pool, observe)
+            for _ in search.run():
+                if stop(search.progress()):
+                    break
+            return search.path()

@@ -1,0 +1,232 @@
+"""The anytime search behind FaSACO with local search, as a generator of pauses."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.costs import walk_cost
+from fasaco_edge.kernels.regions import Box
+from fasaco_edge.kernels.walk_array import Prices
+from fasaco_edge.planners.ants import Colony, group_size, snapshot_of, streams_of
+from fasaco_edge.planners.bound import lower_bound_steps
+from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.cost import MICROSECONDS
+from fasaco_edge.planners.effort import effort_for
+from fasaco_edge.planners.first_walk import first_walks
+from fasaco_edge.planners.framed import FramedGround
+from fasaco_edge.planners.graph import cells_of, graph_of
+from fasaco_edge.planners.observation import Observer
+from fasaco_edge.planners.patch import Patch
+from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import ignore
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.regions import EDGE, ONE_REGION, regions_of
+from fasaco_edge.planners.work import SearchProgress, SearchWork
+
+# A search is asked whether to stop after about so many proposals: a millisecond.
+PROPOSALS_AT_ONCE = 30_000
+
+# Kicks that a region gets in a pass, where there are several.
+KICKS_IN_PASS = 8
+
+# Kicks between two looks at the whole walk, where it is one region.
+KICKS_IN_VISIT = 64
+
+# A walk that visits its cells more often than this is no walk to begin with.
+VISITS_PER_CELL = 4
+
+# Sets the random stream apart from those of the ants.
+LOCAL_SEARCH = 1 << 32
+
+# How often the walk may cross the rim of a region.
+JUMPS = 8 * EDGE
+
+
+class Search:
+    """A search under way. It is a generator of pauses, at which it may be left for good."""
+
+    def __init__(
+        self,
+        name: str,
+        config: ColonyConfig,
+        threads: int,
+        problem: CoverageProblem,
+        pool: ThreadPoolExecutor,
+        observe: Observer,
+    ) -> None:
+        self._began = time.perf_counter()
+        self._name, self._config, self._threads = name, config, threads
+        self._problem, self._pool, self._observe = problem, pool, observe
+        self._graph = graph_of(problem)
+        self._framed = FramedGround.of(problem)
+        cost = problem.cost
+        self._prices = Prices(cost.step_us, cost.quarter_turn_us, problem.end is None)
+        self._effort = effort_for(cost)
+        self._random = _stream(config.seed)
+        self._ants = 0
+        self._first_walk_s = 0.0
+        self._bound = 0
+        # The walk under way and the best of those before it, in framed cells.
+        self._walk, self._walk_us = np.empty(0, np.int32), 0
+        self._best, self._best_us = self._walk, 0
+        self._since_gain = 0
+        self._passes = 0
+        self._groups = _groups(config, problem.cells)
+        self._colony: Colony | None = None
+        self._patch = self._room()
+        self._loaded: Box | None = None
+
+    def run(self) -> Iterator[None]:
+        """Search until nothing is left to do; pause after each piece of work."""
+        yield from self._begin()
+        yield from self._improve()
+        while not self._is_proven():
+            yield from self._kick()
+            if self._since_gain >= self._effort.patience and self._is_whole:
+                group = next(self._groups, None)
+                if group is None:
+                    return
+                yield from self._start_over(*group)
+
+    def progress(self) -> SearchProgress:
+        """Return how far the search is; what a region has gained counts before it is put back."""
+        return SearchProgress(
+            self._work, self._best_us / MICROSECONDS, self._best.size - 1, self._bound
+        )
+
+    def path(self) -> CoveragePath:
+        """Return the best walk."""
+        self._unload()
+        return CoveragePath(
+            cells_of(self._problem, self._framed.unframed(self._best)),
+            planner=self._name,
+            seed=self._config.seed,
+            work=self._work,
+            cost_s=self._best_us / MICROSECONDS,
+            lower_bound_steps=self._bound,
+            first_walk_s=self._first_walk_s,
+        )
+
+    @property
+    def _is_whole(self) -> bool:
+        return self._problem.cells <= ONE_REGION
+
+    @property
+    def _work(self) -> SearchWork:
+        return self._patch.work + SearchWork(ants=self._ants)
+
+    def _is_proven(self) -> bool:
+        """Tell whether no walk can be better."""
+        return not self._prices.quarter_turn_us and self._best.size - 1 == self._bound
+
+    def _room(self) -> Patch:
+        framed, cells = self._framed, self._problem.cells
+        if self._is_whole:
+            return Patch(framed.rows, framed.cols, VISITS_PER_CELL * cells, 1)
+        return Patch(EDGE, EDGE, VISITS_PER_CELL * EDGE * EDGE, JUMPS)
+
+    def _begin(self) -> Iterator[None]:
+        for walk, cost_us in first_walks(self._problem, self._graph):
+            self._ants += 1
+            if not self._first_walk_s:
+                self._first_walk_s = time.perf_counter() - self._began
+            if not self._walk.size or cost_us < self._walk_us:
+                self._walk, self._walk_us = self._framed.framed(walk), cost_us
+        self._best, self._best_us = self._walk, self._walk_us
+        self._bound = lower_bound_steps(self._problem)
+        yield
+
+    def _regions(self) -> Iterator[Box]:
+        """Load each region of the next pass in turn."""
+        for box in regions_of(self._framed, self._problem.cells, self._passes):
+            if self._patch.load(self._framed.ground, self._walk, box, self._prices):
+                self._loaded = box
+                yield box
+                self._unload()
+        self._passes += 1
+
+    def _unload(self) -> None:
+        """Put the region's best walk back, if that is a gain or costs nothing."""
+        if self._loaded is None:
+            return
+        walk = self._patch.put_back(self._framed.ground, self._walk, self._loaded)
+        self._loaded = None
+        cost_us = walk_cost(walk, self._prices.step_us, self._prices.quarter_turn_us)
+        if cost_us < self._walk_us:
+            self._since_gain = 0
+        if cost_us <= self._walk_us:
+            self._walk, self._walk_us = walk, cost_us
+        if cost_us < self._best_us:
+            self._best, self._best_us = walk, cost_us
+
+    def _improve(self) -> Iterator[None]:
+        """Improve the whole walk, without kicks; twice where there are several regions."""
+        effort = self._effort
+        for _ in range(1 if self._is_whole else 2):
+            for _ in self._regions():
+                at_each = effort.proposals * self._patch.best_length // len(effort.heats_us)
+                for heat_us in effort.heats_us:
+                    for proposals in _pieces(at_each, PROPOSALS_AT_ONCE):
+                        self._patch.improve(heat_us, proposals, self._random)
+                        yield
+                self._patch.go_back()
+
+    def _kick(self) -> Iterator[None]:
+        """Kick the walk in every region."""
+        kicks = KICKS_IN_VISIT if self._is_whole else KICKS_IN_PASS
+        for _ in self._regions():
+            proposals = self._effort.kick.mixing * self._patch.best_length
+            if self._effort.kick.radius >= 0:
+                proposals = min(proposals, PROPOSALS_AT_ONCE // 4)
+            for piece in _pieces(kicks, max(PROPOSALS_AT_ONCE // proposals, 1)):
+                self._patch.kick(self._effort.kick, piece, self._random)
+                self._since_gain += piece
+                yield
+
+    def _start_over(self, cohort: int, velocity: int, streams: NDArray[np.int64]) -> Iterator[None]:
+        """Let the next ants walk, on a trail strengthened along the best walk; improve theirs."""
+        if self._colony is None:
+            self._colony = Colony(
+                self._config, self._problem, self._graph, self._pool, self._threads
+            )
+        colony = self._colony
+        colony.offer(self._framed.unframed(self._best), self._best_us)
+        colony.strengthen()
+        walk, self._walk_us = colony.walk(velocity, streams)
+        self._walk = self._framed.framed(walk)
+        self._ants += len(streams)
+        self._since_gain = 0
+        if self._observe is not ignore:
+            self._observe(
+                snapshot_of(
+                    self._problem, colony.trail, cohort, velocity, self._ants, self._best.size - 1
+                )
+            )
+        yield
+        yield from self._improve()
+
+
+def _pieces(total: int, largest: int) -> Iterator[int]:
+    """Yield whole numbers up to ``largest`` that add up to ``total``."""
+    for begun in range(0, total, largest):
+        yield min(largest, total - begun)
+
+
+def _groups(config: ColonyConfig, cells: int) -> Iterator[tuple[int, int, NDArray[np.int64]]]:
+    """Yield the colony's ants in groups: number of their cohort, velocity, random streams."""
+    size = group_size(cells)
+    for number, cohort in enumerate(config.cohorts()):
+        streams = streams_of(config.seed, number, cohort.ants)
+        for first in range(0, cohort.ants, size):
+            yield number, cohort.velocity, streams[first : first + size]
+
+
+def _stream(seed: int) -> NDArray[np.uint64]:
+    """Return the state of the local search's random stream, uint64 (1,), not 0."""
+    word = np.random.SeedSequence((seed, LOCAL_SEARCH)).generate_state(1, np.uint64)
+    return np.maximum(word, np.uint64(1))

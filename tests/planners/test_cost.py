@@ -1,0 +1,111 @@
+"""What a walk costs, against counting; what no robot costs is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.kernels.colony import walk_cost
+from fasaco_edge.planners.cost import CoverageCost
+from tests import naive
+
+WALKS = st.lists(st.sampled_from(naive.DIRECTIONS), max_size=60)
+COSTS = st.builds(CoverageCost, st.floats(0.001, 3600.0), st.floats(0.0, 3600.0))
+
+
+def walk_along(headings, start=(70, 70)):
+    walk = [start]
+    for row, col in headings:
+        walk.append((walk[-1][0] + row, walk[-1][1] + col))
+    return walk
+
+
+@settings(max_examples=300, deadline=None)
+@given(headings=WALKS, cost=COSTS)
+def test_twin_counts_the_same_cost(headings, cost):
+    walk = walk_along(headings)
+    counted = naive.walk_us(walk, cost)
+    assert cost.of_walk(np.array(walk, np.int32)) == counted / 1e6
+    flat = np.array([row * 150 + col for row, col in walk], np.int32)
+    assert walk_cost(flat, cost.step_us, cost.quarter_turn_us) == counted
+
+
+@settings(max_examples=100, deadline=None)
+@given(forwards=st.lists(st.booleans(), min_size=2, max_size=30), cost=COSTS)
+def test_twin_counts_the_same_cost_in_a_single_column(forwards, cost):
+    """Where a step north and a step east would be the same difference of index."""
+    walk = walk_along([naive.NORTH if forward else naive.SOUTH for forward in forwards])
+    flat = np.array([row for row, _ in walk], np.int32)
+    counted = naive.walk_us(walk, cost)
+    assert walk_cost(flat, cost.step_us, cost.quarter_turn_us) == counted
+
+
+def test_a_half_turn_is_two_quarter_turns():
+    cost = CoverageCost(2.0, 0.5)
+    around_a_corner = np.array([[0, 0], [0, 1], [1, 1], [0, 1]], np.int32)
+    assert cost.of_walk(around_a_corner) == 3 * 2.0 + (1 + 2) * 0.5
+
+
+def test_a_walk_without_a_step_costs_nothing():
+    assert CoverageCost(2.0, 0.5).of_walk(np.array([[3, 4]], np.int32)) == 0.0
+    assert CoverageCost(2.0, 0.5).of_walk(np.empty((0, 2), np.int32)) == 0.0
+    assert walk_cost(np.array([5], np.int32), 1_000_000, 500_000) == 0
+
+
+def test_the_default_counts_steps():
+    assert CoverageCost().of_walk(np.array([[0, 0], [0, 1], [1, 1], [0, 1]], np.int32)) == 3.0
+
+
+def test_the_largest_costs_fit_into_a_kernel_s_integers():
+    cost = CoverageCost(3600.0, 3600.0)
+    assert 3 * 10**8 * cost.step_us < 2**63
+
+
+def test_a_robot_s_cost_is_in_whole_microseconds():
+    cost = CoverageCost.for_robot(cell_m=0.3, speed_m_s=0.25, quarter_turn_s=1.5)
+    assert (cost.step_us, cost.quarter_turn_us) == (1_200_000, 1_500_000)
+    assert CoverageCost(1 / 3, 2 / 3) == CoverageCost.for_robot(1.0, 3.0, 2 / 3)
+    assert (CoverageCost(1 / 3, 2 / 3).step_us, CoverageCost(1 / 3, 2 / 3).quarter_turn_us) == (
+        333_333,
+        666_667,
+    )
+
+
+@pytest.mark.parametrize(
+    ("step_s", "quarter_turn_s", "said"),
+    [
+        (0.0, 0.0, "step_s must be in [0.001, 3600] s, got 0.0"),
+        (-1.0, 0.0, "step_s must be in [0.001, 3600] s, got -1.0"),
+        (1e-4, 0.0, "step_s must be in [0.001, 3600] s, got 0.0001"),
+        (3601.0, 0.0, "step_s must be in [0.001, 3600] s, got 3601.0"),
+        (math.inf, 0.0, "step_s must be in [0.001, 3600] s, got inf"),
+        (math.nan, 0.0, "step_s must be in [0.001, 3600] s, got nan"),
+        (1.0, -0.1, "quarter_turn_s must be in [0, 3600] s, got -0.1"),
+        (1.0, math.inf, "quarter_turn_s must be in [0, 3600] s, got inf"),
+        (1.0, math.nan, "quarter_turn_s must be in [0, 3600] s, got nan"),
+    ],
+)
+def test_an_impossible_cost_is_refused(step_s, quarter_turn_s, said):
+    with pytest.raises(BadConfiguration) as caught:
+        CoverageCost(step_s, quarter_turn_s)
+    assert str(caught.value) == said
+
+
+@pytest.mark.parametrize(
+    ("cell_m", "speed_m_s", "said"),
+    [
+        (0.3, 0.0, "speed_m_s must be in"),
+        (0.3, -0.2, "speed_m_s must be in"),
+        (0.3, math.nan, "speed_m_s must be in"),
+        (0.3, math.inf, "speed_m_s must be in"),
+        (0.0, 0.3, "cell_m must be in"),
+        (math.nan, 0.3, "cell_m must be in"),
+        (10.0, 0.001, r"cell_m / speed_m_s must be in \[0.001, 3600\] s, got 10000.0"),
+    ],
+)
+def test_a_robot_that_cannot_be_is_refused(cell_m, speed_m_s, said):
+    with pytest.raises(BadConfiguration, match=said):
+        CoverageCost.for_robot(cell_m, speed_m_s, 0.0)
