@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fasaco_edge.cli.plan_options import ANYWHERE, EPILOG, HOME, add_options, check
+from fasaco_edge.cli.plan_options import ANYWHERE, EPILOG, HOME, add_options, check, settle
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
@@ -45,6 +45,7 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.grid.map_files import find_map
     from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 
+    settle(args)
     check(args)
     colony = ColonyConfig(
         ants=args.ants,
@@ -67,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
             np.savetxt(args.path_out, path.cells, "%d", ",", header="row,col", comments="")
     if args.png is not None:
         with writing(args.png):
-            draw(args.png, lattice, grid, path, figures)
+            draw(args, args.png, lattice, grid, path, figures)
     print_figures(args, figures)
     return 0
 
@@ -111,26 +112,26 @@ def _plan(
 
     A planner that knows no lower bound is given one, for its path and for ``--target-gap``.
     """
-    from fasaco_edge.cli.terminal import progress
+    from fasaco_edge.cli.plan_progress import watching
     from fasaco_edge.planners.bound import lower_bound_steps
     from fasaco_edge.planners.planner import ignore
-    from fasaco_edge.planners.table import PLANNERS
+    from fasaco_edge.planners.table import planner_of
 
-    with progress() as bar:
-        task = bar.add_task("ants", total=colony.ants)
-        bound = lower_bound_steps(problem)
-        is_over = _criterion(args)
+    planner = planner_of(args.planner, colony, args.threads, args.local_search)
+    bound = 0 if args.local_search else lower_bound_steps(problem)
+    is_over = _criterion(args)
+    with watching(args, colony) as show:
 
         def stop(search: SearchProgress) -> bool:
-            bar.update(task, completed=search.work.ants)
-            known = max(search.lower_bound_steps, bound)
-            return is_over(replace(search, lower_bound_steps=known))
+            known = replace(search, lower_bound_steps=max(search.lower_bound_steps, bound))
+            show(known)
+            return is_over(known)
 
         wall, cpu = time.perf_counter(), time.process_time()
-        path = PLANNERS[args.planner](colony, args.threads).plan(problem, stop, ignore)
+        path = planner.plan(problem, stop, ignore)
         wall_s, cpu_s = time.perf_counter() - wall, time.process_time() - cpu
-        known = max(path.lower_bound_steps, bound)
-        return replace(path, lower_bound_steps=known), wall_s, cpu_s
+    known = max(path.lower_bound_steps, bound)
+    return replace(path, lower_bound_steps=known), wall_s, cpu_s
 
 
 def _criterion(args: argparse.Namespace) -> StoppingCriterion:

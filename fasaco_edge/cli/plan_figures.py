@@ -30,6 +30,7 @@ def figures_of(
     walk = asdict(walk_figures(problem.lattice, path.cells))
     return {
         "planner": path.planner,
+        "local_search": args.local_search,
         "seed": path.seed,
         "ants": path.work.ants,
         "kicks": path.work.kicks,
@@ -54,6 +55,7 @@ def figures_of(
 
 
 def draw(
+    args: argparse.Namespace,
     file: Path,
     lattice: CoverageLattice,
     grid: OccupancyGrid | None,
@@ -65,11 +67,13 @@ def draw(
 
     ants = path.work.ants
     colony = f" {figures['velocities']}, {ants} ants, seed {path.seed}" if ants else ""
-    title = path.planner + colony
+    search = f", {path.work.kicks} kicks" if args.local_search else ""
+    title = path.planner + colony + search
     lines = [
         f"{Path(figures['map']).name}: {figures['cells']} cells of {figures['cell_m']} m, "
         f"{figures['steps']} steps, {figures['revisits']} revisits, "
-        f"{figures['turns_90']} quarter-turns",
+        f"{figures['turns_90']} quarter-turns; "
+        f"at most {path.gap or 0.0:.1%} above the fewest steps there can be",
     ]
     draw_walk(lattice, path.cells, grid=grid, title=title, lines=lines).save(file, "PNG")
 

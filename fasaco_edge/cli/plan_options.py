@@ -24,7 +24,8 @@ examples:
   fasaco-edge plan basement --png basement.png
   fasaco-edge plan site.yaml --cell 0.35 --robot-radius 0.2 --start-xy 1.5,-2 --json
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
-  fasaco-edge plan office --turn-s 2 --budget 1 --end 12,3
+  fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
+  fasaco-edge plan basement --no-local-search --seed 7
 
 figures:
   revisits         steps + 1 - distinct cells
@@ -32,8 +33,18 @@ figures:
   n_r_paper        revisits with the way home, to compare with the paper's Table I
   cost_s           seconds the robot drives and turns
   gap              steps / lower_bound_steps - 1; none where no bound is known
-The colony's options are for fasaco; aco takes all but the velocities, the others none.
+
+fasaco searches until its budget ends: a complete walk within milliseconds, then better
+ones by local search, begun anew where the colony's ants lead. --no-local-search is the
+paper's colony alone. The colony's options are for fasaco; aco takes all but the
+velocities, the others none.
 """
+
+# The search's budget where nobody says, and ants that serve local search best. The
+# colony alone is the paper's, and walks to its end.
+BUDGET_S = 1.0
+SEARCH_Q0, PAPER_Q0 = 0.98, 0.7
+SEARCH_VISIBILITY, PAPER_VISIBILITY = "fewest-open", "neighbour"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -64,6 +75,17 @@ def check(args: argparse.Namespace) -> None:
         _require(possible, "--budget", "be above 0 s", args.budget)
     if args.target_gap is not None:
         _require(0.0 <= args.target_gap <= 10.0, "--target-gap", "be in [0, 10]", args.target_gap)
+
+
+def settle(args: argparse.Namespace) -> None:
+    """Fill in the defaults that depend on whether local search is used."""
+    args.local_search = args.planner == "fasaco" and not args.no_local_search
+    if args.q0 is None:
+        args.q0 = SEARCH_Q0 if args.local_search else PAPER_Q0
+    if args.visibility is None:
+        args.visibility = SEARCH_VISIBILITY if args.local_search else PAPER_VISIBILITY
+    if args.budget is None and args.local_search:
+        args.budget = BUDGET_S
 
 
 def _add_problem(group: argparse._ArgumentGroup) -> None:
@@ -138,15 +160,16 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         "(default: %(default)s)",
     )
     group.add_argument(
-        "--q0", type=float, default=0.7, help="equation (4)'s threshold (default: %(default)s)"
+        "--q0",
+        type=float,
+        help=f"equation (4)'s threshold (default: {SEARCH_Q0}; {PAPER_Q0} without local search)",
     )
     group.add_argument(
         "--visibility",
         choices=VISIBILITIES,
-        default="neighbour",
         help="what eta of equation (5) is 1 over: the distance to the neighbour, 1, as in the "
         "paper; the distance an ant will go; the neighbour's open neighbours "
-        "(default: %(default)s)",
+        f"(default: {SEARCH_VISIBILITY}; {PAPER_VISIBILITY} without local search)",
     )
     group.add_argument(
         "--beta", type=float, default=2.0, help="weight of visibility (default: %(default)s)"
@@ -160,13 +183,14 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         help="ants walk on so many; the path is the same for any number (default: %(default)s)",
     )
     group.add_argument(
-        "--no-local-search", action="store_true", help="the colony alone (it is alone as yet)"
+        "--no-local-search", action="store_true", help="the paper's colony alone, no budget set"
     )
     group.add_argument(
         "--budget",
         type=float,
         metavar="S",
-        help="end the search after so long with the best walk it has [s] (default: none)",
+        help="end the search after so long with the best walk it has [s] "
+        f"(default: {BUDGET_S:g}; none without local search)",
     )
     group.add_argument(
         "--target-gap",

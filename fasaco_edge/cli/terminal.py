@@ -32,6 +32,18 @@ def progress() -> Progress:
     )
 
 
+def progress_of_time() -> Progress:
+    """Return a progress bar of seconds, which nobody wants to see counted."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=32),
+        TimeElapsedColumn(),
+        console=err(),
+        transient=True,
+        disable=not err().is_terminal,
+    )
+
+
 def figures(rows: Iterable[tuple[str, str]]) -> Table:
     """Return a table of names and values."""
     table = Table(show_header=False)

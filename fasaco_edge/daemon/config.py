@@ -13,6 +13,7 @@ from msgspec import Meta
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
+from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import Keys
 
@@ -25,11 +26,25 @@ class _Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class RobotConfig(_Section, frozen=True):
-    """The robot: its name on the bus, its disc's radius and its tool's width [m]."""
+    """The robot: its name on the bus, its size [m], and what driving takes it.
+
+    ``quarter_turn_s`` is a turn by 90 degrees on the spot [s], braking and starting
+    included; 0 looks for the fewest steps whatever the turns.
+    """
 
     name: str = "robot"
     radius_m: Metres = 0.18
     tool_width_m: Metres = 0.3
+    speed_m_s: Annotated[float, Meta(gt=0, le=10)] = 0.25
+    quarter_turn_s: Annotated[float, Meta(ge=0, le=600)] = 1.5
+
+    def cost(self) -> CoverageCost:
+        """Return what a step and a turn cost.
+
+        Raises:
+            BadConfiguration: a step would take less than a millisecond or more than an hour.
+        """
+        return CoverageCost.for_robot(self.tool_width_m, self.speed_m_s, self.quarter_turn_s)
 
 
 class BusConfig(_Section, frozen=True):
@@ -66,12 +81,15 @@ class PoseConfig(_Section, frozen=True):
 class PlannerConfig(_Section, frozen=True):
     """The colony, see ``planners.colony.ColonyConfig``; and the time one plan may take [s].
 
+    ``local_search`` is for fasaco alone; without it a plan may end before its budget.
+
     ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
     The paper's ants see no further than their neighbours; a robot's see what will soon
     be cut off, which saves it revisits (``fasaco_edge/bench/RESULTS.md``).
     """
 
     name: Literal["fasaco", "aco", "stc", "spiral-stc", "zigzag"] = "fasaco"
+    local_search: bool = True
     ants: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
     velocities: str = "8:1"
     q0: Annotated[float, Meta(ge=0, le=1)] = 0.98
@@ -81,7 +99,7 @@ class PlannerConfig(_Section, frozen=True):
     beta: Annotated[float, Meta(ge=0, le=10)] = 2.0
     threads: Annotated[int, Meta(ge=1, le=64)] = 1
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
-    budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.5
+    budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.1
 
     def colony(self) -> ColonyConfig:
         """Return these as a colony.
@@ -157,6 +175,10 @@ def _check_together(config: DaemonConfig) -> None:
     if not (config.bus.listen or config.bus.connect):
         raise BadConfiguration("bus.listen and bus.connect must not both be empty")
     config.keys()
+    try:
+        config.robot.cost()
+    except BadConfiguration as error:
+        raise BadConfiguration(f"robot: {error}") from error
     try:
         config.planner.colony()
     except BadConfiguration as error:

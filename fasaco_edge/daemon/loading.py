@@ -49,7 +49,7 @@ class Loader:
         from fasaco_edge.daemon.worker import PlanningWorker  # noqa: PLC0415
         from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
         from fasaco_edge.mission.mission import Mission, MissionConfig  # noqa: PLC0415
-        from fasaco_edge.planners.table import PLANNERS  # noqa: PLC0415
+        from fasaco_edge.planners.table import planner_of  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
         warm_up(self._report)
@@ -57,9 +57,9 @@ class Loader:
         footprint = Footprint(
             robot.tool_width_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least
         )
-        chosen = PLANNERS[planner.name](planner.colony(), planner.threads)
+        chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post, self._is_watched)
-        return Mission(MissionConfig(footprint, maps.max_lattice_cells)), worker
+        return Mission(MissionConfig(footprint, maps.max_lattice_cells, robot.cost())), worker
 
     def _report(self, stage: str) -> None:
         self.stage = f"kernels: {stage}"

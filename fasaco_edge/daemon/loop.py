@@ -11,7 +11,7 @@ from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.inbox import Inbox, Received
 from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.daemon.outbox import Outbox
-from fasaco_edge.daemon.status import StatusBoard
+from fasaco_edge.daemon.status import StatusBoard, plan_figures
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
 from fasaco_edge.mission.events import (
@@ -160,9 +160,7 @@ class Loop:
             "map_revision": mission.map_revision,
             "reason": update.reason,
             "steps": max(len(update.cells) - 1, 0),
-            "planner": plan.planner if plan else None,
-            "seed": plan.seed if plan else None,
-            "ants": plan.work.ants if plan else None,
+            **plan_figures(plan),
             "plan_ms": round(1e3 * update.plan_s, 3),
         }
         xy = mission.lattice.centres(update.cells)

@@ -17,10 +17,25 @@ from fasaco_edge.process_memory import resident_mb
 if TYPE_CHECKING:
     from fasaco_edge.mission.events import PathUpdate
     from fasaco_edge.mission.mission import Mission
+    from fasaco_edge.planners.path import CoveragePath
 
 HEARTBEAT_S = 1.0
 # Changes closer together than this go out as one.
 LEAST_INTERVAL_S = 0.05
+
+
+# Of the plan as it was made; the path may have been driven in part since.
+PLAN_FIGURES = (
+    "planner",
+    "seed",
+    "ants",
+    "kicks",
+    "proposals",
+    "planned_steps",
+    "planned_cost_s",
+    "lower_bound_steps",
+    "gap",
+)
 
 
 class Faults:
@@ -110,10 +125,26 @@ class StatusBoard:
             "steps": max(len(update.cells) - 1, 0),
             "remaining_steps": max(len(mission.path.ahead) - 1, 0),
             "reason": update.reason,
-            "planner": plan.planner if plan else None,
-            "seed": plan.seed if plan else None,
-            "ants": plan.work.ants if plan else None,
+            **plan_figures(plan),
         }
+
+
+def plan_figures(plan: CoveragePath | None) -> dict[str, Any]:
+    """Return what is known of the plan a path follows; each value is null without one."""
+    if plan is None:
+        return dict.fromkeys(PLAN_FIGURES)
+    values = (
+        plan.planner,
+        plan.seed,
+        plan.work.ants,
+        plan.work.kicks,
+        plan.work.proposals,
+        plan.steps,
+        round(plan.cost_s, 3),
+        plan.lower_bound_steps or None,
+        None if plan.gap is None else round(plan.gap, 6),
+    )
+    return dict(zip(PLAN_FIGURES, values, strict=True))
 
 
 def _state(mission: Mission | None, loading: str) -> tuple[str, str]:

@@ -31,6 +31,7 @@ from fasaco_edge.mission.events import (
 from fasaco_edge.mission.ground import Ground, anchor_cell
 from fasaco_edge.mission.ledger import CoverageLedger
 from fasaco_edge.mission.progress import Coverage, DrivenPath, LeftOver, State
+from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 
 # A robot that left its path, or stands still at its end, gets a new one, but not
@@ -40,10 +41,11 @@ PATIENCE_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class MissionConfig:
-    """What the mission is for: the robot's footprint, and the largest lattice it plans on."""
+    """What the mission is for: the robot, the largest lattice it plans on, what walks cost."""
 
     footprint: Footprint
     max_lattice_cells: int = MAX_LATTICE_CELLS
+    cost: CoverageCost = STEPS_ALONE
 
 
 class Mission:
@@ -290,7 +292,9 @@ class Mission:
         covered = self.ledger.visits(self._lattice.window) > 0
         reason, self._wanted = self._wanted, ""
         try:
-            problem = CoverageProblem.of(self._lattice, cell, covered=covered)
+            problem = CoverageProblem.of(
+                self._lattice, cell, covered=covered, cost=self.config.cost
+            )
         except NothingToCover:
             return self._done(update)
         self._asked = PlanRequest(self.plans + 1, problem, reason)

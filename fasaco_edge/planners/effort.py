@@ -48,7 +48,7 @@ def effort_for(cost: CoverageCost) -> Effort:
             patience_us=cost.step_us * 2 // 5,
             loops_of_256=256,
         )
-        return Effort((0,), 200, mixing, 400)
+        return Effort((0,), 200, mixing, 100)
     # The trials had turns of 1.5 steps; their temperatures are in steps.
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
     heating = KickRules(
@@ -60,4 +60,4 @@ def effort_for(cost: CoverageCost) -> Effort:
         loops_of_256=64,
     )
     heats = tuple(int(np.rint(unit * level)) for level in LEVELS)
-    return Effort(heats, 250, heating, 4000)
+    return Effort(heats, 250, heating, 500)

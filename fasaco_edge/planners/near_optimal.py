@@ -21,16 +21,22 @@ from fasaco_edge.planners.observation import Observer
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import StoppingCriterion, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.search import Search
+from fasaco_edge.planners.search import ANTS, Search, SearchPlan
 
 
 @dataclass(frozen=True, slots=True)
 class NearOptimal:
-    """The colony with local search; ants walk on ``threads`` threads."""
+    """The colony with local search; ants walk on ``threads`` threads.
+
+    Attributes:
+        restarts: see ``search.RESTARTS``; other values than the default are there to
+            measure what ants and their trail are worth.
+    """
 
     config: ColonyConfig = field(default_factory=ColonyConfig)
     threads: int = 1
-    name: str = "fasaco-ls"
+    restarts: str = ANTS
+    name: str = "fasaco"
 
     def plan(
         self,
@@ -40,8 +46,12 @@ class NearOptimal:
     ) -> CoveragePath:
         """Return the cheapest walk found; see ``CoveragePlanner.plan``."""
         with ThreadPoolExecutor(self.threads) as pool:
-            search = Search(self.name, self.config, self.threads, problem, pool, observe)
+            plan = SearchPlan(self.config, self.threads, self.restarts, self.name)
+            search = Search(plan, problem, pool, observe)
             for _ in search.run():
                 if stop(search.progress()):
                     break
-            return search.path()
+            path = search.path()
+            if observe is not ignore:
+                search.show()
+            return path

@@ -55,7 +55,7 @@ class Patch:
         self._sections = np.empty((jumps, 2), np.int32)
         self._limits = np.zeros(2, np.int64)
         self._prices = Prices(1, 0, False)
-        self.cells = 0
+        self._loaded_us = self._loaded_length = 0
 
     def load(self, ground: Ground, cells: NDArray[np.int32], box: Box, prices: Prices) -> bool:
         """Cut a region out; return False where the walk does not come there.
@@ -70,8 +70,7 @@ class Patch:
         bound = (box.rows + 2 * FRAME) * width
         self._ground.offsets[:] = (1, width, -1, -width)
         self._ground = self._ground._replace(bound=bound)
-        self.cells = cut_ground(ground, box, self._ground)
-        if not self.cells:
+        if not cut_ground(ground, box, self._ground):
             return False
         length, jumps = cut_walk(
             ground,
@@ -92,12 +91,18 @@ class Patch:
         rays(self._ground, self._tally.rays)
         recount(self._ground, self._walk, length, self._prices)
         remember(self._walk, self._memory)
+        self._loaded_us, self._loaded_length = int(self._walk.counts[COST]), length
         return True
 
     @property
-    def best_us(self) -> int:
-        """Cost of the best walk here [us]: what it has of turns at the rim left out."""
-        return int(self._memory.best_counts[COST])
+    def gain_us(self) -> int:
+        """By how much the best walk here costs more than the one loaded [us], so 0 or less."""
+        return int(self._memory.best_counts[COST]) - self._loaded_us
+
+    @property
+    def longer_by(self) -> int:
+        """By how many steps it is longer."""
+        return self.best_length - self._loaded_length
 
     @property
     def best_length(self) -> int:

@@ -46,11 +46,6 @@ class CoveragePath:
         return max(len(self.cells) - 1, 0)
 
     @property
-    def ants(self) -> int:
-        """How many ants walked for it."""
-        return self.work.ants
-
-    @property
     def gap(self) -> float | None:
         """How much longer than the bound it is (``steps / bound - 1``); None without a bound."""
         return gap_to(self.lower_bound_steps, self.steps)

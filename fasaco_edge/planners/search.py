@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,6 @@ from fasaco_edge.planners.graph import cells_of, graph_of
 from fasaco_edge.planners.observation import Observer
 from fasaco_edge.planners.patch import Patch
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import ignore
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.regions import EDGE, ONE_REGION, regions_of
 from fasaco_edge.planners.work import SearchProgress, SearchWork
@@ -47,27 +47,46 @@ LOCAL_SEARCH = 1 << 32
 JUMPS = 8 * EDGE
 
 
+# What a search goes on from where kicks gain nothing any more: the colony's next
+# ants; the same on a trail that nothing strengthens; or nothing else.
+ANTS, FLAT, NEVER = RESTARTS = ("ants", "flat", "never")
+
+
+@dataclass(frozen=True, slots=True)
+class SearchPlan:
+    """How to search.
+
+    Attributes:
+        colony: the ants and the seed.
+        threads: that ants walk on.
+        restarts: ANTS, FLAT or NEVER.
+        name: of the planner.
+    """
+
+    colony: ColonyConfig
+    threads: int
+    restarts: str
+    name: str
+
+
 class Search:
     """A search under way. It is a generator of pauses, at which it may be left for good."""
 
     def __init__(
         self,
-        name: str,
-        config: ColonyConfig,
-        threads: int,
+        plan: SearchPlan,
         problem: CoverageProblem,
         pool: ThreadPoolExecutor,
         observe: Observer,
     ) -> None:
         self._began = time.perf_counter()
-        self._name, self._config, self._threads = name, config, threads
-        self._problem, self._pool, self._observe = problem, pool, observe
+        self._plan, self._problem, self._pool, self._observe = plan, problem, pool, observe
         self._graph = graph_of(problem)
         self._framed = FramedGround.of(problem)
         cost = problem.cost
         self._prices = Prices(cost.step_us, cost.quarter_turn_us, problem.end is None)
         self._effort = effort_for(cost)
-        self._random = _stream(config.seed)
+        self._random = _stream(plan.colony.seed)
         self._ants = 0
         self._first_walk_s = 0.0
         self._bound = 0
@@ -76,8 +95,9 @@ class Search:
         self._best, self._best_us = self._walk, 0
         self._since_gain = 0
         self._passes = 0
-        self._groups = _groups(config, problem.cells)
+        self._groups = _groups(plan.colony, problem.cells)
         self._colony: Colony | None = None
+        self._cohort, self._velocity = 0, plan.colony.velocities[0]
         self._patch = self._room()
         self._loaded: Box | None = None
 
@@ -85,9 +105,10 @@ class Search:
         """Search until nothing is left to do; pause after each piece of work."""
         yield from self._begin()
         yield from self._improve()
+        may_start_over = self._is_whole and self._plan.restarts != NEVER
         while not self._is_proven():
             yield from self._kick()
-            if self._since_gain >= self._effort.patience and self._is_whole:
+            if self._since_gain >= self._effort.patience and may_start_over:
                 group = next(self._groups, None)
                 if group is None:
                     return
@@ -95,17 +116,21 @@ class Search:
 
     def progress(self) -> SearchProgress:
         """Return how far the search is; what a region has gained counts before it is put back."""
-        return SearchProgress(
-            self._work, self._best_us / MICROSECONDS, self._best.size - 1, self._bound
-        )
+        best_us, steps = self._best_us, self._best.size - 1
+        if self._loaded is not None:
+            # As it will be when the region is put back, but for turns at its rim.
+            here_us = self._walk_us + self._patch.gain_us
+            if here_us < best_us:
+                best_us, steps = here_us, self._walk.size - 1 + self._patch.longer_by
+        return SearchProgress(self._work, best_us / MICROSECONDS, steps, self._bound)
 
     def path(self) -> CoveragePath:
         """Return the best walk."""
         self._unload()
         return CoveragePath(
             cells_of(self._problem, self._framed.unframed(self._best)),
-            planner=self._name,
-            seed=self._config.seed,
+            planner=self._plan.name,
+            seed=self._plan.colony.seed,
             work=self._work,
             cost_s=self._best_us / MICROSECONDS,
             lower_bound_steps=self._bound,
@@ -122,7 +147,7 @@ class Search:
 
     def _is_proven(self) -> bool:
         """Tell whether no walk can be better."""
-        return not self._prices.quarter_turn_us and self._best.size - 1 == self._bound
+        return not self._prices.quarter_turn_us and self.progress().steps == self._bound
 
     def _room(self) -> Patch:
         framed, cells = self._framed, self._problem.cells
@@ -187,28 +212,47 @@ class Search:
                 self._patch.kick(self._effort.kick, piece, self._random)
                 self._since_gain += piece
                 yield
+                if self._is_proven():
+                    break
 
     def _start_over(self, cohort: int, velocity: int, streams: NDArray[np.int64]) -> Iterator[None]:
         """Let the next ants walk, on a trail strengthened along the best walk; improve theirs."""
-        if self._colony is None:
-            self._colony = Colony(
-                self._config, self._problem, self._graph, self._pool, self._threads
-            )
-        colony = self._colony
-        colony.offer(self._framed.unframed(self._best), self._best_us)
-        colony.strengthen()
+        colony = self._ants_at_work()
+        if self._plan.restarts == ANTS:
+            self._strengthen(colony)
         walk, self._walk_us = colony.walk(velocity, streams)
         self._walk = self._framed.framed(walk)
         self._ants += len(streams)
         self._since_gain = 0
-        if self._observe is not ignore:
-            self._observe(
-                snapshot_of(
-                    self._problem, colony.trail, cohort, velocity, self._ants, self._best.size - 1
-                )
-            )
+        self._cohort, self._velocity = cohort, velocity
         yield
         yield from self._improve()
+
+    def show(self) -> None:
+        """Offer the trail to the observer, strengthened along the best walk; the search is over."""
+        colony = self._ants_at_work()
+        self._strengthen(colony)
+        self._observe(
+            snapshot_of(
+                self._problem,
+                colony.trail,
+                self._cohort,
+                self._velocity,
+                self._ants,
+                self._best.size - 1,
+            )
+        )
+
+    def _ants_at_work(self) -> Colony:
+        if self._colony is None:
+            self._colony = Colony(
+                self._plan.colony, self._problem, self._graph, self._pool, self._plan.threads
+            )
+        return self._colony
+
+    def _strengthen(self, colony: Colony) -> None:
+        colony.offer(self._framed.unframed(self._best), self._best_us)
+        colony.strengthen()
 
 
 def _pieces(total: int, largest: int) -> Iterator[int]:

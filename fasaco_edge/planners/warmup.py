@@ -11,13 +11,17 @@ from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.table import PLANNERS
+from fasaco_edge.planners.work import SearchProgress
 
 LATTICE, REACH, WALKS, BOUND = "lattice", "reachability", "shortest walks", "lower bound"
-STAGES = (LATTICE, REACH, WALKS, BOUND, *PLANNERS)
+LOCAL_SEARCH = "local search"
+STAGES = (LATTICE, REACH, WALKS, BOUND, LOCAL_SEARCH, *PLANNERS)
 
 
 def warm_up(report: Callable[[str], None] | None = None) -> None:
@@ -39,6 +43,14 @@ def _stages() -> Iterator[str]:
     walk_figures(lattice, np.array([[0, 0], [0, 1]], np.int32))
     yield BOUND
     lower_bound_steps(problem)
+    yield LOCAL_SEARCH
+    # Turns at a price: no walk is proven to be the best, so the search goes on to kicks.
+    costly = CoverageProblem.of(lattice, (0, 0), cost=CoverageCost(1.0, 1.0))
+    NearOptimal(ColonyConfig(ants=1, velocities=(1,))).plan(costly, _after_a_kick, ignore)
     for name, make in PLANNERS.items():
         yield name
         make(ColonyConfig(ants=1, velocities=(1,)), 1).plan(problem, never, ignore)
+
+
+def _after_a_kick(progress: SearchProgress) -> bool:
+    return progress.work.kicks > 0

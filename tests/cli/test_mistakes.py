@@ -161,7 +161,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(folder):
 
 def test_ctrl_c_ends_a_plan(folder):
     np.save("large.npy", np.ones((900, 900), bool))
-    command = [*PROGRAM, "plan", "large.npy", "--ants", "1000000"]
+    command = [*PROGRAM, "plan", "large.npy", "--budget", "60"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT) as process:
         # Not before it is at work: Python's own start cannot be interrupted in order.
         time.sleep(4.0)

@@ -20,7 +20,7 @@ from tests.cli.commands import fasaco_edge
 from tests.daemon.rooms import coverable_cells, pillared_room
 
 KEYS = {
-    *("planner", "seed", "ants", "velocities", "map", "cell_m", "start", "end", "cells", "steps"),
+    *("planner", "local_search", "seed", "ants", "velocities", "map", "cell_m", "start", "end", "cells", "steps"),
     *("revisits", "recovered_cells", "n_r_paper", "turns_90", "turns_180", "length_m"),
     *("kicks", "proposals", "cost_s", "lower_bound_steps", "gap", "first_walk_ms"),
     *("unreachable_cells", "wall_s", "cpu_s"),
@@ -34,6 +34,8 @@ def plan(tmp_path, capsys):
     def run(*words):
         csv = tmp_path / "walk.csv"
         words = [str(word) for word in words]
+        if "--budget" not in words and "--no-local-search" not in words:
+            words += ["--budget", "0.05"]
         assert main(["plan", *words, "--json", "--path-out", str(csv)]) == 0
         figures = json.loads(capsys.readouterr().out)
         header, *rows = csv.read_text().splitlines()
@@ -115,9 +117,11 @@ def cells_in(file):
 
 
 def test_the_figures_of_a_coverage_grid_are_right(plan, grid_file):
-    figures, walk = plan(grid_file, "--start", "2,5", "--ants", 40, "--seed", 3)
+    options = ("--start", "2,5", "--ants", 40, "--seed", 3)
+    figures, walk = plan(grid_file, *options, "--no-local-search")
     assert set(figures) == KEYS
     assert (figures["planner"], figures["seed"], figures["ants"]) == ("fasaco", 3, 40)
+    assert (figures["local_search"], figures["kicks"], figures["proposals"]) == (False, 0, 0)
     check(figures, walk, cells_in(grid_file), (2, 5))
 
 
@@ -194,14 +198,21 @@ def test_turns_cost_what_they_take(plan, grid_file):
 
 
 def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
-    figures, walk = plan(grid_file, "--ants", 1_000_000, "--budget", 0.05)
+    options = ("--ants", 1_000_000, "--budget", 0.05)
+    figures, walk = plan(grid_file, *options, "--no-local-search")
     check(figures, walk, cells_in(grid_file), (0, 0))
     assert figures["ants"] < 1_000_000
+    assert 0.05 <= figures["wall_s"] < 20
+    # Turns at a price: no walk is proven to be the best, so only the clock ends the search.
+    figures, walk = plan(grid_file, *options, "--turn-s", 1)
+    check(figures, walk, cells_in(grid_file), (0, 0), turn_s=1.0)
+    assert figures["kicks"] > 0
     assert 0.05 <= figures["wall_s"] < 20
 
 
 def test_a_target_gap_ends_the_search_at_the_first_walk_that_is_good_enough(plan, grid_file):
     options = ("--start", "0,0", "--seed", 1, "--velocities", 1, "--visibility", "fewest-open")
+    options += ("--no-local-search",)
     whole, _ = plan(grid_file, *options, "--ants", 4000)
     figures, walk = plan(grid_file, *options, "--ants", 4000, "--target-gap", whole["gap"])
     check(figures, walk, cells_in(grid_file), (0, 0))

@@ -117,7 +117,10 @@ def test_encoding_and_attachment_say_what_it_is(path):
     assert note["map_stamp_ns"] == 12_000_000_034
     assert note["reason"] == "first plan"
     assert note["steps"] == len(points) - 1
-    assert (note["planner"], note["seed"], note["ants"]) == ("fasaco", 0, 200)
+    assert (note["planner"], note["seed"]) == ("fasaco", 0)
+    assert note["ants"] > 0
+    assert note["proposals"] > 0
+    assert note["gap"] == pytest.approx(note["steps"] / note["lower_bound_steps"] - 1, abs=1e-6)
     assert note["plan_ms"] > 0
     stamp = oracle.from_bytes("nav_msgs/msg/Path", path.payload).header.stamp
     assert (stamp.sec, stamp.nanosec) == (12, 34)
@@ -182,15 +185,14 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
         "covered_m2": pytest.approx(TOOL_M**2),
         "fraction": pytest.approx(1 / count, abs=1e-4),
     }
-    steps = about(path)["steps"]
+    note = about(path)
+    figures = ("planner", "seed", "ants", "kicks", "proposals", "planned_steps", "planned_cost_s")
     assert status["path"] == {
         "revision": 1,
-        "steps": steps,
-        "remaining_steps": steps,
+        "steps": note["steps"],
+        "remaining_steps": note["steps"],
         "reason": "first plan",
-        "planner": "fasaco",
-        "seed": 0,
-        "ants": 200,
+        **{name: note[name] for name in (*figures, "lower_bound_steps", "gap")},
     }
     assert status["plan"] == {"plans": 1, "planning": False}
     assert status["latency_ms"]["plan"] > 0

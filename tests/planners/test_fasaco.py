@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fasaco_edge.planners.ants import LARGEST_GROUP
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.ants import LARGEST_GROUP
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import never
