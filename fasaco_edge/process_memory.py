@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from pathlib import Path, PurePath
 
 
@@ -38,3 +39,13 @@ def _field_mb(pid: int | str, name: str) -> float:
             return round(int(value.split()[0]) * 1024 / 1e6, 1)
     # A process that has ended and not been waited for has no memory.
     return 0.0
+
+
+def release_unused() -> None:
+    """Give memory that was freed back to the system, where the C library can (glibc).
+
+    Loading kernels leaves some behind, in the arena of the thread that loaded them.
+    """
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)

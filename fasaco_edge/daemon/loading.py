@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.process_memory import release_unused
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.worker import PlanningWorker
@@ -53,6 +54,7 @@ class Loader:
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
         warm_up(self._report)
+        release_unused()
         robot, maps, planner = self._config.robot, self._config.map, self._config.planner
         footprint = Footprint(
             robot.tool_width_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least

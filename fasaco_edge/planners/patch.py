@@ -47,7 +47,7 @@ class Patch:
             saved=np.empty(room, np.int32),
             best=np.empty(room, np.int32),
             best_counts=np.zeros(3, np.int64),
-            touched=np.empty(room, np.int32),
+            touched=np.empty(size, np.int32),
             area=np.empty(size, np.int32),
             marked=np.zeros(size, np.int64),
             work=np.zeros(2, np.int64),

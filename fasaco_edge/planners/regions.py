@@ -14,8 +14,10 @@ from fasaco_edge.kernels.regions import Box
 from fasaco_edge.kernels.walk_array import FRAME
 from fasaco_edge.planners.framed import FramedGround
 
-# Up to so many cells to cover a ground is one region.
+# A ground of up to so many cells to cover, on a lattice not too large for them, is one
+# region: what it costs to look at it as a whole does not matter yet.
 ONE_REGION = 8_000
+LATTICE_OF_ONE = 5 * ONE_REGION
 
 # Edge of a square region, in cells.
 EDGE = 80
@@ -24,9 +26,14 @@ EDGE = 80
 LAYS = ((0, 0), (1, 1), (1, 0), (0, 1))
 
 
+def is_one_region(framed: FramedGround, cells: int) -> bool:
+    """Tell whether a ground with so many cells to cover is searched as a whole."""
+    return cells <= ONE_REGION and framed.rows * framed.cols <= LATTICE_OF_ONE
+
+
 def regions_of(framed: FramedGround, cells: int, number: int) -> Iterator[Box]:
     """Yield the regions of pass ``number`` over a ground with so many cells to cover."""
-    if cells <= ONE_REGION:
+    if is_one_region(framed, cells):
         labels = np.zeros(framed.ground.bound, np.int32)
         yield Box(labels, 0, FRAME, FRAME, framed.rows, framed.cols)
         return

@@ -25,7 +25,7 @@ from fasaco_edge.planners.observation import Observer
 from fasaco_edge.planners.patch import Patch
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.regions import EDGE, ONE_REGION, regions_of
+from fasaco_edge.planners.regions import EDGE, is_one_region, regions_of
 from fasaco_edge.planners.work import SearchProgress, SearchWork
 
 # A search is asked whether to stop after about so many proposals: a millisecond.
@@ -98,7 +98,7 @@ class Search:
         self._groups = _groups(plan.colony, problem.cells)
         self._colony: Colony | None = None
         self._cohort, self._velocity = 0, plan.colony.velocities[0]
-        self._patch = self._room()
+        self._patch = Patch(0, 0, 0, 0)
         self._loaded: Box | None = None
 
     def run(self) -> Iterator[None]:
@@ -107,18 +107,25 @@ class Search:
         yield from self._improve()
         may_start_over = self._is_whole and self._plan.restarts != NEVER
         while not self._is_proven():
+            before = self._work
             yield from self._kick()
-            if self._since_gain >= self._effort.patience and may_start_over:
-                group = next(self._groups, None)
+            # A walk too long for the patch, or that is in no region: there was nothing to kick.
+            stuck = self._work == before
+            if stuck or (self._since_gain >= self._effort.patience and may_start_over):
+                group = next(self._groups, None) if may_start_over else None
                 if group is None:
                     return
                 yield from self._start_over(*group)
 
     def progress(self) -> SearchProgress:
-        """Return how far the search is; what a region has gained counts before it is put back."""
+        """Return how far the search is.
+
+        What a region has gained counts before it is put back; but not where turns cost,
+        and those at its rim are known only then.
+        """
         best_us, steps = self._best_us, self._best.size - 1
-        if self._loaded is not None:
-            # As it will be when the region is put back, but for turns at its rim.
+        exact = self._is_whole or not self._prices.quarter_turn_us
+        if self._loaded is not None and exact:
             here_us = self._walk_us + self._patch.gain_us
             if here_us < best_us:
                 best_us, steps = here_us, self._walk.size - 1 + self._patch.longer_by
@@ -139,20 +146,24 @@ class Search:
 
     @property
     def _is_whole(self) -> bool:
-        return self._problem.cells <= ONE_REGION
+        return is_one_region(self._framed, self._problem.cells)
 
     @property
     def _work(self) -> SearchWork:
         return self._patch.work + SearchWork(ants=self._ants)
 
     def _is_proven(self) -> bool:
-        """Tell whether no walk can be better."""
+        """Tell whether no walk can be better: it has no step and no turn too many."""
+        if self._best_us == self._bound * self._prices.step_us:
+            return True
         return not self._prices.quarter_turn_us and self.progress().steps == self._bound
 
     def _room(self) -> Patch:
         framed, cells = self._framed, self._problem.cells
         if self._is_whole:
-            return Patch(framed.rows, framed.cols, VISITS_PER_CELL * cells, 1)
+            # Few cells may lie far apart: then most of the walk is the way from one to the next.
+            visits = max(VISITS_PER_CELL * cells, 2 * self._walk.size)
+            return Patch(framed.rows, framed.cols, visits, 1)
         return Patch(EDGE, EDGE, VISITS_PER_CELL * EDGE * EDGE, JUMPS)
 
     def _begin(self) -> Iterator[None]:
@@ -163,6 +174,7 @@ class Search:
             if not self._walk.size or cost_us < self._walk_us:
                 self._walk, self._walk_us = self._framed.framed(walk), cost_us
         self._best, self._best_us = self._walk, self._walk_us
+        self._patch = self._room()
         self._bound = lower_bound_steps(self._problem)
         yield
 

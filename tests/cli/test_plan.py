@@ -20,7 +20,19 @@ from tests.cli.commands import fasaco_edge
 from tests.daemon.rooms import coverable_cells, pillared_room
 
 KEYS = {
-    *("planner", "local_search", "seed", "ants", "velocities", "map", "cell_m", "start", "end", "cells", "steps"),
+    *(
+        "planner",
+        "local_search",
+        "seed",
+        "ants",
+        "velocities",
+        "map",
+        "cell_m",
+        "start",
+        "end",
+        "cells",
+        "steps",
+    ),
     *("revisits", "recovered_cells", "n_r_paper", "turns_90", "turns_180", "length_m"),
     *("kicks", "proposals", "cost_s", "lower_bound_steps", "gap", "first_walk_ms"),
     *("unreachable_cells", "wall_s", "cpu_s"),
