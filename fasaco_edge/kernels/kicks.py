@@ -22,6 +22,7 @@ from fasaco_edge.kernels.parity import (
     draw_loop,
     euler_walk,
     find_loops,
+    note_order,
     search_ways,
 )
 from fasaco_edge.kernels.random import draw, index_of
@@ -44,6 +45,8 @@ class KickRules(NamedTuple):
         heat_us: temperature that an annealing begins with [us].
         patience_us: temperature at which a worse walk is gone on with [us].
         loops_of_256: so many of 256 kicks change the end or add a loop.
+        steady: whether what need not change stays in the order it is in.
+        strict: whether a walk that costs the same as the one before is taken back.
     """
 
     limit: int
@@ -52,6 +55,8 @@ class KickRules(NamedTuple):
     heat_us: int
     patience_us: int
     loops_of_256: int
+    steady: bool = False
+    strict: bool = False
 
 
 class Memory(NamedTuple):
@@ -161,6 +166,8 @@ def _change_parity(
     """Move the end or add a loop; return how many cells were touched, 0 if nothing was."""
     length = walk.counts[LENGTH]
     count_steps(ground, walk, tally)
+    if rules.steady:
+        note_order(ground, walk, tally)
     end = walk.cells[length - 1]
     if prices.free_end and draw(random) & 1:
         touched = _move_end(ground, walk, tally, memory, rules, random)
@@ -169,7 +176,7 @@ def _change_parity(
         touched = _add_loop(ground, walk, tally, memory, rules, random)
     if touched == 0 or length + touched + 1 > walk.cells.size:
         return 0
-    length = euler_walk(ground, walk, tally, end, prices.quarter_turn_us > 0, random)
+    length = euler_walk(ground, walk, tally, end, rules.steady, random)
     recount(ground, walk, length, prices)
     return touched
 
@@ -224,6 +231,31 @@ def _settle(
 
 
 @lean_kernel
+def touch_up(
+    ground: Ground,
+    walk: Walk,
+    prices: Prices,
+    memory: Memory,
+    rules: KickRules,
+    touched: int,
+    random: NDArray[np.uint64],
+) -> None:
+    """Improve the walk around the first ``touched`` cells of ``memory.touched``.
+
+    If that gains nothing the walk stays as it was.
+    """
+    length, cost = walk.counts[LENGTH], walk.counts[COST]
+    copy(walk.cells, memory.saved, length)
+    _settle(ground, walk, prices, memory, rules, touched, random)
+    memory.work[KICKS] += 1
+    if walk.counts[COST] < cost:
+        remember(walk, memory)
+    else:
+        copy(memory.saved, walk.cells, length)
+        recount(ground, walk, length, prices)
+
+
+@lean_kernel
 def kick(
     ground: Ground,
     walk: Walk,
@@ -262,6 +294,6 @@ def kick(
         memory.work[KICKS] += 1
         if walk.counts[COST] < memory.best_counts[COST]:
             remember(walk, memory)
-        elif not accepts(walk.counts[COST] - cost, rules.patience_us, random):
+        elif rules.strict or not accepts(walk.counts[COST] - cost, rules.patience_us, random):
             copy(memory.saved, walk.cells, length)
             recount(ground, walk, length, prices)

@@ -33,6 +33,8 @@ class Tally(NamedTuple):
 
     Attributes:
         times: int16 (n, 2), how often the steps east and north of a cell are walked.
+        order_of_old: int8 (n, 4), the direction in which the walk, seen from its end, went on
+            from a cell that it came to in each direction; -1 for none.
         rays: int64 (n,), see ``holes.rays``.
         reached: int64 (n,), number of the search that reached the cell, doubled; one
             more once its distance is settled.
@@ -57,6 +59,7 @@ class Tally(NamedTuple):
     """
 
     times: NDArray[np.int16]
+    order_of_old: NDArray[np.int8]
     rays: NDArray[np.int64]
     reached: NDArray[np.int64]
     distance: NDArray[np.int32]
@@ -80,6 +83,26 @@ class Tally(NamedTuple):
 @inlined
 def _axis(ground: Ground, one: int, other: int) -> int:
     return 0 if abs(one - other) == 1 else 1
+
+
+@inlined
+def _direction(ground: Ground, one: int, other: int) -> int:
+    for direction in range(4):
+        if ground.offsets[direction] == other - one:
+            return direction
+    return -1
+
+
+@lean_kernel
+def note_order(ground: Ground, walk: Walk, tally: Tally) -> None:
+    """Set ``order_of_old``."""
+    bound, cells = ground.bound, walk.cells
+    tally.order_of_old[:] = -1
+    for index in range(1, walk.counts[LENGTH] - 1):
+        before, here, after = cells[index - 1], cells[index], cells[index + 1]
+        if before < bound and here < bound and after < bound:
+            came = _direction(ground, after, here)
+            tally.order_of_old[here, came] = _direction(ground, here, before)
 
 
 @lean_kernel
@@ -236,13 +259,15 @@ def draw_loop(tally: Tally, found: int, random: NDArray[np.uint64]) -> int:
 
 @inlined
 def _heading(ground: Ground, tally: Tally, depth: int) -> int:
-    """Return the direction of the step to the top of the stack; -1 for a jump or the start."""
-    if depth > 1:
-        gap = tally.stack[depth - 1] - tally.stack[depth - 2]
-        for direction in range(4):
-            if ground.offsets[direction] == gap:
-                return direction
-    return -1
+    """Return how to go on from the top of the stack: as of old, else straight; -1 for any way."""
+    if depth < 2:
+        return -1
+    here = tally.stack[depth - 1]
+    came = _direction(ground, tally.stack[depth - 2], here)
+    if came < 0:
+        return -1
+    known = tally.order_of_old[here, came]
+    return int(known) if known >= 0 else came
 
 
 @lean_kernel
@@ -288,14 +313,15 @@ def euler_walk(
     walk: Walk,
     tally: Tally,
     end: int,
-    straight: bool,
+    steady: bool,
     random: NDArray[np.uint64],
 ) -> int:
     """Write into ``walk.cells`` a walk that takes each step as often as ``times`` says.
 
     Hierholzer's algorithm from the walk's ``end``, so that what it yields begins
-    with the start. Uses up ``times``. Goes straight on where there is a choice if
-    ``straight``, else at random. Returns the walk's length.
+    with the start. Uses up ``times``. Where there is a choice it goes on as the walk
+    did of old (``order_of_old``) or straight if ``steady``, else at random. Returns the
+    walk's length.
     """
     bound, stack = ground.bound, tally.stack
     _hang_up_jumps(tally)
@@ -304,7 +330,7 @@ def euler_walk(
     while depth:
         here = stack[depth - 1]
         if here < bound:
-            heading = _heading(ground, tally, depth) if straight else -1
+            heading = _heading(ground, tally, depth) if steady else -1
             if heading < 0:
                 heading = draw(random) & 3
             direction = _next_step(ground, tally, here, heading)

@@ -58,6 +58,22 @@ def effort_for(cost: CoverageCost) -> Effort:
         heat_us=unit,
         patience_us=unit * 3 // 10,
         loops_of_256=64,
+        steady=True,
     )
     heats = tuple(int(np.rint(unit * level)) for level in LEVELS)
     return Effort(heats, 250, heating, 500)
+
+
+def repair_for(cost: CoverageCost) -> KickRules:
+    """Return how to improve a mended walk: near what changed, and nothing that gains nothing."""
+    unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5 if cost.quarter_turn_us else 0
+    return KickRules(
+        limit=300,
+        mixing=40,
+        radius=6,
+        heat_us=unit // 2,
+        patience_us=0,
+        loops_of_256=128 if unit else 256,
+        steady=True,
+        strict=True,
+    )

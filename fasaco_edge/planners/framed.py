@@ -26,7 +26,7 @@ class FramedGround:
 
     @classmethod
     def of(cls, problem: CoverageProblem) -> FramedGround:
-        """Frame a problem's lattice; start and end keep a visit whatever is covered."""
+        """Frame a problem's lattice."""
         rows, cols = problem.to_cover.shape
         steps = np.pad(problem.lattice.steps, FRAME)
         needed = np.pad(problem.to_cover.astype(np.int32), FRAME)

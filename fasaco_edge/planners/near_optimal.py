@@ -21,7 +21,17 @@ from fasaco_edge.planners.observation import Observer
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import StoppingCriterion, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.repair import can_repair, repaired
 from fasaco_edge.planners.search import ANTS, Search, SearchPlan
+
+# A repaired walk with more steps than this above its bound is not worth keeping, unless
+# a search finds no better one.
+POOR_GAP = 0.25
+
+
+def is_poor(path: CoveragePath) -> bool:
+    """Tell whether a repaired walk is so long that a new one is to be looked for."""
+    return path.gap is not None and path.gap > POOR_GAP
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +54,22 @@ class NearOptimal:
         stop: StoppingCriterion = never,
         observe: Observer = ignore,
     ) -> CoveragePath:
-        """Return the cheapest walk found; see ``CoveragePlanner.plan``."""
+        """Return the cheapest walk found; see ``CoveragePlanner.plan``.
+
+        A walk that was still to be driven (``problem.before``) is repaired; only where
+        that leaves it far above its bound the colony searches anew.
+        """
+        path = None
+        if can_repair(problem):
+            path = repaired(problem, self.name, self.config.seed, stop)
+            if not is_poor(path):
+                return path
+        found = self._search(problem, stop, observe)
+        return found if path is None or found.cost_s < path.cost_s else path
+
+    def _search(
+        self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
+    ) -> CoveragePath:
         with ThreadPoolExecutor(self.threads) as pool:
             plan = SearchPlan(self.config, self.threads, self.restarts, self.name)
             search = Search(plan, problem, pool, observe)

@@ -6,7 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.holes import rays
-from fasaco_edge.kernels.kicks import KICKS, PROPOSALS, KickRules, Memory, kick, recall, remember
+from fasaco_edge.kernels.kicks import (
+    KICKS,
+    PROPOSALS,
+    KickRules,
+    Memory,
+    kick,
+    recall,
+    remember,
+    touch_up,
+)
 from fasaco_edge.kernels.local_search import improve
 from fasaco_edge.kernels.parity import JUMPS, Tally
 from fasaco_edge.kernels.regions import AFTER, Box, cut_ground, cut_walk, put_back
@@ -122,6 +131,13 @@ class Patch:
         if self._walk.counts[COST] <= self._memory.best_counts[COST]:
             remember(self._walk, self._memory)
 
+    def touch_up(
+        self, cells: NDArray[np.int32], rules: KickRules, random: NDArray[np.uint64]
+    ) -> None:
+        """Improve the walk around cells of the region, int32 (n,), if that gains something."""
+        self._memory.touched[: cells.size] = cells
+        touch_up(self._ground, self._walk, self._prices, self._memory, rules, cells.size, random)
+
     def kick(self, rules: KickRules, kicks: int, random: NDArray[np.uint64]) -> None:
         """Kick the walk so many times."""
         kick(
@@ -159,6 +175,7 @@ class Patch:
 def _tally(size: int, jumps: int, room: int) -> Tally:
     return Tally(
         times=np.zeros((size, 2), np.int16),
+        order_of_old=np.zeros((size, 4), np.int8),
         rays=np.zeros(size, np.int64),
         reached=np.zeros(size, np.int64),
         distance=np.zeros(size, np.int32),

@@ -35,6 +35,8 @@ class CoverageProblem:
         end: the cell (row, col) the walk ends in, which need not be one to cover; the
             start itself for a walk back home; None for anywhere.
         cost: what a walk is to have little of.
+        before: int32 (n, 2), the walk that was still to be driven when the problem changed
+            to this one; a planner that can keeps of it what holds. None for none.
     """
 
     lattice: CoverageLattice
@@ -43,6 +45,7 @@ class CoverageProblem:
     unreachable: NDArray[np.bool_]
     end: Cell | None = None
     cost: CoverageCost = STEPS_ALONE
+    before: NDArray[np.int32] | None = None
 
     @classmethod
     def of(
@@ -53,6 +56,7 @@ class CoverageProblem:
         covered: NDArray[np.bool_] | None = None,
         end: Cell | None = None,
         cost: CoverageCost = STEPS_ALONE,
+        before: NDArray[np.int32] | None = None,
     ) -> CoverageProblem:
         """Pose the problem of covering what is reachable and not yet ``covered``.
 
@@ -62,6 +66,7 @@ class CoverageProblem:
             covered: bool (rows, cols), cells that need no visit; None for none.
             end: cell (row, col) to end in; the start for home, None for anywhere.
             cost: of steps and turns; by default of steps alone.
+            before: int32 (n, 2), the walk that was still to be driven; None for none.
 
         Raises:
             StartOutsideMap, EndOutsideMap: the lattice does not span the start, or the end.
@@ -80,7 +85,7 @@ class CoverageProblem:
         if not to_cover.any():
             raise NothingToCover("every reachable cell is covered")
         to_cover.flags.writeable = unreachable.flags.writeable = False
-        return cls(lattice, start, to_cover, unreachable, end, cost)
+        return cls(lattice, start, to_cover, unreachable, end, cost, before)
 
     @property
     def cells(self) -> int:

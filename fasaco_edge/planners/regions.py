@@ -26,14 +26,14 @@ EDGE = 80
 LAYS = ((0, 0), (1, 1), (1, 0), (0, 1))
 
 
-def is_one_region(framed: FramedGround, cells: int) -> bool:
-    """Tell whether a ground with so many cells to cover is searched as a whole."""
-    return cells <= ONE_REGION and framed.rows * framed.cols <= LATTICE_OF_ONE
+def is_one_region(rows: int, cols: int, cells: int) -> bool:
+    """Tell whether a lattice with so many cells to cover is searched as a whole."""
+    return cells <= ONE_REGION and rows * cols <= LATTICE_OF_ONE
 
 
 def regions_of(framed: FramedGround, cells: int, number: int) -> Iterator[Box]:
     """Yield the regions of pass ``number`` over a ground with so many cells to cover."""
-    if is_one_region(framed, cells):
+    if is_one_region(framed.rows, framed.cols, cells):
         labels = np.zeros(framed.ground.bound, np.int32)
         yield Box(labels, 0, FRAME, FRAME, framed.rows, framed.cols)
         return

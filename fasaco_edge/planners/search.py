@@ -86,6 +86,7 @@ class Search:
         cost = problem.cost
         self._prices = Prices(cost.step_us, cost.quarter_turn_us, problem.end is None)
         self._effort = effort_for(cost)
+        self._is_whole = is_one_region(self._framed.rows, self._framed.cols, problem.cells)
         self._random = _stream(plan.colony.seed)
         self._ants = 0
         self._first_walk_s = 0.0
@@ -143,10 +144,6 @@ class Search:
             lower_bound_steps=self._bound,
             first_walk_s=self._first_walk_s,
         )
-
-    @property
-    def _is_whole(self) -> bool:
-        return is_one_region(self._framed, self._problem.cells)
 
     @property
     def _work(self) -> SearchWork:

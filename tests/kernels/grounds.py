@@ -139,6 +139,7 @@ def tally_on(ground, room, jumps=0):
     size = ground.bound
     tally = Tally(
         times=guarded((size, 2), np.int16),
+        order_of_old=guarded((size, 4), np.int8, -1),
         rays=guarded(size, np.int64),
         reached=guarded(size, np.int64),
         distance=guarded(size, np.int32),

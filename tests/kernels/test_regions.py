@@ -1,0 +1,319 @@
+"""Regions cut out of a walk and put back: whatever is done inside, the whole stays a walk."""
+
+import itertools
+from collections import Counter
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.kernels.costs import walk_cost
+from fasaco_edge.kernels.holes import rays
+from fasaco_edge.kernels.kicks import Memory, kick, remember
+from fasaco_edge.kernels.local_search import improve
+from fasaco_edge.kernels.parity import JUMPS, Tally
+from fasaco_edge.kernels.regions import AFTER, BEFORE, Box, cut_ground, cut_walk, put_back
+from fasaco_edge.kernels.walk_array import COST, FIXED, FRAME, LENGTH, Ground, Prices, Walk, recount
+from tests.kernels.grounds import (
+    PRICES,
+    Task,
+    assert_counts,
+    assert_guards_hold,
+    assert_legal,
+    assert_sound,
+    cells_of,
+    drawn_task,
+    guarded,
+    memory_on,
+    steps_taken,
+    stream,
+    tally_on,
+    walk_on,
+)
+from tests.kernels.test_kicks import rules_for
+from tests.planners.grids import lattice
+
+EVERYWHERE = np.empty(0, np.int32)
+
+
+class Cut(NamedTuple):
+    """A region, its walk and what it takes to put that back."""
+
+    whole: Ground
+    cells: np.ndarray
+    box: Box
+    ground: Ground
+    walk: Walk
+    tally: Tally
+    memory: Memory
+    prices: Prices
+    sections: np.ndarray
+    limits: np.ndarray
+
+    def put_back(self):
+        inner = np.array(cells_of(self.walk), np.int32)
+        out = guarded(self.cells.size + inner.size, np.int32)
+        length = put_back(
+            self.whole, self.box, self.cells, self.ground.bound, inner,
+            self.sections, self.limits, out,
+        )  # fmt: skip
+        assert_guards_hold(self.walk, self.tally, self.memory)
+        return out[:length].copy()
+
+
+def box_round(labels, label, rows, cols, margin=0):
+    """The box of all cells of a lattice with a label, int32 (rows, cols), or a wider one."""
+    row, col = np.nonzero(labels == label)
+    row0, col0 = max(row.min() - margin, 0), max(col.min() - margin, 0)
+    row1, col1 = min(row.max() + 1 + margin, rows), min(col.max() + 1 + margin, cols)
+    framed = np.pad(labels, FRAME, constant_values=label).astype(np.int32).ravel()
+    return Box(
+        framed, int(label), *map(int, (row0 + FRAME, col0 + FRAME, row1 - row0, col1 - col0))
+    )
+
+
+def cut(task, box, cells=None, prices=PRICES[0], jumps=200, room=None):
+    """Cut the region out; None where the walk does not come there."""
+    whole = task.ground()
+    cells = task.cells() if cells is None else cells
+    width = box.cols + 2 * FRAME
+    bound = (box.rows + 2 * FRAME) * width
+    offsets = np.array([1, width, -1, -width], np.int64)
+    both = bound + jumps
+    ground = Ground(guarded(both, np.uint8), guarded(both, np.int32), offsets, bound)
+    inside = cut_ground(whole, box, ground)
+    assert inside == np.count_nonzero(ground.needed[:bound] != FIXED)
+    room = 4 * cells.size + 300 if room is None else room
+    walk = walk_on(ground, [], prices, room, jumps)
+    tally, memory = tally_on(ground, room, jumps), memory_on(ground, room)
+    sections, limits = guarded((jumps, 2), np.int32), guarded(2, np.int64)
+    length, made = cut_walk(whole, box, cells, bound, walk.cells, tally.jump_ends, sections, limits)
+    assert_guards_hold(ground, walk, tally)
+    if not (length and inside):
+        return None
+    tally.counts[JUMPS] = made
+    prices = prices._replace(free_end=prices.free_end and bool(limits[AFTER] == cells.size))
+    recount(ground, walk, length, prices)
+    rays(ground, tally.rays)
+    remember(walk, memory)
+    return Cut(whole, cells, box, ground, walk, tally, memory, prices, sections, limits)
+
+
+def labels_for(random, shape):
+    """Labels of a ground: squares, halves, or a patchwork without any order."""
+    rows, cols = np.indices(shape)
+    return (
+        rows // 3 * 10 + cols // 3,
+        (rows + 2 * cols > random.integers(20)).astype(int),
+        random.integers(0, 3, shape),
+        (random.random(shape) < 0.85).astype(int),
+    )[random.integers(4)]
+
+
+def drawn_cut(seed, prices=PRICES[0], side=9):
+    random = np.random.default_rng(seed)
+    task = drawn_task(seed, side)
+    labels = labels_for(random, task.steps.shape)
+    label = random.choice(labels.ravel())
+    box = box_round(labels, label, *task.steps.shape, margin=int(random.integers(2)))
+    return task, cut(task, box, prices=prices)
+
+
+SEEDS = st.integers(0, 2**32)
+
+
+def naive_sections(task, cells, box):
+    """The parts of a walk outside the region, as they lie between two visits inside."""
+    inside = [box.labels[cell] == box.label for cell in cells.tolist()]
+    runs = [list(run) for _, run in itertools.groupby(range(len(cells)), inside.__getitem__)]
+    return [(run[0], run[-1]) for run in runs[1:-1] if not inside[run[0]]]
+
+
+@settings(max_examples=150, deadline=None)
+@given(seed=SEEDS)
+def test_a_region_cut_out_and_put_back_is_the_same_walk(seed):
+    task, region = drawn_cut(seed)
+    if region is None:
+        return
+    assert_counts(region.ground, region.walk)
+    made = int(region.tally.counts[JUMPS])
+    assert region.sections[:made].tolist() == [
+        list(section) for section in naive_sections(task, region.cells, region.box)
+    ]
+    assert region.put_back().tolist() == region.cells.tolist()
+    # What stands for the outside is not to be touched; the rest is as in the whole ground.
+    bound, width = region.ground.bound, region.box.cols + 2 * FRAME
+    assert (region.ground.needed[bound:] == FIXED).all()
+    assert not region.ground.steps[bound:].any()
+    for cell in np.flatnonzero(region.ground.needed[:bound] != FIXED).tolist():
+        row, col = cell // width - FRAME + region.box.row, cell % width - FRAME + region.box.col
+        large = row * task.width + col
+        assert region.box.labels[large] == region.box.label
+        assert region.ground.needed[cell] == region.whole.needed[large]
+        for direction, gap in enumerate(region.whole.offsets.tolist()):
+            stays = region.box.labels[large + gap] == region.box.label
+            there = region.whole.steps[large] >> direction & 1 and stays
+            assert region.ground.steps[cell] >> direction & 1 == there
+
+
+def assert_whole_walk(task, region, cells):
+    """The walk with the region put back covers all, and is the old one outside."""
+    walk = walk_on(region.whole, cells, region.prices)
+    before = task._replace(walk=[task.unframed(cell) for cell in region.cells])
+    assert_sound(before, region.whole, walk, region.prices)
+    outside = [
+        Counter({step: times for step, times in steps_taken(way).items()
+                 if all(region.box.labels[cell] != region.box.label for cell in step)})
+        for way in (region.cells.tolist(), cells.tolist())
+    ]  # fmt: skip
+    assert outside[0] == outside[1]
+
+
+@settings(max_examples=200, deadline=None)
+@given(seed=SEEDS, prices=st.sampled_from(PRICES), hot=st.booleans(), kicks=st.booleans())
+def test_whatever_is_done_in_a_region_the_whole_is_a_walk(seed, prices, hot, kicks):
+    task, region = drawn_cut(seed, prices)
+    if region is None:
+        return
+    random, heat = stream(seed), hot * 2 * (prices.step_us + prices.quarter_turn_us)
+    rules, before = rules_for(prices, 3 if hot else -1), region.walk.counts[COST]
+    for _ in range(4):
+        improve(region.ground, region.walk, region.prices, EVERYWHERE, heat, 300, random)
+        assert_counts(region.ground, region.walk)
+        cells = region.put_back()
+        assert_whole_walk(task, region, cells)
+        if kicks:
+            kick(
+                region.ground, region.walk, region.prices, region.tally, region.memory,
+                rules, 3, random,
+            )  # fmt: skip
+            assert_counts(region.ground, region.walk)
+            assert_whole_walk(task, region, region.put_back())
+        if not prices.quarter_turn_us:
+            # Turns at the rim are priced otherwise in the region; steps are not.
+            gain = walk_cost(region.cells, *prices[:2]) - walk_cost(region.put_back(), *prices[:2])
+            assert gain == before - region.walk.counts[COST]
+
+
+def corridor(*cols, cols_inside, prices=PRICES[0], **room):
+    """A walk over columns of a corridor of ten cells, and what is cut out of it."""
+    ground = lattice("..........")
+    task = Task(ground.steps, ground.coverable, [(0, col) for col in cols])
+    labels = np.isin(np.arange(10), cols_inside).astype(int)[None]
+    region = cut(task, box_round(labels, 1, 1, 10), prices=prices, **room)
+    return task, region
+
+
+def there_and(*stops):
+    """The walk along the corridor by way of some stops."""
+    walk = [stops[0]]
+    for stop in stops[1:]:
+        walk += range(walk[-1], stop, 1 if stop > walk[-1] else -1)[1:]
+        walk.append(stop)
+    return walk
+
+
+@pytest.mark.parametrize(
+    ("stops", "inside", "before", "sections", "after"),
+    [
+        # The region holds the start, and the end.
+        ((0, 9), range(10), 0, [], 10),
+        ((0, 9), range(5), 0, [], 6),
+        ((0, 9), range(5, 10), 4, [], 10),
+        ((0, 9), range(3, 6), 2, [], 7),
+        ((0, 9), [4], 3, [], 6),
+        # It is left for good at the last visit: that visit stands in its walk.
+        ((0, 9), range(9), 0, [], 10),
+        # Left and come back to: for one visit, for several, at both ends.
+        ((4, 9, 0), range(9), 0, [(5, 5)], 15),
+        ((4, 9, 0), range(7), 0, [(3, 7)], 15),
+        ((4, 9, 0, 9), range(3, 7), 0, [(3, 7), (12, 16)], 22),
+        # Twice by way of the same cell.
+        ((4, 8, 4, 9, 4), range(8), 0, [(4, 4), (12, 14)], 19),
+        # A section between two different cells.
+        ((0, 9), [0, 1, 2, 7, 8, 9], 0, [(3, 6)], 10),
+        ((0, 9, 0), [0, 9], 0, [(1, 8), (10, 17)], 19),
+    ],
+)
+def test_sections_and_limits_are_as_told(stops, inside, before, sections, after):
+    walk = there_and(*stops)
+    _, region = corridor(*walk, cols_inside=list(inside))
+    made = int(region.tally.counts[JUMPS])
+    assert list(map(tuple, region.sections[:made].tolist())) == sections
+    assert (region.limits[BEFORE], region.limits[AFTER]) == (before, after)
+    # A section is three visits in the region's walk, whatever its length.
+    hidden = sum(last - first + 1 for first, last in sections)
+    assert region.walk.counts[LENGTH] == after - before - hidden + 3 * made
+    assert region.put_back().tolist() == region.cells.tolist()
+    inner = [there for there in cells_of(region.walk) if there >= region.ground.bound]
+    assert inner == [region.ground.bound + number for number in range(made)]
+
+
+def test_a_walk_that_never_comes_there_is_told():
+    assert corridor(*range(5), cols_inside=[7, 8])[1] is None
+
+
+def test_what_does_not_fit_is_told():
+    walk = there_and(4, 8, 4, 9, 4)
+    fits = corridor(*walk, cols_inside=range(8), jumps=2, room=30)[1]
+    assert fits is not None
+    assert corridor(*walk, cols_inside=range(8), jumps=1)[1] is None
+    longest = fits.walk.counts[LENGTH]
+    assert corridor(*walk, cols_inside=range(8), room=int(longest) - 1)[1] is None
+
+
+def test_a_way_there_and_back_through_the_rim_is_left_out():
+    """Nothing to be done at cell 5: the two sections beside it come to follow each other."""
+    task, region = corridor(*there_and(3, 6, 5, 9), cols_inside=range(6), prices=PRICES[1])
+    assert region.tally.counts[JUMPS] == 1
+    improve(region.ground, region.walk, region.prices, EVERYWHERE, 0, 2000, stream(1))
+    assert [task.unframed(cell)[1] for cell in region.put_back().tolist()] == [*range(3, 10)]
+
+
+def test_sections_are_passed_in_either_direction():
+    """A kick orders the sections anew: each is there once, and some are turned round."""
+    turned, prices = 0, PRICES[1]
+    for seed in range(120):
+        task, region = drawn_cut(seed, prices)
+        if region is None or not region.tally.counts[JUMPS]:
+            continue
+        kick(
+            region.ground, region.walk, region.prices, region.tally, region.memory,
+            rules_for(prices, 0, mixing=0, patience=1e4), 3, stream(seed),
+        )  # fmt: skip
+        after = region.put_back().tolist()
+        for first, last in region.sections[: region.tally.counts[JUMPS]].tolist():
+            section = region.cells[first : last + 1].tolist()
+            there, back = (any(way == after[at : at + len(way)] for at in range(len(after)))
+                           for way in (section, section[::-1]))  # fmt: skip
+            assert there or back
+            turned += not there
+        assert_legal(task, after)
+    assert turned >= 10
+
+
+@pytest.mark.parametrize("prices", PRICES[:4], ids=str)
+def test_region_by_region_a_large_ground_gets_better_and_stays_covered(prices):
+    """Rooms of a lattice of squares, laid anew each time, over a clumsy walk."""
+    task = drawn_task(11, 24)
+    cells, random = task.cells(), np.random.default_rng(3)
+    rows, cols = np.indices(task.steps.shape)
+    costs = [walk_cost(cells, *prices[:2])]
+    for _ in range(6):
+        shift = random.integers(8, size=2)
+        labels = (rows + shift[0]) // 8 * 10 + (cols + shift[1]) // 8
+        for label in np.unique(labels):
+            box = box_round(labels, label, *task.steps.shape)
+            region = cut(task, box, cells, prices)
+            if region is None:
+                continue
+            improve(region.ground, region.walk, region.prices, EVERYWHERE, 0, 4000, stream(label))
+            now = region.put_back()
+            assert_whole_walk(task, region, now)
+            if walk_cost(now, *prices[:2]) <= costs[-1]:
+                cells = now
+                costs.append(walk_cost(cells, *prices[:2]))
+    assert costs == sorted(costs, reverse=True)
+    assert costs[-1] < 0.5 * costs[0]

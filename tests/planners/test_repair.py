@@ -1,0 +1,149 @@
+"""A mended walk: legal, complete, and the same where nothing changed."""
+
+from itertools import pairwise
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.bench.checking import check_walk
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.kernels.walks import reachable_from
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.framed import FramedGround
+from fasaco_edge.planners.mending import mended
+from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.planner import never
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.repair import KICKS, can_repair, repaired
+from fasaco_edge.planners.stopping import WorkLimit
+from fasaco_edge.planners.work import SearchWork
+
+SHORT = WorkLimit(SearchWork(kicks=8))
+TURNS = CoverageCost(1.0, 1.5)
+
+
+def ground(seed, rows=9, cols=13, blocked=0.2):
+    """Return free cells at random, bool (rows, cols)."""
+    return np.random.default_rng(seed).random((rows, cols)) >= blocked
+
+
+def driven_halfway(seed, change, end=None, cost=None):
+    """Return the problem of a robot amid its walk when some cells change, and that walk's rest."""
+    free = ground(seed)
+    free[4, 6] = True
+    cost = cost or CoverageCost()
+    before = CoverageProblem.of(CoverageLattice.from_free(free), (4, 6), cost=cost)
+    walk = NearOptimal().plan(before, SHORT).cells
+    rng = np.random.default_rng((seed, 1))
+    at = int(rng.integers(0, len(walk)))
+    here = (int(walk[at, 0]), int(walk[at, 1]))
+    covered = np.zeros(free.shape, bool)
+    covered[tuple(walk[: at + 1].T)] = True
+    free ^= rng.random(free.shape) < change
+    free[here] = True
+    lattice = CoverageLattice.from_free(free)
+    rest = walk[at:].copy()
+    # Something must be left to do.
+    covered &= reachable_from(lattice.steps, *here).astype(bool)
+    if not (reachable_from(lattice.steps, *here).astype(bool) & ~covered).any():
+        covered[:] = False
+    end = here if end else None
+    return CoverageProblem.of(lattice, here, covered=covered, end=end, cost=cost, before=rest)
+
+
+def judge(problem, cells):
+    """Check a walk by code that shares nothing with the planners."""
+    verdict = check_walk(problem.lattice.steps, problem.to_cover, cells, problem.start, problem.end)
+    assert verdict.legal, verdict.problems
+    assert verdict.complete, verdict.problems
+    return verdict
+
+
+@settings(max_examples=150, deadline=None)
+@given(seed=st.integers(0, 10**6), change=st.sampled_from((0.0, 0.03, 0.2)), home=st.booleans())
+def test_a_mended_walk_is_legal_and_complete(seed, change, home):
+    problem = driven_halfway(seed, change, end=home)
+    framed = FramedGround.of(problem)
+    flat = framed.unframed(mended(problem, framed, problem.before))
+    judge(problem, np.column_stack(np.divmod(flat, framed.cols)))
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_where_nothing_changed_the_walk_is_what_it_was(seed):
+    problem = driven_halfway(seed, change=0.0)
+    framed = FramedGround.of(problem)
+    flat = framed.unframed(mended(problem, framed, problem.before))
+    kept = np.column_stack(np.divmod(flat, framed.cols))
+    assert np.array_equal(kept, problem.before[: len(kept)])
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    change=st.sampled_from((0.03, 0.2)),
+    home=st.booleans(),
+    cost=st.sampled_from((CoverageCost(), TURNS)),
+)
+def test_a_repaired_walk_costs_no_more_than_the_mended_one(seed, change, home, cost):
+    problem = driven_halfway(seed, change, end=home, cost=cost)
+    framed = FramedGround.of(problem)
+    flat = framed.unframed(mended(problem, framed, problem.before))
+    only_mended = np.column_stack(np.divmod(flat, framed.cols)).astype(np.int32)
+    path = repaired(problem, "fasaco", 0, never)
+    verdict = judge(problem, path.cells)
+    assert path.cost_s == cost.of_walk(path.cells)
+    assert path.cost_s <= cost.of_walk(only_mended)
+    assert path.lower_bound_steps <= verdict.steps == path.steps
+    assert path.work.kicks <= KICKS + 1
+
+
+def test_a_repair_is_worth_its_while():
+    gains = []
+    for seed in range(30):
+        problem = driven_halfway(seed, change=0.05)
+        framed = FramedGround.of(problem)
+        gains.append(len(mended(problem, framed, problem.before)) - 1)
+        gains[-1] -= repaired(problem, "fasaco", 0, never).steps
+    assert np.mean(gains) > 5
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), pieces=st.integers(0, 5))
+def test_the_same_work_repairs_the_same_way(seed, pieces):
+    problem = driven_halfway(seed, change=0.1, cost=TURNS)
+    asked = iter(range(pieces))
+    first = repaired(problem, "fasaco", 3, lambda progress: next(asked, None) is None)
+    again = repaired(problem, "fasaco", 3, WorkLimit(first.work))
+    assert again.work == first.work
+    assert np.array_equal(again.cells, first.cells)
+
+
+def test_the_planner_keeps_what_holds_of_the_walk_before():
+    free = np.ones((20, 30), bool)
+    lattice = CoverageLattice.from_free(free)
+    walk = NearOptimal().plan(CoverageProblem.of(lattice, (0, 0)), SHORT).cells
+    changed = free.copy()
+    row, col = walk[-40]
+    changed[row, col] = False
+    problem = CoverageProblem.of(CoverageLattice.from_free(changed), (0, 0), before=walk)
+    assert can_repair(problem)
+    path = NearOptimal().plan(problem, never)
+    judge(problem, path.cells)
+    old, new = (
+        set(pairwise(map(tuple, walk.tolist()))),
+        set(pairwise(map(tuple, path.cells.tolist()))),
+    )
+    assert len(new - old) < 40
+
+
+def test_a_walk_far_above_its_bound_is_planned_anew():
+    free = np.ones((12, 12), bool)
+    lattice = CoverageLattice.from_free(free)
+    there_and_back = [(0, col) for col in range(12)] + [(0, col) for col in range(10, -1, -1)]
+    walk = np.array(there_and_back * 12, np.int32)
+    problem = CoverageProblem.of(lattice, (0, 0), before=walk)
+    path = NearOptimal().plan(problem, SHORT)
+    judge(problem, path.cells)
+    assert path.steps < 180

@@ -1,0 +1,201 @@
+"""A search may be stopped anywhere: its walk is sound, and its work repeats it bit for bit."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.bench.buildings import building
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.kernels.walk_array import FRAME
+from fasaco_edge.planners import regions
+from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
+from fasaco_edge.planners.framed import FramedGround
+from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.planner import never
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.stopping import AnyOf, GapReached, Interrupt, WorkLimit
+from tests.planners.grids import ENDS, ROOMS, end_of, problems
+from tests.planners.searches import (
+    FEW_ANTS,
+    TURNS,
+    Watched,
+    after,
+    ask_often,
+    hall,
+    looks,
+    plan,
+    take_apart,
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    ground=problems(max_side=12),
+    end=ENDS,
+    cost=st.sampled_from((STEPS_ALONE, TURNS, CoverageCost(0.001, 3600.0), CoverageCost(3600, 0))),
+    covered=st.sampled_from((0.0, 0.3, 0.9)),
+    looked=st.integers(1, 40),
+    seed=st.integers(0, 2**63 - 1),
+)
+def test_wherever_it_is_stopped_the_walk_is_sound_and_repeats_from_its_work(
+    ground, end, cost, covered, looked, seed
+):
+    ground, start = ground
+    done = np.random.default_rng(seed).random(ground.states.shape) < covered
+    done[ground.local(start)] = False
+    problem = CoverageProblem.of(
+        ground, start, covered=done, end=end_of(end, ground, start), cost=cost
+    )
+    config = ColonyConfig(ants=4, velocities=(2, 1), seed=seed)
+    path = plan(problem, AnyOf(looks(looked), after(kicks=500)), config)
+    assert_repeats(problem, path, config)
+
+
+def assert_repeats(problem, path, config, threads=1):
+    again = plan(problem, WorkLimit(path.work), config, threads)
+    assert again.cells.tobytes() == path.cells.tobytes()
+    assert again.work == path.work
+    assert again.cost_s == path.cost_s
+
+
+# Where a search stands: at the first walk, on its way through the first improvement,
+# between kicks, behind the second group of ants.
+STOPS = {
+    "first walk": lambda: looks(1),
+    "improving": lambda: after(proposals=20_000),
+    "kicks": lambda: after(kicks=100),
+    "ants": lambda: after(ants=20),
+    "in between": lambda: looks(33),
+}
+
+
+@pytest.mark.parametrize("cost", [STEPS_ALONE, TURNS], ids=["steps", "turns"])
+@pytest.mark.parametrize("stop", STOPS.values(), ids=STOPS)
+def test_any_number_of_threads_and_any_repetition_find_the_same_path(stop, cost, monkeypatch):
+    ask_often(monkeypatch)
+    problem = CoverageProblem.of(*ROOMS["rooms"], end=(4, 9), cost=cost)
+    config = ColonyConfig(ants=96, velocities=(2, 1), seed=5)
+    path = plan(problem, stop(), config)
+    for threads in (1, 2):
+        assert_repeats(problem, path, config, threads)
+
+
+def test_the_same_seed_gives_the_same_path_and_another_seed_another():
+    problem = CoverageProblem.of(*ROOMS["rooms"], cost=TURNS)
+    paths = {
+        seed: plan(problem, after(proposals=10_000), ColonyConfig(seed=seed)).cells.tobytes()
+        for seed in range(6)
+    }
+    again = plan(problem, after(proposals=10_000), ColonyConfig(seed=4))
+    assert again.cells.tobytes() == paths[4]
+    assert len(set(paths.values())) >= 5
+
+
+@pytest.mark.parametrize("cost", [STEPS_ALONE, TURNS], ids=["steps", "turns"])
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_search_ends_by_itself_and_that_repeats_too(room, cost):
+    ground, start = ROOMS[room]
+    problem = CoverageProblem.of(ground, start, end=start, cost=cost)
+    watched = Watched(never)
+    path = plan(problem, watched)
+    watched.assert_steady()
+    # Proven to be the best, or all of the colony has walked.
+    walked = path.work.ants - (4 if cost.quarter_turn_us else 1)
+    assert walked == FEW_ANTS.ants or path.steps == path.lower_bound_steps
+    assert_repeats(problem, path, FEW_ANTS)
+
+
+@settings(max_examples=60, deadline=None)
+@given(rows=st.integers(1, 200), cols=st.integers(1, 200), number=st.integers(0, 5))
+def test_each_cell_is_of_one_region_and_that_fits_into_the_patch(rows, cols, number):
+    problem = CoverageProblem.of(CoverageLattice.from_free(np.ones((rows, cols), bool)), (0, 0))
+    framed = FramedGround.of(problem)
+    for cells in (regions.ONE_REGION, regions.ONE_REGION + 1):
+        held = np.zeros((rows + 2 * FRAME, framed.width), int)
+        boxes = list(regions.regions_of(framed, cells, number))
+        for box in boxes:
+            inside = np.s_[box.row : box.row + box.rows, box.col : box.col + box.cols]
+            held[inside] += box.labels.reshape(held.shape)[inside] == box.label
+            assert max(box.rows, box.cols) <= regions.EDGE or len(boxes) == 1
+        assert (held[FRAME:-FRAME, FRAME:-FRAME] == 1).all()
+        assert held.sum() == rows * cols
+    walk = np.arange(rows * cols, dtype=np.int32)
+    assert framed.unframed(framed.framed(walk)).tolist() == walk.tolist()
+    assert (framed.ground.needed[framed.framed(walk)] == 1).all()
+    assert framed.ground.needed.sum() == walk.size
+
+
+@pytest.mark.parametrize("home", [False, True], ids=["open", "home"])
+@pytest.mark.parametrize("covered", [0.0, 0.7])
+@pytest.mark.parametrize("cost", [STEPS_ALONE, TURNS], ids=["steps", "turns"])
+@pytest.mark.parametrize("looked", [1, 7, 100, 1500])
+def test_in_regions_it_is_as_sound_and_as_repeatable(monkeypatch, looked, cost, covered, home):
+    take_apart(monkeypatch)
+    config = ColonyConfig(ants=8, velocities=(1,), seed=1)
+    problem = hall(home, cost, covered, cells=2_600)
+    watched = Watched(looks(looked))
+    path = plan(problem, watched, config)
+    assert len(watched.seen) == looked
+    watched.assert_steady()
+    assert path.cost_s <= watched.seen[-1].cost_s
+    if not cost.quarter_turn_us:
+        # What was gained in the region it was stopped in was known before.
+        assert path.cost_s == watched.seen[-1].cost_s
+    assert_repeats(problem, path, config)
+    if looked == 1500:
+        assert path.cost_s < 0.95 * watched.seen[0].cost_s
+
+
+def test_an_interrupt_in_a_region_leaves_the_best_walk_so_far(monkeypatch):
+    take_apart(monkeypatch)
+    problem, interrupt = hall(), Interrupt()
+    watched = Watched(interrupt)
+
+    def in_the_fourth_region(progress):
+        if progress.work.proposals >= 40_000:
+            interrupt.asked.set()
+        return watched(progress)
+
+    path = plan(problem, in_the_fourth_region)
+    first, last = watched.seen[0], watched.seen[-1]
+    assert path.cost_s == last.cost_s < first.cost_s
+    assert path.work == last.work
+    assert last.work.proposals < 50_000
+
+
+def test_a_target_gap_ends_the_search_as_soon_as_it_is_reached(monkeypatch):
+    ask_often(monkeypatch)
+    problem = hall()
+    watched = Watched(GapReached(0.03))
+    path = plan(problem, watched)
+    assert path.gap <= 0.03
+    assert [progress.gap <= 0.03 for progress in watched.seen] == (
+        [False] * (len(watched.seen) - 1) + [True]
+    )
+    assert len(watched.seen) > 2
+
+
+@pytest.mark.parametrize("cost", [STEPS_ALONE, TURNS], ids=["steps", "turns"])
+def test_it_is_asked_often_whether_to_stop(cost):
+    """Counted in proposals, of which a millisecond has some thirty thousand."""
+    grid = building(5_000, 1)
+    problem = CoverageProblem.of(grid.lattice, grid.start, cost=cost)
+    watched = Watched(after(kicks=20))
+    plan(problem, watched)
+    done = [progress.work.proposals for progress in watched.seen]
+    assert max(np.diff(done)) <= 200_000
+    assert len(watched.seen) > 30
+
+
+def test_who_observes_sees_the_trail_and_changes_nothing():
+    problem, seen = CoverageProblem.of(*ROOMS["rooms"]), []
+    config = ColonyConfig(ants=32, seed=2)
+    path = NearOptimal(config).plan(problem, after(kicks=10), seen.append)
+    assert path.cells.tobytes() == plan(problem, after(kicks=10), config).cells.tobytes()
+    (snapshot,) = seen
+    assert snapshot.best_steps == path.steps
+    assert snapshot.ants == path.work.ants
+    walked = tuple(path.cells[1:-1].T)
+    assert snapshot.trail[walked].min() > config.tau0
