@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,12 +17,13 @@ from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.repair import repaired
 from fasaco_edge.planners.table import PLANNERS
 from fasaco_edge.planners.work import SearchProgress
 
 LATTICE, REACH, WALKS, BOUND = "lattice", "reachability", "shortest walks", "lower bound"
-LOCAL_SEARCH = "local search"
-STAGES = (LATTICE, REACH, WALKS, BOUND, LOCAL_SEARCH, *PLANNERS)
+LOCAL_SEARCH, REPAIR = "local search", "repair"
+STAGES = (LATTICE, REACH, WALKS, BOUND, LOCAL_SEARCH, REPAIR, *PLANNERS)
 
 
 def warm_up(report: Callable[[str], None] | None = None) -> None:
@@ -46,7 +48,9 @@ def _stages() -> Iterator[str]:
     yield LOCAL_SEARCH
     # Turns at a price: no walk is proven to be the best, so the search goes on to kicks.
     costly = CoverageProblem.of(lattice, (0, 0), cost=CoverageCost(1.0, 1.0))
-    NearOptimal(ColonyConfig(ants=1, velocities=(1,))).plan(costly, _after_a_kick, ignore)
+    path = NearOptimal(ColonyConfig(ants=1, velocities=(1,))).plan(costly, _after_a_kick, ignore)
+    yield REPAIR
+    repaired(replace(costly, before=path.cells[2:]), path.planner, 0, _after_a_kick)
     for name, make in PLANNERS.items():
         yield name
         make(ColonyConfig(ants=1, velocities=(1,)), 1).plan(problem, never, ignore)

@@ -1,6 +1,7 @@
 """Warming up compiles all that a mission needs: nothing is compiled while a robot waits."""
 
 import importlib
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,8 +12,11 @@ from fasaco_edge.kernels.jit import KERNEL_SOURCES
 from fasaco_edge.mission.events import MapReceived, PlanReady, PoseReceived
 from fasaco_edge.mission.mission import Mission, MissionConfig
 from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
+from fasaco_edge.planners.stopping import WorkLimit
 from fasaco_edge.planners.warmup import STAGES, warm_up
+from fasaco_edge.planners.work import SearchWork
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
 
 
@@ -38,10 +42,13 @@ def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up():
     pose = PoseReceived(StampedPose(Pose2D(1.0, 1.0)))
     asked = mission.step([MapReceived(off_the_bus), pose], 0.0).plan
     assert asked is not None
-    path = Fasaco().plan(asked.problem)
+    path = NearOptimal().plan(asked.problem, WorkLimit(SearchWork(kicks=5)))
     answer = mission.step([PlanReady(asked.number, path, 0.0)], 0.0)
     assert answer.path is not None
     assert mission.coverage() is not None
     walk_figures(asked.problem.lattice, path.cells)
+    again = replace(asked.problem, before=path.cells[::-1].copy())
+    assert NearOptimal().plan(again, WorkLimit(SearchWork(kicks=5))).steps
+    assert Fasaco().plan(asked.problem).steps
 
     assert compiled_signatures() == before
