@@ -196,6 +196,10 @@ class Mission:
         if not len(cells) or self._ground.legal_steps(cells) < len(cells) - 1:
             self._wanted = self._wanted or "the map changed while planning"
             return None
+        if np.array_equal(cells, self.path.ahead):
+            # Nothing to change: whoever drives it need not hear of it again.
+            self._published_at = self._now
+            return None
         return self._publish(cells, asked.reason, event)
 
     def _from_here(self, cells: NDArray[np.int32], here: Cell) -> NDArray[np.int32]:
@@ -293,7 +297,11 @@ class Mission:
         reason, self._wanted = self._wanted, ""
         try:
             problem = CoverageProblem.of(
-                self._lattice, cell, covered=covered, cost=self.config.cost
+                self._lattice,
+                cell,
+                covered=covered,
+                cost=self.config.cost,
+                before=self.path.ahead,
             )
         except NothingToCover:
             return self._done(update)

@@ -301,7 +301,11 @@ def test_a_plan_leaves_out_what_was_driven_while_it_was_made():
     drive.request = None
     for _ in range(4):
         drive.go()
-    assert drive.tell(stale).path.cells.tolist() == [[0, col] for col in range(4, 9)]
+    revision = drive.mission.revision
+    # The rest of the plan is what is being driven: nobody needs to hear of it again.
+    assert drive.tell(stale).path is None
+    assert drive.mission.revision == revision
+    assert drive.mission.path.ahead.tolist() == [[0, col] for col in range(4, 9)]
 
 
 def test_an_answer_nobody_asked_for_changes_nothing():
