@@ -10,6 +10,8 @@ demo: $(STAMP)  ## watch a robot cover a building nobody mapped before
 	$(BIN)/fasaco-edge demo $(ARGS)
 
 test: $(STAMP)  ## all tests
+	# Compiles once what each test would wait for.
+	$(BIN)/fasaco-edge warmup
 	$(BIN)/python -m pytest $(ARGS)
 
 check: $(STAMP)  ## format, lint, types, import contracts
