@@ -132,3 +132,11 @@ def seconds(text: str) -> float:
     if not 0.0 <= number <= 3600.0:
         raise argparse.ArgumentTypeError(f"must be in 0..3600 s, got {text}")
     return number
+
+
+def seconds_above_zero(text: str) -> float:
+    """Read a time [s] above 0, up to an hour."""
+    number = seconds(text)
+    if number == 0.0:
+        raise argparse.ArgumentTypeError(f"must be above 0 s, got {text}")
+    return number

@@ -9,7 +9,14 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bench.benchmark import Benchmark, Report, Say, positive, seconds
+from fasaco_edge.bench.benchmark import (
+    Benchmark,
+    Report,
+    Say,
+    positive,
+    seconds,
+    seconds_above_zero,
+)
 from fasaco_edge.bench.grid_options import add_grid_options, grid_names
 from fasaco_edge.errors import BadConfiguration
 
@@ -32,7 +39,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--budgets",
         nargs="+",
-        type=seconds,
+        type=seconds_above_zero,
         default=[0.02, 0.1, 1.0],
         metavar="S",
         help="plan for so long [s] (default: 0.02 0.1 1; there is a goal for 10, too)",

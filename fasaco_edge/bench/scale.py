@@ -7,7 +7,7 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bench.benchmark import Benchmark, Report, Say, positive, seconds
+from fasaco_edge.bench.benchmark import Benchmark, Report, Say, positive, seconds_above_zero
 from fasaco_edge.errors import BadConfiguration
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--budget-s",
         nargs="+",
-        type=seconds,
+        type=seconds_above_zero,
         default=[],
         metavar="S",
         help="plan for so long [s]: one time for all sizes, or one for each (default: a minute a "

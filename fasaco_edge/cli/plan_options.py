@@ -32,10 +32,12 @@ figures:
   recovered_cells  distinct cells visited twice or more
   n_r_paper        revisits with the way home, to compare with the paper's Table I
   cost_s           seconds the robot drives and turns
-  gap              steps / lower_bound_steps - 1; none where no bound is known
+  gap              steps / lower_bound_steps - 1, of steps whatever turns cost
 
-fasaco searches until its budget ends: a complete walk within milliseconds, then better
-ones by local search, begun anew where the colony's ants lead. --no-local-search is the
+fasaco searches until its budget ends, the walk is proven to be the best, or all ants
+have walked: a complete walk within milliseconds, then better ones by local search,
+begun anew where the colony's ants lead (on up to 8,000 cells; larger grounds have
+local search alone). --no-local-search is the
 paper's colony alone. The colony's options are for fasaco; aco takes all but the
 velocities, the others none.
 """
@@ -72,7 +74,7 @@ def check(args: argparse.Namespace) -> None:
     _require(1 <= args.threads <= 64, "--threads", "be in 1..64", args.threads)
     if args.budget is not None:
         possible = math.isfinite(args.budget) and args.budget > 0.0
-        _require(possible, "--budget", "be above 0 s", args.budget)
+        _require(possible, "--budget", "be finite and above 0 s", args.budget)
     if args.target_gap is not None:
         _require(0.0 <= args.target_gap <= 10.0, "--target-gap", "be in [0, 10]", args.target_gap)
 

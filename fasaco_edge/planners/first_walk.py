@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.colony import FEWEST_OPEN, Rules, walk_ants
 from fasaco_edge.kernels.costs import walk_cost
 from fasaco_edge.kernels.search import Graph
-from fasaco_edge.planners.graph import flat_end, flat_start, scratch_for
+from fasaco_edge.planners.graph import flat_cells, flat_end, flat_start, scratch_for
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.stc import SpanningTree
 from fasaco_edge.planners.sweeps import spiral_stc, zigzag
 
 # An ant of this velocity goes straight on as long as it can.
@@ -26,7 +27,8 @@ def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[tuple[NDArra
 
     The first is that of an ant which always goes where the fewest open neighbours
     are left, Warnsdorff's rule. Where turns count, there follow an ant that goes
-    straight on, the spiral and the zigzag: each is best on some grids.
+    straight on, the spiral, the zigzag and the walk around a spanning tree: each is
+    best on some grids.
     """
     cost = problem.cost
     for walk in _walks(problem, graph):
@@ -39,6 +41,7 @@ def _walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.int32]
         yield _ant(problem, graph, velocity=STRAIGHT_ON)
         yield spiral_stc().walk(problem, graph)
         yield zigzag().walk(problem, graph)
+        yield flat_cells(problem, SpanningTree().plan(problem).cells)
 
 
 def _ant(problem: CoverageProblem, graph: Graph, velocity: int) -> NDArray[np.int32]:

@@ -55,6 +55,13 @@ def cells_of(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[np.in
     return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
 
 
+def flat_cells(problem: CoverageProblem, cells: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return cells (row, col), int32 (n, 2), as flat indices, int32 (n,)."""
+    window = problem.lattice.window
+    flat = (cells[:, 0] - window.row0) * window.cols + cells[:, 1] - window.col0
+    return flat.astype(np.int32)
+
+
 def _flat(problem: CoverageProblem, cell: Cell) -> int:
     row, col = problem.lattice.local(cell)
     return row * problem.lattice.window.cols + col

@@ -7,8 +7,9 @@
    the best of them goes through 2 and 3, and the trail is strengthened along the
    best walk of all, by equation (8): ants begin where the search has been good.
 
-The search ends when it is told to, when the walk meets its lower bound, or when
-all ants have walked. Its work is counted; the same counts give the same walk.
+The search ends when it is told to, when the walk meets its lower bound, when all
+ants have walked, or on a large ground, where no ants start over, when kicks gain
+nothing any more. Its work is counted; the same counts give the same walk.
 """
 
 from __future__ import annotations

@@ -34,6 +34,9 @@ PROPOSALS_AT_ONCE = 30_000
 # Kicks that a region gets in a pass, where there are several.
 KICKS_IN_PASS = 8
 
+# Where there are several regions the search ends after so many passes without gain.
+GAINLESS_PASSES = 10
+
 # Kicks between two looks at the whole walk, where it is one region.
 KICKS_IN_VISIT = 64
 
@@ -94,7 +97,7 @@ class Search:
         # The walk under way and the best of those before it, in framed cells.
         self._walk, self._walk_us = np.empty(0, np.int32), 0
         self._best, self._best_us = self._walk, 0
-        self._since_gain = 0
+        self._since_gain = self._kicks_in_pass = 0
         self._passes = 0
         self._groups = _groups(plan.colony, problem.cells)
         self._colony: Colony | None = None
@@ -105,13 +108,16 @@ class Search:
     def run(self) -> Iterator[None]:
         """Search until nothing is left to do; pause after each piece of work."""
         yield from self._begin()
-        yield from self._improve()
+        if not self._is_proven():
+            yield from self._improve()
         may_start_over = self._is_whole and self._plan.restarts != NEVER
         while not self._is_proven():
             before = self._work
             yield from self._kick()
             # A walk too long for the patch, or that is in no region: there was nothing to kick.
             stuck = self._work == before
+            if not self._is_whole and self._since_gain >= GAINLESS_PASSES * self._kicks_in_pass:
+                return
             if stuck or (self._since_gain >= self._effort.patience and may_start_over):
                 group = next(self._groups, None) if may_start_over else None
                 if group is None:
@@ -135,6 +141,8 @@ class Search:
     def path(self) -> CoveragePath:
         """Return the best walk."""
         self._unload()
+        # A search that was stopped at once has not come to it.
+        self._bound = self._bound or lower_bound_steps(self._problem)
         return CoveragePath(
             cells_of(self._problem, self._framed.unframed(self._best)),
             planner=self._plan.name,
@@ -170,10 +178,10 @@ class Search:
                 self._first_walk_s = time.perf_counter() - self._began
             if not self._walk.size or cost_us < self._walk_us:
                 self._walk, self._walk_us = self._framed.framed(walk), cost_us
-        self._best, self._best_us = self._walk, self._walk_us
+                self._best, self._best_us = self._walk, self._walk_us
+            yield
         self._patch = self._room()
         self._bound = lower_bound_steps(self._problem)
-        yield
 
     def _regions(self) -> Iterator[Box]:
         """Load each region of the next pass in turn."""
@@ -208,11 +216,14 @@ class Search:
                     for proposals in _pieces(at_each, PROPOSALS_AT_ONCE):
                         self._patch.improve(heat_us, proposals, self._random)
                         yield
+                        if self._is_proven():
+                            return
                 self._patch.go_back()
 
     def _kick(self) -> Iterator[None]:
         """Kick the walk in every region."""
         kicks = KICKS_IN_VISIT if self._is_whole else KICKS_IN_PASS
+        self._kicks_in_pass = 0
         for _ in self._regions():
             proposals = self._effort.kick.mixing * self._patch.best_length
             if self._effort.kick.radius >= 0:
@@ -220,9 +231,10 @@ class Search:
             for piece in _pieces(kicks, max(PROPOSALS_AT_ONCE // proposals, 1)):
                 self._patch.kick(self._effort.kick, piece, self._random)
                 self._since_gain += piece
+                self._kicks_in_pass += piece
                 yield
                 if self._is_proven():
-                    break
+                    return
 
     def _start_over(self, cohort: int, velocity: int, streams: NDArray[np.int64]) -> Iterator[None]:
         """Let the next ants walk, on a trail strengthened along the best walk; improve theirs."""

@@ -10,7 +10,7 @@ class SearchWork:
     """Work of a search in counts; with problem, planner and seed they repeat its path.
 
     Attributes:
-        ants: ants that walked.
+        ants: ants that walked, and the sweeps that a search begins with.
         kicks: how often a local search left a local optimum.
         proposals: moves that a local search tried.
     """
