@@ -9,16 +9,12 @@ import sys
 from collections.abc import Sequence
 
 from fasaco_edge import __version__
-from fasaco_edge.cli import bench, demo, maps, plan, record, run, simulate, warmup
+from fasaco_edge.cli import bench, demo, exits, maps, plan, record, run, simulate, warmup
 from fasaco_edge.cli.arguments import with_negative_pairs
 from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
 COMMANDS = (demo, plan, run, record, simulate, bench, maps, warmup)
-
-EXIT_ERROR = 1
-EXIT_CONFIG = 78  # EX_CONFIG of sysexits.h: a service must not be started again
-EXIT_INTERRUPTED = 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -33,16 +29,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     except FasacoError as error:
         return _fail(error)
     except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
+        return exits.INTERRUPTED
     except SystemError as error:
         # What numba makes of Ctrl-C while a kernel runs.
         if isinstance(error.__cause__, KeyboardInterrupt):
-            return EXIT_INTERRUPTED
+            return exits.INTERRUPTED
         raise
     except BrokenPipeError:
         # The reader has seen enough (``| head``); nothing is left to be flushed to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_ERROR
+        return exits.ERROR
     return code
 
 
@@ -72,4 +68,4 @@ def _fail(error: FasacoError) -> int:
     print(f"fasaco-edge: {error}", file=sys.stderr)
     if error.hint:
         print(f"  hint: {error.hint}", file=sys.stderr)
-    return EXIT_CONFIG if isinstance(error, BadConfiguration) else EXIT_ERROR
+    return exits.CONFIG if isinstance(error, BadConfiguration) else exits.ERROR

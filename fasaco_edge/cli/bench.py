@@ -9,6 +9,7 @@ from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.bench.table import BENCHMARKS
+from fasaco_edge.cli import exits
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from fasaco_edge.bench.benchmark import Benchmark, Report
     from fasaco_edge.cli.arguments import Subparsers
 
-EXIT_GOAL_MISSED = 1
-EXIT_INTERRUPTED = 130
 WIDTH = 80
 
 EPILOG = """\
@@ -31,7 +30,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command and its benchmarks."""
     parser = commands.add_parser(
         "bench",
-        help="measure speed, footprint, latency, walks, scale and the paper's Table I",
+        help="measure speed, footprint, latency, walks, missions, scale and the paper's Table I",
         description="Measure this installation on this machine.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -58,7 +57,7 @@ def _add(
     benchmark.add_options(parser)
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     parser.add_argument(
-        "--check", action="store_true", help=f"exit with {EXIT_GOAL_MISSED} if a goal is missed"
+        "--check", action="store_true", help=f"exit with {exits.ERROR} if a goal is missed"
     )
     parser.set_defaults(benchmark=benchmark)
 
@@ -81,9 +80,9 @@ def run(args: argparse.Namespace) -> int:
     for file in args.benchmark.write(args, samples):
         terminal.err().print(f"wrote {file}")
     if interrupted:
-        return EXIT_INTERRUPTED
+        return exits.INTERRUPTED
     missed = any(goal.met is False for goal in report.goals)
-    return EXIT_GOAL_MISSED if args.check and missed else 0
+    return exits.ERROR if args.check and missed else exits.OK
 
 
 def _measure(benchmark: Benchmark[Any], args: argparse.Namespace) -> tuple[list[Any], bool]:

@@ -6,10 +6,12 @@ import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fasaco_edge.cli import exits
+from fasaco_edge.cli.interrupts import ctrl_c_asks
 from fasaco_edge.cli.plan_options import ANYWHERE, EPILOG, HOME, add_options, check, settle
 
 if TYPE_CHECKING:
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from fasaco_edge.planners.path import CoveragePath
     from fasaco_edge.planners.planner import StoppingCriterion
     from fasaco_edge.planners.problem import CoverageProblem
+    from fasaco_edge.planners.stopping import Interrupt
     from fasaco_edge.planners.work import SearchProgress
 
 
@@ -44,6 +47,7 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.cli.warmup import compile_kernels
     from fasaco_edge.grid.map_files import find_map
     from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
+    from fasaco_edge.planners.stopping import Interrupt
 
     settle(args)
     check(args)
@@ -61,8 +65,10 @@ def run(args: argparse.Namespace) -> int:
     compile_kernels()
     lattice, grid, file = _read(args)
     problem = _pose(args, lattice, file)
-    path, wall_s, cpu_s = _plan(args, colony, problem)
-    figures = figures_of(args, problem, path, wall_s, cpu_s)
+    asked = Interrupt()
+    with ctrl_c_asks(asked.asked.set):
+        path, search = _plan(args, colony, problem, asked)
+    figures = figures_of(args, problem, path, search)
     if args.path_out is not None:
         with writing(args.path_out):
             np.savetxt(args.path_out, path.cells, "%d", ",", header="row,col", comments="")
@@ -70,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         with writing(args.png):
             draw(args, args.png, lattice, grid, path, figures)
     print_figures(args, figures)
-    return 0
+    return exits.INTERRUPTED if asked.asked.is_set() else exits.OK
 
 
 def _read(args: argparse.Namespace) -> tuple[CoverageLattice, OccupancyGrid | None, Path]:
@@ -106,9 +112,9 @@ def _start(args: argparse.Namespace, lattice: CoverageLattice, file: Path) -> Ce
 
 
 def _plan(
-    args: argparse.Namespace, colony: ColonyConfig, problem: CoverageProblem
-) -> tuple[CoveragePath, float, float]:
-    """Plan with a progress bar; return the path, wall and processor seconds.
+    args: argparse.Namespace, colony: ColonyConfig, problem: CoverageProblem, asked: Interrupt
+) -> tuple[CoveragePath, dict[str, Any]]:
+    """Plan with a progress bar; return the path and the figures of the search itself.
 
     A planner that knows no lower bound is given one, for its path and for ``--target-gap``.
     """
@@ -119,28 +125,37 @@ def _plan(
 
     planner = planner_of(args.planner, colony, args.threads, args.local_search)
     bound = 0 if args.local_search else lower_bound_steps(problem)
-    is_over = _criterion(args)
+    criteria = _criteria(args, asked)
+    ended_by = "the search"
     with watching(args, colony) as show:
 
         def stop(search: SearchProgress) -> bool:
+            nonlocal ended_by
             known = replace(search, lower_bound_steps=max(search.lower_bound_steps, bound))
             show(known)
-            return is_over(known)
+            over = [name for name, is_over in criteria.items() if is_over(known)]
+            ended_by = over[0] if over else ended_by
+            return bool(over)
 
         wall, cpu = time.perf_counter(), time.process_time()
         path = planner.plan(problem, stop, ignore)
-        wall_s, cpu_s = time.perf_counter() - wall, time.process_time() - cpu
+        search = {
+            "ended_by": ended_by,
+            "first_walk_ms": round(1e3 * path.first_walk_s, 3),
+            "wall_s": round(time.perf_counter() - wall, 6),
+            "cpu_s": round(time.process_time() - cpu, 6),
+        }
     known = max(path.lower_bound_steps, bound)
-    return replace(path, lower_bound_steps=known), wall_s, cpu_s
+    return replace(path, lower_bound_steps=known), search
 
 
-def _criterion(args: argparse.Namespace) -> StoppingCriterion:
-    """Return what ends the search early; a budget begins to run here."""
-    from fasaco_edge.planners.stopping import AnyOf, GapReached, TimeBudget
+def _criteria(args: argparse.Namespace, asked: Interrupt) -> dict[str, StoppingCriterion]:
+    """Return what ends the search early, by its name; a budget begins to run here."""
+    from fasaco_edge.planners.stopping import GapReached, TimeBudget
 
-    criteria: list[StoppingCriterion] = []
-    if args.budget is not None:
-        criteria.append(TimeBudget(args.budget))
+    criteria: dict[str, StoppingCriterion] = {"Ctrl-C": asked}
     if args.target_gap is not None:
-        criteria.append(GapReached(args.target_gap))
-    return AnyOf(*criteria)
+        criteria["target gap"] = GapReached(args.target_gap)
+    if args.budget is not None:
+        criteria["budget"] = TimeBudget(args.budget)
+    return criteria

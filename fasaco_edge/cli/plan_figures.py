@@ -21,10 +21,9 @@ def figures_of(
     args: argparse.Namespace,
     problem: CoverageProblem,
     path: CoveragePath,
-    wall_s: float,
-    cpu_s: float,
+    search: dict[str, Any],
 ) -> dict[str, Any]:
-    """Return the figures of a walk that took so long to find, as JSON values."""
+    """Return the figures of a walk and of the search for it, as JSON values."""
     from fasaco_edge.planners.path import walk_figures
 
     walk = asdict(walk_figures(problem.lattice, path.cells))
@@ -48,9 +47,12 @@ def figures_of(
         "lower_bound_steps": path.lower_bound_steps,
         "gap": None if path.gap is None else round(path.gap, 6),
         "unreachable_cells": int(np.count_nonzero(problem.unreachable)),
-        "first_walk_ms": round(1e3 * path.first_walk_s, 3),
-        "wall_s": round(wall_s, 6),
-        "cpu_s": round(cpu_s, 6),
+        "speed_m_s": args.speed_m_s,
+        "turn_s": args.turn_s,
+        "budget_s": args.budget,
+        "target_gap": args.target_gap,
+        "threads": args.threads,
+        **search,
     }
 
 
@@ -66,7 +68,8 @@ def draw(
     from fasaco_edge.drawing import draw_walk
 
     ants = path.work.ants
-    colony = f" {figures['velocities']}, {ants} ants, seed {path.seed}" if ants else ""
+    counted = "1 ant" if ants == 1 else f"{ants} ants"
+    colony = f" {figures['velocities']}, {counted}, seed {path.seed}" if ants else ""
     search = f", {path.work.kicks} kicks" if args.local_search else ""
     title = path.planner + colony + search
     lines = [

@@ -37,6 +37,9 @@ def cache_folder() -> Path:
     given = os.environ.get("NUMBA_CACHE_DIR")
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     base = Path(given) if given else Path(home) / "fasaco-edge"
+    if base.name.startswith("kernels-"):
+        # Handed down by a process that set it below: not a folder within the folder.
+        base = base.parent
     # Straight in the sticky temporary folder, where nobody else can move it away.
     temporary = Path(tempfile.gettempdir()) / f"fasaco-edge-{os.getuid()}-{name}"
     for folder in (base / name, temporary):

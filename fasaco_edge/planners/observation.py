@@ -1,4 +1,4 @@
-"""What a search lets others see: values, offered after every cohort."""
+"""What a search lets others see: values, offered after every cohort or restart."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fasaco_edge.grid.geometry import Window
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColonySnapshot:
-    """The colony after a cohort.
+    """The colony after a cohort, or where local search starts over.
 
     Attributes:
         window: which cells of the lattice ``trail`` spans.

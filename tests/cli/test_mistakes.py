@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import time
@@ -159,17 +160,27 @@ def test_a_reader_that_has_seen_enough_is_no_error(folder):
     assert "Exception ignored" not in said
 
 
-def test_ctrl_c_ends_a_plan(folder):
-    np.save("large.npy", np.ones((900, 900), bool))
-    command = [*PROGRAM, "plan", "large.npy", "--budget", "60"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT) as process:
+def test_ctrl_c_ends_a_plan_with_the_best_walk_so_far(folder):
+    pillars = np.ones((300, 300), bool)
+    pillars[5::10, 5::10] = False
+    np.save("large.npy", pillars)
+    # Turns at a price: no walk is proven to be the best, so only Ctrl-C ends the search.
+    command = [*PROGRAM, "plan", "large.npy", "--budget", "60", "--turn-s", "2", "--json"]
+    command += ["--path-out", "walk.csv"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT
+    ) as process:
         # Not before it is at work: Python's own start cannot be interrupted in order.
         time.sleep(4.0)
         process.send_signal(signal.SIGINT)
-        said = process.stderr.read()
-        code = process.wait(20)
+        printed, said = process.communicate(timeout=20)
     assert "Traceback" not in said
-    assert code == 130
+    assert process.returncode == 130
+    figures = json.loads(printed)
+    assert figures["ended_by"] == "Ctrl-C"
+    walk = np.loadtxt("walk.csv", int, delimiter=",", skiprows=1)
+    assert len(walk) == figures["steps"] + 1
+    assert len(np.unique(walk, axis=0)) == np.count_nonzero(pillars)
 
 
 def test_a_demo_that_runs_out_of_time_says_so(folder):

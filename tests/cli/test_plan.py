@@ -35,7 +35,8 @@ KEYS = {
     ),
     *("revisits", "recovered_cells", "n_r_paper", "turns_90", "turns_180", "length_m"),
     *("kicks", "proposals", "cost_s", "lower_bound_steps", "gap", "first_walk_ms"),
-    *("unreachable_cells", "wall_s", "cpu_s"),
+    *("unreachable_cells", "wall_s", "cpu_s", "ended_by"),
+    *("speed_m_s", "turn_s", "budget_s", "target_gap", "threads"),
 }
 
 
@@ -214,12 +215,14 @@ def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
     figures, walk = plan(grid_file, *options, "--no-local-search")
     check(figures, walk, cells_in(grid_file), (0, 0))
     assert figures["ants"] < 1_000_000
-    assert 0.05 <= figures["wall_s"] < 20
+    assert figures["ended_by"] == "budget"
+    assert figures["wall_s"] < 20
     # Turns at a price: no walk is proven to be the best, so only the clock ends the search.
     figures, walk = plan(grid_file, *options, "--turn-s", 1)
     check(figures, walk, cells_in(grid_file), (0, 0), turn_s=1.0)
     assert figures["kicks"] > 0
-    assert 0.05 <= figures["wall_s"] < 20
+    assert figures["ended_by"] == "budget"
+    assert figures["wall_s"] < 20
 
 
 def test_a_target_gap_ends_the_search_at_the_first_walk_that_is_good_enough(plan, grid_file):

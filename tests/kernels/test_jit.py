@@ -135,3 +135,10 @@ def test_twins_agree_without_the_compiler():
     )
     assert done.returncode == 0, done.stdout[-3000:]
     assert " passed" in done.stdout
+
+
+def test_a_child_process_uses_the_same_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    parents = jit.cache_folder()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(parents))
+    assert jit.cache_folder() == parents
