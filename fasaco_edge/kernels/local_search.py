@@ -157,12 +157,16 @@ def _flip_corner(
     if corner == here or not (leads(ground, before, corner) and leads(ground, after, corner)):
         return
     turn = prices.quarter_turn_us
+    delta = 0
     if turn:
-        delta = -_turn_at(walk, index - 1, turn) - _turn_at(walk, index + 1, turn)
+        delta -= _turn_at(walk, index - 1, turn) + _turn_at(walk, index + 1, turn)
         if index > 1:
             delta += turning(cells[index - 2], before, corner, turn)
         if index + 2 < walk.counts[LENGTH]:
             delta += turning(corner, after, cells[index + 2], turn)
+    if delta >= 0 and index < prices.held:
+        return
+    if turn:
         if not accepts(delta, heat_us, random):
             return
         walk.counts[COST] += delta
@@ -261,8 +265,10 @@ def _flip_square(
     if not _is_flip(ground, walk, first, last, back, prices.free_end):
         return
     turn = prices.quarter_turn_us
+    delta = _turns_of_flip(walk, first, last, turn) if turn else 0
+    if delta >= 0 and first + 1 < prices.held:
+        return
     if turn:
-        delta = _turns_of_flip(walk, first, last, turn)
         if not accepts(delta, heat_us, random):
             return
         walk.counts[COST] += delta
@@ -282,7 +288,7 @@ def _detour(
 ) -> None:
     """Go from visit ``index`` to the next around a square, or to a side and back first."""
     length = walk.counts[LENGTH]
-    if index + 1 >= length or length + 2 > walk.cells.size:
+    if index + 1 >= length or length + 2 > walk.cells.size or index + 1 < prices.held:
         return
     cells = walk.cells
     here, after = cells[index], cells[index + 1]

@@ -64,16 +64,18 @@ class Walk(NamedTuple):
 
 
 class Prices(NamedTuple):
-    """What a walk costs, and whether its last cell is free to be another.
+    """What a walk costs, whether its last cell is free to be another, and what is to hold still.
 
     Attributes:
         step_us, quarter_turn_us: [us]; a half turn is two quarter-turns.
         free_end: whether the walk may end anywhere.
+        held: so many of the first visits are changed only where something is gained.
     """
 
     step_us: int
     quarter_turn_us: int
     free_end: bool
+    held: int = 0
 
 
 @inlined

@@ -65,15 +65,22 @@ def effort_for(cost: CoverageCost) -> Effort:
 
 
 def repair_for(cost: CoverageCost) -> KickRules:
-    """Return how to improve a mended walk: near what changed, and nothing that gains nothing."""
-    unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5 if cost.quarter_turn_us else 0
-    return KickRules(
-        limit=300,
-        mixing=40,
-        radius=6,
-        heat_us=unit // 2,
+    """Return how to improve a mended walk: nothing is taken that gains nothing.
+
+    What is kicked is the neighbourhood of what changed, small enough to be mixed whole
+    where turns are free.
+    """
+    rules = KickRules(
+        limit=100,
+        mixing=6,
+        radius=WHOLE_WALK,
+        heat_us=0,
         patience_us=0,
-        loops_of_256=128 if unit else 256,
+        loops_of_256=256,
         steady=True,
         strict=True,
     )
+    if not cost.quarter_turn_us:
+        return rules
+    unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
+    return rules._replace(mixing=40, radius=6, heat_us=unit // 2, loops_of_256=128)

@@ -103,6 +103,10 @@ class Patch:
         self._loaded_us, self._loaded_length = int(self._walk.counts[COST]), length
         return True
 
+    def hold(self, visits: int) -> None:
+        """Let the first so many visits change only where something is gained, from now on."""
+        self._prices = self._prices._replace(held=visits)
+
     @property
     def gain_us(self) -> int:
         """By how much the best walk here costs more than the one loaded [us], so 0 or less."""

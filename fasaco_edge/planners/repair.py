@@ -1,8 +1,10 @@
 """Repair: the walk that was still to be driven, mended, and improved where it changed.
 
 What holds stays as it is, cell by cell: a change is taken only if it gains
-something. A robot sees its path hold still wherever the map did, and what one
-search found serves the next.
+something, and of what lies just ahead of the robot first only the change itself.
+A robot sees its path hold still wherever the map did, and what one search found
+serves the next. What a repair costs follows from what changed: all but a few
+passes over the walk happens in the neighbourhoods of that.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.costs import walk_cost
+from fasaco_edge.kernels.neighbourhood import changed_cells
 from fasaco_edge.kernels.walk_array import Prices
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.cost import MICROSECONDS
@@ -21,26 +24,27 @@ from fasaco_edge.planners.effort import repair_for
 from fasaco_edge.planners.framed import FramedGround
 from fasaco_edge.planners.graph import cells_of
 from fasaco_edge.planners.mending import framed_cells, mended
+from fasaco_edge.planners.neighbourhoods import Neighbourhood, neighbourhoods
 from fasaco_edge.planners.patch import Patch
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.regions import is_one_region, regions_of
-from fasaco_edge.planners.work import SearchProgress
+from fasaco_edge.planners.work import NO_WORK, SearchProgress
 
-# Kicks that one repair makes, and how many before it is asked whether to stop.
-KICKS = 30
-KICKS_AT_ONCE = 5
+# Kicks that a neighbourhood gets, and how many before it is asked whether to stop.
+KICKS = 100
+KICKS_AT_ONCE = 20
+
+# So many of them hold still what is just ahead.
+HELD_KICKS = 60
+
+# The robot is about to drive these cells: five metres of common ones.
+HELD = 18
 
 
 def can_repair(problem: CoverageProblem) -> bool:
-    """Tell whether there is a walk to repair, on a ground small enough to be looked at whole."""
-    rows, cols = problem.to_cover.shape
-    return (
-        problem.before is not None
-        and len(problem.before) > 0
-        and is_one_region(rows, cols, problem.cells)
-    )
+    """Tell whether there is a walk to repair."""
+    return problem.before is not None and len(problem.before) > 0
 
 
 def repaired(
@@ -70,39 +74,73 @@ class _Repair:
         self._problem = problem
         self._framed = FramedGround.of(problem)
         self._prices = Prices(cost.step_us, cost.quarter_turn_us, problem.end is None)
+        self._rules = repair_for(cost)
         self._walk = mended(problem, self._framed, problem.before)
-        self._touched = _touched(framed_cells(problem, self._framed, problem.before), self._walk)
         self._first_walk_s = time.perf_counter() - began
+        before = framed_cells(problem, self._framed, problem.before)
+        self._changed = _changed(self._framed, before, self._walk)
+        self._cost_us = self._count_cost()
         self._bound = lower_bound_steps(problem)
         word = np.random.SeedSequence((seed, len(self._walk))).generate_state(1, np.uint64)
         self._random = np.maximum(word, np.uint64(1))
-        self._box = next(regions_of(self._framed, problem.cells, 0))
-        self._patch = Patch(self._framed.rows, self._framed.cols, 2 * self._walk.size, 1)
-        self._patch.load(self._framed.ground, self._walk, self._box, self._prices)
+        self._work = NO_WORK
+        # What is under way: the patch with the walk's part, and where it lies.
+        self._loaded: tuple[Patch, Neighbourhood] | None = None
 
     def run(self) -> Iterator[None]:
-        """Improve the walk around what changed, then by kicks; pause after each piece."""
-        rules = repair_for(self._problem.cost)
-        if self._touched.size:
-            self._patch.touch_up(self._touched, rules, self._random)
+        """Improve the walk where it changed, one neighbourhood after the other."""
+        for place in neighbourhoods(self._framed, self._walk[:HELD], self._changed):
+            patch = place.patch(self._walk)
+            if patch.load(self._framed.ground, self._walk, place.box, self._prices):
+                self._loaded = patch, place
+                yield from self._improve(patch, place)
+                self._unload()
+
+    def _improve(self, patch: Patch, place: Neighbourhood) -> Iterator[None]:
+        """Improve around what changed, then kick; pause after each piece.
+
+        Moves that gain nothing carry a walk about: first where the robot is not yet.
+        """
+        for held in (HELD, 0) if place.is_first else (0,):
+            patch.hold(held)
+            patch.touch_up(place.changed, self._rules, self._random)
             yield
-        for _ in range(0, KICKS, KICKS_AT_ONCE):
+        for kicks in range(0, KICKS, KICKS_AT_ONCE):
             if not self._prices.quarter_turn_us and self.progress().steps == self._bound:
                 return
-            self._patch.kick(rules, KICKS_AT_ONCE, self._random)
+            patch.hold(HELD if place.is_first and kicks < HELD_KICKS else 0)
+            patch.kick(self._rules, KICKS_AT_ONCE, self._random)
             yield
+
+    def _unload(self) -> None:
+        """Put what is under way back into the walk."""
+        if self._loaded is None:
+            return
+        patch, place = self._loaded
+        self._walk = patch.put_back(self._framed.ground, self._walk, place.box)
+        self._cost_us, self._work = self._count_cost(), self._work + patch.work
+        self._loaded = None
+
+    def _count_cost(self) -> int:
+        prices = self._prices
+        return int(walk_cost(self._walk, prices.step_us, prices.quarter_turn_us))
 
     def progress(self) -> SearchProgress:
         """Return how far it is."""
-        walk = self._best()
-        cost_us = walk_cost(walk, self._prices.step_us, self._prices.quarter_turn_us)
-        return SearchProgress(self._patch.work, cost_us / MICROSECONDS, walk.size - 1, self._bound)
+        cost_us, steps, work = self._cost_us, self._walk.size - 1, self._work
+        if self._loaded is not None:
+            patch, _ = self._loaded
+            cost_us += patch.gain_us
+            steps += patch.longer_by
+            work += patch.work
+        return SearchProgress(work, cost_us / MICROSECONDS, steps, self._bound)
 
     def path(self, name: str, seed: int) -> CoveragePath:
         """Return the walk as it is now."""
+        self._unload()
         progress = self.progress()
         return CoveragePath(
-            cells_of(self._problem, self._framed.unframed(self._best())),
+            cells_of(self._problem, self._framed.unframed(self._walk)),
             planner=name,
             seed=seed,
             work=progress.work,
@@ -111,21 +149,19 @@ class _Repair:
             first_walk_s=self._first_walk_s,
         )
 
-    def _best(self) -> NDArray[np.int32]:
-        return self._patch.put_back(self._framed.ground, self._walk, self._box)
 
+def _changed(
+    framed: FramedGround, before: NDArray[np.int32], walk: NDArray[np.int32]
+) -> NDArray[np.int32]:
+    """Return the walk's cells at steps that one walk takes more often, int32 (n,), in its order.
 
-def _touched(before: NDArray[np.int32], walk: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the cells at steps that one walk takes more often than the other, int32 (n,)."""
-    old, new = _steps(before), _steps(walk)
-    steps, where = np.unique(np.concatenate((old, new)), axis=0, return_inverse=True)
-    where = where.ravel()
-    times = np.bincount(where[len(old) :], minlength=len(steps))
-    times -= np.bincount(where[: len(old)], minlength=len(steps))
-    # The part that was driven since is gone from the old walk's beginning, no change.
-    return np.intersect1d(steps[times != 0], walk).astype(np.int32)
-
-
-def _steps(walk: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return a walk's steps, whichever way they are taken, int32 (n, 2)."""
-    return np.sort(np.column_stack((walk[:-1], walk[1:])), axis=1)
+    The part that was driven since is gone from the old walk's beginning, no change.
+    """
+    ground = framed.ground
+    listed = np.empty(2 * (before.size + walk.size), np.int32)
+    times = np.zeros((ground.bound, 2), np.int32)
+    size = changed_cells(ground, before, walk, times, listed)
+    place = np.full(ground.bound, -1, np.int32)
+    place[walk[::-1]] = np.arange(walk.size - 1, -1, -1, dtype=np.int32)
+    visits = np.unique(place[listed[:size]])
+    return walk[visits[visits >= 0]]

@@ -7,9 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.grid.lattice import CoverageLattice, Footprint
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
+from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
+from fasaco_edge.kernels.changes import Box
+from fasaco_edge.kernels.free_pixels import tally_free
+from fasaco_edge.kernels.reach import update_reach
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
@@ -21,9 +25,10 @@ from fasaco_edge.planners.repair import repaired
 from fasaco_edge.planners.table import PLANNERS
 from fasaco_edge.planners.work import SearchProgress
 
-LATTICE, REACH, WALKS, BOUND = "lattice", "reachability", "shortest walks", "lower bound"
+LATTICE, CHANGES, REACH = "lattice", "changes of the map", "reachability"
+WALKS, BOUND = "shortest walks", "lower bound"
 LOCAL_SEARCH, REPAIR = "local search", "repair"
-STAGES = (LATTICE, REACH, WALKS, BOUND, LOCAL_SEARCH, REPAIR, *PLANNERS)
+STAGES = (LATTICE, CHANGES, REACH, WALKS, BOUND, LOCAL_SEARCH, REPAIR, *PLANNERS)
 
 
 def warm_up(report: Callable[[str], None] | None = None) -> None:
@@ -38,7 +43,10 @@ def _stages() -> Iterator[str]:
     # Read-only, as maps off the bus are: numba compiles for that apart.
     cells = np.zeros((4, 4), np.int8)
     grid = OccupancyGrid(GridGeometry(4, 4, 1.0, Pose2D(0.0, 0.0)), cells)
-    lattice = CoverageLattice.from_map(grid, Footprint(cell_m=1.0, robot_radius_m=0.4))
+    footprint = Footprint(cell_m=1.0, robot_radius_m=0.4)
+    lattice = CoverageLattice.from_map(grid, footprint)
+    yield CHANGES
+    _take_changes_in(grid, lattice, footprint)
     yield REACH
     problem = CoverageProblem.of(lattice, (0, 0))
     yield WALKS
@@ -54,6 +62,18 @@ def _stages() -> Iterator[str]:
     for name, make in PLANNERS.items():
         yield name
         make(ColonyConfig(ants=1, velocities=(1,)), 1).plan(problem, never, ignore)
+
+
+def _take_changes_in(grid: OccupancyGrid, lattice: CoverageLattice, footprint: Footprint) -> None:
+    cells = np.zeros((4, 5), np.int8)
+    cells[1, 1] = OCCUPIED
+    grown = OccupancyGrid(GridGeometry(4, 5, 1.0, Pose2D(0.0, 0.0)), cells)
+    change = LatticeChange.between((grid, grown), lattice, footprint)
+    steps, reachable = change.after.steps, np.ones((4, 5), np.bool_)
+    update_reach(steps, steps, change.cells.copy(), reachable, 0, 0)
+    raster, _ = grid.geometry.on_raster()
+    place, counts = placement_on(raster, footprint.cell_m), np.zeros((4, 5), np.int32)
+    tally_free(pixels_of(grid), pixels_of(grown), Box(0, 0, 4, 5), 25, place, counts, 0, 0)
 
 
 def _after_a_kick(progress: SearchProgress) -> bool:

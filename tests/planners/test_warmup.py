@@ -1,15 +1,16 @@
 """Warming up compiles all that a mission needs: nothing is compiled while a robot waits."""
 
 import importlib
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.kernels.jit import KERNEL_SOURCES
-from fasaco_edge.mission.events import MapReceived, PlanReady, PoseReceived
+from fasaco_edge.mission.events import MapReceived, PatchReceived, PlanReady, PoseReceived
 from fasaco_edge.mission.mission import Mission, MissionConfig
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.near_optimal import NearOptimal
@@ -17,7 +18,12 @@ from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.stopping import WorkLimit
 from fasaco_edge.planners.warmup import STAGES, warm_up
 from fasaco_edge.planners.work import SearchWork
-from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
+from fasaco_edge.wire.maps import (
+    decode_map_update,
+    decode_occupancy_grid,
+    encode_map_update,
+    encode_occupancy_grid,
+)
 
 
 def compiled_signatures() -> set[str]:
@@ -28,6 +34,19 @@ def compiled_signatures() -> set[str]:
         for name, kernel in vars(module).items()
         for signature in getattr(kernel, "signatures", ())
     }
+
+
+def changes(grid: OccupancyGrid) -> Iterator[MapReceived | PatchReceived]:
+    """An update, a map with another pixel, one that has grown, and one that has moved."""
+    update = MapPatch(Window(30, 30, 32, 32), np.full((2, 2), 100, np.int8))
+    yield PatchReceived(decode_map_update(encode_map_update(update)))
+    cells = grid.cells.copy()
+    cells[-5, 3] = 100
+    wider = np.pad(cells, ((0, 9), (0, 7)), constant_values=-1)
+    for pixels, x in ((cells, 0.0), (wider, 0.0), (wider, 0.02)):
+        placed = GridGeometry(*pixels.shape, 0.05, Pose2D(x, 0.0))
+        payload = encode_occupancy_grid(OccupancyGrid(placed, pixels))
+        yield MapReceived(decode_occupancy_grid(payload))
 
 
 def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up():
@@ -50,5 +69,8 @@ def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up():
     again = replace(asked.problem, before=path.cells[::-1].copy())
     assert NearOptimal().plan(again, WorkLimit(SearchWork(kicks=5))).steps
     assert Fasaco().plan(asked.problem).steps
+    for event in changes(off_the_bus):
+        assert mission.step([event], 1.0).faults == ()
+        assert mission.coverage() is not None
 
     assert compiled_signatures() == before
