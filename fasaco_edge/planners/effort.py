@@ -83,4 +83,4 @@ def repair_for(cost: CoverageCost) -> KickRules:
     if not cost.quarter_turn_us:
         return rules
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
-    return rules._replace(mixing=40, radius=6, heat_us=unit // 2, loops_of_256=128)
+    return rules._replace(mixing=40, radius=6, heat_us=unit * 3 // 2, loops_of_256=128)
