@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+# A raster's corner is told in this many parts of a pixel: a map that grows by whole
+# pixels stays on its raster, also where its origin is rounded to float32.
+RASTER_STEPS = 2048
+
 
 @dataclass(frozen=True, slots=True)
 class Pose2D:
@@ -40,12 +44,46 @@ class Window:
         row1, col1 = min(self.row1, other.row1), min(self.col1, other.col1)
         return Window(row0, col0, row1, col1) if row0 < row1 and col0 < col1 else None
 
+    def moved(self, rows: int, cols: int) -> Window:
+        """Return the rectangle so many rows and columns further on."""
+        return Window(self.row0 + rows, self.col0 + cols, self.row1 + rows, self.col1 + cols)
+
+    def without(self, hole: Window) -> tuple[Window, ...]:
+        """Return up to four rectangles that together are this window less ``hole``."""
+        common = self.intersection(hole)
+        if common is None:
+            return (self,) if self.rows > 0 and self.cols > 0 else ()
+        parts = (
+            Window(self.row0, self.col0, common.row0, self.col1),
+            Window(common.row0, self.col0, common.row1, common.col0),
+            Window(common.row0, common.col1, common.row1, self.col1),
+            Window(common.row1, self.col0, self.row1, self.col1),
+        )
+        return tuple(part for part in parts if part.rows > 0 and part.cols > 0)
+
     def slices_in(self, outer: Window) -> tuple[slice, slice]:
         """Return the index of this window in an array that spans ``outer``."""
         return (
             slice(self.row0 - outer.row0, self.row1 - outer.row0),
             slice(self.col0 - outer.col0, self.col1 - outer.col0),
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Raster:
+    """The unbounded raster of pixels that a map shows a window of.
+
+    Attributes:
+        resolution: edge of a pixel [m].
+        yaw: of the raster in the map frame [rad].
+        right, up: where pixel (0, 0) begins, seen from the map frame's origin along the
+            raster's own axes [pixels]; in [0, 1), multiples of 1 / ``RASTER_STEPS``.
+    """
+
+    resolution: float
+    yaw: float
+    right: float
+    up: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +112,20 @@ class GridGeometry:
         cos, sin = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
         u, v = col * self.resolution, row * self.resolution
         return self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v
+
+    def on_raster(self) -> tuple[Raster, Window]:
+        """Return the raster this grid lies on, and which of its pixels they are.
+
+        Two grids lie on one raster if they differ by whole pixels. The raster is off the
+        grid by up to half a step, 1 / 4096 of a pixel, on either axis.
+        """
+        cos, sin = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
+        x, y = self.origin.x / self.resolution, self.origin.y / self.resolution
+        col, right = divmod(round((cos * x + sin * y) * RASTER_STEPS), RASTER_STEPS)
+        row, up = divmod(round((cos * y - sin * x) * RASTER_STEPS), RASTER_STEPS)
+        window = Window(row, col, row + self.rows, col + self.cols)
+        raster = Raster(self.resolution, self.origin.yaw, right / RASTER_STEPS, up / RASTER_STEPS)
+        return raster, window
 
     def bounds(self) -> tuple[float, float, float, float]:
         """Return (x_min, y_min, x_max, y_max) [m] of the grid in the map frame."""

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import MapTooLarge
-from fasaco_edge.grid.geometry import GridGeometry, Window
+from fasaco_edge.grid.geometry import GridGeometry, Raster, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.classification import Cells, classify_cells
 from fasaco_edge.kernels.directions import EAST, NORTH, SOUTH, WEST
-from fasaco_edge.kernels.footprint import Placement, Thresholds, classify_cells
+from fasaco_edge.kernels.footprint import Pixels, Placement, Thresholds
 from fasaco_edge.kernels.states import BLOCKED, COVERABLE, UNKNOWN
 
 __all__ = ["BLOCKED", "COVERABLE", "UNKNOWN", "Cell", "CoverageLattice", "Footprint"]
@@ -48,6 +49,11 @@ class Footprint:
     robot_radius_m: float
     free_at_most: int = 25
     occupied_at_least: int = 65
+
+    @property
+    def thresholds(self) -> Thresholds:
+        """What counts as free and as occupied."""
+        return Thresholds(self.free_at_most, self.occupied_at_least)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,18 +88,14 @@ class CoverageLattice:
         Raises:
             MapTooLarge: it would have more than ``max_cells`` cells.
         """
-        cell_m = footprint.cell_m
-        window = _window_over(grid.geometry, cell_m, max_cells)
-        states = np.empty((window.rows, window.cols), np.uint8)
-        steps = np.empty_like(states)
-        classify_cells(
-            grid.cells,
-            _placement(grid.geometry, window, footprint),
-            Thresholds(footprint.free_at_most, footprint.occupied_at_least),
-            states,
-            steps,
-        )
-        return cls(window, cell_m, states, steps)
+        window = lattice_window(grid.geometry, footprint.cell_m, max_cells)
+        shape = window.rows, window.cols
+        states, steps = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
+        cells = Cells(states, steps, np.ones(shape, np.bool_), window.row0, window.col0)
+        raster, _ = grid.geometry.on_raster()
+        placement = placement_on(raster, footprint.cell_m, footprint.robot_radius_m)
+        classify_cells(pixels_of(grid), placement, footprint.thresholds, cells)
+        return cls(window, footprint.cell_m, states, steps)
 
     @classmethod
     def from_free(cls, free: NDArray[np.bool_], cell_m: float = 1.0) -> CoverageLattice:
@@ -133,7 +135,12 @@ class CoverageLattice:
         return (cells[:, ::-1].astype(np.float64) + 0.5) * self.cell_m
 
 
-def _window_over(geometry: GridGeometry, cell_m: float, max_cells: int) -> Window:
+def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Window:
+    """Return which cells of the unbounded lattice, ``cell_m`` [m] wide, a map reaches into.
+
+    Raises:
+        MapTooLarge: they are more than ``max_cells``.
+    """
     x0, y0, x1, y1 = geometry.bounds()
     rows, cols = (y1 - y0) / cell_m + 2, (x1 - x0) / cell_m + 2
     # A negated comparison, so that NaN is caught too.
@@ -150,11 +157,18 @@ def _window_over(geometry: GridGeometry, cell_m: float, max_cells: int) -> Windo
     )
 
 
-def _placement(geometry: GridGeometry, window: Window, footprint: Footprint) -> Placement:
-    cell_m = footprint.cell_m
-    x0, y0 = geometry.to_pixels((window.col0 + 0.5) * cell_m, (window.row0 + 0.5) * cell_m)
-    scale = cell_m / geometry.resolution
-    # The lattice's x axis, seen from the pixel grid, is turned by -yaw.
-    ux, uy = scale * math.cos(geometry.origin.yaw), -scale * math.sin(geometry.origin.yaw)
-    radius = footprint.robot_radius_m / geometry.resolution - TOUCH_TOLERANCE_PX
-    return Placement(x0, y0, ux, uy, max(radius, TOUCH_TOLERANCE_PX))
+def pixels_of(grid: OccupancyGrid) -> Pixels:
+    """Return a map as a window of its raster, in the one memory layout kernels know."""
+    cells = np.ascontiguousarray(grid.cells)
+    cells.flags.writeable = False
+    _, shown = grid.geometry.on_raster()
+    return Pixels(cells, shown.row0, shown.col0)
+
+
+def placement_on(raster: Raster, cell_m: float, robot_radius_m: float = 0.0) -> Placement:
+    """Return where the lattice's cells, ``cell_m`` [m] wide, lie on a raster."""
+    scale = cell_m / raster.resolution
+    # The lattice's x axis, seen from the raster, is turned by -yaw.
+    ux, uy = scale * math.cos(raster.yaw), -scale * math.sin(raster.yaw)
+    radius = robot_radius_m / raster.resolution - TOUCH_TOLERANCE_PX
+    return Placement(-raster.right, -raster.up, ux, uy, max(radius, TOUCH_TOLERANCE_PX))

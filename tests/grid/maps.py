@@ -1,6 +1,7 @@
 """Maps and footprints at random, with origins of every kind."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
@@ -14,6 +15,7 @@ YAWS = st.one_of(
     st.sampled_from([0.0, math.pi / 2, math.pi, -math.pi / 4, math.pi / 6]),
     st.floats(-math.pi, math.pi),
 )
+VALUES = (-1, 0, 10, 25, 26, 50, 64, 65, 100)
 RESOLUTIONS = st.sampled_from([0.05, 0.1, 0.25, float(np.float32(0.05)), 0.07])
 
 
@@ -50,3 +52,48 @@ def cropped(grid, row0, col0, row1, col1):
         row1 - row0, col1 - col0, geometry.resolution, Pose2D(x, y, geometry.origin.yaw)
     )
     return OccupancyGrid(part, grid.cells[row0:row1, col0:col1].copy())
+
+
+def on_raster(geometry):
+    """The same grid where its raster has it: off by less than rounding to float32 may be."""
+    raster, window = geometry.on_raster()
+    right, up = window.col0 + raster.right, window.row0 + raster.up
+    corner = GridGeometry(0, 0, raster.resolution, Pose2D(0, 0, raster.yaw)).to_map(right, up)
+    return GridGeometry(
+        geometry.rows, geometry.cols, raster.resolution, Pose2D(*corner, raster.yaw)
+    )
+
+
+def repainted(draw, occupancy):
+    """Some pixels have got other values; of the same meaning or not."""
+    cells = occupancy.cells.copy()
+    random = np.random.default_rng(draw(st.integers(0, 2**32)))
+    share = draw(st.sampled_from([0.0, 0.005, 0.05, 1.0]))
+    cells = np.where(random.random(cells.shape) < share, random.choice(VALUES, cells.shape), cells)
+    return replace(occupancy, cells=cells.astype(np.int8))
+
+
+def part_of(draw, whole):
+    """As much of the building as has been seen."""
+    rows, cols = whole.cells.shape
+    row0, row1 = sorted(draw(st.tuples(st.integers(0, rows), st.integers(0, rows))))
+    col0, col1 = sorted(draw(st.tuples(st.integers(0, cols), st.integers(0, cols))))
+    return cropped(whole, row0, col0, row1, col1)
+
+
+def displaced(draw, occupancy):
+    """The map lies elsewhere, or is turned, or is told in other pixels."""
+    geometry, origin = occupancy.geometry, occupancy.geometry.origin
+    pixels = draw(st.sampled_from([3.0, -2.0, 1000.0, 0.5, 0.37, 1e-5]))
+    match draw(st.sampled_from(["along x", "along y", "turned", "scaled"])):
+        case "along x":
+            origin = Pose2D(*geometry.to_map(pixels, 0), origin.yaw)
+        case "along y":
+            origin = Pose2D(*geometry.to_map(0, pixels), origin.yaw)
+        case "turned":
+            origin = Pose2D(origin.x, origin.y, draw(YAWS))
+        case _:
+            return replace(
+                occupancy, geometry=replace(geometry, resolution=geometry.resolution / 2)
+            )
+    return replace(occupancy, geometry=replace(geometry, origin=origin))

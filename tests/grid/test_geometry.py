@@ -1,13 +1,15 @@
 """Frames, bounds and windows."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.geometry import RASTER_STEPS, GridGeometry, Pose2D, Window
+from tests.grid.maps import on_raster
 
 METRES = st.floats(-1e3, 1e3)
 SIDES = st.integers(-20, 20)
@@ -59,6 +61,69 @@ def test_an_intersection_holds_the_common_cells(one, other):
     common = one.intersection(other)
     assert (cells_of(common) if common else set()) == cells_of(one) & cells_of(other)
     assert common == other.intersection(one)
+
+
+@given(windows(), windows())
+def test_a_window_without_another_is_cut_into_rectangles(one, hole):
+    parts = one.without(hole)
+    assert len(parts) <= 4
+    assert all(part.rows > 0 and part.cols > 0 for part in parts)
+    cells = [cell for part in parts for cell in cells_of(part)]
+    assert len(cells) == len(set(cells))
+    assert set(cells) == cells_of(one) - cells_of(hole)
+
+
+@given(windows(), SIDES, SIDES)
+def test_a_moved_window_is_as_large(window, rows, cols):
+    moved = {(row + rows, col + cols) for row, col in cells_of(window)}
+    assert cells_of(window.moved(rows, cols)) == moved
+
+
+RESOLUTIONS = st.sampled_from([0.05, 0.1, 0.0375, float(np.float32(0.05))])
+YAWS = st.one_of(st.sampled_from([0.0, math.pi / 2, math.pi / 4]), st.floats(-7, 7))
+
+
+@given(METRES, METRES, YAWS, RESOLUTIONS)
+def test_a_raster_is_hardly_off_its_grid(x, y, yaw, resolution):
+    geometry = GridGeometry(3, 4, resolution, Pose2D(x, y, yaw))
+    raster, window = geometry.on_raster()
+    assert (window.rows, window.cols) == (3, 4)
+    assert 0.0 <= raster.right < 1.0
+    assert 0.0 <= raster.up < 1.0
+    snapped = on_raster(geometry)
+    col, row = geometry.to_pixels(snapped.origin.x, snapped.origin.y)
+    half = 0.5 / RASTER_STEPS + 1e-6
+    assert abs(col) <= half
+    assert abs(row) <= half
+
+
+# As maps come: whole and half pixels, or a corner that was rounded once.
+CORNERS = st.one_of(st.integers(-400, 400).map(lambda n: n / 2), st.integers(-99, 99).map(float))
+
+
+@given(CORNERS, CORNERS, YAWS, RESOLUTIONS, SIDES, SIDES, st.booleans())
+def test_grids_that_differ_by_whole_pixels_lie_on_one_raster(
+    col, row, yaw, resolution, cols, rows, rounded
+):
+    there = GridGeometry(0, 0, resolution, Pose2D(0, 0, yaw))
+    grids = []
+    for corner in (there.to_map(col, row), there.to_map(col + cols, row + rows)):
+        x, y = (float(np.float32(at)) for at in corner) if rounded else corner
+        grids.append(GridGeometry(5, 6, resolution, Pose2D(x, y, yaw)))
+    (raster, window), (other, moved) = (geometry.on_raster() for geometry in grids)
+    assert raster == other
+    assert moved == window.moved(rows, cols)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [Pose2D(0.012, 0.0), Pose2D(0.0, -0.0021), Pose2D(0.0, 0.0, 1e-3)],
+)
+def test_grids_that_differ_otherwise_do_not(other):
+    geometry = GridGeometry(5, 6, 0.05, Pose2D(0.0, 0.0))
+    raster, _ = geometry.on_raster()
+    assert replace(geometry, origin=other).on_raster()[0] != raster
+    assert replace(geometry, resolution=0.0501).on_raster()[0] != raster
 
 
 @given(windows(), windows())

@@ -13,7 +13,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from tests import naive
-from tests.grid.maps import cropped, footprints, grid, occupancy_grids
+from tests.grid.maps import cropped, footprints, grid, occupancy_grids, on_raster
 
 
 def cells_and_centres(window, cell_m):
@@ -56,7 +56,7 @@ def test_no_coverable_cell_lies_beyond_the_window(data, occupancy):
     lattice = CoverageLattice.from_map(occupancy, footprint)
     window = lattice.window
     wider = Window(window.row0 - 1, window.col0 - 1, window.row1 + 1, window.col1 + 1)
-    twin = naive.classify(occupancy.cells, occupancy.geometry, wider, footprint)
+    twin = naive.classify(occupancy.cells, on_raster(occupancy.geometry), wider, footprint)
     beyond = np.ones((wider.rows, wider.cols), bool)
     beyond[1:-1, 1:-1] = False
     assert not (twin.states[beyond] == COVERABLE).any()

@@ -1,0 +1,244 @@
+"""What a new map changes of the coverage lattice, at the cost of what changed.
+
+Where the new map lies on the raster of the one before - it was patched, it has grown,
+or its origin has moved by whole pixels - pixels are compared, and only those cells are
+classified anew for which changed pixels may matter. On another raster - its origin has
+moved by a fraction of a pixel, or was turned - no pixel is what it was, and all cells
+are. Either way the lattice is, bit for bit, ``CoverageLattice.from_map`` of the new map.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import (
+    MAX_LATTICE_CELLS,
+    UNKNOWN,
+    CoverageLattice,
+    Footprint,
+    lattice_window,
+    pixels_of,
+    placement_on,
+)
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.changes import Box, mark_stale
+from fasaco_edge.kernels.classification import Cells, classify_cells
+from fasaco_edge.kernels.footprint import Placement, reach_of
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LatticeChange:
+    """A lattice over a new map, and which cells are not what they were before.
+
+    Attributes:
+        before: the lattice before; None for the first.
+        after: the lattice over the new map; that before where no cell has changed.
+        cells: int32 (n, 2), read-only: (row, col) of each cell whose state or steps have
+            changed. Beyond its window a lattice is unknown: a cell that came into the
+            window, or fell out of it, has changed if it is or was known.
+    """
+
+    before: CoverageLattice | None
+    after: CoverageLattice
+    cells: NDArray[np.int32]
+
+    def __post_init__(self) -> None:
+        self.cells.flags.writeable = False
+
+    def __bool__(self) -> bool:
+        """Tell whether any cell has changed."""
+        return len(self.cells) > 0
+
+    @property
+    def window(self) -> Window | None:
+        """The smallest window around the changed cells; None where there are none."""
+        if not len(self.cells):
+            return None
+        row0, col0 = self.cells.min(axis=0).tolist()
+        row1, col1 = self.cells.max(axis=0).tolist()
+        return Window(row0, col0, row1 + 1, col1 + 1)
+
+    @classmethod
+    def first(
+        cls, grid: OccupancyGrid, footprint: Footprint, max_cells: int = MAX_LATTICE_CELLS
+    ) -> Self:
+        """Return the lattice over a map that none came before.
+
+        Raises:
+            MapTooLarge: it would have more than ``max_cells`` cells.
+        """
+        lattice = CoverageLattice.from_map(grid, footprint, max_cells)
+        return cls(None, lattice, _cells_where(lattice.states != UNKNOWN, lattice.window))
+
+    @classmethod
+    def between(
+        cls,
+        grids: tuple[OccupancyGrid, OccupancyGrid],
+        lattice: CoverageLattice,
+        footprint: Footprint,
+        max_cells: int = MAX_LATTICE_CELLS,
+        within: Window | None = None,
+    ) -> Self:
+        """Return what becomes of ``lattice``.
+
+        Args:
+            grids: the map before and the new one.
+            lattice: over the map before, made for ``footprint``.
+            footprint: what the lattice is made for.
+            max_cells: the most cells that the new lattice may have.
+            within: which pixels (row, col) of a map on its old place may differ, as a patch
+                names them; no others are looked at. None for any.
+
+        Raises:
+            MapTooLarge: the new lattice would have more than ``max_cells`` cells.
+        """
+        window = lattice_window(grids[1].geometry, footprint.cell_m, max_cells)
+        stale = _stale_cells(grids, lattice, window, footprint, within)
+        if window == lattice.window and not stale.any():
+            return cls(lattice, lattice, np.empty((0, 2), np.int32))
+        old_states = carried(lattice.states, lattice.window, window)
+        old_steps = carried(lattice.steps, lattice.window, window)
+        states, steps = old_states.copy(), old_steps.copy()
+        raster, _ = grids[1].geometry.on_raster()
+        classify_cells(
+            pixels_of(grids[1]),
+            placement_on(raster, footprint.cell_m, footprint.robot_radius_m),
+            footprint.thresholds,
+            Cells(states, steps, stale, window.row0, window.col0),
+        )
+        changed = _cells_where((states != old_states) | (steps != old_steps), window)
+        if window == lattice.window:
+            if not len(changed):
+                return cls(lattice, lattice, changed)
+        else:
+            changed = np.concatenate((changed, _known_outside(lattice, window)))
+        return cls(lattice, CoverageLattice(window, footprint.cell_m, states, steps), changed)
+
+
+def regions_to_compare(
+    before: OccupancyGrid,
+    after: OccupancyGrid,
+    window: Window,
+    placement: Placement,
+    within: Window | None = None,
+) -> tuple[Window, ...] | None:
+    """Return rectangles of the raster that hold all pixels in which two maps may differ.
+
+    Each is shown by both maps or by one of them alone. None where the maps do not lie on
+    one raster.
+
+    Args:
+        before, after: the maps.
+        window: of what the old map showed beyond the new one, only pixels that matter for
+            these lattice cells are of interest.
+        placement: where the lattice's cells lie.
+        within: see ``LatticeChange.between``.
+    """
+    (old_raster, old), (raster, new) = before.geometry.on_raster(), after.geometry.on_raster()
+    if raster != old_raster:
+        return None
+    if old == new:
+        return (new if within is None else within.moved(new.row0, new.col0),)
+    around = _pixels_around(window, placement)
+    common = old.intersection(new)
+    shared = () if common is None else (common,)
+    lost = (part.intersection(around) for part in old.without(new))
+    return (*shared, *new.without(old), *(part for part in lost if part is not None))
+
+
+def carried(array: NDArray[Scalar], old: Window, new: Window) -> NDArray[Scalar]:
+    """Return what an array over the old window says on the new one, 0 where it says nothing.
+
+    That is the array itself where the windows are the same.
+    """
+    if new == old:
+        return array
+    result = np.zeros((new.rows, new.cols), array.dtype)
+    common = new.intersection(old)
+    if common is not None:
+        result[common.slices_in(new)] = array[common.slices_in(old)]
+    return result
+
+
+def _stale_cells(
+    grids: tuple[OccupancyGrid, OccupancyGrid],
+    lattice: CoverageLattice,
+    window: Window,
+    footprint: Footprint,
+    within: Window | None,
+) -> NDArray[np.bool_]:
+    """Return which cells of the new window must be classified anew, bool (rows, cols)."""
+    before, after = grids
+    raster, _ = after.geometry.on_raster()
+    placement = placement_on(raster, footprint.cell_m, footprint.robot_radius_m)
+    regions = regions_to_compare(before, after, window, placement, within)
+    if regions is None:
+        return np.ones((window.rows, window.cols), np.bool_)
+    stale = _new_to(lattice.window, window)
+    for region in regions:
+        mark_stale(
+            pixels_of(before),
+            pixels_of(after),
+            Box(region.row0, region.col0, region.row1, region.col1),
+            footprint.thresholds,
+            placement,
+            stale,
+            window.row0,
+            window.col0,
+        )
+    return stale
+
+
+def _new_to(old: Window, new: Window) -> NDArray[np.bool_]:
+    """Mark the cells of the new window that the old one lacks, bool (rows, cols).
+
+    Nothing need have changed around them: a robot wider than its tool may have been blocked
+    where the old lattice did not reach. Of the others none has a step there, unless pixels
+    have changed near by: what lies beyond a window lies beyond its map, and is unknown.
+    """
+    lacking = np.ones((new.rows, new.cols), np.bool_)
+    common = new.intersection(old)
+    if common is not None:
+        lacking[common.slices_in(new)] = False
+    return lacking
+
+
+def _pixels_around(window: Window, placement: Placement) -> Window:
+    """Return the pixels of the raster that may matter for the cells of a window."""
+    ux, uy, reach = placement.ux, placement.uy, reach_of(placement) + 2.0
+    corners = [
+        (col * ux - row * uy + placement.x0, col * uy + row * ux + placement.y0)
+        for row in (window.row0, window.row1)
+        for col in (window.col0, window.col1)
+    ]
+    xs, ys = zip(*corners, strict=True)
+    return Window(
+        math.floor(min(ys) - reach),
+        math.floor(min(xs) - reach),
+        math.ceil(max(ys) + reach),
+        math.ceil(max(xs) + reach),
+    )
+
+
+def _known_outside(lattice: CoverageLattice, window: Window) -> NDArray[np.int32]:
+    """Return the cells (row, col), int32 (n, 2), that are known and lie outside ``window``."""
+    known = lattice.states != UNKNOWN
+    common = lattice.window.intersection(window)
+    if common is not None:
+        known[common.slices_in(lattice.window)] = False
+    return _cells_where(known, lattice.window)
+
+
+def _cells_where(mask: NDArray[np.bool_], window: Window) -> NDArray[np.int32]:
+    """Return the cells (row, col), int32 (n, 2), at which a mask over ``window`` holds."""
+    rows, cols = np.divmod(np.flatnonzero(mask), max(window.cols, 1))
+    cells = np.stack((rows + window.row0, cols + window.col0), axis=1)
+    return cells.astype(np.int32)

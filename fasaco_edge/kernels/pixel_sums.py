@@ -1,0 +1,93 @@
+"""Summed-area tables of a map: how many pixels of a rectangle are free or known, in four looks.
+
+After F. Crow, "Summed-area tables for texture mapping", SIGGRAPH 1984.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.footprint import Pixels, Thresholds, state_of
+from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.states import COVERABLE, UNKNOWN
+
+# One sum counts two things: the pixels that are not free in its low bits, those that are
+# not unknown from here on.
+KNOWN_BIT = 32
+NOT_FREE = (1 << KNOWN_BIT) - 1
+
+
+class PixelSums(NamedTuple):
+    """Counts over a window of the raster that begins with pixel (row, col).
+
+    Attributes:
+        sums: int64 ((height + 1) * (width + 1),) or longer: at ``i * (width + 1) + j`` the
+            count of the window's first i rows and j columns.
+        row, col, height, width: the window.
+    """
+
+    sums: NDArray[np.int64]
+    row: int
+    col: int
+    height: int
+    width: int
+
+
+@lean_kernel
+def weigh(thresholds: Thresholds, weights: NDArray[np.int64]) -> None:
+    """Fill in what a pixel of occupancy v adds to a count: int64 (256,), at ``v & 255``."""
+    for value in range(-128, 128):
+        state = state_of(value, thresholds)
+        weights[value & 255] = (state != COVERABLE) + ((state != UNKNOWN) << KNOWN_BIT)
+
+
+@lean_kernel
+def sums_around(
+    pixels: Pixels, x: float, y: float, reach_x: float, reach_y: float, sums: NDArray[np.int64]
+) -> PixelSums:
+    """Return the sums, yet to be filled in, of all pixels of a map within reach of (x, y)."""
+    height, width = pixels.values.shape
+    row0 = max(int(np.floor(y - reach_y)), pixels.row)
+    col0 = max(int(np.floor(x - reach_x)), pixels.col)
+    row1 = min(int(np.floor(y + reach_y)) + 1, pixels.row + height)
+    col1 = min(int(np.floor(x + reach_x)) + 1, pixels.col + width)
+    return PixelSums(sums, row0, col0, max(row1 - row0, 0), max(col1 - col0, 0))
+
+
+@lean_kernel
+def sum_up(pixels: Pixels, weights: NDArray[np.int64], table: PixelSums) -> None:
+    """Fill in the sums."""
+    stride = table.width + 1
+    table.sums[:stride] = 0
+    for row in range(table.height):
+        values = pixels.values[table.row - pixels.row + row, table.col - pixels.col :]
+        above = table.sums[row * stride : (row + 1) * stride]
+        here = table.sums[(row + 1) * stride : (row + 2) * stride]
+        here[0] = running = 0
+        for col in range(table.width):
+            running += weights[int(values[col]) & 255]
+            here[col + 1] = above[col + 1] + running
+
+
+@inlined
+def count_around(table: PixelSums, x: float, y: float, reach_x: float, reach_y: float) -> int:
+    """Return the count of all pixels within reach of (x, y); -1 if the sums lack some."""
+    row0, row1 = int(np.floor(y - reach_y)) - table.row, int(np.floor(y + reach_y)) + 1 - table.row
+    col0, col1 = int(np.floor(x - reach_x)) - table.col, int(np.floor(x + reach_x)) + 1 - table.col
+    if row0 < 0 or col0 < 0 or row1 > table.height or col1 > table.width:
+        return -1
+    sums, low, high = table.sums, row0 * (table.width + 1), row1 * (table.width + 1)
+    return int(sums[high + col1] - sums[high + col0] - sums[low + col1] + sums[low + col0])
+
+
+@inlined
+def is_free(count: int) -> bool:
+    """Tell whether a count is of free pixels alone."""
+    return bool(count >= 0 and count & NOT_FREE == 0)
+
+
+@inlined
+def is_unknown(count: int) -> bool:
+    """Tell whether a count is of unknown pixels alone."""
+    return bool(count >= 0 and count >> KNOWN_BIT == 0)

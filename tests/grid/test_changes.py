@@ -1,0 +1,265 @@
+"""A lattice carried on from map to map is, bit for bit, the lattice over the last map."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.errors import MapTooLarge
+from fasaco_edge.grid.changes import LatticeChange
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from tests.grid.maps import (
+    cropped,
+    displaced,
+    footprints,
+    grid,
+    occupancy_grids,
+    part_of,
+    repainted,
+)
+
+CELL = Footprint(0.3, 0.12)
+
+
+def known_cells(lattice):
+    """State and steps of each cell that is known, by its place in the lattice."""
+    row0, col0 = lattice.window.row0, lattice.window.col0
+    return {
+        (row + row0, col + col0): (lattice.states[row, col], lattice.steps[row, col])
+        for row, col in np.argwhere(lattice.states != UNKNOWN).tolist()
+    }
+
+
+def assert_follows(change, lattice, after, footprint):
+    """The new lattice is the map's own, and exactly what differs is told."""
+    whole = CoverageLattice.from_map(after, footprint)
+    assert change.before is lattice
+    assert change.after.window == whole.window
+    assert change.after.cell_m == whole.cell_m
+    assert np.array_equal(change.after.states, whole.states)
+    assert np.array_equal(change.after.steps, whole.steps)
+    old, new = known_cells(lattice), known_cells(whole)
+    differing = {cell for cell in old.keys() | new.keys() if old.get(cell) != new.get(cell)}
+    told = [tuple(cell) for cell in change.cells.tolist()]
+    assert len(told) == len(set(told))
+    assert set(told) == differing
+    assert bool(change) == bool(differing)
+    if differing:
+        rows, cols = zip(*differing, strict=True)
+        assert change.window == Window(min(rows), min(cols), max(rows) + 1, max(cols) + 1)
+    else:
+        assert change.window is None
+
+
+@settings(max_examples=300, deadline=None)
+@given(data=st.data(), whole=occupancy_grids(max_side=40))
+def test_a_lattice_follows_its_map(data, whole):
+    footprint = data.draw(footprints(whole.geometry.resolution))
+    before = part_of(data.draw, whole)
+    lattice = CoverageLattice.from_map(before, footprint)
+    for _ in range(data.draw(st.integers(1, 3))):
+        whole = repainted(data.draw, whole)
+        if data.draw(st.integers(0, 3)) == 0:
+            whole = displaced(data.draw, whole)
+        after = part_of(data.draw, whole) if data.draw(st.booleans()) else whole
+        change = LatticeChange.between((before, after), lattice, footprint)
+        assert_follows(change, lattice, after, footprint)
+        before, lattice = after, change.after
+
+
+@settings(max_examples=100, deadline=None)
+@given(data=st.data(), before=occupancy_grids(max_side=40))
+def test_a_lattice_follows_patches(data, before):
+    footprint = data.draw(footprints(before.geometry.resolution))
+    lattice = CoverageLattice.from_map(before, footprint)
+    rows, cols = before.cells.shape
+    assume(rows and cols)
+    row0, row1 = sorted(data.draw(st.tuples(st.integers(0, rows - 1), st.integers(1, rows))))
+    col0, col1 = sorted(data.draw(st.tuples(st.integers(0, cols - 1), st.integers(1, cols))))
+    assume(row0 < row1 and col0 < col1)
+    window = Window(row0, col0, row1, col1)
+    painted = repainted(data.draw, before).cells[row0:row1, col0:col1]
+    after = before.patched(MapPatch(window, painted))
+    change = LatticeChange.between((before, after), lattice, footprint, within=window)
+    assert_follows(change, lattice, after, footprint)
+
+
+@settings(max_examples=50, deadline=None)
+@given(data=st.data(), occupancy=occupancy_grids(max_side=20))
+def test_the_first_lattice_has_all_that_is_known(data, occupancy):
+    footprint = data.draw(footprints(occupancy.geometry.resolution))
+    change = LatticeChange.first(occupancy, footprint)
+    assert change.before is None
+    assert known_cells(change.after) == known_cells(CoverageLattice.from_map(occupancy, footprint))
+    assert sorted(map(tuple, change.cells.tolist())) == sorted(known_cells(change.after))
+
+
+def hall(side=300, resolution=0.05, **placed):
+    """A hall with walls around and pillars in it."""
+    cells = np.zeros((side, side), np.int8)
+    cells[::40, ::40] = 100
+    cells[:3] = cells[-3:] = cells[:, :3] = cells[:, -3:] = 100
+    return grid(cells, resolution, **placed)
+
+
+def edited(occupancy, window, value):
+    cells = occupancy.cells.copy()
+    cells[window.row0 : window.row1, window.col0 : window.col1] = value
+    return replace(occupancy, cells=cells)
+
+
+def forged(lattice):
+    """A lattice in which every cell is wrong: who looks at one anew gives himself away."""
+    return CoverageLattice(
+        lattice.window, lattice.cell_m, lattice.states + 3, np.full_like(lattice.steps, 15)
+    )
+
+
+def looked_at(before, after, footprint=CELL, within=None):
+    """Return how many cells are classified anew."""
+    lattice = forged(CoverageLattice.from_map(before, footprint))
+    change = LatticeChange.between((before, after), lattice, footprint, within=within)
+    window = change.after.window
+    return int(np.count_nonzero(change.after.states < 3)), window.rows * window.cols
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4])
+def test_only_cells_around_changed_pixels_are_classified_anew(yaw):
+    before = hall(yaw=yaw)
+    assert looked_at(before, replace(before, cells=before.cells.copy()))[0] == 0
+    one = edited(before, Window(150, 150, 151, 151), 100)
+    assert 1 <= looked_at(before, one)[0] <= 30
+    crate = edited(before, Window(100, 150, 118, 168), 100)
+    assert 9 <= looked_at(before, crate)[0] <= 100
+    corners = edited(edited(before, Window(5, 5, 6, 6), 100), Window(290, 290, 291, 291), 100)
+    assert looked_at(before, corners)[0] <= 60
+
+
+def test_a_value_of_the_same_meaning_is_no_change():
+    before = hall()
+    lattice = CoverageLattice.from_map(before, CELL)
+    cells = np.where(before.cells == 0, 20, 90).astype(np.int8)
+    assert looked_at(before, replace(before, cells=cells))[0] == 0
+    change = LatticeChange.between((before, replace(before, cells=cells)), lattice, CELL)
+    assert change.after is lattice
+    assert not change
+
+
+def test_what_changes_no_cell_keeps_the_lattice():
+    """A pixel in the corner of a cell that no disc and no lane touches."""
+    before = grid(np.zeros((60, 60)), 0.1)
+    footprint = Footprint(2.0, 0.3)
+    lattice = CoverageLattice.from_map(before, footprint)
+    after = edited(before, Window(20, 20, 21, 21), 100)
+    change = LatticeChange.between((before, after), lattice, footprint)
+    assert change.after is lattice
+    assert not change
+
+
+def test_of_a_patched_map_only_the_patch_is_looked_at():
+    before = hall()
+    window = Window(100, 100, 110, 110)
+    both = edited(edited(before, window, 100), Window(200, 200, 210, 210), 100)
+    lattice = CoverageLattice.from_map(before, CELL)
+    change = LatticeChange.between((before, both), lattice, CELL, within=window)
+    assert change
+    assert change.cells.max() < 25
+
+
+@pytest.mark.parametrize("yaw", [0.0, math.pi / 6])
+def test_a_map_that_grows_by_nothing_known_costs_its_new_sides(yaw):
+    before = hall(yaw=yaw)
+    corner = before.geometry.to_map(-12, -30)
+    after = grid(np.pad(before.cells, ((30, 5), (12, 60)), constant_values=-1), 0.05, *corner, yaw)
+    lattice = CoverageLattice.from_map(before, CELL)
+    change = LatticeChange.between((before, after), lattice, CELL)
+    assert_follows(change, lattice, after, CELL)
+    inner = before.geometry.rows * before.geometry.cols / 36
+    looked, cells = looked_at(before, after)
+    assert looked < cells - 0.8 * inner
+
+
+def test_a_map_that_shrinks_tells_what_fell_out_of_it():
+    before = hall()
+    lattice = CoverageLattice.from_map(before, CELL)
+    after = cropped(before, 0, 0, 300, 150)
+    change = LatticeChange.between((before, after), lattice, CELL)
+    assert_follows(change, lattice, after, CELL)
+    assert change.window == Window(0, 24, 50, 50)
+    nothing = cropped(before, 0, 0, 0, 0)
+    gone = LatticeChange.between((before, nothing), lattice, CELL)
+    assert_follows(gone, lattice, nothing, CELL)
+    assert len(gone.cells) == 50 * 50
+
+
+def test_a_map_that_jumps_tells_only_what_is_otherwise_now():
+    """A loop closure moves the map by part of a pixel: hardly a cell is another."""
+    before = hall()
+    lattice = CoverageLattice.from_map(before, CELL)
+    after = hall(x=0.012, y=-0.007)
+    change = LatticeChange.between((before, after), lattice, CELL)
+    assert_follows(change, lattice, after, CELL)
+    assert len(change.cells) < 0.5 * lattice.states.size
+    far = hall(x=500.0, y=-800.0)
+    assert_follows(LatticeChange.between((before, far), lattice, CELL), lattice, far, CELL)
+
+
+def test_an_obstacle_beyond_the_old_lattice_blocks_a_cell_that_comes_into_it():
+    """The robot is wider than its cells: it was blocked there before the map reached there."""
+    wide = Footprint(0.3, 0.5)
+    cells = np.zeros((60, 60), np.int8)
+    cells[:, -1] = 100
+    before = grid(cells, 0.05)
+    after = grid(np.pad(cells, ((0, 0), (0, 12)), constant_values=-1), 0.05)
+    lattice = CoverageLattice.from_map(before, wide)
+    change = LatticeChange.between((before, after), lattice, wide)
+    assert_follows(change, lattice, after, wide)
+    assert (change.after.states[:, -1] == BLOCKED).any()
+
+
+def test_a_thin_wall_is_a_change_of_steps_alone():
+    before = grid(np.zeros((40, 40)), 0.1)
+    footprint = Footprint(2.0, 0.2)
+    lattice = CoverageLattice.from_map(before, footprint)
+    after = edited(before, Window(0, 20, 40, 21), 100)
+    change = LatticeChange.between((before, after), lattice, footprint)
+    assert_follows(change, lattice, after, footprint)
+    assert (change.after.states == COVERABLE).all()
+    assert len(change.cells) == 4
+
+
+def test_a_lattice_beyond_the_limit_is_refused():
+    before = hall()
+    lattice = CoverageLattice.from_map(before, CELL)
+    with pytest.raises(MapTooLarge, match="exceeds 2500 cells"):
+        LatticeChange.between((before, hall(side=400)), lattice, CELL, max_cells=2500)
+    with pytest.raises(MapTooLarge):
+        LatticeChange.first(before, CELL, max_cells=2000)
+
+
+def test_the_lattice_before_is_left_alone():
+    before = hall()
+    lattice = CoverageLattice.from_map(before, CELL)
+    states, steps = lattice.states.copy(), lattice.steps.copy()
+    after = edited(before, Window(100, 100, 150, 150), 100)
+    change = LatticeChange.between((before, after), lattice, CELL)
+    assert change
+    assert np.array_equal(lattice.states, states)
+    assert np.array_equal(lattice.steps, steps)
+    for array in (change.after.states, change.after.steps, change.cells):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0, 0] = 1
+
+
+def test_maps_of_any_memory_layout_are_compared():
+    before = hall()
+    cells = before.cells.copy()
+    cells[100:120, 100:120] = 100
+    after = OccupancyGrid(before.geometry, np.asfortranarray(cells))
+    lattice = CoverageLattice.from_map(before, CELL)
+    assert_follows(LatticeChange.between((before, after), lattice, CELL), lattice, after, CELL)
