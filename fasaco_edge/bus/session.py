@@ -12,6 +12,7 @@ Choices that hold for every process, and why:
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -62,6 +63,27 @@ class Reply:
     schema: str = ""
     attachment: bytes = b""
     is_error: bool = False
+
+
+class Question:
+    """A query that somebody waits for an answer to; to be answered once, on any thread.
+
+    Attributes:
+        payload: what came with it, b"" for nothing.
+    """
+
+    def __init__(self, query: zenoh.Query, key: str) -> None:
+        payload = query.payload
+        self.payload = payload.to_bytes() if payload is not None else b""
+        self._query = query
+        self._key = key
+
+    def answer(self, reply: Reply) -> None:
+        """Answer; who asked may be gone by now."""
+        with contextlib.suppress(zenoh.ZError):
+            _send(self._query, self._key, reply)
+        query: Any = self._query  # drop() has no annotation
+        query.drop()
 
 
 class Publisher:
@@ -143,19 +165,31 @@ class Bus:
         """Answer queries on ``key``; ``answer`` gets the parameters, on a Zenoh thread."""
 
         def receive(query: zenoh.Query) -> None:
-            reply = answer(_parameters(query))
-            encoding = _encoding(reply.schema)
-            if reply.is_error:
-                query.reply_err(reply.payload, encoding=encoding)
-            else:
-                attachment = reply.attachment or None
-                query.reply(key, reply.payload, encoding=encoding, attachment=attachment)
+            _send(query, key, answer(_parameters(query)))
 
         self._declared.append(self._session.declare_queryable(key, receive, complete=True))
 
-    def get(self, selector: str, timeout_s: float = 2.0) -> list[Reply]:
-        """Ask ``selector`` (a key, parameters behind ``?``) and return all answers."""
-        return [_reply(reply) for reply in self._session.get(selector, timeout=timeout_s)]
+    def take_questions(self, key: str, receive: Callable[[Question], None]) -> None:
+        """Call ``receive`` with each query on ``key``, on a Zenoh thread; to be answered later."""
+
+        def take(query: zenoh.Query) -> None:
+            receive(Question(query, key))
+
+        self._declared.append(self._session.declare_queryable(key, take, complete=True))
+
+    def get(self, selector: str, timeout_s: float = 2.0, payload: bytes = b"") -> list[Reply]:
+        """Ask ``selector`` (a key, parameters behind ``?``) and return all answers.
+
+        Args:
+            selector: what to ask.
+            timeout_s: how long to wait for answers [s].
+            payload: JSON that goes with the question, b"" for none.
+        """
+        encoding = JSON if payload else None
+        replies = self._session.get(
+            selector, timeout=timeout_s, payload=payload or None, encoding=encoding
+        )
+        return [_reply(reply) for reply in replies]
 
     def token(self, key: str) -> None:
         """Declare a liveliness token; it vanishes with this session."""
@@ -219,6 +253,15 @@ def _config(mode: str, connect: Sequence[str], listen: Sequence[str]) -> zenoh.C
 def _parameters(query: zenoh.Query) -> dict[str, str]:
     parameters: Any = query.parameters  # no mapping by the stubs
     return {str(key): str(value) for key, value in parameters}
+
+
+def _send(query: zenoh.Query, key: str, reply: Reply) -> None:
+    encoding = _encoding(reply.schema)
+    if reply.is_error:
+        query.reply_err(reply.payload, encoding=encoding)
+    else:
+        attachment = reply.attachment or None
+        query.reply(key, reply.payload, encoding=encoding, attachment=attachment)
 
 
 def _encoding(schema: str) -> zenoh.Encoding:

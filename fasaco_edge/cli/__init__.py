@@ -9,12 +9,24 @@ import sys
 from collections.abc import Sequence
 
 from fasaco_edge import __version__
-from fasaco_edge.cli import bench, demo, exits, maps, plan, record, run, simulate, warmup
+from fasaco_edge.cli import (
+    bench,
+    demo,
+    exits,
+    maps,
+    mission,
+    plan,
+    record,
+    replay,
+    run,
+    simulate,
+    warmup,
+)
 from fasaco_edge.cli.arguments import with_negative_pairs
 from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
-COMMANDS = (demo, plan, run, record, simulate, bench, maps, warmup)
+COMMANDS = (demo, plan, run, mission, record, replay, simulate, bench, maps, warmup)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

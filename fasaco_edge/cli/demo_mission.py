@@ -103,7 +103,9 @@ class DemoMission:
         config = self._out / "config.yaml"
         config.write_text(yaml.safe_dump(self._config()), encoding="utf-8")
         recording = ["--record", str(self._out)]
-        self._spawn("daemon", ["run", "--config", str(config), *recording])
+        # Its own progress, from the beginning: no other daemon's, nor an earlier demo's.
+        state = ["--state", str(self._out / "state"), "--fresh"]
+        self._spawn("daemon", ["run", "--config", str(config), *recording, *state])
         self._bus = self._join()
         self._bus.subscribe(self._keys.status, self._newest.put, latched=True)
         robot = ["--speed", str(self._args.speed), "--robot-radius", str(self._args.robot_radius)]

@@ -21,7 +21,8 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         parents=[common],
         help="record a robot's mission into a Rerun recording (.rrd)",
         description="Record map, coverage, pheromone, path, pose, states and latencies of one "
-        "robot, until SIGTERM or SIGINT. Open the result with `rerun FILE.rrd`.",
+        "robot, and byte for byte what its mission hears, until SIGTERM or SIGINT. Open the result "
+        "with `rerun FILE.rrd`, play it again with `fasaco-edge replay FILE.rrd`.",
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
     parser.add_argument(

@@ -15,8 +15,12 @@ there already, it joins that one) under the keys fasaco/@v1/robot/...:
   in    map, map_update, pose      ROS messages in CDR
   out   path, coverage, pheromone  ROS messages in CDR
         status                     JSON, on change and once a second
+        command                    JSON, each command that was taken
         alive                      liveliness token
-  ask   @rpc/path, @rpc/status, @rpc/coverage
+  ask   @rpc/path, @rpc/status, @rpc/coverage, @rpc/mission
+It covers everything it can reach, unless it is told otherwise (`fasaco-edge mission`) or to wait
+for an order (mission.autostart: false). Order and coverage are kept on disk: after a restart the
+mission goes on where it stopped.
 """
 
 
@@ -34,6 +38,18 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--record", type=Path, metavar="DIR", help="start a recorder that writes to DIR"
     )
+    parser.add_argument(
+        "--state",
+        type=Path,
+        metavar="DIR",
+        help="folder in which progress is kept (default: mission.state_dir of the configuration, "
+        "else $STATE_DIRECTORY, else fasaco-edge in $XDG_STATE_HOME or ~/.local/state)",
+    )
+    parser.add_argument(
+        "--fresh",
+        action="store_true",
+        help="cover everything anew; the progress there is is kept aside",
+    )
     parser.set_defaults(command=run)
 
 
@@ -42,5 +58,5 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.daemon.config import load_config
     from fasaco_edge.daemon.service import run_daemon
 
-    run_daemon(load_config(args.config), args.record)
+    run_daemon(load_config(args.config), args.record, args.state, fresh=args.fresh)
     return 0

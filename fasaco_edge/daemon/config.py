@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
@@ -120,6 +122,37 @@ class PlannerConfig(_Section, frozen=True):
         )
 
 
+class MissionSettings(_Section, frozen=True):
+    """Whether to begin without being told to, how patient to be, and where progress is kept.
+
+    What is blocked or left over in the end is tried again ``retries`` times, each after
+    ``retry_s`` [s]. Without a pose for ``lost_pose_s`` [s], or a map or an update for
+    ``stale_map_s`` [s], the state is degraded; 0 for never. ``state_dir`` "" is the folder a
+    service manager or the user has for that.
+    """
+
+    autostart: bool = True
+    retries: Annotated[int, Meta(ge=0, le=100)] = 2
+    retry_s: Annotated[float, Meta(ge=0, le=86_400)] = 30.0
+    lost_pose_s: Annotated[float, Meta(ge=0, le=86_400)] = 3.0
+    stale_map_s: Annotated[float, Meta(ge=0, le=86_400)] = 0.0
+    state_dir: str = ""
+
+    def state_folder(self, environ: Mapping[str, str] = os.environ) -> Path:
+        """Return the folder of the coverage ledger.
+
+        By default systemd's $STATE_DIRECTORY, else fasaco-edge in an absolute $XDG_STATE_HOME,
+        else in ~/.local/state; BadConfiguration where there is no such home.
+        """
+        if self.state_dir:
+            return _home(Path(self.state_dir))
+        if service := environ.get("STATE_DIRECTORY", "").partition(":")[0]:
+            return Path(service)
+        if (user := environ.get("XDG_STATE_HOME", "")).startswith("/"):
+            return Path(user, "fasaco-edge")
+        return _home(Path("~/.local/state/fasaco-edge"))
+
+
 class DaemonConfig(_Section, frozen=True):
     """The whole configuration."""
 
@@ -128,6 +161,7 @@ class DaemonConfig(_Section, frozen=True):
     map: MapConfig = MapConfig()
     pose: PoseConfig = PoseConfig()
     planner: PlannerConfig = PlannerConfig()
+    mission: MissionSettings = MissionSettings()
 
     def keys(self) -> Keys:
         """Return the keys of this robot.
@@ -165,6 +199,13 @@ def load_config(path: Path | None) -> DaemonConfig:
     return config
 
 
+def _home(path: Path) -> Path:
+    try:
+        return path.expanduser()
+    except RuntimeError as error:
+        raise BadConfiguration(f"mission.state_dir: {path}: there is no home folder") from error
+
+
 def _check_together(config: DaemonConfig) -> None:
     """Check what no single value shows."""
     low, high = config.map.free_at_most, config.map.occupied_at_least
@@ -174,6 +215,8 @@ def _check_together(config: DaemonConfig) -> None:
         )
     if not (config.bus.listen or config.bus.connect):
         raise BadConfiguration("bus.listen and bus.connect must not both be empty")
+    if "\0" in config.mission.state_dir:
+        raise BadConfiguration("mission.state_dir must be a path, got one with a NUL")
     config.keys()
     try:
         config.robot.cost()

@@ -35,7 +35,7 @@ def make_mailbox() -> Mailbox[object]:
     Poses are queued: each tells what the tool passed over. Some seconds of them
     are plenty. A map does not clear what was before it: it may be broken.
     """
-    return Mailbox({"map": 4, "map_update": 256, "pose": 1024, "snapshot": 8})
+    return Mailbox({"map": 4, "map_update": 256, "pose": 1024, "snapshot": 8, "command": 16})
 
 
 class Inbox:

@@ -49,7 +49,9 @@ class Loader:
     def _load(self) -> tuple[Mission, PlanningWorker]:
         from fasaco_edge.daemon.worker import PlanningWorker  # noqa: PLC0415
         from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
-        from fasaco_edge.mission.mission import Mission, MissionConfig  # noqa: PLC0415
+        from fasaco_edge.mission.assignment import NO_ORDER, Assignment  # noqa: PLC0415
+        from fasaco_edge.mission.config import MissionConfig  # noqa: PLC0415
+        from fasaco_edge.mission.mission import Mission  # noqa: PLC0415
         from fasaco_edge.planners.table import planner_of  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
@@ -61,7 +63,18 @@ class Loader:
         )
         chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post, self._is_watched)
-        return Mission(MissionConfig(footprint, maps.max_lattice_cells, robot.cost())), worker
+        patience = self._config.mission
+        mission = MissionConfig(
+            footprint,
+            maps.max_lattice_cells,
+            robot.cost(),
+            retries=patience.retries,
+            retry_s=patience.retry_s,
+            lost_pose_s=patience.lost_pose_s,
+            stale_map_s=patience.stale_map_s,
+        )
+        first = Assignment.by_itself() if patience.autostart else Assignment.none(NO_ORDER)
+        return Mission(mission, first), worker
 
     def _report(self, stage: str) -> None:
         self.stage = f"kernels: {stage}"

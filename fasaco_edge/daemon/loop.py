@@ -4,24 +4,31 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.daemon.beginning import Beginning
+from fasaco_edge.daemon.commands import Commands
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.inbox import Inbox, Received
+from fasaco_edge.daemon.keeping import Keeping
+from fasaco_edge.daemon.ledger_writer import LedgerWriter
 from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.daemon.outbox import Outbox
 from fasaco_edge.daemon.status import StatusBoard, plan_figures
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
-from fasaco_edge.errors import FasacoError, PatchWithoutBase
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.mission.assignment import Assignment
 from fasaco_edge.mission.events import (
+    Answer,
+    CommandReceived,
     Decision,
     Event,
-    MapReceived,
     PathUpdate,
     PlanReady,
-    PoseReceived,
 )
+from fasaco_edge.mission.order_document import command_document
 from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.wire.coverage import coverage_grid
 
@@ -41,26 +48,34 @@ class Loop:
         config: DaemonConfig,
         mailbox: Mailbox[object],
         inbox: Inbox,
+        commands: Commands,
         outbox: Outbox,
+        ledger: LedgerWriter,
         recorder: RecorderSupervisor | None,
     ) -> None:
         self._config = config
         self._mailbox = mailbox
         self._inbox = inbox
+        self._commands = commands
         self._outbox = outbox
+        self._ledger = ledger
+        self._keeping = Keeping(
+            ledger, config.robot.tool_width_m, autostart=config.mission.autostart
+        )
+        self._beginning = Beginning(self._keeping, self._load)
         self._recorder = recorder
         self._status = StatusBoard(config)
-        self._loader: Loader | None = None
         self._mission: Mission | None = None
         self._worker: PlanningWorker | None = None
-        self._held: list[Event] = []
         self._map_arrived: float | None = None
         # Arrival of the oldest map that no plan was asked for yet, and of the one
         # that the plan under way was asked for.
         self._unanswered_map: float | None = None
         self._asked_map: float | None = None
         self._coverage_at = float("-inf")
-        self._coverage_key: tuple[int, int] = (0, 0)
+        self._coverage_key: tuple[object, ...] = ()
+        if self._keeping.fault is not None:
+            self._status.faults.count([self._keeping.fault])
 
     def run(self, stop: threading.Event) -> None:
         """Turn until ``stop`` is set."""
@@ -70,14 +85,43 @@ class Loop:
             events, faults = self._inbox.decode(items, self._mailbox.take_lost("map_update"))
             self._status.faults.count(faults)
             self._note(items)
-            mission = self._mission or self._load(events)
+            commands = self._commands.take(items)
+            mission = self._mission or self._begin(events)
             if mission is not None:
-                self._turn(mission, [*self._held, *events, *_plans(items)], started)
+                answers = self._turn(mission, [*events, *commands, *_plans(items)], started)
+            else:
+                answers = self._beginning.obey(commands)
+            self._publish_commands(commands, answers)
+            self._keeping.keep(mission, self._assignment, started)
             self._publish_status(started)
+            self._commands.note(answers)
+            if self._commands.are_asked:
+                report = self._status.report(mission, self._assignment, self._loading)
+                self._commands.answer(report, is_kept=self._keeping.is_kept(time.monotonic()))
 
-    def _turn(self, mission: Mission, events: list[Event], started: float) -> None:
-        """Step the mission and do what it decides."""
-        self._held.clear()
+    @property
+    def _assignment(self) -> Assignment:
+        return self._mission.assignment if self._mission else self._beginning.assignment
+
+    @property
+    def _loading(self) -> str:
+        return "" if self._mission else self._beginning.stage
+
+    def _load(self) -> Loader:
+        return Loader(self._config, self._mailbox, self._outbox.is_watched)
+
+    def _begin(self, events: list[Event]) -> Mission | None:
+        """Hold ``events`` until there is a mission; once it is there, they are all that was."""
+        self._status.faults.count(self._beginning.take(events))
+        loaded = self._beginning.loaded()
+        if loaded is None:
+            return None
+        self._mission, self._worker = loaded
+        events[:] = self._beginning.held
+        return self._mission
+
+    def _turn(self, mission: Mission, events: list[Event], started: float) -> Sequence[Answer]:
+        """Step the mission and do what it decides; return its answers to commands."""
         maps = mission.map_revision
         decision = mission.step(events, started)
         if mission.map_revision > maps:
@@ -90,13 +134,15 @@ class Loop:
         except FasacoError as error:
             # What cannot be said in the protocol's limits costs this message alone.
             self._status.faults.count([error])
+        return decision.answers
 
     def announce(self) -> None:
         """Publish a first status, so that who asks gets one from the beginning."""
         self._publish_status(time.monotonic())
 
     def close(self, timeout_s: float) -> None:
-        """End the planning thread."""
+        """Hand over what the ledger holds, and end the planning thread."""
+        self._keeping.keep(self._mission, self._assignment, float("inf"))
         if self._worker is not None:
             self._worker.close(timeout_s)
 
@@ -113,35 +159,11 @@ class Loop:
             elif kind in ("map", "map_update") and isinstance(item, Received):
                 self._map_arrived = item.at
 
-    def _load(self, events: list[Event]) -> Mission | None:
-        """Hold events until the kernels are there; the first map sends for them."""
-        for event in events:
-            self._hold(event)
-        if self._loader is None:
-            if any(isinstance(event, MapReceived) for event in events):
-                self._loader = Loader(self._config, self._mailbox, self._outbox.is_watched)
-            return None
-        loaded = self._loader.poll()
-        if loaded is not None:
-            self._mission, self._worker = loaded
-        events.clear()
-        return self._mission
-
-    def _hold(self, event: Event) -> None:
-        """Keep the newest map with the updates after it, and the newest pose."""
-        match event:
-            case MapReceived():
-                self._held = [held for held in self._held if isinstance(held, PoseReceived)]
-            case PoseReceived():
-                self._held = [held for held in self._held if not isinstance(held, PoseReceived)]
-            case _ if not any(isinstance(held, MapReceived) for held in self._held):
-                why = "map update refused: there is no map yet"
-                self._status.faults.count([PatchWithoutBase(why)])
-                return
-        self._held.append(event)
-
     def _perform(self, mission: Mission, decision: Decision) -> None:
         self._status.faults.count(decision.faults)
+        self._keeping.note_faults(decision.faults)
+        if decision.forgotten:
+            self._keeping.forget()
         if decision.plan is not None and self._worker is not None:
             self._asked_map, self._unanswered_map = self._unanswered_map, None
             self._worker.submit(decision.plan)
@@ -170,7 +192,8 @@ class Loop:
             self._status.map_to_path_s = time.monotonic() - self._asked_map
 
     def _publish_coverage(self, mission: Mission, now: float) -> None:
-        key = (mission.ledger.total, mission.map_revision)
+        # An order may forget what was covered, and keep the robot out of cells.
+        key = (mission.ledger.total, mission.map_revision, mission.assignment)
         if key == self._coverage_key or now - self._coverage_at < COVERAGE_PERIOD_S:
             return
         if mission.lattice is None or mission.grid is None:
@@ -190,11 +213,21 @@ class Loop:
         frame = mission.grid.frame if mission and mission.grid else "map"
         self._outbox.pheromone(snapshot, frame)
 
+    def _publish_commands(
+        self, commands: Sequence[CommandReceived], answers: Sequence[Answer]
+    ) -> None:
+        """Tell everybody what was taken: a question is heard by who is asked alone."""
+        refused = {answer.number for answer in answers if answer.error is not None}
+        for asked in commands:
+            if asked.number not in refused:
+                self._outbox.command(command_document(asked.command, asked.order))
+
     def _publish_status(self, now: float) -> None:
         if self._recorder is not None:
             self._status.recorder = self._recorder.poll(now)
-        loading = self._loader.stage if self._loader and not self._mission else ""
-        document = self._status.due(self._mission, loading, now)
+        self._status.ledger = self._ledger.document(now)
+        self._status.faults.count(self._ledger.take_faults())
+        document = self._status.due(self._mission, self._assignment, self._loading, now)
         if document is not None:
             self._outbox.status(document)
 

@@ -38,6 +38,7 @@ class Outbox:
         self._coverage = bus.publisher(keys.coverage, schemas.OCCUPANCY_GRID, latched=True)
         self._pheromone = bus.publisher(keys.pheromone, schemas.PHEROMONE_GRID)
         self._status = bus.publisher(keys.status, latched=True)
+        self._command = bus.publisher(keys.command)
         for name, key in (
             ("path", keys.path),
             ("status", keys.status),
@@ -65,6 +66,10 @@ class Outbox:
         payload = encode_json(document)
         self._remember("status", Reply(payload))
         self._status.put(payload)
+
+    def command(self, document: dict[str, Any]) -> None:
+        """Publish a command that the mission has taken."""
+        self._command.put(encode_json(document))
 
     def coverage(self, grid: OccupancyGrid) -> None:
         """Publish the coverage, a grid on the lattice."""

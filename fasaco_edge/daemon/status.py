@@ -11,7 +11,9 @@ import msgspec
 
 from fasaco_edge import __version__
 from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.daemon.mission_report import mission_report
 from fasaco_edge.errors import FasacoError
+from fasaco_edge.mission.assignment import Assignment
 from fasaco_edge.process_memory import resident_mb
 
 if TYPE_CHECKING:
@@ -69,32 +71,50 @@ class StatusBoard:
         self.plan_s: float | None = None
         self.map_to_path_s: float | None = None
         self.recorder: dict[str, Any] | None = None
+        self.ledger: dict[str, Any] = {}
         self.path: PathUpdate | None = None
         self._config = config
         self._started = time.monotonic()
         self._sent_at = float("-inf")
         self._sent_key: tuple[Any, ...] = ()
 
-    def due(self, mission: Mission | None, loading: str, now: float) -> dict[str, Any] | None:
+    def due(
+        self, mission: Mission | None, assignment: Assignment, loading: str, now: float
+    ) -> dict[str, Any] | None:
         """Return the status if it changed or a second has passed, else None."""
-        state, reason = _state(mission, loading)
+        state, reason = _state(mission, assignment, loading)
         recorder = (self.recorder or {}).get("state")
-        key = (state, reason, self.path and self.path.revision, recorder)
+        revision = self.path and self.path.revision
+        key = (state, reason, revision, recorder, self.ledger.get("fault"), assignment)
         # Many small faults are not worth a message each: the heartbeat counts them.
         wait = LEAST_INTERVAL_S if key != self._sent_key else HEARTBEAT_S
         if now - self._sent_at < wait:
             return None
         self._sent_at, self._sent_key = now, key
-        return self._document(mission, state, reason, now)
-
-    def _document(
-        self, mission: Mission | None, state: str, reason: str, now: float
-    ) -> dict[str, Any]:
         return {
             "robot": self._config.robot.name,
             "version": __version__,
             "state": state,
             "reason": reason,
+            **self._document(mission, now),
+            "mission": mission_report(mission, assignment),
+        }
+
+    def report(
+        self, mission: Mission | None, assignment: Assignment, loading: str
+    ) -> dict[str, Any]:
+        """Return what the answer to a command says."""
+        state, reason = _state(mission, assignment, loading)
+        return {
+            "robot": self._config.robot.name,
+            "state": state,
+            "reason": reason,
+            "coverage": _coverage(mission),
+            "mission": mission_report(mission, assignment),
+        }
+
+    def _document(self, mission: Mission | None, now: float) -> dict[str, Any]:
+        return {
             "uptime_s": round(now - self._started, 3),
             "map": _map(mission),
             "pose": _pose(mission),
@@ -110,6 +130,7 @@ class StatusBoard:
                 "map_to_path": _ms(self.map_to_path_s),
             },
             "errors": self.faults.document(),
+            "ledger": self.ledger,
             "recorder": self.recorder,
             "rss_mb": resident_mb(),
             "config": msgspec.to_builtins(self._config),
@@ -147,9 +168,13 @@ def plan_figures(plan: CoveragePath | None) -> dict[str, Any]:
     return dict(zip(PLAN_FIGURES, values, strict=True))
 
 
-def _state(mission: Mission | None, loading: str) -> tuple[str, str]:
+def _state(mission: Mission | None, assignment: Assignment, loading: str) -> tuple[str, str]:
     if mission is not None:
         return str(mission.state), mission.reason
+    if assignment.order is None:
+        return "idle", assignment.why
+    if assignment.paused:
+        return "paused", "paused by command"
     return ("loading", loading) if loading else ("waiting for map", "no map yet")
 
 
@@ -183,7 +208,9 @@ def _coverage(mission: Mission | None) -> dict[str, Any] | None:
         "recovered": coverage.recovered,
         "remaining": coverage.remaining,
         "unreachable": coverage.unreachable,
-        "covered_m2": round(coverage.covered * coverage.cell_m2, 3),
+        "covered_m2": round(coverage.covered_m2, 3),
+        "to_cover_m2": round(coverage.to_cover_m2, 3),
+        "free_out_of_reach_m2": round(coverage.free_out_of_reach_m2, 3),
         "fraction": round(coverage.fraction, 4),
     }
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.mission.order import EVERYTHING_ONCE, MissionOrder
+from fasaco_edge.mission.order_document import CommandName
 
 if TYPE_CHECKING:
     # Only named here: the daemon hears events before it has loaded what plans.
@@ -55,7 +57,16 @@ class PlanReady:
     seconds: float
 
 
-Event = MapReceived | PatchReceived | PatchesLost | PoseReceived | PlanReady
+@dataclass(frozen=True, slots=True)
+class CommandReceived:
+    """Somebody commands; ``order`` is what ``start`` is to start."""
+
+    number: int
+    command: CommandName
+    order: MissionOrder = EVERYTHING_ONCE
+
+
+Event = MapReceived | PatchReceived | PatchesLost | PoseReceived | PlanReady | CommandReceived
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +98,14 @@ class PathUpdate:
 
 
 @dataclass(frozen=True, slots=True)
+class Answer:
+    """The answer to command ``number``: done, or why not."""
+
+    number: int
+    error: FasacoError | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Decision:
     """What is to be done after some events.
 
@@ -94,8 +113,12 @@ class Decision:
         plan: a plan to make; replaces none, there is one at a time.
         path: a path to publish; of several in one step the last is the one that holds.
         faults: events that were refused, and why; they changed nothing.
+        answers: to the commands among the events, in order.
+        forgotten: whether what was covered is to be forgotten on disk too.
     """
 
     plan: PlanRequest | None = None
     path: PathUpdate | None = None
     faults: tuple[FasacoError, ...] = ()
+    answers: tuple[Answer, ...] = ()
+    forgotten: bool = False

@@ -9,14 +9,19 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.grid.changes import LatticeChange, carried
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
 from fasaco_edge.kernels.directions import COL_STEP, ROW_STEP
+from fasaco_edge.kernels.reach import update_reach
 from fasaco_edge.kernels.walks import reachable_from, shortest_walk
 
 # A robot that stands a little off, or whose cell was just closed by a noisy
 # scan, goes on from the nearest coverable cell this close.
 ANCHOR_CELLS = 1.5
+
+# Where more of the lattice has changed, to search all of it is as fast.
+LOCAL_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +58,27 @@ class Ground:
         """Return the ground that can be reached from a coverable ``cell``."""
         reachable = reachable_from(lattice.steps, *lattice.local(cell)).astype(bool)
         return cls(lattice, reachable)
+
+    def after(self, change: LatticeChange, cell: Cell) -> Ground:
+        """Return the ground that can be reached from ``cell`` after the lattice has changed.
+
+        The same as ``around`` finds, at the cost of what changed where that is possible.
+        """
+        lattice = change.after
+        if lattice is self.lattice and self.holds(cell):
+            return self
+        if change.before is not self.lattice:
+            return Ground.around(lattice, cell)
+        old, new = self.lattice.window, lattice.window
+        changed = change.cells - np.array((new.row0, new.col0), np.int32)
+        is_local = 0 < len(changed) <= lattice.states.size * LOCAL_SHARE
+        if is_local and (changed >= 0).all() and (changed < (new.rows, new.cols)).all():
+            steps = carried(self.lattice.steps, old, new)
+            steps.flags.writeable = False
+            reachable = carried(self.reachable, old, new).copy()
+            if update_reach(steps, lattice.steps, changed, reachable, *lattice.local(cell)):
+                return Ground(lattice, reachable)
+        return Ground.around(lattice, cell)
 
     def holds(self, cell: Cell) -> bool:
         """Tell whether a coverable ``cell`` is reachable."""

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.grid.lattice import Cell
+
+if TYPE_CHECKING:
+    # Only named here: a daemon reads its ledger before it has loaded what plans.
+    from fasaco_edge.grid.lattice import Cell
 
 # Two poses further apart than this many cells are a jump, not a drive: nobody
 # knows what lay under the tool in between.
@@ -16,22 +24,90 @@ JUMP_CELLS = 2.0
 
 TILE = 64
 
+Tiles = Mapping["Cell", NDArray[np.uint16]]
+
+
+class LedgerMismatchError(FasacoError):
+    """A ledger is of another building, of other cells, or of another release."""
+
+    code = "ledger_mismatch"
+    hint = "it was kept aside and a new one begun; nothing has to be done to go on"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LedgerSnapshot:
+    """What a ledger held at a moment; shares nothing that will change.
+
+    Attributes:
+        cell_m: edge of a cell [m].
+        frame: name of the frame the cells lie in; "" as long as none is known.
+        total: all visits.
+        tiles: the visits, uint16 (TILE, TILE), read-only; tile (i, j) has the cells from
+            (TILE * i, TILE * j) on.
+        under_tool: the cells that lay under the tool: still there, it does not visit them anew.
+        note: what is kept with it, as JSON: the order and how far it is, see
+            ``mission.assignment``; "" for none.
+    """
+
+    cell_m: float
+    frame: str
+    total: int
+    tiles: Tiles
+    under_tool: frozenset[Cell] = frozenset()
+    note: str = ""
+
+    @property
+    def cells(self) -> int:
+        """How many cells were visited."""
+        return sum(int(np.count_nonzero(tile)) for tile in self.tiles.values())
+
+    def visits(self, window: Window) -> NDArray[np.uint16]:
+        """Return the number of visits, uint16 (rows, cols), of the cells of ``window``."""
+        return _visits(self.tiles, window)
+
 
 class CoverageLedger:
     """Visits of the tool to each cell.
 
     A cell is visited when the tool, a disc as wide as a cell, passes over its
     centre. Coming back after having left counts as another visit; ``total`` counts
-    all of them.
+    all of them. ``frame`` names the frame of the poses, "" as long as none is known.
     """
 
-    def __init__(self, cell_m: float) -> None:
+    def __init__(self, cell_m: float, frame: str = "") -> None:
+        self.frame = frame
         self.total = 0
         self._cell_m = cell_m
         # By tile, so that a map that jumps far away costs nothing in between.
         self._tiles: dict[Cell, NDArray[np.uint16]] = {}
+        # What the last snapshot holds, and which tiles have changed since.
+        self._frozen: dict[Cell, NDArray[np.uint16]] = {}
+        self._changed: set[Cell] = set()
         self._under_tool: frozenset[Cell] = frozenset()
         self._last: Pose2D | None = None
+
+    @classmethod
+    def restored(cls, snapshot: LedgerSnapshot) -> Self:
+        """Return the ledger as it was.
+
+        It does not know the last pose: what the robot did since, nobody saw.
+        """
+        ledger = cls(snapshot.cell_m, snapshot.frame)
+        ledger.total = snapshot.total
+        ledger._tiles = {place: tile.copy() for place, tile in snapshot.tiles.items()}
+        ledger._frozen = dict(snapshot.tiles)
+        ledger._under_tool = snapshot.under_tool
+        return ledger
+
+    def snapshot(self) -> LedgerSnapshot:
+        """Return what it holds now; costs a copy of the tiles that changed since the last one."""
+        for place in self._changed:
+            copy = self._tiles[place].copy()
+            copy.flags.writeable = False
+            self._frozen[place] = copy
+        self._changed.clear()
+        tiles = MappingProxyType(dict(self._frozen))
+        return LedgerSnapshot(self._cell_m, self.frame, self.total, tiles, self._under_tool)
 
     def record(self, pose: Pose2D) -> frozenset[Cell]:
         """Note that the robot drove on to ``pose``; return the cells newly visited."""
@@ -40,32 +116,49 @@ class CoverageLedger:
             last = pose
         swept = self._swept(last, pose)
         entered = swept - self._under_tool
-        for row, col in entered:
-            self.total += 1
-            tile = self._tiles.setdefault(
-                (row // TILE, col // TILE), np.zeros((TILE, TILE), np.uint16)
-            )
-            tile[row % TILE, col % TILE] = min(int(tile[row % TILE, col % TILE]) + 1, 65535)
+        for cell in entered:
+            self._visit(cell)
         self._under_tool = self._swept(pose, pose)
         self._last = pose
         return entered
 
+    def lift(self) -> None:
+        """Note that nobody knows how the robot gets to its next pose."""
+        self._last = None
+
+    def forget(self, inside: Callable[[Window], NDArray[np.bool_]]) -> None:
+        """Forget all visits to some cells, but the one to what lies under the tool now.
+
+        Args:
+            inside: returns for a window which of its cells, bool (rows, cols).
+        """
+        for (row, col), tile in self._tiles.items():
+            corner = row * TILE, col * TILE
+            chosen = inside(Window(*corner, corner[0] + TILE, corner[1] + TILE))
+            if tile[chosen].any():
+                tile[chosen] = 0
+                self._changed.add((row, col))
+        for cell in self._under_tool:
+            if not self.has_visited(cell):
+                self._visit(cell)
+
     def visits(self, window: Window) -> NDArray[np.uint16]:
         """Return the number of visits, uint16 (rows, cols), of the cells of ``window``."""
-        result = np.zeros((window.rows, window.cols), np.uint16)
-        for (tile_row, tile_col), tile in self._tiles.items():
-            row, col = tile_row * TILE, tile_col * TILE
-            place = Window(row, col, row + TILE, col + TILE)
-            common = window.intersection(place)
-            if common is not None:
-                result[common.slices_in(window)] = tile[common.slices_in(place)]
-        return result
+        return _visits(self._tiles, window)
 
     def has_visited(self, cell: Cell) -> bool:
         """Tell whether the tool has passed over ``cell``."""
         row, col = cell
         tile = self._tiles.get((row // TILE, col // TILE))
         return tile is not None and bool(tile[row % TILE, col % TILE])
+
+    def _visit(self, cell: Cell) -> None:
+        row, col = cell
+        self.total += 1
+        place = (row // TILE, col // TILE)
+        self._changed.add(place)
+        tile = self._tiles.setdefault(place, np.zeros((TILE, TILE), np.uint16))
+        tile[row % TILE, col % TILE] = min(int(tile[row % TILE, col % TILE]) + 1, 65535)
 
     def _swept(self, start: Pose2D, end: Pose2D) -> frozenset[Cell]:
         """Return the cells whose centre is within half a cell of the segment."""
@@ -82,6 +175,17 @@ class CoverageLedger:
                 if math.hypot(px - along * dx, py - along * dy) < half:
                     cells.append((row, col))
         return frozenset(cells)
+
+
+def _visits(tiles: Tiles, window: Window) -> NDArray[np.uint16]:
+    result = np.zeros((window.rows, window.cols), np.uint16)
+    for (tile_row, tile_col), tile in tiles.items():
+        row, col = tile_row * TILE, tile_col * TILE
+        place = Window(row, col, row + TILE, col + TILE)
+        common = window.intersection(place)
+        if common is not None:
+            result[common.slices_in(window)] = tile[common.slices_in(place)]
+    return result
 
 
 def _span(low: float, high: float, cell_m: float) -> range:

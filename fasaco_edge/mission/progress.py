@@ -25,11 +25,15 @@ MOST_TRIES = 3
 class State(StrEnum):
     """What the mission is doing."""
 
+    IDLE = "idle"
     WAITING_FOR_MAP = "waiting for map"
     WAITING_FOR_POSE = "waiting for pose"
     PLANNING = "planning"
     COVERING = "covering"
+    RETURNING = "returning"
+    PAUSED = "paused"
     BLOCKED = "blocked"
+    DEGRADED = "degraded"
     DONE = "done"
 
 
@@ -43,6 +47,7 @@ class Coverage:
         recovered: those it has passed over at least twice.
         unreachable: cells where the robot would fit but cannot come to.
         cell_m2: area of a cell [m2].
+        free_out_of_reach_m2: area known to be free, but in no reachable cell [m2].
     """
 
     coverable: int
@@ -50,6 +55,7 @@ class Coverage:
     recovered: int
     unreachable: int
     cell_m2: float
+    free_out_of_reach_m2: float = 0.0
 
     @classmethod
     def of(
@@ -57,6 +63,7 @@ class Coverage:
         lattice: CoverageLattice,
         reachable: NDArray[np.bool_] | None,
         visits: NDArray[np.uint16],
+        free_out_of_reach_m2: float = 0.0,
     ) -> Self:
         """Count over ``lattice``; all arrays are (rows, cols)."""
         coverable = lattice.coverable
@@ -68,12 +75,23 @@ class Coverage:
             recovered=int(np.count_nonzero(reachable & (visits > 1))),
             unreachable=int(np.count_nonzero(coverable & ~reachable)),
             cell_m2=lattice.cell_m**2,
+            free_out_of_reach_m2=free_out_of_reach_m2,
         )
 
     @property
     def remaining(self) -> int:
         """Reachable cells still to be covered."""
         return self.coverable - self.covered
+
+    @property
+    def covered_m2(self) -> float:
+        """Area of the covered cells [m2]."""
+        return self.covered * self.cell_m2
+
+    @property
+    def to_cover_m2(self) -> float:
+        """Area of the reachable cells still to be covered [m2]."""
+        return self.remaining * self.cell_m2
 
     @property
     def fraction(self) -> float:
@@ -132,18 +150,23 @@ class DrivenPath:
         return bool(abs(int(row) - cell[0]) + abs(int(col) - cell[1]) > FAR_CELLS)
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class LeftOver:
-    """How often plans for left-over cells came to nothing: not a cell more was visited."""
+    """How often a path came to its end and left as many cells over as the one before.
 
-    visits: int = -1
+    Attributes:
+        cells: left over by the last one.
+        tries: paths that have left over so many.
+    """
+
+    cells: int = -1
     tries: int = 0
 
-    def tried(self, visits: int) -> None:
-        """Note another try, begun after so many visits."""
-        self.tries = self.tries + 1 if visits == self.visits else 1
-        self.visits = visits
+    def after(self, cells: int) -> LeftOver:
+        """Return it after another path that left ``cells`` over."""
+        return LeftOver(cells, self.tries + 1 if cells == self.cells else 1)
 
-    def given_up(self, visits: int) -> bool:
-        """Tell whether there is no point in trying again before something is visited."""
-        return visits == self.visits and self.tries > MOST_TRIES
+    @property
+    def given_up(self) -> bool:
+        """Whether there is no point in trying again at once."""
+        return self.cells > 0 and self.tries > MOST_TRIES

@@ -7,6 +7,7 @@ flipped here, and nowhere else.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,22 +21,33 @@ from fasaco_edge.wire.pheromone import PheromoneMessage
 Colour = tuple[int, int, int]
 Bounds = tuple[float, float, float, float]
 
-PATH_COLOUR: Colour = (124, 58, 237)
-OLD_PATH_COLOUR: Colour = (196, 181, 253)
-TRAIL_COLOUR: Colour = (5, 150, 105)
 ROBOT_COLOUR: Colour = (220, 38, 38)
 HEADING_COLOUR: Colour = (250, 204, 21)
-CHANGE_COLOUR: Colour = (219, 39, 119)
 COVERED_COLOUR: Colour = (56, 152, 222)
 RECOVERED_COLOUR: Colour = (245, 140, 40)
 BLOCKED_COLOUR: Colour = (120, 120, 130)
 
 # Heights [m] only say what lies on what: the eye looks down from far above.
-CHANGE_Z, OLD_PATH_Z, PATH_Z, TRAIL_Z, ROBOT_Z = 0.02, 0.03, 0.04, 0.05, 0.06
+ROBOT_Z = 0.06
 MAP_ORDER, COVERAGE_ORDER = 0.0, 1.0
 
-# Widths in points of the screen, which rerun takes as negative radii.
-PATH_RADIUS, OLD_PATH_RADIUS, TRAIL_RADIUS = -1.2, -0.8, -1.6
+# Sine over cosine of a bend that is none.
+STRAIGHT = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class LineStyle:
+    """How a line is drawn: its colour, its height ``z`` [m], its width [points of the screen]."""
+
+    colour: Colour
+    z: float
+    width: float
+
+
+CHANGE = LineStyle((219, 39, 119), z=0.02, width=1.6)
+OLD_PATH = LineStyle((196, 181, 253), z=0.03, width=0.8)
+PATH = LineStyle((124, 58, 237), z=0.04, width=1.2)
+TRAIL = LineStyle((5, 150, 105), z=0.05, width=1.6)
 
 
 def map_archetype(grid: OccupancyGrid) -> rr.GridMap:
@@ -59,13 +71,28 @@ def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
     return _grid(message.geometry, message.levels, rr.components.Colormap.Inferno, MAP_ORDER)
 
 
-def path_archetype(
-    xy: NDArray[np.float64], colour: Colour, z: float, radius: float
-) -> rr.LineStrips3D:
-    """Return a path, points [m] float64 (n, 2), as a line; nothing for fewer than two points."""
-    points = np.column_stack((xy, np.full(len(xy), z)))
+def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:
+    """Return points [m] float64 (n, 2) as a line; nothing for fewer than two points."""
+    points = np.column_stack((xy, np.full(len(xy), style.z)))
     strips = [points] if len(points) >= 2 else []
-    return rr.LineStrips3D(strips, colors=[colour] * len(strips), radii=[radius] * len(strips))
+    count = len(strips)
+    # Rerun takes a width on the screen as a negative radius.
+    return rr.LineStrips3D(strips, colors=[style.colour] * count, radii=[-style.width] * count)
+
+
+def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a line, points float64 (n, 2), without the points it runs straight through.
+
+    A path over the lattice is mostly lanes: a tenth of its points draw the same line.
+    """
+    if len(xy) < 3:
+        return xy
+    steps = np.diff(xy, axis=0)
+    across = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
+    along = (steps[:-1] * steps[1:]).sum(axis=1)
+    bends = np.ones(len(xy), bool)
+    bends[1:-1] = (np.abs(across) > STRAIGHT * np.abs(along)) | (along <= 0)
+    return xy[bends]
 
 
 def pose_archetype(pose: Pose2D) -> rr.Transform3D:
@@ -88,8 +115,7 @@ def body_archetypes(radius_m: float) -> tuple[rr.Ellipsoids3D, rr.LineStrips3D]:
 def change_archetype(bounds: Bounds) -> rr.LineStrips3D:
     """Return the outline of a rectangle (x_min, y_min, x_max, y_max) [m] of the map."""
     x0, y0, x1, y1 = bounds
-    corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)])
-    return path_archetype(corners, CHANGE_COLOUR, CHANGE_Z, TRAIL_RADIUS)
+    return line_archetype(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]), CHANGE)
 
 
 def coverage_fractions(grid: OccupancyGrid) -> tuple[float, float]:

@@ -42,3 +42,8 @@ BUS_LOG: Final = "log/bus"
 RECORDER_LOG: Final = "log/recorder"
 
 RUN_CARD: Final = "run/card"
+
+INPUTS: Final = "inputs"
+"""What the mission heard, in batches of samples (``bus.sample_codec``)."""
+INPUTS_ARCHETYPE: Final = "Inputs"
+INPUTS_COMPONENT: Final = "batch"

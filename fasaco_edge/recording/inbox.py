@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections import deque
-from dataclasses import dataclass
+from collections import Counter, deque
 
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import Arrival
 
-# So many samples waiting mean that the writer is behind.
-BEHIND_SAMPLES = 128
+# So many samples waiting mean that the writer is behind: some ten seconds of poses.
+BEHIND_SAMPLES = 1024
 
 # What a sample makes worthless when the writer is behind. Paths are missing: they are
 # small, and each revision counts. A full map also clears the patches of the one before it.
@@ -20,15 +19,6 @@ SUPERSEDED: dict[str, frozenset[str]] = {
     "pheromone": frozenset({"pheromone"}),
     "status": frozenset({"status"}),
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Arrival:
-    """A sample, what it is about, and when it came: wall clock [ns]."""
-
-    topic: str
-    sample: Sample
-    wall_ns: int
 
 
 class Inbox:
@@ -43,7 +33,7 @@ class Inbox:
         self._waiting: deque[Arrival] = deque()
         self._capacity = capacity_bytes
         self._bytes = 0
-        self._lost = 0
+        self._lost: Counter[str] = Counter()
 
     def post(self, arrival: Arrival) -> None:
         """Leave a sample; safe from any thread, never waits for the writer."""
@@ -52,7 +42,7 @@ class Inbox:
             if len(self._waiting) >= BEHIND_SAMPLES or 2 * (self._bytes + size) > self._capacity:
                 self._forget(SUPERSEDED.get(arrival.topic, frozenset()))
             if self._bytes + size > self._capacity:
-                self._lost += 1
+                self._lost[arrival.topic] += 1
                 return
             self._waiting.append(arrival)
             self._bytes += size
@@ -69,13 +59,13 @@ class Inbox:
             return arrivals
 
     @property
-    def lost(self) -> int:
-        """How many samples never reached the writer."""
+    def lost(self) -> Counter[str]:
+        """How many samples of each topic never reached the writer."""
         with self._changed:
-            return self._lost
+            return self._lost.copy()
 
     def _forget(self, topics: frozenset[str]) -> None:
+        self._lost.update(arrival.topic for arrival in self._waiting if arrival.topic in topics)
         kept = deque(arrival for arrival in self._waiting if arrival.topic not in topics)
-        self._lost += len(self._waiting) - len(kept)
         self._bytes = sum(len(arrival.sample.payload) for arrival in kept)
         self._waiting = kept

@@ -12,14 +12,16 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.recording import entities
 from fasaco_edge.recording.part import Flush, Part
 from fasaco_edge.recording.sdk import rr, rrb
+from fasaco_edge.recording.standing import Standing
 
-FLUSH_PERIOD_NS = 1_000_000_000
+# What a kill -9 costs of what is drawn. Each entity begins a chunk with each flush, and a
+# chunk takes a kilobyte.
+FLUSH_PERIOD_NS = 4_000_000_000
+# While nothing can be written, how often to look whether it can again.
+RETRY_PERIOD_NS = 1_000_000_000
 # Rerun's own queue has no bound: no more than this may wait in it between two flushes.
 FLUSH_BYTES = 8_000_000
 FLUSH_TIMEOUT_S = 0.5
@@ -61,14 +63,7 @@ class Journal:
         self._folder = folder
         self._recording_id = recording_id
         self._room = room
-        self._blueprint = blueprint
-        self._name = recording_id
-        self._properties: dict[str, str] = {}
-        self._static: dict[str, tuple[rr.AsComponents, ...]] = {}
-        self._latched: dict[str, rr.AsComponents] = {}
-        self._missed_ns: dict[str, int] = {}
-        self._sequences: dict[str, int] = {}
-        self._wall_ns = 0
+        self._standing = Standing(recording_id, blueprint)
         self._part: Part | None = None
         self._parts = 0
         self._abandoned: list[Part] = []
@@ -95,12 +90,22 @@ class Journal:
         return bool(self._abandoned) or self.state is JournalState.STALLED
 
     @property
-    def bytes(self) -> int:
+    def wall_ns(self) -> int:
+        """The time of what is logged next [ns]."""
+        return self._standing.wall_ns
+
+    @property
+    def part_number(self) -> int:
+        """Number of the part being written, from 1; 0 while there is none."""
+        return self._parts if self._part else 0
+
+    @property
+    def size(self) -> int:
         """Size of the part being written [bytes]."""
         return self._part.size if self._part else 0
 
-    def message(self, wall_ns: int, size: int) -> None:
-        """Begin what a message of ``size`` bytes, received at ``wall_ns``, gives to log.
+    def message(self, wall_ns: int) -> None:
+        """Begin what a message received at ``wall_ns`` gives to log.
 
         A message that is not written is counted as lost, one that only may have been
         lost with a broken part, too.
@@ -108,46 +113,61 @@ class Journal:
         self.at(wall_ns)
         if self.state is JournalState.RECORDING:
             self._unflushed_messages += 1
-            self._unflushed_bytes += size
         else:
             self.lost += 1
 
     def at(self, wall_ns: int) -> None:
         """Set the time [ns] of what is logged next."""
-        self._wall_ns = wall_ns
+        self._standing.wall_ns = wall_ns
         if self._part:
-            self._set_times(self._part.stream)
+            self._standing.set_times(self._part.stream)
 
     def sequence(self, timeline: str, number: int) -> None:
         """Set the place on another timeline of all that is logged from now on."""
-        self._sequences[timeline] = number
+        self._standing.sequences[timeline] = number
         if self._part:
-            self._set_times(self._part.stream)
+            self._standing.set_times(self._part.stream)
 
-    def log(self, entity: str, archetype: rr.AsComponents, *, latched: bool = False) -> None:
-        """Log at the time set; ``latched``: in force until the next, so parts begin with it."""
+    def log(
+        self, entity: str, archetype: rr.AsComponents, *, latched: bool = False, size: int = 0
+    ) -> None:
+        """Log at the time set.
+
+        Args:
+            entity, archetype: what.
+            latched: in force until the next, so parts begin with it.
+            size: how much it is, where that is much [bytes].
+        """
+        part = self._part if self.state is JournalState.RECORDING else None
         if latched:
-            self._latched[entity] = archetype
-        if self._part and self.state is JournalState.RECORDING:
-            self._part.stream.log(entity, archetype)
-        elif latched:
-            self._missed_ns[entity] = self._wall_ns
+            self._standing.latch(entity, archetype, missed=part is None)
+        if part is not None:
+            part.stream.log(entity, archetype)
+            self._unflushed_bytes += size
+
+    def write_blob(self, blob: bytes) -> bool:
+        """Write bytes at the time set, without waiting for a flush; False where it cannot be."""
+        if self._part is None or self.state is not JournalState.RECORDING:
+            return False
+        self._part.write_blob(blob, self.wall_ns)
+        self._unflushed_bytes += len(blob)
+        return True
 
     def log_static(self, entity: str, *archetypes: rr.AsComponents) -> None:
         """Log what holds for the whole run; takes the place of what held before."""
-        self._static[entity] = archetypes
+        self._standing.static[entity] = archetypes
         if self._part and self.state is JournalState.RECORDING:
             self._part.stream.log(entity, *archetypes, static=True)
 
     def describe(self, name: str, properties: dict[str, str]) -> None:
         """Name the recording, and set its properties."""
-        self._name, self._properties = name, properties
+        self._standing.name, self._standing.properties = name, properties
         if self._part and self.state is JournalState.RECORDING:
-            self._send_description(self._part.stream)
+            self._standing.send_description(self._part.stream)
 
     def show(self, blueprint: rrb.Blueprint) -> None:
         """Make ``blueprint`` the one that opens; a file's last one counts."""
-        self._blueprint = blueprint
+        self._standing.blueprint = blueprint
         if self._part and self.state is JournalState.RECORDING:
             self._part.stream.send_blueprint(blueprint)
 
@@ -159,11 +179,12 @@ class Journal:
         """
         if now_ns < self._next_flush_ns and self._unflushed_bytes < FLUSH_BYTES:
             return
-        self._next_flush_ns = now_ns + FLUSH_PERIOD_NS
         if self._part is None:
             self._try_again()
         elif self._is_flushed(self._part):
             self._keep_room(self._part)
+        recording = self.state is JournalState.RECORDING
+        self._next_flush_ns = now_ns + (FLUSH_PERIOD_NS if recording else RETRY_PERIOD_NS)
 
     def close(self) -> bool:
         """End the part in order; False where the disk holds rerun's writer up."""
@@ -192,7 +213,7 @@ class Journal:
         self._unflushed_messages = self._unflushed_bytes = 0
         if stalled:
             self._enter(JournalState.RECORDING, "the disk writes again")
-            self._send_latched(part.stream)
+            self._standing.send_latched(part.stream)
         return True
 
     def _keep_room(self, part: Part) -> None:
@@ -237,32 +258,7 @@ class Journal:
         path = self._folder / f"{self._recording_id}-part{number}.rrd"
         part = Part(path, self._recording_id)
         self._part, self._parts = part, number
-        part.stream.send_blueprint(self._blueprint)
-        self._send_description(part.stream)
-        for entity, archetypes in self._static.items():
-            part.stream.log(entity, *archetypes, static=True)
-        self._send_latched(part.stream)
-
-    def _send_description(self, stream: rr.RecordingStream) -> None:
-        stream.send_recording_name(self._name)
-        if self._properties:
-            stream.send_property(entities.APPLICATION, rr.AnyValues(**self._properties))
-
-    def _send_latched(self, stream: rr.RecordingStream) -> None:
-        now_ns = self._wall_ns
-        for entity, archetype in self._latched.items():
-            # What came while nothing was written is in force since then.
-            self._wall_ns = self._missed_ns.get(entity, now_ns)
-            self._set_times(stream)
-            stream.log(entity, archetype)
-        self._missed_ns.clear()
-        self._wall_ns = now_ns
-        self._set_times(stream)
-
-    def _set_times(self, stream: rr.RecordingStream) -> None:
-        stream.set_time(entities.WALL, timestamp=np.datetime64(self._wall_ns, "ns"))
-        for timeline, number in self._sequences.items():
-            stream.set_time(timeline, sequence=number)
+        self._standing.begin(part.stream)
 
     def _free_bytes(self) -> int:
         try:

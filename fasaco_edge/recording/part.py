@@ -7,13 +7,14 @@ import fcntl
 import os
 from pathlib import Path
 
+import numpy as np
+
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.repair import repair_recording
 from fasaco_edge.recording.sdk import rr
 
-# Rows gather this long before they are written [s]: what a kill -9 costs, and what
-# keeps chunks from being tiny.
-FLUSH_TICK_S = 1.0
+# Rows gather until the journal flushes, or at most this long [s].
+FLUSH_TICK_S = 10.0
 
 
 class Flush(enum.Enum):
@@ -59,6 +60,15 @@ class Part:
     def size(self) -> int:
         """Size of the file so far [bytes]."""
         return os.fstat(self._lock).st_size
+
+    def write_blob(self, blob: bytes, wall_ns: int) -> None:
+        """Write bytes at ``wall_ns`` [ns], past what gathers."""
+        time = rr.TimeColumn(entities.WALL, timestamp=np.array([wall_ns], "datetime64[ns]"))
+        columns = rr.DynamicArchetype.columns(
+            archetype=entities.INPUTS_ARCHETYPE,
+            components={entities.INPUTS_COMPONENT: rr.components.BlobBatch([blob])},
+        )
+        rr.send_columns(entities.INPUTS, indexes=[time], columns=columns, recording=self.stream)
 
     def flush(self, timeout_s: float) -> Flush:
         """Wait up to ``timeout_s`` [s] until all that was logged is handed to the disk."""

@@ -17,12 +17,15 @@ from itertools import chain, count
 from pathlib import Path
 from types import FrameType
 
+from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Bus, Publisher, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, FasacoError
 from fasaco_edge.process_memory import resident_mb
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.blueprint import build_blueprint
-from fasaco_edge.recording.inbox import Arrival, Inbox
+from fasaco_edge.recording.clock import RunClock
+from fasaco_edge.recording.inbox import Inbox
+from fasaco_edge.recording.input_log import InputLog
 from fasaco_edge.recording.journal import Journal, Room
 from fasaco_edge.recording.repair import repair_folder
 from fasaco_edge.recording.report import RecorderReport
@@ -77,11 +80,13 @@ class Recorder:
         self._settings = settings
         self._bus = bus
         self._clock = RunClock()
-        began = datetime.fromtimestamp(self._clock.now_ns() / 1e9, UTC)
+        began_ns = self._clock.now_ns()
+        began = datetime.fromtimestamp(began_ns / 1e9, UTC)
         name = _unused_name(settings.out, f"{began:%Y%m%dT%H%M%SZ}-{settings.robot}")
         room = Room(settings.part_bytes, settings.least_free_bytes)
         self._journal = Journal(settings.out, name, room, build_blueprint(None))
-        self._journal.at(self._clock.now_ns())
+        self._journal.at(began_ns)
+        self._inputs = InputLog(self._journal, began_ns)
         description = RunDescription(settings.robot, f"{began:%Y-%m-%d %H:%M:%S} UTC")
         self._scene = Scene(self._journal, description)
         self._inbox = Inbox(settings.queue_bytes)
@@ -89,6 +94,7 @@ class Recorder:
             "map": self._read_map,
             "map_update": self._read_map_update,
             "pose": self._read_pose,
+            "command": self._read_command,
             "path": self._read_path,
             "coverage": self._read_coverage,
             "pheromone": self._read_pheromone,
@@ -107,6 +113,7 @@ class Recorder:
         self._subscribe("map", settings.map_key or keys.map, latched=True)
         self._subscribe("map_update", settings.map_update_key or keys.map_update)
         self._subscribe("pose", settings.pose_key or keys.pose)
+        self._subscribe("command", keys.command)
         self._subscribe("path", keys.path, latched=True)
         self._subscribe("coverage", keys.coverage, latched=True)
         self._subscribe("pheromone", keys.pheromone)
@@ -117,9 +124,11 @@ class Recorder:
         """Write what came within ``timeout_s`` [s], find out whether it is written, report."""
         for arrival in self._inbox.take(timeout_s):
             self._write(arrival)
-            self._journal.sync(time.monotonic_ns())
-        self._journal.sync(time.monotonic_ns())
+            self._sync()
+        self._inputs.note_lost(self._inbox.lost)
         self._journal.at(self._clock.now_ns())
+        self._sync()
+        self._scene.catch_up()
         self._watch_planner()
         self._tell(self._journal.state.value, self._journal.reason)
 
@@ -130,6 +139,7 @@ class Recorder:
             if time.monotonic_ns() < deadline_ns:
                 self._write(arrival)
         self._journal.at(self._clock.now_ns())
+        self._inputs.write()
         self._tell("stopping", "asked to end")
         self._scene.finish()
         return self._journal.close()
@@ -145,13 +155,19 @@ class Recorder:
 
     def _subscribe(self, topic: str, key: str, latched: bool = False) -> None:
         def post(sample: Sample) -> None:
-            self._inbox.post(Arrival(topic, sample, self._clock.now_ns()))
+            self._inbox.post(self._clock.arrival(topic, sample))
 
         self._bus.subscribe(key, post, latched)
 
+    def _sync(self) -> None:
+        now_ns = time.monotonic_ns()
+        self._inputs.write_if_due(now_ns)
+        self._journal.sync(now_ns)
+
     def _write(self, arrival: Arrival) -> None:
         self._messages += 1
-        self._journal.message(arrival.wall_ns, len(arrival.sample.payload))
+        self._journal.message(arrival.wall_ns)
+        self._inputs.add(arrival)
         try:
             self._readers[arrival.topic](arrival.sample)
         except FasacoError as error:
@@ -170,6 +186,9 @@ class Recorder:
     def _read_pose(self, sample: Sample) -> None:
         schema = sample.schema or self._settings.pose_schema
         self._scene.add_pose(decode_pose(sample.payload, schema))
+
+    def _read_command(self, sample: Sample) -> None:
+        self._scene.add_command(decode_json(sample.payload))
 
     def _read_path(self, sample: Sample) -> None:
         note = decode_json(sample.attachment) if sample.attachment else {}
@@ -202,26 +221,15 @@ class Recorder:
             state=state,
             reason=reason,
             file=str(path) if path else "",
-            bytes=self._journal.bytes,
+            bytes=self._journal.size,
             messages=self._messages,
-            lost=self._journal.lost + self._inbox.lost,
+            lost=self._journal.lost + self._inbox.lost.total(),
             malformed=self._malformed,
             rss_mb=resident_mb(),
             pid=os.getpid(),
         )
         self._scene.add_report(self._report)
         self._reporter.put(encode_json(self._report))
-
-
-class RunClock:
-    """UTC [ns] that never steps: a clock set during a run must not tear its timeline."""
-
-    def __init__(self) -> None:
-        self._offset_ns = time.time_ns() - time.monotonic_ns()
-
-    def now_ns(self) -> int:
-        """Return the time [ns] since the epoch, as the clock saw it when the run began."""
-        return self._offset_ns + time.monotonic_ns()
 
 
 def _unused_name(folder: Path, stem: str) -> str:

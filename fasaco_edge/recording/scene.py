@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,8 @@ from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.changes import Bounds, changed_bounds, known_bounds, union
 from fasaco_edge.recording.fields import Json, integer, number, section, text
 from fasaco_edge.recording.journal import Journal
+from fasaco_edge.recording.layers import Layers, size_in_file
+from fasaco_edge.recording.path_drawing import PathDrawing
 from fasaco_edge.recording.report import RecorderReport
 from fasaco_edge.recording.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
@@ -39,12 +42,12 @@ class Scene:
         self._map: OccupancyGrid | None = None
         self._known: Bounds | None = None
         self._framed: Bounds | None = None
-        self._path: PathMessage | None = None
-        self._revision: int | None = None
         self._last_place: tuple[float, float] | None = None
         self._cohorts = 0
         self._errors = 0
         self._states: dict[str, str] = {}
+        self._layers = Layers()
+        self._paths = PathDrawing(journal, self._layers)
         log_styles(journal)
         self._describe()
         self._draw_robot(DEFAULT_RADIUS_M)
@@ -58,8 +61,14 @@ class Scene:
             changed = changed_bounds(before, grid)
             if changed is not None:
                 self._journal.log(entities.MAP_CHANGE, draw.change_archetype(changed))
-        self._journal.log(entities.MAP, draw.map_archetype(grid), latched=True)
-        self._frame(grid)
+
+        def draw_map() -> None:
+            self._journal.log(
+                entities.MAP, draw.map_archetype(grid), latched=True, size=grid.cells.size
+            )
+            self._frame(grid)
+
+        self._draw(entities.MAP, size_in_file(grid.cells), draw_map)
 
     def add_map_update(self, patch: MapPatch) -> None:
         """Lay a patch over the map.
@@ -80,29 +89,30 @@ class Scene:
             self._last_place = here
         elif math.dist(self._last_place, here) >= TRAIL_SPACING_M:
             step = np.array([self._last_place, here])
-            line = draw.path_archetype(step, draw.TRAIL_COLOUR, draw.TRAIL_Z, draw.TRAIL_RADIUS)
-            self._journal.log(entities.TRAIL, line)
+            self._journal.log(entities.TRAIL, draw.line_archetype(step, draw.TRAIL))
             self._last_place = here
+
+    def add_command(self, command: Json) -> None:
+        """Log a command that the mission has taken."""
+        self._say(entities.MISSION_LOG, f"command: {text(command, 'command')}")
 
     def add_path(self, message: PathMessage, note: Json) -> None:
         """Draw the path to drive, over the one before it, and log why it came."""
-        revision = integer(note, "revision")
-        if revision is not None:
-            self._journal.sequence(entities.REPLAN, revision)
-        if self._path is not None and revision != self._revision:
-            old = draw.path_archetype(
-                self._path.xy, draw.OLD_PATH_COLOUR, draw.OLD_PATH_Z, draw.OLD_PATH_RADIUS
-            )
-            self._journal.log(entities.OLD_PATH, old, latched=True)
-        new = draw.path_archetype(message.xy, draw.PATH_COLOUR, draw.PATH_Z, draw.PATH_RADIUS)
-        self._journal.log(entities.PATH, new, latched=True)
-        if self._path is None or revision != self._revision:
-            self._say(entities.PATH_LOG, _path_line(message, note))
-        self._path, self._revision = message, revision
+        self._paths.add(message, note)
 
     def add_coverage(self, grid: OccupancyGrid) -> None:
         """Tint what is covered, and plot how much that is."""
-        self._journal.log(entities.COVERAGE, draw.coverage_archetype(grid), latched=True)
+
+        def draw_coverage() -> None:
+            self._journal.log(
+                entities.COVERAGE,
+                draw.coverage_archetype(grid),
+                latched=True,
+                size=4 * grid.cells.size,
+            )
+
+        # It is drawn in four bytes a cell, which makes it twice as large.
+        self._draw(entities.COVERAGE, 2 * size_in_file(grid.cells), draw_coverage)
         covered, recovered = draw.coverage_fractions(grid)
         self._plot(entities.COVERED_FRACTION, covered)
         self._plot(entities.RECOVERED_FRACTION, recovered)
@@ -111,7 +121,16 @@ class Scene:
         """Draw the pheromone after a cohort, and plot the best walk so far."""
         self._cohorts += 1
         self._journal.sequence(entities.ITER, self._cohorts)
-        self._journal.log(entities.PHEROMONE, draw.pheromone_archetype(message), latched=True)
+
+        def draw_pheromone() -> None:
+            self._journal.log(
+                entities.PHEROMONE,
+                draw.pheromone_archetype(message),
+                latched=True,
+                size=message.levels.size,
+            )
+
+        self._draw(entities.PHEROMONE, size_in_file(message.levels), draw_pheromone)
         self._plot(entities.BEST_STEPS, message.best_steps)
         # The levels' scale: with it they can be turned back into trails.
         self._plot(f"{entities.TRAIL_RANGE}/min", message.trail_min)
@@ -152,10 +171,18 @@ class Scene:
         """Log something that went wrong."""
         self._say(log, message, "WARN")
 
+    def catch_up(self) -> None:
+        """Draw what had to wait; call it often."""
+        self._layers.catch_up(self._journal.wall_ns)
+
     def finish(self) -> None:
-        """Frame the map as it was at the end."""
+        """Draw what waits, and frame the map as it was at the end."""
+        self._layers.finish()
         if self._known is not None and self._known != self._framed:
             self._journal.show(build_blueprint(self._known))
+
+    def _draw(self, layer: str, size: int, draw_it: Callable[[], None]) -> None:
+        self._layers.draw(layer, size, draw_it, self._journal.wall_ns)
 
     def _frame(self, grid: OccupancyGrid) -> None:
         bounds = known_bounds(grid)
@@ -210,16 +237,3 @@ def _is_far(framed: Bounds, bounds: Bounds) -> bool:
     size = max(framed[2] - framed[0], framed[3] - framed[1])
     moved = max(abs(a - b) for a, b in zip(framed, bounds, strict=True))
     return moved > REFRAME_FRACTION * size
-
-
-def _path_line(message: PathMessage, note: Json) -> str:
-    revision = integer(note, "revision")
-    named = "path" if revision is None else f"path {revision}"
-    facts = [f"{max(len(message.xy) - 1, 0)} steps"]
-    planner, plan_ms = text(note, "planner"), number(note, "plan_ms")
-    if planner:
-        facts.append(planner)
-    if plan_ms is not None:
-        facts.append(f"{plan_ms:.0f} ms")
-    reason = text(note, "reason")
-    return f"{named} ({', '.join(facts)}){': ' if reason else ''}{reason}"

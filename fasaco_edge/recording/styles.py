@@ -31,11 +31,15 @@ GREEN, AMBER, RED, BLUE, VIOLET, GREY = (
 
 STATES: dict[str, dict[str, int]] = {
     entities.MISSION_STATE: {
+        "idle": GREY,
         "waiting for map": GREY,
         "waiting for pose": GREY,
         "planning": VIOLET,
         "covering": GREEN,
+        "returning": GREEN,
+        "paused": AMBER,
         "blocked": RED,
+        "degraded": AMBER,
         "done": BLUE,
         "silent": AMBER,
     },

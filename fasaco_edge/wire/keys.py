@@ -73,6 +73,11 @@ class Keys:
         return f"{self.prefix}/status"
 
     @property
+    def command(self) -> str:
+        """Out: each command the mission has taken."""
+        return f"{self.prefix}/command"
+
+    @property
     def alive(self) -> str:
         """Liveliness token of the planner."""
         return f"{self.prefix}/alive"

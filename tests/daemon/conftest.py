@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
+from fasaco_edge.daemon.ledger_file import LedgerFile
+from tests.daemon.ledgers import lane
 from tests.daemon.outsider import Outsider
 from tests.daemon.processes import Daemon, daemon_process
 
@@ -20,3 +23,12 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
 def outsider(daemon: Daemon) -> Iterator[Outsider]:
     with Outsider(daemon.endpoint) as client:
         yield client
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Path:
+    """The folder of a robot that has covered four cells, and has written three and four."""
+    file = LedgerFile(tmp_path, "robot")
+    for length in (3, 4):
+        file.write(lane(length))
+    return tmp_path

@@ -70,16 +70,28 @@ class Daemon:
 
 @contextmanager
 def daemon_process(
-    folder: Path, *words: str, env: dict[str, str] | None = None, **sections: Any
+    folder: Path,
+    *words: str,
+    env: dict[str, str] | None = None,
+    state: bool = True,
+    **sections: Any,
 ) -> Iterator[Daemon]:
-    """Run a daemon with these sections of configuration; end it, and check how it ended."""
+    """Run a daemon with these sections of configuration; end it, and check how it ended.
+
+    Its progress is kept in the folder ``state`` of ``folder``, if words and configuration do not
+    say where (``state=False``): the next one there goes on with it.
+    """
+    # The robots of most tests stand still, and say so once.
+    sections.setdefault("mission", {}).setdefault("lost_pose_s", 0.0)
     sections.setdefault("bus", {}).setdefault("listen", [free_endpoint()])
-    endpoint = sections["bus"]["listen"][0]
+    endpoint = [*sections["bus"]["listen"], *sections["bus"].get("connect", ())][0]
     number = len(list(folder.glob("daemon*.yaml")))
     config, log = folder / f"daemon{number}.yaml", folder / f"daemon{number}.log"
     config.write_text(yaml.safe_dump(sections))
     with log.open("wb") as stderr:
         command = [*PROGRAM, "run", "--config", str(config), *words]
+        if state and "--state" not in words:
+            command += ["--state", str(folder / "state")]
         process = subprocess.Popen(command, stderr=stderr, env=ENVIRONMENT | (env or {}))
     daemon = Daemon(process, endpoint, log)
     try:

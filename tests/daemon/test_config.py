@@ -13,7 +13,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.daemon.config import DaemonConfig, load_config
+from fasaco_edge.daemon.config import DaemonConfig, MissionSettings, load_config
 from fasaco_edge.errors import BadConfiguration
 from tests.daemon.processes import PROGRAM
 
@@ -63,6 +63,7 @@ def test_every_section_is_read(load):
             "seed": 9,
             "budget_s": 3,
         },
+        "mission": {"state_dir": "/var/lib/mower"},
     }
     config = load(yaml.safe_dump(sections))
     for name, section in sections.items():
@@ -126,6 +127,9 @@ def test_every_section_is_read(load):
         ("planner: {budget_s: .nan}", "planner.budget_s: expected float > 0.0, got nan"),
         # Without quotes this is a number in YAML 1.1: 8 minutes 1 second.
         ("planner: {velocities: 8:1}", "planner.velocities: expected str, in quotes, got 481"),
+        ("mission: {state: /var}", "unknown key mission.state"),
+        ("mission: {state_dir: 3}", "mission.state_dir: expected str, in quotes, got 3"),
+        (r'mission: {state_dir: "a\0b"}', "mission.state_dir must be a path"),
         ("[1, 2]", "the file: expected object, got [1, 2]"),
         ("robot: {1: 2}", "robot: expected str as key, got {1: 2}"),
         ("1: 2", "the file: expected str as key, got {1: 2}"),
@@ -170,6 +174,28 @@ def test_unreadable_files_are_named(tmp_path):
     binary.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(BadConfiguration, match="not YAML"):
         load_config(binary)
+
+
+@pytest.mark.parametrize(
+    ("configured", "environ", "folder"),
+    [
+        ("/srv/state", {"STATE_DIRECTORY": "/var/lib/fasaco-edge"}, "/srv/state"),
+        ("~/state", {}, "/home/pi/state"),
+        ("", {"STATE_DIRECTORY": "/var/lib/a:/var/lib/b"}, "/var/lib/a"),
+        ("", {"STATE_DIRECTORY": "", "XDG_STATE_HOME": "/x"}, "/x/fasaco-edge"),
+        # The XDG specification: relative paths are to be ignored.
+        ("", {"XDG_STATE_HOME": "x"}, "/home/pi/.local/state/fasaco-edge"),
+        ("", {}, "/home/pi/.local/state/fasaco-edge"),
+    ],
+)
+def test_where_progress_is_kept(monkeypatch, configured, environ, folder):
+    monkeypatch.setenv("HOME", "/home/pi")
+    assert MissionSettings(state_dir=configured).state_folder(environ) == Path(folder)
+
+
+def test_who_has_no_home_has_to_say_where_progress_is_kept():
+    with pytest.raises(BadConfiguration, match=r"mission\.state_dir: ~nobody-of-that-name"):
+        MissionSettings(state_dir="~nobody-of-that-name/x").state_folder({})
 
 
 VALUES = st.one_of(

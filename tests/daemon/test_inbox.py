@@ -6,12 +6,21 @@ import pytest
 
 from fasaco_edge.bus.session import BusSettings, Sample, open_bus
 from fasaco_edge.daemon.inbox import Inbox, Received, make_mailbox
-from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.errors import MalformedMessage, PatchWithoutBase
+from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.events import MapReceived, PatchesLost, PatchReceived, PoseReceived
+from fasaco_edge.mission.mission import Mission, MissionConfig
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from tests.daemon.processes import free_endpoint
-from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
+from tests.daemon.rooms import (
+    RADIUS_M,
+    TOOL_M,
+    map_bytes,
+    pillared_room,
+    pose_bytes,
+    update_bytes,
+)
 
 MAP = map_bytes(pillared_room())
 UPDATE = update_bytes(pillared_room(), 1.0, 1.0, 2.0, 2.0)
@@ -30,10 +39,14 @@ class Arrivals:
         sample = Sample(f"fasaco/@v1/robot/{kind}", payload)
         self.mailbox.post(kind, Received(sample, self.clock))
 
+    def events(self):
+        """Return the events, and the faults."""
+        items = self.mailbox.take(0.0)
+        return self.inbox.decode(items, self.mailbox.take_lost("map_update"))
+
     def decode(self):
         """Return the types of the events, and the faults."""
-        items = self.mailbox.take(0.0)
-        events, faults = self.inbox.decode(items, self.mailbox.take_lost("map_update"))
+        events, faults = self.events()
         return [type(event) for event in events], faults
 
 
@@ -103,6 +116,32 @@ def test_updates_lost_before_a_map_matter_no_more(arrivals):
     arrivals.post("map", MAP)
     arrivals.post("map_update", UPDATE)
     assert arrivals.decode() == ([MapReceived, PatchReceived], [])
+
+
+def test_an_update_without_its_base_or_after_a_lost_one_asks_for_the_full_map(arrivals):
+    mission = Mission(MissionConfig(Footprint(TOOL_M, RADIUS_M)))
+
+    def asked_for_a_map():
+        """Step; return how many updates were refused for want of the full map."""
+        events, faults = arrivals.events()
+        faults += mission.step(events, arrivals.clock).faults
+        assert {type(fault) for fault in faults} <= {PatchWithoutBase}
+        assert all("publish the full map" in fault.hint for fault in faults)
+        return len(faults)
+
+    arrivals.post("map_update", UPDATE)
+    assert (asked_for_a_map(), mission.map_revision) == (1, 0)
+    arrivals.post("map", MAP)
+    arrivals.post("map_update", UPDATE)
+    assert (asked_for_a_map(), mission.map_revision) == (0, 2)
+    for _ in range(300):
+        arrivals.post("map_update", UPDATE)
+    assert (asked_for_a_map(), mission.map_revision) == (1 + 256, 2)
+    arrivals.post("map_update", UPDATE)
+    assert (asked_for_a_map(), mission.map_revision) == (1, 2)
+    arrivals.post("map", MAP)
+    arrivals.post("map_update", UPDATE)
+    assert (asked_for_a_map(), mission.map_revision) == (0, 4)
 
 
 def test_a_broken_sample_costs_that_sample_alone(arrivals):

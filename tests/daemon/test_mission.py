@@ -13,6 +13,7 @@ from tests.daemon.processes import daemon_process
 from tests.daemon.rooms import (
     FREE,
     RADIUS_M,
+    RESOLUTION_M,
     TOOL_M,
     UNKNOWN,
     WALL,
@@ -162,10 +163,13 @@ def test_the_coverage_tells_what_is_where(path, pixels, outsider):
 
 def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     status = outsider.wait_status(lambda status: status["coverage"] is not None)
-    count = len(coverable_cells(pixels))
+    fits = coverable_cells(pixels)
+    count = len(fits)
+    # A cell is six pixels wide.
+    free_pixels = sum((row // 6, col // 6) not in fits for row, col in np.argwhere(pixels == FREE))
     assert set(status) == {
         *("robot", "version", "state", "reason", "uptime_s", "map", "pose", "coverage", "path"),
-        *("plan", "latency_ms", "errors", "recorder", "rss_mb", "config"),
+        *("plan", "latency_ms", "errors", "ledger", "recorder", "rss_mb", "config", "mission"),
     }
     assert (status["robot"], status["state"], status["reason"]) == ("robot", "covering", "path 1")
     assert status["map"] == {
@@ -183,6 +187,8 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
         "remaining": count - 1,
         "unreachable": 0,
         "covered_m2": pytest.approx(TOOL_M**2),
+        "to_cover_m2": pytest.approx((count - 1) * TOOL_M**2),
+        "free_out_of_reach_m2": pytest.approx(free_pixels * RESOLUTION_M**2, abs=1e-3),
         "fraction": pytest.approx(1 / count, abs=1e-4),
     }
     note = about(path)
@@ -197,6 +203,8 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     assert status["plan"] == {"plans": 1, "planning": False}
     assert status["latency_ms"]["plan"] > 0
     assert status["errors"] == {"total": 0, "last": "", "by_code": {}}
+    assert status["ledger"]["restored_cells"] == 0
+    assert status["ledger"]["fault"] is None
     assert status["recorder"] is None
     assert 50 < status["rss_mb"] < 400
     assert status["config"]["bus"]["listen"] == [daemon.endpoint]
@@ -318,7 +326,7 @@ def test_a_robot_in_a_wall_is_blocked_until_it_stands_well(fresh):
     fresh.put("map", map_bytes(pixels))
     fresh.put("pose", pose_bytes(3.3, 1.5))
     status = fresh.wait_status(lambda status: status["state"] == "blocked")
-    assert status["reason"] == "robot is not on coverable ground"
+    assert status["reason"].startswith("robot is in an occupied cell")
     fresh.put("pose", pose_bytes(0.75, 0.75))
     status = fresh.wait_status(lambda status: status["state"] == "covering")
     assert status["coverage"]["coverable"] == len(coverable_cells(pixels))

@@ -7,11 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.mission import ground as ground_module
 from fasaco_edge.mission.ground import Ground, GroundChange, anchor_cell
 from fasaco_edge.mission.progress import FAR_CELLS, LOOK_AHEAD, DrivenPath
 from tests import naive
-from tests.planners.grids import lattice, placed, problems
+from tests.planners.grids import lattice, placed, problems, with_passages_closed
 
 
 def ground(*rows, at=(0, 0), cell=None):
@@ -36,6 +39,138 @@ def test_a_shifted_window_is_no_change():
     after = ground("#####", "#####", "##..#", "#####", at=(2, -5), cell=(3, -3))
     assert not after.change_since(before)
     assert not before.change_since(after)
+
+
+def change_to(before, after):
+    """What a new map tells: the cells that differ; beyond its window a lattice is unknown."""
+    known = [
+        {
+            (row + lattice.window.row0, col + lattice.window.col0): (state, lattice.steps[row, col])
+            for (row, col), state in np.ndenumerate(lattice.states)
+        }
+        for lattice in (before, after)
+    ]
+    old, new = known
+    cells = [cell for cell in old.keys() | new.keys() if old.get(cell) != new.get(cell)]
+    return LatticeChange(before, after, np.array(cells, np.int32).reshape(-1, 2))
+
+
+def reworked(draw, lattice):
+    """Some cells are open, closed or cut off that were not; the window may be another."""
+    window, random = lattice.window, np.random.default_rng(draw(st.integers(0, 2**32)))
+    toggled = random.random(lattice.states.shape) < draw(st.sampled_from((0.0, 0.02, 0.1)))
+    pads = draw(st.tuples(*[st.integers(-1, 2)] * 4))
+    south, north, west, east = (max(pad, 0) for pad in pads)
+    floor = np.pad(lattice.coverable ^ toggled, ((south, north), (west, east)))
+    inner = np.s_[max(-pads[0], 0) : -1 if pads[1] < 0 else None]
+    across = np.s_[max(-pads[2], 0) : -1 if pads[3] < 0 else None]
+    row0, col0 = window.row0 - pads[0], window.col0 - pads[2]
+    again = CoverageLattice.from_free(floor[inner, across], lattice.cell_m)
+    return placed(
+        with_passages_closed(again, draw(st.sampled_from((0.0, 0.02))), random), row0, col0
+    )
+
+
+@settings(max_examples=300, deadline=None)
+@given(problems(max_side=24), st.data())
+def test_after_a_change_the_same_is_reachable_as_if_all_were_searched(given_ground, data):
+    lattice, start = given_ground
+    before = Ground.around(lattice, start)
+    for _ in range(3):
+        after = reworked(data.draw, before.lattice)
+        corner = np.array((after.window.row0, after.window.col0))
+        places = np.argwhere(after.coverable) + corner
+        if not len(places):
+            return
+        here = tuple(places[data.draw(st.integers(0, 10**6)) % len(places)].tolist())
+        start = start if start in set(map(tuple, places.tolist())) else here
+        with pytest.MonkeyPatch.context() as patch:
+            # However much has changed, first it is tried to look at that alone.
+            patch.setattr(ground_module, "LOCAL_SHARE", 1.0)
+            ground = before.after(change_to(before.lattice, after), start)
+        assert ground.lattice is after
+        assert np.array_equal(ground.reachable, Ground.around(after, start).reachable)
+        before = ground
+
+
+def forged(ground):
+    """A ground that holds a blocked cell in its corner: lost once all is searched anew."""
+    reachable = ground.reachable.copy()
+    reachable[-1, -1] = True
+    return Ground(ground.lattice, reachable)
+
+
+def is_searched(before, *rows, cell=(0, 0)):
+    """Tell whether the whole lattice was searched for a change to a drawing."""
+    after = lattice(*rows)
+    ground = forged(before).after(change_to(before.lattice, after), cell)
+    return not ground.reachable[-1, -1]
+
+
+def drawn_over(rows, at, *pieces):
+    """A drawing with something else from line and column ``at`` on."""
+    line, col = at
+    drawing = list(rows)
+    for piece in pieces:
+        drawing[line] = drawing[line][:col] + piece + drawing[line][col + len(piece) :]
+        line += 1
+    return drawing
+
+
+# Two rooms with a door between them, and a third that nobody can come to.
+ROOMS = ["." * 40 + "#" + "." * 18 + "##", *["." * 40 + "#" + "." * 18 + "#."] * 59]
+WITH_DOOR = drawn_over(ROOMS, (30, 40), ".")
+
+
+@pytest.mark.parametrize(
+    ("at", "pieces", "searched"),
+    [
+        ((10, 12), ("##", "##"), False),  # a crate in the open
+        ((10, 38), ("##",), False),  # and at a wall
+        ((0, 0), ("#",), False),  # and in a corner
+        ((30, 40), ("#",), True),  # the door is closed
+        ((30, 39), ("#",), True),  # or blocked
+        ((31, 40), (".",), False),  # or wider: a way more to where there was one
+        ((20, 40), (".",), True),  # a second door, far from the first
+        ((30, 59), (".",), True),  # a door to the third room
+    ],
+)
+def test_all_is_searched_only_if_something_comes_apart_or_together(at, pieces, searched):
+    before = ground(*WITH_DOOR)
+    assert is_searched(before, *drawn_over(WITH_DOOR, at, *pieces)) is searched
+
+
+def test_a_map_that_no_longer_shows_the_way_between_two_rooms_parts_them(monkeypatch):
+    """The way led through cells that fell out of the map: among those left nothing came apart."""
+    before = ground("......##", "........", "#######.", "........", "......##")
+    after = lattice("......#", ".......", "#######", ".......", "......#")
+    monkeypatch.setattr(ground_module, "LOCAL_SHARE", 1.0)
+    here = before.after(change_to(before.lattice, after), (0, 0))
+    assert before.holds((4, 0))
+    assert not here.holds((4, 0))
+
+
+def test_a_robot_that_was_carried_elsewhere_while_the_map_changed():
+    before = ground(*ROOMS)
+    after = lattice(*drawn_over(ROOMS, (10, 12), "##"))
+    there = before.after(change_to(before.lattice, after), (0, 50))
+    assert there.holds((0, 50))
+    assert not there.holds((0, 0))
+
+
+def test_the_ground_of_another_lattice_is_searched():
+    before = ground("...", "...")
+    other = lattice("...", "...")
+    after = lattice("..#", "...")
+    assert before.after(change_to(other, after), (0, 0)).reachable.sum() == 5
+
+
+def test_a_robot_that_stands_elsewhere_has_another_ground():
+    rooms = lattice("..#..", "..#..")
+    before = Ground.around(rooms, (0, 0))
+    unchanged = LatticeChange(rooms, rooms, np.empty((0, 2), np.int32))
+    assert before.after(unchanged, (1, 1)) is before
+    assert before.after(unchanged, (0, 3)).reachable.tolist() == [[False] * 3 + [True] * 2] * 2
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.mission.ledger import JUMP_CELLS, CoverageLedger
+from tests.mission.world import Drive, building, pose_at
 
 CELL = 0.25
 
@@ -154,3 +156,83 @@ def test_the_first_pose_sweeps_nothing_but_where_it_is(first):
     ledger, entered = drive(first)
     assert entered == [{(math.floor(first[0]), math.floor(first[1]))}]
     assert ledger.total == 1
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_where_the_robot_stands_counts_whether_map_or_pose_came_first(order):
+    first = MapReceived(building("....")), pose_at(0, 2)
+    standing = Drive((0, 2), *first[::order])
+    assert standing.visited == {(0, 2)}
+    standing.tell(pose_at(0, 2), MapReceived(building(".....")))
+    assert standing.mission.ledger.total == 1, "it has stood there all the time"
+
+
+def same(one, other):
+    """Tell whether two snapshots hold the same."""
+    return (
+        (one.cell_m, one.frame, one.total, one.under_tool)
+        == (other.cell_m, other.frame, other.total, other.under_tool)
+        and set(one.tiles) == set(other.tiles)
+        and all(np.array_equal(one.tiles[place], other.tiles[place]) for place in one.tiles)
+    )
+
+
+def test_a_snapshot_holds_what_the_ledger_holds():
+    ledger, _ = drive((0.5, 0.5), (0.5, 1.5), (0.5, 0.5), (-99.5, 130.5))
+    ledger.frame = "map"
+    snapshot = ledger.snapshot()
+    assert (snapshot.cell_m, snapshot.frame, snapshot.total) == (CELL, "map", 4)
+    assert snapshot.cells == 3
+    assert snapshot.under_tool == {(-100, 130)}
+    for window in (NEARBY, Window(-120, 100, -60, 140)):
+        assert np.array_equal(snapshot.visits(window), ledger.visits(window))
+
+
+def test_a_snapshot_stays_as_it_was():
+    ledger, _ = drive((0.5, 0.5))
+    first = ledger.snapshot()
+    ledger.record(Pose2D(0.5 * CELL, 1.5 * CELL))
+    ledger.record(Pose2D(200.5 * CELL, 1.5 * CELL))
+    second = ledger.snapshot()
+    assert (first.cells, second.cells) == (1, 3)
+    assert first.visits(NEARBY).sum() == 1
+    with pytest.raises(ValueError, match="read-only"):
+        first.tiles[0, 0][0, 0] = 7
+    with pytest.raises(TypeError):
+        first.tiles[9, 9] = first.tiles[0, 0]
+
+
+def test_a_snapshot_copies_only_what_has_changed():
+    ledger, _ = drive((0.5, 0.5), (0.5, 200.5))
+    first = ledger.snapshot()
+    ledger.record(Pose2D(201.5 * CELL, 0.5 * CELL))
+    second = ledger.snapshot()
+    assert second.tiles[0, 0] is first.tiles[0, 0]
+    assert second.tiles[0, 3] is not first.tiles[0, 3]
+
+
+def test_a_restored_ledger_goes_on_as_if_nothing_had_been():
+    points = [(0.5, 0.5 + 0.4 * step) for step in range(12)]
+    whole, _ = drive(*points, *points[::-1])
+    begun, _ = drive(*points)
+    restored = CoverageLedger.restored(begun.snapshot())
+    assert same(restored.snapshot(), begun.snapshot())
+    for row, col in points[::-1]:
+        restored.record(Pose2D(col * CELL, row * CELL))
+    assert same(restored.snapshot(), whole.snapshot())
+    assert begun.total < restored.total, "they share nothing"
+
+
+def test_what_was_driven_while_nobody_listened_is_not_invented():
+    """Around a corner, and not straight to where the robot is heard of again."""
+    ledger, _ = drive((0.5, 0.5))
+    restored = CoverageLedger.restored(ledger.snapshot())
+    assert restored.record(Pose2D(2.5 * CELL, 0.5 * CELL)) == {(0, 2)}
+    assert counts(restored) == {(0, 0): 1, (0, 2): 1}
+
+
+def test_a_robot_that_stood_still_visits_nothing_anew():
+    ledger, _ = drive((0.5, 0.5))
+    restored = CoverageLedger.restored(ledger.snapshot())
+    assert restored.record(Pose2D(0.6 * CELL, 0.5 * CELL)) == set()
+    assert restored.total == 1

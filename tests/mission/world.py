@@ -10,19 +10,23 @@ import numpy as np
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.events import (
+    CommandReceived,
     MapReceived,
     PatchReceived,
     PlanReady,
     PoseReceived,
 )
-from fasaco_edge.mission.mission import Mission, MissionConfig
+from fasaco_edge.mission.mission import Mission
+from fasaco_edge.mission.order_document import read_order
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.fasaco import Fasaco
 from tests import naive
 
 CELL, PIXELS = 0.25, 2
 FOOTPRINT = Footprint(cell_m=CELL, robot_radius_m=CELL / 2)
+CONFIG = MissionConfig(FOOTPRINT)
 VALUES = {".": 0, "#": 100}
 TICK_S = 0.1
 
@@ -72,10 +76,14 @@ class Drive:
         decisions: all decisions, in order.
         request: the plan asked for and not yet answered.
         revision: of the last path published.
+        commands: how many were given.
+        refused: why the last one was; None if it was not.
     """
 
-    def __init__(self, cell, *first_events):
-        self.mission = Mission(MissionConfig(FOOTPRINT))
+    refused = None
+
+    def __init__(self, cell, *first_events, config=CONFIG, assignment=None):
+        self.mission = Mission(config, assignment)
         self.cell = cell
         self.now = 0.0
         self.walk = []
@@ -83,6 +91,7 @@ class Drive:
         self.decisions = []
         self.request = None
         self.revision = 0
+        self.commands = 0
         self.tell(*first_events)
 
     @property
@@ -114,6 +123,16 @@ class Drive:
             self.walk = walk[1:] if walk and walk[0] == self.cell else walk
         return decision
 
+    def command(self, name, order=None, after=TICK_S):
+        """Give a command; the order as a document. Return what the mission decides."""
+        self.commands += 1
+        event = CommandReceived(self.commands, name, read_order(order))
+        decision = self.tell(event, after=after)
+        (answer,) = decision.answers
+        assert answer.number == self.commands
+        self.refused = answer.error
+        return decision
+
     def plan(self):
         """Answer the plan asked for."""
         request, self.request = self.request, None
@@ -139,6 +158,12 @@ class Drive:
                 self.plan()
             self.go()
         raise AssertionError(f"not done after {ticks} ticks: {self.mission.reason}")
+
+
+def rectangle(row0, col0, row1, col1):
+    """The polygon around some cells, from (row0, col0) up to and without (row1, col1)."""
+    x0, y0, x1, y1 = (CELL * value for value in (col0, row0, col1, row1))
+    return [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
 
 
 def started(*rows, cell=(0, 0)):

@@ -7,14 +7,15 @@ import threading
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
-from fasaco_edge.recording.inbox import BEHIND_SAMPLES, Arrival, Inbox
+from fasaco_edge.recording.inbox import BEHIND_SAMPLES, Inbox
 
 TOPICS = ["map", "map_update", "pose", "path", "coverage", "pheromone", "status"]
 
 
 def arrival(topic: str, number: int = 0, size: int = 10) -> Arrival:
-    return Arrival(topic, Sample(topic, bytes(size)), number)
+    return Arrival(topic, Sample(topic, bytes(size)), number, number)
 
 
 def test_arrivals_come_out_in_order():
@@ -23,7 +24,7 @@ def test_arrivals_come_out_in_order():
         inbox.post(arrival(TOPICS[number % 7], number))
     assert [one.wall_ns for one in inbox.take(0.0)] == list(range(20))
     assert inbox.take(0.0) == []
-    assert inbox.lost == 0
+    assert not inbox.lost
 
 
 def test_behind_the_newest_pose_wins_and_every_path_stays():
@@ -35,7 +36,7 @@ def test_behind_the_newest_pose_wins_and_every_path_stays():
     taken = inbox.take(0.0)
     assert [one.wall_ns for one in taken if one.topic == "path"] == list(range(BEHIND_SAMPLES))
     assert [one.wall_ns for one in taken if one.topic == "pose"] == [49]
-    assert inbox.lost == 49
+    assert inbox.lost == {"pose": 49}
 
 
 def test_behind_a_full_map_clears_the_patches_of_the_one_before():
@@ -44,7 +45,7 @@ def test_behind_a_full_map_clears_the_patches_of_the_one_before():
     inbox.post(arrival("map_update", 1, 20))
     inbox.post(arrival("map", 2, 40))
     assert [one.wall_ns for one in inbox.take(0.0)] == [2]
-    assert inbox.lost == 2
+    assert inbox.lost == {"map": 1, "map_update": 1}
 
 
 @given(st.lists(st.tuples(st.sampled_from(TOPICS), st.integers(0, 400)), max_size=300))
@@ -54,7 +55,7 @@ def test_memory_is_bounded_and_nothing_vanishes_uncounted(posts):
         inbox.post(arrival(topic, size=size))
     taken = inbox.take(0.0)
     assert sum(len(one.sample.payload) for one in taken) <= 1000
-    assert len(taken) + inbox.lost == len(posts)
+    assert len(taken) + inbox.lost.total() == len(posts)
 
 
 def test_a_waiting_reader_wakes():

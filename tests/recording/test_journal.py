@@ -53,10 +53,10 @@ def test_parts_rotate_and_each_begins_with_what_is_in_force(tmp_path):
     journal = journal_in(tmp_path, part_bytes=250_000)
     journal.describe("a run", {"planner": "fasaco"})
     journal.log_static(entities.RUN_CARD, rr.TextDocument("card"))
-    journal.message(clock.now_ns, 10)
+    journal.message(clock.now_ns)
     journal.log(entities.PATH, rr.LineStrips3D([[[0, 0, 0], [1, 2, 0]]]), latched=True)
     for seed in range(7):
-        journal.message(clock.now_ns, 100_000)
+        journal.message(clock.now_ns)
         journal.log("noise", noise(seed))
         journal.sync(clock.tick())
     assert journal.close()
@@ -75,11 +75,11 @@ def test_no_part_is_written_below_the_floor(tmp_path):
     clock = Clock()
     # One more than there is: no room, though the disk is far from full.
     journal = journal_in(tmp_path, least_free_bytes=shutil.disk_usage(tmp_path).total)
-    journal.message(clock.now_ns, 10)
+    journal.message(clock.now_ns)
     journal.sync(clock.tick())
     assert journal.state is JournalState.DISK_FULL
     assert journal.path is None
-    journal.message(clock.now_ns, 10)
+    journal.message(clock.now_ns)
     assert journal.lost == 1
     (part,) = tmp_path.glob("*.rrd")
     assert read_summary(part).complete
@@ -92,12 +92,12 @@ def test_a_stalled_disk_is_told_and_taken_up_again(tmp_path):
     os.mkfifo(pipe)
     clock = Clock()
     journal = journal_in(tmp_path)
-    journal.message(clock.now_ns, 10)
+    journal.message(clock.now_ns)
     journal.log(entities.PATH, rr.LineStrips3D([[[0, 0, 0], [1, 2, 0]]]), latched=True)
     journal.log("noise", noise(1, 400_000))
     journal.sync(clock.tick())
     assert journal.state is JournalState.STALLED
-    journal.message(clock.now_ns, 10)
+    journal.message(clock.now_ns)
     assert journal.lost == 1
     assert not journal.close()
     drained = threading.Thread(target=drain, args=(pipe, tmp_path / "copy.rrd"))

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,10 +17,15 @@ import pytest
 
 pytest.importorskip("rerun")
 
+from fasaco_edge.bus.arrival import PATH_DIGEST
 from fasaco_edge.errors import MissingExtra
 from fasaco_edge.recording import entities
+from fasaco_edge.recording.input_log import PERIOD_NS as INPUT_PERIOD_NS
+from fasaco_edge.recording.journal import FLUSH_PERIOD_NS
 from fasaco_edge.recording.reading import RecordingSummary, read_column, read_summary
+from fasaco_edge.recording.samples import RecordedSamples
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID
 from tests.recording.mission import CELL_M, COLS, ORIGIN, ROWS, Mission, building
 from tests.recording.recorders import bus_on_free_port, recorder_process
@@ -72,6 +78,20 @@ def test_everything_on_the_bus_becomes_an_entity(recorded):
     assert 0.9 * FRAMES * FRAME_S < recorded.summary.duration_s < 30
 
 
+def test_what_the_mission_hears_is_there_byte_for_byte(recorded):
+    samples = list(RecordedSamples([recorded.path]))
+    topics = Counter(sample.topic for sample in samples)
+    assert topics["pose"] == FRAMES
+    assert topics[PATH_DIGEST] == recorded.mission.revision
+    assert topics["status"] >= 2
+    maps = [sample for sample in samples if sample.topic == "map"]
+    assert maps[-1].sample.schema == OCCUPANCY_GRID
+    assert maps[-1].sample.key == Keys().map
+    assert np.array_equal(decode_occupancy_grid(maps[-1].sample.payload).cells, building(1.0))
+    assert [sample.at_ns for sample in samples] == sorted(sample.at_ns for sample in samples)
+    assert len({sample.wall_ns - sample.at_ns for sample in samples}) == 1
+
+
 def test_the_end_is_orderly(recorded):
     assert recorded.exit_code == 0
     assert recorded.summary.complete
@@ -93,7 +113,11 @@ def test_the_summary_gives_the_last_figures(recorded):
 
 def test_the_path_lies_where_it_was_published(recorded):
     strip = read_column(recorded.path, entities.PATH, "LineStrips3D:strips").values[-1][0]
-    assert np.allclose(np.array(strip)[:, :2], recorded.mission.rest, atol=1e-5)
+    rest = recorded.mission.rest
+    # Without the points it runs straight through.
+    turns = (np.diff(rest, n=2, axis=0) ** 2).sum(axis=1) > 1e-9
+    corners = rest[[True, *turns, True]]
+    assert np.allclose(np.array(strip)[:, :2], corners, atol=1e-5)
 
 
 def test_the_robot_stands_where_it_was_published(recorded):
@@ -157,17 +181,23 @@ def test_killed_and_torn_recordings_read_after_the_next_start(tmp_path):
         mission = Mission(bus)
         with recorder_process(bus, endpoint, tmp_path) as recorder:
             play(mission, 20)
-            # Flushed once a second: then all of it is on the disk.
             recorder.written(40)
-            time.sleep(1.2)
+            # By then all that is drawn of it is on the disk, of the rest what the mission heard.
+            time.sleep(FLUSH_PERIOD_NS / 1e9 + 0.3)
+            play(mission, 5)
+            time.sleep(INPUT_PERIOD_NS / 1e9 + 0.3)
             recorder.process.kill()
             recorder.process.wait()
         (killed,) = tmp_path.glob("*.rrd")
         summary = read_summary(killed)
         assert not summary.complete
-        assert summary.rows[entities.ROBOT] == 20
+        assert summary.rows[entities.ROBOT] >= 20
+        assert Counter(sample.topic for sample in RecordedSamples([killed]))["pose"] == 25
         # As a power cut would leave it: the last frame's end is missing.
         os.truncate(killed, killed.stat().st_size - 7)
+        torn = killed.read_bytes()
+        assert Counter(sample.topic for sample in RecordedSamples([killed]))["pose"] >= 20
+        assert killed.read_bytes() == torn
         with recorder_process(bus, endpoint, tmp_path) as recorder:
             assert read_summary(killed).rows[entities.ROBOT] >= 15
             # What is latched is there at once, though nobody publishes any more.
@@ -199,6 +229,7 @@ def test_a_full_disk_is_told_and_recording_goes_on_when_there_is_room(tiny_disk)
     ):
         mission = Mission(bus)
         play(mission, 10)
+        time.sleep(FLUSH_PERIOD_NS / 1e9)
         with ballast.open("wb") as file:
             file.write(bytes(os.statvfs(tiny_disk).f_bavail * os.statvfs(tiny_disk).f_bsize - 9000))
         play(mission, 10)

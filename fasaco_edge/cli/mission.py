@@ -1,0 +1,229 @@
+"""``fasaco-edge mission``: command a running daemon, and see how far it is."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fasaco_edge.cli import exits
+from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings
+from fasaco_edge.errors import FasacoError
+
+if TYPE_CHECKING:
+    from fasaco_edge.cli.arguments import Subparsers
+
+EPILOG = """\
+examples:
+  fasaco-edge mission status
+  fasaco-edge mission start                         everything the robot can come to
+  fasaco-edge mission start --passes 2 --return-home
+  fasaco-edge mission start --zone "kitchen:0,0;4,0;4,3;0,3" --zone "hall:4,0;6,0;6,9;4,9"
+  fasaco-edge mission start --keep-out "1,1;2,1;2,2;1,2"
+  fasaco-edge mission start --order evening.yaml
+  fasaco-edge mission pause && fasaco-edge mission resume
+
+evening.yaml, or the same as JSON; all lengths in metres in the frame of the map:
+  zones:                      # one after the other; without any: everything reachable
+    - name: kitchen
+      polygon: [[0, 0], [4, 0], [4, 3], [0, 3]]
+      passes: 2
+    - name: hall
+      polygon: [[4, 0], [6, 0], [6, 9], [4, 9]]
+  keep_out:                   # never to be touched
+    - [[1, 1], [2, 1], [2, 2], [1, 2]]
+  passes: 1                   # of zones that say nothing else, and of everything
+  return_home: true           # in the end, to where the mission began
+  keep_covered: false         # true: what is covered already needs no first pass
+
+Each pass counts from its beginning: what was covered before is covered again. An order, how far
+it is, and whether it is paused outlive the daemon. Where a daemon is told nothing, it covers
+everything by itself (mission.autostart of its configuration).
+
+exit codes: 0 done; 1 refused, or nobody answered; 2 not understood; 78 no name for a robot
+"""
+
+COMMANDS = {
+    "start": "begin an order, in place of the one before; the same one goes on",
+    "pause": "let the robot stand; what it passes over still counts",
+    "resume": "go on",
+    "cancel": "stop, and forget the order; what is covered is remembered",
+    "reset": "stop, and forget the order and what is covered; the ledger is kept aside",
+    "status": "tell state, progress, and what could not be reached",
+}
+
+
+def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "mission",
+        help="command a running daemon: start, pause, resume, cancel, reset, status",
+        description="Command the mission of a running daemon over Zenoh, and see how far it is.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    names = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    for name, told in COMMANDS.items():
+        described = told[0].upper() + told[1:] + "."
+        command = names.add_parser(name, parents=[common], help=told, description=described)
+        if name == "start":
+            _add_order(command)
+        command.add_argument("--json", action="store_true", help="print the answer as JSON")
+        command.add_argument(
+            "--timeout",
+            type=_seconds,
+            default=5.0,
+            metavar="S",
+            help="how long to wait for the answer (default: %(default)s)",
+        )
+        add_robot_on_bus(command)
+        command.set_defaults(command=run, mission_command=name)
+
+
+def _add_order(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--order", type=Path, metavar="FILE", help="YAML or JSON; in place of the options below"
+    )
+    parser.add_argument(
+        "--zone",
+        type=_zone,
+        action="append",
+        metavar="NAME:X,Y;X,Y;...",
+        help="area to cover, by its corners [m]; may be repeated, they are covered in this order",
+    )
+    parser.add_argument(
+        "--keep-out",
+        type=_polygon,
+        action="append",
+        metavar="X,Y;X,Y;...",
+        help="area the robot must not touch; may be repeated",
+    )
+    parser.add_argument("--passes", type=int, metavar="N", help="how often to cover (default: 1)")
+    parser.add_argument(
+        "--return-home", action="store_true", help="in the end drive to where the mission began"
+    )
+    parser.add_argument(
+        "--keep-covered", action="store_true", help="what is covered already needs no first pass"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Ask, and show the answer."""
+    from fasaco_edge.bus.session import open_bus
+    from fasaco_edge.cli.mission_view import show
+    from fasaco_edge.wire.keys import Keys
+    from fasaco_edge.wire.status import decode_json, encode_json
+
+    asked: dict[str, Any] = {"command": args.mission_command}
+    if args.mission_command == "start":
+        asked["order"] = _order(args)
+    keys = Keys(args.robot, args.base)
+    with open_bus(client_settings(args)) as bus:
+        replies = bus.get(keys.rpc("mission"), args.timeout, encode_json(asked))
+        if not replies:
+            raise _nobody(keys.prefix, bus.alive(f"{args.base}/@v1/*/alive"))
+    reply, answer = replies[0], decode_json(replies[0].payload)
+    if args.json:
+        print(replies[0].payload.decode())
+    if reply.is_error:
+        raise CommandRefusedError(answer)
+    if not args.json:
+        show(answer)
+    return exits.OK
+
+
+class CommandRefusedError(FasacoError):
+    """The daemon's answer to a command is an error."""
+
+    def __init__(self, answer: dict[str, Any]) -> None:
+        super().__init__(str(answer.get("message")), hint=str(answer.get("hint", "")))
+        self.code = str(answer.get("code"))
+
+
+class NobodyAnswersError(FasacoError):
+    """No daemon of that robot is on the bus."""
+
+    code = "nobody_answers"
+
+
+def _nobody(prefix: str, alive: list[str]) -> NobodyAnswersError:
+    robots = sorted(key.split("/")[-2] for key in alive)
+    there = f"there are {', '.join(robots)}: give one as --robot" if robots else "there is none"
+    return NobodyAnswersError(
+        f"no daemon answers at {prefix}",
+        hint=f"of robots on this bus {there}; `fasaco-edge run` starts a daemon",
+    )
+
+
+def _order(args: argparse.Namespace) -> dict[str, Any]:
+    """Return the order as a document, checked: what is wrong is told without a daemon."""
+    from fasaco_edge.mission.order import OrderError
+    from fasaco_edge.mission.order_document import order_document, read_order
+
+    options = {
+        "zones": args.zone,
+        "keep_out": args.keep_out,
+        "passes": args.passes,
+        "return_home": args.return_home,
+        "keep_covered": args.keep_covered,
+    }
+    # Not by their truth: no passes at all are a mistake to be told.
+    given = {
+        name: value for name, value in options.items() if value is not None and value is not False
+    }
+    if args.order is None:
+        return order_document(read_order(given))
+    if given:
+        names = ", ".join(f"--{name.rstrip('s').replace('_', '-')}" for name in given)
+        raise OrderError(f"--order says it all, got {names} with it", hint="put them into the file")
+    try:
+        return order_document(read_order(_read(args.order)))
+    except OrderError as error:
+        raise OrderError(f"{args.order}: {error}", hint=error.hint) from error
+
+
+def _read(path: Path) -> object:
+    import json
+
+    import yaml
+
+    from fasaco_edge.mission.order import OrderError
+
+    try:
+        text = path.read_text(encoding="utf-8")
+        # YAML 1.1 would take 1e3 for a text.
+        return json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
+    except OSError as error:
+        raise OrderError(str(error.strerror), hint="name a file that can be read") from error
+    except RecursionError as error:
+        raise OrderError("nested too deeply") from error
+    except (yaml.YAMLError, ValueError) as error:
+        raise OrderError(f"neither YAML nor JSON: {error}") from error
+
+
+def _zone(text: str) -> dict[str, Any]:
+    name, colon, corners = text.partition(":")
+    if not colon or not name:
+        raise argparse.ArgumentTypeError(f"must be NAME:x,y;x,y;..., got {text!r}")
+    return {"name": name, "polygon": _polygon(corners)}
+
+
+def _polygon(text: str) -> list[list[float]]:
+    try:
+        corners = [[float(value) for value in pair.split(",")] for pair in text.split(";")]
+    except ValueError:
+        corners = []
+    if len(corners) < 3 or any(len(corner) != 2 for corner in corners):
+        raise argparse.ArgumentTypeError(f"must be x,y;x,y;x,y;... in metres, got {text!r}")
+    return corners
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = 0.0
+    # A negated comparison, so that NaN is caught too.
+    if not 0 < seconds <= 3600:
+        raise argparse.ArgumentTypeError(f"must be in (0, 3600] s, got {text!r}")
+    return seconds

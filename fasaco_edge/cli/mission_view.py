@@ -1,0 +1,72 @@
+"""How far a mission is, as tables for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from fasaco_edge.cli.terminal import figures, out
+
+
+def show(report: dict[str, Any]) -> None:
+    """Print a daemon's answer."""
+    mission = report["mission"]
+    console = out()
+    console.print(figures(_rows(report, mission)))
+    if mission["zones"]:
+        console.print(_zones(mission["zones"]))
+    if mission["unreached"]["areas"]:
+        console.print(_unreached(mission["unreached"]))
+
+
+def _rows(report: dict[str, Any], mission: dict[str, Any]) -> list[tuple[str, str]]:
+    # Square brackets in names are no mark-up.
+    rows = [(name, escape(report[name])) for name in ("robot", "state", "reason")]
+    if mission["ordered"] is not None:
+        began = "begun by itself" if mission["ordered"] == "itself" else "as ordered"
+        rows.append(("mission", f"{_stage(mission)}, {began}"))
+    if coverage := report["coverage"]:
+        rows.append(
+            (
+                "covered",
+                f"{100 * coverage['fraction']:.1f} %: {coverage['covered']} of "
+                f"{coverage['coverable']} cells, {coverage['covered_m2']:.1f} m2",
+            )
+        )
+    if mission["keep_out"]:
+        rows.append(("keep-out zones", str(mission["keep_out"])))
+    if mission["return_home"]:
+        home = mission["home"]
+        rows.append(("home", f"({home['x']:.2f}, {home['y']:.2f}) m" if home else "not known yet"))
+    return rows
+
+
+def _stage(mission: dict[str, Any]) -> str:
+    if mission["stage"] != "covering":
+        return str(mission["stage"])
+    zone = f"zone {escape(mission['zone'])}" if mission["zone"] else "everything reachable"
+    return f"{zone}, pass {mission['pass']} of {mission['passes']}"
+
+
+def _zones(zones: list[dict[str, Any]]) -> Table:
+    table = Table("zone", "pass", "covered", title="Zones", title_justify="left")
+    for zone in zones:
+        share = 100 * zone["covered"] / zone["cells"] if zone["cells"] else 0.0
+        table.add_row(
+            escape(zone["name"]),
+            f"{zone['pass']} of {zone['passes']}" if zone["pass"] else "to come",
+            f"{share:.1f} %: {zone['covered']} of {zone['cells']} cells",
+        )
+    return table
+
+
+def _unreached(unreached: dict[str, Any]) -> Table:
+    table = Table("cells", "m2", "at", "why", title="Not reached", title_justify="left")
+    for area in unreached["areas"]:
+        place = f"({area['x']:.2f}, {area['y']:.2f}) m"
+        table.add_row(str(area["cells"]), f"{area['m2']:.2f}", place, escape(area["reason"]))
+    if unreached["areas_left_out"]:
+        table.caption = f"and {unreached['areas_left_out']} smaller areas"
+    return table

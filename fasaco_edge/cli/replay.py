@@ -1,0 +1,200 @@
+"""``fasaco-edge replay``: a recorded mission once more, and whether it decides the same."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.daemon.replay import Replay, ReplayStep
+    from fasaco_edge.daemon.replay_run import RecordedRun
+    from fasaco_edge.mission.events import PathUpdate
+    from fasaco_edge.recording.samples import RecordedSamples
+
+DESCRIPTION = """\
+Play the samples of a recording to the mission again, through the same code that the
+daemon runs, and tell what it decides. Time is that of the samples and planning is counted
+in work: the same files give the same decisions on any machine, byte for byte.
+"""
+EPILOG = """\
+The column `then` tells whether the path is cell by cell the one that was recorded. A
+recording does not tell in full which samples the daemon took together, nor the work of
+plans that came to nothing: a path that differs is no error by itself.
+"""
+
+
+def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "replay",
+        parents=[common],
+        help="play a recorded mission again and compare its decisions",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "recordings",
+        nargs="+",
+        type=Path,
+        metavar="FILE.rrd",
+        help="the parts of a recording, in any order",
+    )
+    parser.add_argument(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="YAML configuration in place of the recorded one",
+    )
+    parser.add_argument(
+        "--work",
+        type=_count,
+        metavar="N",
+        help="proposals of each plan (default: what was recorded with its path)",
+    )
+    parser.add_argument("--json", action="store_true", help="print a JSON document")
+    parser.set_defaults(command=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Replay."""
+    from fasaco_edge.cli import terminal
+    from fasaco_edge.daemon.config import load_config
+    from fasaco_edge.daemon.replay import Replay
+    from fasaco_edge.daemon.replay_run import read_run
+    from fasaco_edge.recording.samples import RecordedSamples
+
+    samples = RecordedSamples(args.recordings)
+    recorded = read_run(samples)
+    config = load_config(args.config) if args.config else recorded.daemon_config()
+    replay = Replay(config, recorded, args.work)
+    began = time.monotonic()
+    steps: list[ReplayStep] = []
+    last_s = 0.0
+    for step in replay.steps(samples):
+        last_s = step.at_s
+        if step.is_news:
+            steps.append(step)
+    summary = _summary(replay, recorded, samples, steps, last_s)
+    if args.json:
+        print(json.dumps({"decisions": [_document(step) for step in steps], "summary": summary}))
+        return 0
+    console = terminal.out()
+    console.print(_table(steps))
+    console.print(terminal.figures((name, str(value)) for name, value in _rows(summary)))
+    terminal.err().print(f"{last_s:.1f} s in {time.monotonic() - began:.1f} s")
+    return 0
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"must be a whole number from 0 on, got {text!r}")
+    return int(text)
+
+
+def _document(step: ReplayStep) -> dict[str, Any]:
+    faults = (*step.refused, *step.decision.faults)
+    document: dict[str, Any] = {"at_s": round(step.at_s, 6), "state": step.state}
+    document["reason"] = step.reason
+    if step.decision.plan is not None:
+        document["asked"] = step.decision.plan.reason
+    if step.decision.path is not None:
+        document["path"] = _path(step.decision.path) | {"as_recorded": step.as_recorded}
+    if faults:
+        document["faults"] = [{"code": fault.code, "message": str(fault)} for fault in faults]
+    return document
+
+
+def _path(update: PathUpdate) -> dict[str, Any]:
+    from fasaco_edge.bus.arrival import digest
+    from fasaco_edge.daemon.status import plan_figures
+
+    return {
+        "revision": update.revision,
+        "reason": update.reason,
+        "steps": max(len(update.cells) - 1, 0),
+        "cells_digest": digest(update.cells.astype("<i4").tobytes()).hex(),
+        **plan_figures(update.plan),
+    }
+
+
+def _summary(
+    replay: Replay,
+    recorded: RecordedRun,
+    samples: RecordedSamples,
+    steps: Iterable[ReplayStep],
+    last_s: float,
+) -> dict[str, Any]:
+    steps = list(steps)
+    mission = replay.mission
+    verdicts = Counter(step.as_recorded for step in steps if step.decision.path is not None)
+    faults = Counter(
+        fault.code for step in steps for fault in (*step.refused, *step.decision.faults)
+    )
+    coverage = mission.coverage()
+    return {
+        "duration_s": round(last_s, 3),
+        "state": str(mission.state),
+        "reason": mission.reason,
+        "covered_cells": coverage.covered if coverage else 0,
+        "coverable_cells": coverage.coverable if coverage else 0,
+        "plans": mission.plans,
+        "paths": mission.revision,
+        "paths_recorded": len(recorded.paths),
+        "paths_as_recorded": verdicts[True],
+        "faults": dict(sorted(faults.items())),
+        "samples_missing": samples.missing,
+        "restored_cells_missing": recorded.restored_cells,
+        "restarts_ignored": recorded.starts,
+    }
+
+
+def _table(steps: Iterable[ReplayStep]) -> Any:  # noqa: ANN401 - rich is imported where it is used
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for name in ("s", "state", "path", "steps", "proposals", "then"):
+        table.add_column(name, justify="left" if name in ("state", "then") else "right")
+    table.add_column("why", overflow="fold")
+    for step in steps:
+        update = step.decision.path
+        faults = [str(fault) for fault in (*step.refused, *step.decision.faults)]
+        why = update.reason if update else step.reason if step.changed else ""
+        row = ["", "", "", ""]
+        if update is not None:
+            plan = update.plan
+            row = [
+                str(update.revision),
+                str(max(len(update.cells) - 1, 0)),
+                "" if plan is None else str(plan.work.proposals),
+                {True: "same", False: "other", None: "-"}[step.as_recorded],
+            ]
+        if update or step.changed or faults:
+            table.add_row(
+                f"{step.at_s:.2f}", step.state, *row, "; ".join(filter(None, (why, *faults)))
+            )
+    return table
+
+
+def _rows(summary: dict[str, Any]) -> list[tuple[str, object]]:
+    faults = ", ".join(f"{count} {code}" for code, count in summary["faults"].items())
+    rows: list[tuple[str, object]] = [
+        ("ended", f"{summary['state']}: {summary['reason']}"),
+        ("covered", f"{summary['covered_cells']} of {summary['coverable_cells']} cells"),
+        ("plans, paths", f"{summary['plans']}, {summary['paths']}"),
+        ("as recorded", f"{summary['paths_as_recorded']} of {summary['paths_recorded']} paths"),
+        ("refused", faults or "nothing"),
+    ]
+    if summary["samples_missing"]:
+        rows.append(("not recorded", f"{summary['samples_missing']} samples"))
+    if summary["restored_cells_missing"]:
+        rows.append(("covered before", f"{summary['restored_cells_missing']} cells, not recorded"))
+    if summary["restarts_ignored"]:
+        rows.append(("daemon restarts", f"{summary['restarts_ignored']}, played as one mission"))
+    return rows

@@ -1,0 +1,74 @@
+"""Before there is a mission: the first map sends for the kernels, what comes meanwhile is held."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from fasaco_edge.daemon.keeping import Keeping
+from fasaco_edge.daemon.loading import Loader
+from fasaco_edge.errors import FasacoError, PatchWithoutBase
+from fasaco_edge.mission.events import Answer, CommandReceived, Event, MapReceived, PoseReceived
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.worker import PlanningWorker
+    from fasaco_edge.mission.mission import Mission
+
+
+class Beginning:
+    """Holds events, takes commands, and hands both over to the mission.
+
+    Attributes:
+        assignment: what the mission will have to do.
+        held: the newest map with the updates after it, and the newest pose.
+    """
+
+    def __init__(self, keeping: Keeping, load: Callable[[], Loader]) -> None:
+        self.assignment = keeping.first
+        self.held: list[Event] = []
+        self._keeping = keeping
+        self._load = load
+        self._loader: Loader | None = None
+
+    @property
+    def stage(self) -> str:
+        """What is being loaded; "" for nothing."""
+        return self._loader.stage if self._loader else ""
+
+    def take(self, events: Sequence[Event]) -> list[FasacoError]:
+        """Hold events; return those that are of no use, and why."""
+        faults: list[FasacoError] = []
+        for event in events:
+            match event:
+                case MapReceived():
+                    self.held = [held for held in self.held if isinstance(held, PoseReceived)]
+                case PoseReceived():
+                    self.held = [held for held in self.held if not isinstance(held, PoseReceived)]
+                case _ if not any(isinstance(held, MapReceived) for held in self.held):
+                    faults.append(PatchWithoutBase("map update refused: there is no map yet"))
+                    continue
+            self.held.append(event)
+        if self._loader is None and any(isinstance(event, MapReceived) for event in events):
+            self._loader = self._load()
+        return faults
+
+    def loaded(self) -> tuple[Mission, PlanningWorker] | None:
+        """Return mission and worker once they are there."""
+        loaded = self._loader.poll() if self._loader else None
+        if loaded is not None:
+            self._keeping.restore(loaded[0], self.assignment)
+        return loaded
+
+    def obey(self, commands: Sequence[CommandReceived]) -> list[Answer]:
+        """Take commands, as the mission will; return the answers."""
+        answers = []
+        for asked in commands:
+            try:
+                self.assignment = self.assignment.after(asked.command, asked.order)
+            except FasacoError as error:
+                answers.append(Answer(asked.number, error))
+                continue
+            if asked.command == "reset":
+                self._keeping.forget()
+            answers.append(Answer(asked.number))
+        return answers

@@ -1,0 +1,251 @@
+"""The agenda: what of the order is still to be done, on the map as it is now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.assignment import NO_ORDER, Assignment, Stage
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.frontier import next_frontier
+from fasaco_edge.mission.ground import Ground
+from fasaco_edge.mission.leftovers import Leftovers
+from fasaco_edge.mission.logbook import Logbook
+from fasaco_edge.mission.order import Zone
+from fasaco_edge.mission.progress import MOST_TRIES, LeftOver
+from fasaco_edge.mission.site import Site
+from fasaco_edge.mission.unreached import UnreachedArea
+from fasaco_edge.mission.zones import in_zones
+from fasaco_edge.planners.problem import CoverageProblem
+
+
+@dataclass(slots=True)
+class _Memory:
+    """What is only known as long as the daemon lives.
+
+    Attributes:
+        viewpoints: cells (row, col) to look from, and not yet driven to.
+        looked: cells from which a way to the zone was looked for.
+        left_over: whether paths still get anything done.
+        retry_at: when what is blocked or left over is tried again [s]; None if nobody waits.
+        ending: how the order came to its end.
+    """
+
+    viewpoints: set[Cell] = field(default_factory=set)
+    looked: set[Cell] = field(default_factory=set)
+    left_over: LeftOver = field(default_factory=LeftOver)
+    retry_at: float | None = None
+    ending: str = "the order was carried out"
+
+
+class Agenda:
+    """Goes through an order: zones pass by pass, what was left over once more, the way home.
+
+    Attributes:
+        assignment: the order, and how far it is.
+    """
+
+    def __init__(self, config: MissionConfig, site: Site, log: Logbook) -> None:
+        self.assignment = Assignment.none(NO_ORDER)
+        self._config = config
+        self._site = site
+        self._log = log
+        self._memory = _Memory()
+        self._leftovers = Leftovers(site, log)
+        # Whether anything is worth trying again, and as of when.
+        self._counted: tuple[object, bool] = (None, False)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the robot stands until it is time to try again."""
+        return self._memory.retry_at is not None
+
+    @property
+    def ending(self) -> str:
+        """How the order came to its end."""
+        return self._memory.ending
+
+    def take(self, assignment: Assignment) -> None:
+        """Begin with another order, or with none."""
+        self.assignment, self._memory = assignment, _Memory()
+        self._counted = (None, False)
+        self._leftovers.begin_anew()
+
+    def see(self) -> None:
+        """Remember what can be reached now."""
+        self._leftovers.see()
+
+    def pass_by(self, cell: Cell) -> None:
+        """Note that the robot has come to ``cell``."""
+        self._memory.viewpoints.discard(cell)
+
+    def begin(self, cell: Cell, now: float) -> str:
+        """Begin what is due, the robot being in ``cell``; return why a plan is wanted, or ""."""
+        if self._memory.retry_at is not None and not self._worth_trying():
+            self.go_on(now)
+        if self._memory.retry_at is not None:
+            return self._begin_try(cell) if now >= self._memory.retry_at else ""
+        assignment = self.assignment
+        if assignment.begun or assignment.order is None or assignment.stage is Stage.OVER:
+            return ""
+        zone = assignment.current
+        if zone is not None and not (assignment.order.keep_covered and assignment.turn == 1):
+            cell_m = self._config.footprint.cell_m
+            self._log.forget(lambda window: in_zones((zone,), window, cell_m))
+        self.assignment = replace(assignment, begun=True, home=assignment.home or cell)
+        self._memory.left_over = LeftOver()
+        if assignment.turn == 1:
+            self._memory.looked.clear()
+        return "" if assignment.standing else assignment.title
+
+    def problem(self, cell: Cell, before: NDArray[np.int32]) -> CoverageProblem:
+        """Return the problem of what is still to be covered now.
+
+        Raises:
+            NothingToCover: nothing is.
+        """
+        ground, assignment = self._site.ground, self.assignment
+        assert ground is not None
+        lattice, home, zone = ground.lattice, assignment.home, assignment.current
+        if zone is not None and self._memory.viewpoints and self._in_reach(zone, ground):
+            self._memory.viewpoints.clear()
+        ends_home = (
+            home is not None
+            and assignment.returns_after_this
+            and lattice.contains(home)
+            and ground.holds(home)
+        )
+        return CoverageProblem.of(
+            lattice,
+            cell,
+            covered=~self.open_cells(lattice.window),
+            end=home if ends_home else None,
+            cost=self._config.cost,
+            before=before,
+        )
+
+    def seek(self, cell: Cell) -> str:
+        """Look for a way to a zone the robot cannot come to; return why a plan is wanted, or "".
+
+        At the border of the known, cell by cell, until the zone is in reach or all was looked at.
+        """
+        zone, ground, memory = self.assignment.current, self._site.ground, self._memory
+        if zone is None or zone.polygon is None or ground is None or self._in_reach(zone, ground):
+            return ""
+        memory.looked |= {cell}
+        goal = next_frontier(ground, zone.polygon, memory.looked)
+        if goal is None:
+            return ""
+        memory.looked.add(goal)
+        memory.viewpoints = {goal}
+        return f"looking for a way to zone {zone.name!r}"
+
+    def _in_reach(self, zone: Zone, ground: Ground) -> bool:
+        inside = in_zones((zone,), ground.lattice.window, self._config.footprint.cell_m)
+        return bool((inside & ground.reachable).any())
+
+    def open_cells(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of ``window`` still need a visit, coverable or not."""
+        order = self.assignment.order
+        if order is None:
+            return np.zeros((window.rows, window.cols), bool)
+        zone = self.assignment.current
+        zones = order.zones if zone is None else (zone,)
+        wanted = in_zones(zones, window, self._config.footprint.cell_m)
+        open_cells: NDArray[np.bool_] = wanted & (self._log.ledger.visits(window) == 0)
+        for row, col in self._memory.viewpoints:
+            if window.row0 <= row < window.row1 and window.col0 <= col < window.col1:
+                open_cells[row - window.row0, col - window.col0] = True
+        return open_cells
+
+    def gives_up(self) -> bool:
+        """Note that a path came to its end; return whether what it left over has to wait."""
+        memory, cells = self._memory, self._left()
+        self._leftovers.failures += cells > 0
+        memory.left_over = memory.left_over.after(cells)
+        if memory.left_over.given_up and memory.looked and memory.viewpoints:
+            memory.viewpoints.clear()  # a way to the zone may be found from elsewhere
+            return False
+        return memory.left_over.given_up
+
+    def go_on(self, now: float) -> None:
+        """Go on to what comes next: all that could be done now is done."""
+        assignment, memory = self.assignment, self._memory
+        memory.viewpoints.clear()
+        following = assignment.next_leg()
+        if following is not assignment:
+            self.assignment = following
+            return
+        if assignment.stage is Stage.RETRYING and not self.waiting:
+            assignment = replace(assignment, tries=assignment.tries + 1)
+        if assignment.stage is Stage.RETURNING:
+            self._end()
+            return
+        # What is left is counted over all zones from here on.
+        self.assignment = replace(assignment, stage=Stage.RETRYING)
+        if assignment.tries < self._config.retries and self._worth_trying():
+            if memory.retry_at is None:
+                memory.retry_at = now + self._config.retry_s
+        elif assignment.returns_after_this:
+            memory.retry_at = None
+            self.assignment = replace(assignment, stage=Stage.RETURNING, begun=False)
+        else:
+            self._end()
+
+    def reopen(self) -> None:
+        """Let an order that stands go on: the map has changed since it was over."""
+        if self.assignment.standing and self.assignment.stage is Stage.OVER:
+            self.assignment = replace(self.assignment, stage=Stage.COVERING)
+
+    def waits_for(self) -> str:
+        """Return in words what the robot waits for before it tries again."""
+        cells, config = sum(area.cells for area in self.unreached()), self._config
+        return (
+            f"{cells} {'cell' if cells == 1 else 'cells'} not reached: tried again after "
+            f"{config.retry_s:g} s ({self.assignment.tries + 1} of {config.retries})"
+        )
+
+    def unreached(self) -> list[UnreachedArea]:
+        """Return what of the order stays uncovered as things are, the largest areas first."""
+        return self._leftovers.areas(self.assignment)
+
+    def _begin_try(self, cell: Cell) -> str:
+        memory = self._memory
+        memory.retry_at, memory.viewpoints = None, self._closed_off() - {cell}
+        # One path that changes nothing is enough this time.
+        memory.left_over = LeftOver(self._left(), MOST_TRIES)
+        return f"tried again, {self.assignment.tries + 1} of {self._config.retries}"
+
+    def _end(self) -> None:
+        left, order = self._left(), self.assignment.order
+        self._memory.retry_at = None
+        self.assignment = replace(self.assignment, stage=Stage.OVER)
+        every = order is None or order.zones[0].polygon is None
+        self._memory.ending = f"every reachable cell{'' if every else ' of the zones'} is covered"
+        if left:
+            self._memory.ending += f" but {left} left over"
+
+    def _worth_trying(self) -> bool:
+        """Tell whether there is anything to be tried again; counted anew if anything changed."""
+        key = (self._site.ground, self._log.ledger.total)
+        if key != self._counted[0]:
+            self._counted = key, bool(self._left() or self._closed_off())
+        return self._counted[1]
+
+    def _left(self) -> int:
+        """Return how many reachable cells still need a visit."""
+        ground = self._site.ground
+        if ground is None:
+            return 0
+        return int(np.count_nonzero(self.open_cells(ground.lattice.window) & ground.reachable))
+
+    def _closed_off(self) -> set[Cell]:
+        """Return the cells to look at closed areas from."""
+        order, ground = self.assignment.order, self._site.ground
+        if order is None or ground is None:
+            return set()
+        return self._leftovers.viewpoints(order, ground)

@@ -1,0 +1,71 @@
+"""The ledger of a mission, and whose building it is of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.mission.fit import ResumedLedger, Verdict
+from fasaco_edge.mission.ledger import CoverageLedger, LedgerMismatchError, LedgerSnapshot
+
+
+class Logbook:
+    """Keeps the ledger; one from before a restart only as long as no map contradicts it.
+
+    Attributes:
+        ledger: what is covered.
+        opening: why the first plan is wanted.
+    """
+
+    def __init__(self, cell_m: float) -> None:
+        self.ledger = CoverageLedger(cell_m)
+        self.opening = "first plan"
+        self._resumed: ResumedLedger | None = None
+
+    def resume(self, before: LedgerSnapshot) -> None:
+        """Go on with the ledger from before a restart."""
+        self._resumed = ResumedLedger(before)
+        self.ledger = self._resumed.ledger
+        self.opening = f"first plan, {before.cells} cells were covered before"
+
+    def record(self, pose: Pose2D) -> None:
+        """Note that the robot drove on to ``pose``."""
+        self.ledger.record(pose)
+        if self._resumed is not None:
+            self._resumed.record(pose)
+
+    def lift(self) -> None:
+        """Note that nobody knows how the robot gets to its next pose."""
+        self.ledger.lift()
+        if self._resumed is not None:
+            self._resumed.lift()
+
+    def forget(self, inside: Callable[[Window], NDArray[np.bool_]]) -> None:
+        """Forget all visits to cells ``inside``, see ``CoverageLedger.forget``."""
+        self.ledger.forget(inside)
+        if self._resumed is not None:
+            self._resumed.forget(inside)
+
+    def begin_anew(self) -> None:
+        """Forget all there is, but where the tool is now."""
+        self.forget(lambda window: np.ones((window.rows, window.cols), bool))
+        self._resumed = None
+        self.opening = "first plan"
+
+    def check(self, lattice: CoverageLattice, frame: str) -> LedgerMismatchError | None:
+        """Begin anew where a map shows the ledger to be of another building; return what to say."""
+        self.ledger.frame = self.ledger.frame or frame
+        resumed = self._resumed
+        verdict = resumed.verdict(lattice, frame) if resumed else Verdict.OPEN
+        if resumed is None or verdict is Verdict.OPEN:
+            return None
+        self._resumed = None
+        if verdict is Verdict.SAME:
+            return None
+        self.ledger, misfit = resumed.since(frame), resumed.mismatch(frame)
+        self.opening = f"{misfit}: begun anew"
+        return misfit

@@ -1,0 +1,61 @@
+"""The parts of a mission, which those that hear and those that decide have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fasaco_edge.mission.agenda import Agenda
+from fasaco_edge.mission.assignment import Assignment
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.logbook import Logbook
+from fasaco_edge.mission.route import Route
+from fasaco_edge.mission.site import Site
+from fasaco_edge.mission.watch import Watch
+
+
+@dataclass(slots=True)
+class Parts:
+    """What a mission consists of.
+
+    Attributes:
+        site: the map and the robot's place in it.
+        log: what is covered.
+        watch: whether map and pose keep coming.
+        agenda: what is still to be done.
+        route: the path, and the plan under way.
+        now: time of the step [s].
+    """
+
+    site: Site
+    log: Logbook
+    watch: Watch
+    agenda: Agenda
+    route: Route
+    now: float = 0.0
+
+    @classmethod
+    def of(cls, config: MissionConfig) -> Parts:
+        """Return the parts of a mission that has heard nothing yet."""
+        site, log = Site(config), Logbook(config.footprint.cell_m)
+        agenda = Agenda(config, site, log)
+        return cls(site, log, Watch(config), agenda, Route(site, agenda))
+
+    def take_order(self, assignment: Assignment) -> None:
+        """Begin with another order, or with none; a survey has to follow."""
+        self.route.disown()
+        self.site.keep_out(assignment.order.keep_out if assignment.order else ())
+        self.agenda.take(assignment)
+
+    def survey(self) -> None:
+        """Find out what can be reached now; want a new plan if that changed."""
+        before, route = self.site.ground, self.route
+        self.site.survey()
+        ground = self.site.ground
+        if ground is None:
+            return
+        self.agenda.see()
+        if before is None:
+            again = "robot is on coverable ground again"
+            route.wanted = again if route.revision else self.log.opening
+        elif change := ground.change_since(before):
+            route.wanted = str(change)

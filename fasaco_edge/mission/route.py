@@ -1,0 +1,119 @@
+"""The route: the path the robot was given, and the plan under way for the next one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.agenda import Agenda
+from fasaco_edge.mission.events import PathUpdate, PlanReady, PlanRequest
+from fasaco_edge.mission.ground import Ground
+from fasaco_edge.mission.progress import DrivenPath
+from fasaco_edge.mission.site import Site
+from fasaco_edge.planners.problem import CoverageProblem
+
+
+class Route:
+    """Asks for plans, one at a time, and makes paths of them.
+
+    Attributes:
+        path: the published path, and how far the robot is on it.
+        revision: counts the published paths.
+        plans: counts the plans that came back.
+        wanted: why a new plan is wanted; "" where none is.
+        asked: the plan under way.
+        now: time of the step [s].
+        published_at: when a path was last published, or found to be still right [s].
+    """
+
+    def __init__(self, site: Site, agenda: Agenda) -> None:
+        self.path = DrivenPath.none()
+        self.revision = 0
+        self.plans = 0
+        self.wanted = ""
+        self.asked: PlanRequest | None = None
+        self.now = 0.0
+        self.published_at = 0.0
+        self._site = site
+        self._agenda = agenda
+        self._disowned = False
+        self._checked_on: Ground | None = None
+
+    def ask(self, problem: CoverageProblem) -> PlanRequest:
+        """Ask for the plan that is wanted."""
+        self.asked = PlanRequest(self.plans + 1, problem, self.wanted)
+        self.wanted = ""
+        return self.asked
+
+    def disown(self) -> None:
+        """Want no plan any more; what comes back of the one under way is for another order."""
+        self.wanted = ""
+        self._disowned = self.asked is not None
+
+    def take_plan(self, event: PlanReady) -> PathUpdate | None:
+        """Publish a plan that was asked for, unless it does not hold any more."""
+        asked, ground = self.asked, self._site.ground
+        if asked is None or asked.number != event.number:
+            return None
+        self.asked = None
+        self.plans += 1
+        disowned, self._disowned = self._disowned, False
+        cell = self._site.cell()
+        if disowned or cell is None or ground is None:
+            return None
+        cells = self._from_here(event.path.cells, cell, ground)
+        if not len(cells) or ground.legal_steps(cells) < len(cells) - 1:
+            self.wanted = self.wanted or "the map changed while planning"
+            return None
+        if np.array_equal(cells, self.path.ahead):
+            # Nothing to change: whoever drives it need not hear of it again.
+            self.published_at = self.now
+            return None
+        return self.publish(cells, asked.reason, event)
+
+    def _from_here(self, cells: NDArray[np.int32], here: Cell, ground: Ground) -> NDArray[np.int32]:
+        """Return a fresh plan without what was covered while it was made.
+
+        The robot went on meanwhile: it joins the plan at the first cell that still
+        needs a visit. Empty where it cannot come there: it was carried elsewhere.
+        """
+        window = ground.lattice.window
+        open_cells = self._agenda.open_cells(window)
+        rows, cols = cells[:, 0] - window.row0, cells[:, 1] - window.col0
+        inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
+        still_open = np.ones(len(cells), bool)
+        still_open[inside] = open_cells[rows[inside], cols[inside]]
+        first = int(np.argmax(still_open)) if still_open.any() else len(cells) - 1
+        lead = ground.way(here, (int(cells[first, 0]), int(cells[first, 1])))
+        return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead
+
+    def publish(
+        self, cells: NDArray[np.int32], reason: str, ready: PlanReady | None = None
+    ) -> PathUpdate:
+        """Publish a path in place of the one before."""
+        self.revision += 1
+        self.published_at = self.now
+        self.path = DrivenPath(cells)
+        plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
+        return PathUpdate(self.revision, cells, reason, plan, seconds)
+
+    def stop(self, reason: str) -> PathUpdate | None:
+        """Publish an empty path; None where the robot has none to drive."""
+        if not len(self.path.cells):
+            return None
+        return self.publish(np.empty((0, 2), np.int32), reason)
+
+    def cut_off(self) -> PathUpdate | None:
+        """Shorten a path that a new map blocks, at once; a new plan follows."""
+        ground = self._site.ground
+        if ground is None or ground is self._checked_on:
+            return None
+        self._checked_on = ground
+        ahead = self.path.ahead
+        legal = ground.legal_steps(ahead) if len(ahead) else 0
+        if legal >= len(ahead) - 1:
+            return None
+        row, col = ahead[legal + 1]
+        self.wanted = f"path blocked at cell ({row}, {col})"
+        return self.publish(ahead[: legal + 1], self.wanted)

@@ -1,0 +1,178 @@
+"""What of an order stays uncovered, area by area, and why; and where to look at it again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell, CoverageLattice
+from fasaco_edge.mission.connected import connected_areas
+from fasaco_edge.mission.ground import Ground
+
+
+class Cause(IntEnum):
+    """Why a cell stays uncovered; 0 is a cell that does not."""
+
+    KEPT_OUT = 1
+    BEHIND_KEEP_OUT = 2
+    BEHIND_OBSTACLES = 3
+    CLOSED = 4
+    LEFT_OVER = 5
+    UNKNOWN = 6
+
+
+REASONS = {
+    Cause.KEPT_OUT: "in a keep-out zone",
+    Cause.BEHIND_KEEP_OUT: "closed off by a keep-out zone",
+    Cause.BEHIND_OBSTACLES: "closed off by obstacles",
+    Cause.CLOSED: "blocked by an obstacle that was not there before",
+    Cause.UNKNOWN: "unknown to the map",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class UnreachedArea:
+    """Cells that hang together and stay uncovered for one reason.
+
+    Attributes:
+        cells: how many.
+        cell: one of them, (row, col) on the lattice.
+        reason: why.
+    """
+
+    cells: int
+    cell: Cell
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighted:
+    """Which cells the robot could come to at some time, bool (rows, cols) of ``window``."""
+
+    window: Window
+    mask: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, ground: Ground) -> Sighted:
+        """Return what can be reached now."""
+        return cls(ground.lattice.window, ground.reachable)
+
+    def on(self, window: Window) -> NDArray[np.bool_]:
+        """Return the mask on another window, bool (rows, cols)."""
+        if window == self.window:
+            return self.mask
+        mask = np.zeros((window.rows, window.cols), bool)
+        if common := window.intersection(self.window):
+            mask[common.slices_in(window)] = self.mask[common.slices_in(self.window)]
+        return mask
+
+    def and_now(self, ground: Ground) -> Sighted:
+        """Return what could be reached before, or can be now."""
+        window = ground.lattice.window
+        return Sighted(window, self.on(window) | ground.reachable)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Situation:
+    """All that decides what stays uncovered; arrays are bool (rows, cols) on one window.
+
+    Attributes:
+        free: the lattice without any keep-out zone.
+        ground: the lattice with them, and what can be reached on it.
+        uncovered: cells that were to be covered, and are not.
+        sighted: cells that could be reached at some time.
+        zoned: whether the order names zones; else unknown cells are nobody's.
+        given_up: whether reachable cells will not be tried again; else they are still to come.
+        tries: how often they were tried.
+    """
+
+    free: CoverageLattice
+    ground: Ground
+    uncovered: NDArray[np.bool_]
+    sighted: NDArray[np.bool_]
+    zoned: bool
+    given_up: bool
+    tries: int
+
+    def areas(self) -> list[UnreachedArea]:
+        """Return what stays uncovered, the largest areas first."""
+        window = self.ground.lattice.window
+        found = []
+        for area in connected_areas(self._causes()):
+            row, col = area.inner_cell
+            reason = REASONS.get(Cause(area.kind), f"left over after {self.tries} tries")
+            cell = row + window.row0, col + window.col0
+            found.append(UnreachedArea(area.cells, cell, reason))
+        return found
+
+    def closed(self) -> NDArray[np.bool_]:
+        """Return the uncovered cells that could be reached once, bool (rows, cols)."""
+        kept_out = self.free.coverable & ~self.ground.lattice.coverable
+        return self.uncovered & self.sighted & ~self.ground.reachable & ~kept_out
+
+    def _causes(self) -> NDArray[np.uint8]:
+        states, reachable = self.ground.lattice.states, self.ground.reachable
+        coverable = self.ground.lattice.coverable
+        causes = np.zeros(states.shape, np.uint8)
+        if self.zoned:
+            causes[states == UNKNOWN] = Cause.UNKNOWN
+        causes[self.sighted & ~coverable] = Cause.CLOSED
+        causes[coverable & ~reachable] = Cause.BEHIND_OBSTACLES
+        if self.free is not self.ground.lattice:
+            self._blame_keep_out(causes)
+        if self.given_up:
+            causes[reachable] = Cause.LEFT_OVER
+        causes[~self.uncovered] = 0
+        return causes
+
+    def _blame_keep_out(self, causes: NDArray[np.uint8]) -> None:
+        lattice, reachable = self.ground.lattice, self.ground.reachable
+        causes[self.free.coverable & (lattice.states == BLOCKED)] = Cause.KEPT_OUT
+        if reachable.any():
+            row, col = divmod(int(np.argmax(reachable)), reachable.shape[1])
+            somewhere = row + lattice.window.row0, col + lattice.window.col0
+            behind = Ground.around(self.free, somewhere).reachable & lattice.coverable & ~reachable
+            causes[behind] = Cause.BEHIND_KEEP_OUT
+
+
+def viewpoints(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -> list[Cell]:
+    """Return a cell beside each closed area to look at it from; indices of the arrays.
+
+    An area without a square of two by two cells is left out: rows of cells along the walls
+    come and go with a map's noise, and nobody wants a robot to drive along all of them again.
+    """
+    found = []
+    block = closed[:-1, :-1] & closed[1:, :-1] & closed[:-1, 1:] & closed[1:, 1:]
+    if not block.any():
+        return []
+    for area in connected_areas(closed.astype(np.uint8)):
+        rows = [row for row, _, _ in area.runs]
+        window = Window(
+            min(rows),
+            min(first for _, first, _ in area.runs),
+            max(rows) + 1,
+            max(last for _, _, last in area.runs),
+        )
+        mask = np.zeros((window.rows + 2, window.cols + 2), bool)
+        for row, first, last in area.runs:
+            mask[row - window.row0 + 1, first - window.col0 + 1 : last - window.col0 + 1] = True
+        if not (mask[:-1, :-1] & mask[1:, :-1] & mask[:-1, 1:] & mask[1:, 1:]).any():
+            continue
+        beside = mask.copy()
+        beside[1:] |= mask[:-1]
+        beside[:-1] |= mask[1:]
+        beside[:, 1:] |= mask[:, :-1]
+        beside[:, :-1] |= mask[:, 1:]
+        around = Window(window.row0 - 1, window.col0 - 1, window.row1 + 1, window.col1 + 1)
+        inside = around.intersection(Window(0, 0, *closed.shape))
+        assert inside is not None
+        whole = Window(0, 0, *closed.shape)
+        cells = np.argwhere(beside[inside.slices_in(around)] & reachable[inside.slices_in(whole)])
+        if len(cells):
+            row, col = cells[len(cells) // 2].tolist()
+            found.append((row + inside.row0, col + inside.col0))
+    return found

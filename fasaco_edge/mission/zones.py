@@ -1,0 +1,73 @@
+"""An order on the lattice: the cells of its zones, and those its keep-out zones take away."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
+from fasaco_edge.kernels.directions import EAST, NORTH, SOUTH, WEST
+from fasaco_edge.mission.order import Zone
+from fasaco_edge.mission.polygons import Polygon, cells_inside, cells_near
+
+
+def in_zones(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
+    """Return which cells of ``window`` lie in one of the zones, bool (rows, cols), read-only."""
+    if any(zone.polygon is None for zone in zones):
+        return _everything(window)
+    return _inside_any(tuple(zone.polygon for zone in zones if zone.polygon), window, cell_m)
+
+
+def kept_out(
+    polygons: tuple[Polygon, ...], window: Window, cell_m: float, robot_radius_m: float
+) -> NDArray[np.bool_]:
+    """Return which cells of ``window`` the robot must keep out of, bool (rows, cols), read-only.
+
+    Those that a polygon touches, or where the robot would touch it.
+    """
+    return _near_any(polygons, window, cell_m, max(0.5 * cell_m, robot_radius_m))
+
+
+def without(lattice: CoverageLattice, cells: NDArray[np.bool_]) -> CoverageLattice:
+    """Return ``lattice`` with some of its cells, bool (rows, cols), blocked for driving too."""
+    if not cells.any():
+        return lattice
+    states, steps = lattice.states.copy(), lattice.steps.copy()
+    states[cells] = BLOCKED
+    steps[cells] = 0
+    steps[:, :-1][cells[:, 1:]] &= ~np.uint8(1 << EAST)
+    steps[:, 1:][cells[:, :-1]] &= ~np.uint8(1 << WEST)
+    steps[:-1][cells[1:]] &= ~np.uint8(1 << NORTH)
+    steps[1:][cells[:-1]] &= ~np.uint8(1 << SOUTH)
+    return CoverageLattice(lattice.window, lattice.cell_m, states, steps)
+
+
+# A map moves its window seldom; zones and passes ask for the same cells again and again.
+@lru_cache(maxsize=1)
+def _everything(window: Window) -> NDArray[np.bool_]:
+    cells = np.ones((window.rows, window.cols), bool)
+    cells.flags.writeable = False
+    return cells
+
+
+@lru_cache(maxsize=4)
+def _inside_any(polygons: tuple[Polygon, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
+    cells = np.zeros((window.rows, window.cols), bool)
+    for polygon in polygons:
+        cells |= cells_inside(polygon, window, cell_m)
+    cells.flags.writeable = False
+    return cells
+
+
+@lru_cache(maxsize=2)
+def _near_any(
+    polygons: tuple[Polygon, ...], window: Window, cell_m: float, reach_m: float
+) -> NDArray[np.bool_]:
+    cells = np.zeros((window.rows, window.cols), bool)
+    for polygon in polygons:
+        cells |= cells_near(polygon, window, cell_m, reach_m)
+    cells.flags.writeable = False
+    return cells

@@ -1,0 +1,130 @@
+"""What the mission heard, byte for byte, beside what is drawn of it.
+
+Samples are gathered for a second and written as one blob, past rerun's own batches: a kill
+costs no more. Each part begins with what is in force, told as a whole, so that it can be
+read without the parts before it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import Counter
+from dataclasses import replace
+from typing import Final
+
+from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
+from fasaco_edge.bus.sample_codec import Numbered, SampleEncoder
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.recording.journal import Journal
+from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.status import decode_json
+
+INPUTS: Final = ("map", "map_update", "pose", "command")
+"""Topics that are logged as they come: all that a mission hears."""
+PERIOD_NS = 1_000_000_000
+WAITING_BYTES = 4_000_000
+# Updates since the last full map; with more of them a part begins without the map.
+IN_FORCE_BYTES = 8_000_000
+
+
+class InputLog:
+    """Writes samples into a journal; for the journal's thread only.
+
+    Of paths only a digest is kept, of statuses those that tell another state or configuration.
+    """
+
+    def __init__(self, journal: Journal, run: int) -> None:
+        self._journal = journal
+        self._encoder = SampleEncoder(run)
+        self._in_force = _InForce()
+        self._part = 0
+        self._lost = 0
+        self._next_ns = 0
+        self._told: tuple[object, ...] = ()
+
+    def add(self, arrival: Arrival) -> None:
+        """Take a sample, if it is one that matters."""
+        if arrival.topic == "path":
+            arrival = _path_digest(arrival)
+        elif arrival.topic not in INPUTS and not self._is_news(arrival):
+            return
+        self._in_force.note(self._encoder.add(arrival))
+        if self._encoder.waiting_bytes > WAITING_BYTES:
+            self.write()
+
+    def note_lost(self, lost: Counter[str]) -> None:
+        """Note how many samples of each topic never came here, in all."""
+        count = sum(lost[topic] for topic in INPUTS)
+        self._encoder.skip(count - self._lost)
+        self._lost = count
+
+    def write_if_due(self, now_ns: int) -> None:
+        """Write what has gathered, about once a second; ``now_ns`` by a steady clock [ns]."""
+        if now_ns >= self._next_ns:
+            self._next_ns = now_ns + PERIOD_NS
+            self.write()
+
+    def write(self) -> None:
+        """Write what has gathered."""
+        if self._part != self._journal.part_number:
+            self._part = self._journal.part_number
+            self._encoder.restart(self._in_force.samples())
+        batch = self._encoder.take()
+        if batch and not self._journal.write_blob(batch):
+            # What is not there, nothing can be told by.
+            self._part = 0
+
+    def _is_news(self, arrival: Arrival) -> bool:
+        if arrival.topic != "status":
+            return False
+        try:
+            status = decode_json(arrival.sample.payload)
+        except MalformedMessage:
+            return False
+        # A map in it: the mission has begun.
+        has_map = status.get("map") is not None
+        told = (status.get("state"), has_map, status.get("version"), status.get("config"))
+        is_news = told != self._told
+        self._told = told
+        return is_news
+
+
+def _path_digest(arrival: Arrival) -> Arrival:
+    """Return what stands for a path: thousands of points are many bytes, and no input."""
+    payload = arrival.sample.payload
+    with contextlib.suppress(MalformedMessage):
+        payload = decode_path(payload).xy.tobytes()
+    sample = replace(arrival.sample, payload=digest(payload))
+    return replace(arrival, topic=PATH_DIGEST, sample=sample)
+
+
+class _InForce:
+    """The newest map, what has changed of it since, and the newest of what else is latched."""
+
+    def __init__(self) -> None:
+        self._newest: dict[str, Numbered] = {}
+        self._updates: list[Numbered] = []
+        self._updates_bytes = 0
+
+    def note(self, numbered: Numbered) -> None:
+        topic = numbered.arrival.topic
+        if topic == "map":
+            self._updates, self._updates_bytes = [], 0
+        if topic != "map_update":
+            self._newest[topic] = numbered
+        elif "map" in self._newest:
+            self._note_update(numbered)
+
+    def _note_update(self, numbered: Numbered) -> None:
+        self._updates.append(numbered)
+        self._updates_bytes += len(numbered.arrival.sample.payload)
+        if self._updates_bytes > IN_FORCE_BYTES:
+            # A map without its updates would be another one: better none.
+            del self._newest["map"]
+            self._updates, self._updates_bytes = [], 0
+
+    def samples(self) -> list[Numbered]:
+        newest = [
+            numbered for topic, numbered in self._newest.items() if topic not in ("pose", "command")
+        ]
+        return sorted((*newest, *self._updates), key=lambda numbered: numbered.number)

@@ -1,0 +1,64 @@
+"""Paths as a recording shows them: the newest, the one drawn before it, and why it came."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.recording import archetypes as draw
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.fields import Json, integer, number, text
+from fasaco_edge.recording.journal import Journal
+from fasaco_edge.recording.layers import Layers
+from fasaco_edge.recording.sdk import rr
+from fasaco_edge.wire.paths import PathMessage
+
+# A point of a line in the file; each path is drawn twice, the second time as the one before.
+POINT_BYTES = 2 * 12
+
+
+class PathDrawing:
+    """Draws paths into a journal, each as soon as the allowance of its layer lets it."""
+
+    def __init__(self, journal: Journal, layers: Layers) -> None:
+        self._journal = journal
+        self._layers = layers
+        self._revision: int | None = None
+        self._count = 0
+        # Which of the paths is drawn, and its line.
+        self._drawn: tuple[int, NDArray[np.float64] | None] = (0, None)
+
+    def add(self, message: PathMessage, note: Json) -> None:
+        """Draw a path; one that is published again is still the same."""
+        revision = integer(note, "revision")
+        if revision is not None:
+            self._journal.sequence(entities.REPLAN, revision)
+        if not self._count or revision != self._revision:
+            self._journal.log(entities.PATH_LOG, rr.TextLog(_line(message, note), level="INFO"))
+            self._count += 1
+        self._revision, count, line = revision, self._count, draw.corners(message.xy)
+
+        def draw_path() -> None:
+            (before, old), self._drawn = self._drawn, (count, line)
+            if old is not None and before != count:
+                self._draw(entities.OLD_PATH, old, draw.OLD_PATH)
+            self._draw(entities.PATH, line, draw.PATH)
+
+        self._layers.draw(entities.PATH, POINT_BYTES * len(line), draw_path, self._journal.wall_ns)
+
+    def _draw(self, entity: str, line: NDArray[np.float64], style: draw.LineStyle) -> None:
+        archetype = draw.line_archetype(line, style)
+        self._journal.log(entity, archetype, latched=True, size=line.nbytes)
+
+
+def _line(message: PathMessage, note: Json) -> str:
+    revision = integer(note, "revision")
+    named = "path" if revision is None else f"path {revision}"
+    facts = [f"{max(len(message.xy) - 1, 0)} steps"]
+    planner, plan_ms = text(note, "planner"), number(note, "plan_ms")
+    if planner:
+        facts.append(planner)
+    if plan_ms is not None:
+        facts.append(f"{plan_ms:.0f} ms")
+    reason = text(note, "reason")
+    return f"{named} ({', '.join(facts)}){': ' if reason else ''}{reason}"

@@ -1,0 +1,323 @@
+"""Commands to a real daemon: as queries of somebody else's program, and from the command line."""
+
+from __future__ import annotations
+
+import json
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.commands import fasaco_edge
+from tests.daemon.hall import begin, drive, lanes
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import Daemon, daemon_process
+from tests.daemon.rooms import TOOL_M, cells_of, map_bytes, pose_bytes, room
+from tests.daemon.test_mission import about, planned
+
+# Lanes 3 and 4 of the hall, columns 1 to 4.
+KITCHEN = {"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5], [0.3, 1.5]]}
+KITCHEN_CELLS = {(row, col) for row in (3, 4) for col in range(1, 5)}
+
+
+def command(outsider: Outsider, name: str, order: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Give a command; return the answer, or the error."""
+    asked = {"command": name} | ({"order": order} if order is not None else {})
+    return ask(outsider, json.dumps(asked).encode())
+
+
+def ask(outsider: Outsider, payload: bytes | None) -> dict[str, Any]:
+    (reply,) = outsider.session.get(f"{outsider.prefix}/@rpc/mission", payload=payload, timeout=10)
+    answer = reply.ok or reply.err
+    assert "json" in str(answer.encoding)
+    document: dict[str, Any] = json.loads(answer.payload.to_bytes())
+    assert ("code" in document) == (reply.ok is None)
+    return document
+
+
+def told(daemon: Daemon, *words: str) -> Any:
+    """Run ``fasaco-edge mission``; it has to succeed. Return its JSON."""
+    ended = fasaco_edge("mission", *words, "--connect", daemon.endpoint, "--json")
+    assert ended.code == 0, ended.err
+    return json.loads(ended.out)
+
+
+@pytest.mark.parametrize(
+    ("payload", "code", "said"),
+    [
+        (b"{", "malformed_message", "JSON object"),
+        (b"[]", "malformed_message", "JSON object"),
+        (b"\xff", "malformed_message", "JSON object"),
+        (b"{}", "bad_order", "missing member command"),
+        (b'{"command":"go"}', "bad_order", "got 'go'"),
+        (b'{"command":"start","order":{"zone":1}}', "bad_order", "order: unknown member zone"),
+        (b'{"command":"start","order":{"keep_out":[[[0,0],[1,1],[1,0],[0,1]]]}}', "bad_order",
+         "keep_out[0] crosses or touches itself"),
+        (b'{"command":"start","order":{"passes":1e99}}', "bad_order", "order.passes"),
+    ],
+)  # fmt: skip
+def test_what_is_no_command_is_answered_with_an_error(outsider, payload, code, said):
+    error = ask(outsider, payload)
+    assert error["code"] == code
+    assert said in error["message"]
+    assert error["hint"]
+    # Nothing has happened, and nothing is counted against those who sent maps and poses.
+    assert outsider.ask_status()["errors"]["total"] == 0
+
+
+def test_a_question_without_a_payload_is_one_for_the_status(outsider):
+    for payload in (None, b"", b'{"command":"status"}'):
+        answer = ask(outsider, payload)
+        assert (answer["robot"], answer["state"]) == ("robot", "waiting for map")
+        assert answer["mission"]["ordered"] == "itself"
+
+
+def test_an_order_before_any_map_and_a_life_after_it(tmp_path):
+    with (
+        daemon_process(tmp_path, mission={"autostart": False}) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        paths, taken = outsider.listen("path"), outsider.listen("command", late=False)
+        assert outsider.ask_status()["state"] == "idle"
+        assert outsider.ask_status()["reason"] == "no order yet: start a mission"
+        assert command(outsider, "pause")["code"] == "not_now"
+        answer = command(outsider, "start", {"zones": [KITCHEN], "passes": 2, "return_home": True})
+        assert answer["state"] == "waiting for map"
+        assert answer["mission"]["zones"] == [
+            {"name": "kitchen", "passes": 2, "pass": 0, "cells": 0, "covered": 0}
+        ]
+        status = begin(outsider)
+        assert status["state"] == "covering"
+        first = paths.wait(lambda heard: True)
+        assert about(first)["reason"] == "zone 'kitchen', pass 1 of 2"
+        assert set(cells_of(planned(first)[0])) >= KITCHEN_CELLS
+        mission = outsider.ask_status()["mission"]
+        assert (mission["zone"], mission["pass"], mission["passes"]) == ("kitchen", 1, 2)
+        assert mission["zones"][0]["cells"] == 8
+        assert mission["home"] == {"x": 0.45, "y": 0.45}
+
+        # Paused, the robot gets an empty path, and what it passes over still counts.
+        answer = command(outsider, "pause")
+        assert (answer["state"], answer["mission"]["paused"]) == ("paused", True)
+        stop = paths.wait(lambda heard: about(heard)["reason"] == "paused by command")
+        assert len(planned(stop)[0]) == 0
+        status = drive(outsider, lanes(5))
+        assert status["coverage"]["covered"] == 5
+        assert status["state"] == "paused"
+        # Killed, it still is.
+        running.process.send_signal(signal.SIGKILL)
+        running.process.wait()
+        order = taken.wait(lambda heard: heard.json()["command"] == "start").json()["order"]
+        assert order["zones"][0]["name"] == "kitchen"
+        assert [heard.json()["command"] for heard in taken.heard] == ["start", "pause"]
+    with (
+        daemon_process(tmp_path, mission={"autostart": False}) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        assert outsider.ask_status()["state"] == "paused"
+        outsider.put("map", map_bytes(room(6.0, 4.5)))
+        outsider.put("pose", pose_bytes(*lanes(5)[-1]))
+        status = outsider.wait_status(lambda status: status["pose"] is not None)
+        assert status["state"] == "paused"
+        assert (status["mission"]["zone"], status["mission"]["pass"]) == ("kitchen", 1)
+        paths = outsider.listen("path")
+        assert command(outsider, "resume")["mission"]["paused"] is False
+        path = planned(paths.wait(lambda heard: len(planned(heard)[0]) > 0))[0].tolist()
+        assert set(cells_of(path)) >= KITCHEN_CELLS
+        # It drives each path to its end: the second pass, and the way home.
+        for number in range(1, 6):
+            status = drive(outsider, [(x, y) for x, y in path])
+            if status["state"] == "done":
+                break
+            heard = paths.wait(lambda heard: True, since=number)
+            path = planned(heard)[0].tolist()
+        status = outsider.wait_status(lambda status: status["state"] == "done")
+        assert status["reason"] == "every reachable cell of the zones is covered"
+        assert status["mission"]["zones"][0] == {
+            "name": "kitchen", "passes": 2, "pass": 2, "cells": 8, "covered": 8
+        }  # fmt: skip
+        assert (status["pose"]["x"], status["pose"]["y"]) == (0.45, 0.45)
+
+
+def test_a_keep_out_zone_is_kept_out_of_and_named(tmp_path):
+    # A square of 4 x 4 cells.
+    corners = [[0.9, 0.9], [2.1, 0.9], [2.1, 2.1], [0.9, 2.1]]
+    inside = {(row, col) for row in range(3, 7) for col in range(3, 7)}
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        paths = outsider.listen("path")
+        begin(outsider)
+        paths.wait(lambda heard: True)
+        answer = command(outsider, "start", {"keep_out": [corners], "keep_covered": True})
+        assert answer["mission"]["keep_out"] == 1
+        heard = paths.wait(lambda heard: about(heard)["reason"] == "everything reachable", since=1)
+        driven = set(cells_of(planned(heard)[0]))
+        # The robot is wider than its tool: it keeps its rim out, too.
+        around = {(row, col) for row in range(2, 8) for col in range(2, 8)}
+        assert not driven & inside
+        assert not driven & around
+        status = outsider.wait_status(lambda status: status["mission"]["unreached"]["cells"])
+        (area,) = status["mission"]["unreached"]["areas"]
+        assert area["reason"] == "in a keep-out zone"
+        assert area["cells"] == len(around)
+        assert area["m2"] == pytest.approx(len(around) * TOOL_M**2)
+        # A zone beyond the map is refused, and the mission goes on.
+        beyond = {"name": "moon", "polygon": [[100, 0], [101, 0], [101, 1]]}
+        error = command(outsider, "start", {"zones": [beyond]})
+        assert error["code"] == "bad_order"
+        assert "zone 'moon' lies outside of the map" in error["message"]
+        assert outsider.ask_status()["state"] == "covering"
+
+
+def test_cancelled_it_stays_so_after_a_kill(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider)
+        drive(outsider, lanes(10))
+        assert command(outsider, "cancel")["state"] == "idle"
+        running.process.send_signal(signal.SIGKILL)
+        running.process.wait()
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        status = outsider.ask_status()
+        assert (status["state"], status["reason"]) == ("idle", "cancelled")
+        assert status["ledger"]["restored_cells"] == 10
+
+
+def test_reset_keeps_the_ledger_aside(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider)
+        drive(outsider, lanes(10))
+        answer = command(outsider, "reset")
+        assert answer["state"] == "idle"
+        assert answer["coverage"]["covered"] == 1, "the tool stands there"
+        assert outsider.ask_status()["ledger"]["fault"] is None
+        outsider.wait_status(lambda status: status["ledger"]["restored_cells"] == 0)
+        assert command(outsider, "start")["mission"]["stage"] == "covering"
+        outsider.wait_status(lambda status: status["state"] == "covering")
+    names = [path.name for path in (tmp_path / "state").iterdir()]
+    assert any(name.startswith("robot.ledger.reset-") for name in names), names
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        assert outsider.ask_status()["ledger"]["restored_cells"] == 1
+        assert command(outsider, "reset")["state"] == "idle", "before there is a map, too"
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        assert outsider.ask_status()["state"] == "idle"
+        assert outsider.ask_status()["ledger"]["restored_cells"] == 0
+
+
+def test_an_order_that_cannot_be_read_moves_no_robot(tmp_path):
+    from dataclasses import replace
+
+    from fasaco_edge.daemon.ledger_file import LedgerFile
+    from tests.daemon.ledgers import lane
+
+    (tmp_path / "state").mkdir()
+    LedgerFile(tmp_path / "state", "robot").write(replace(lane(5), note='{"version":9}'))
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        status = outsider.ask_status()
+        assert status["state"] == "idle"
+        assert status["reason"].startswith("the order kept with the ledger cannot be read")
+        assert status["errors"]["by_code"] == {"bad_order": 1}
+        assert status["ledger"]["restored_cells"] == 5
+        assert command(outsider, "start", {"keep_covered": True})["state"] == "waiting for map"
+
+
+def test_poses_that_stop_are_a_state(tmp_path):
+    patience = {"lost_pose_s": 0.5, "stale_map_s": 60.0}
+    with (
+        daemon_process(tmp_path, mission=patience) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        outsider.put("map", map_bytes(room(3.0, 3.0)))
+        outsider.put("pose", pose_bytes(0.75, 0.75))
+        status = outsider.wait_status(lambda status: status["state"] == "degraded")
+        assert status["reason"].startswith("no pose for 0.5 s")
+        assert status["path"]["steps"] > 0
+        outsider.put("pose", pose_bytes(0.75, 0.75))
+        outsider.wait_status(lambda status: status["state"] == "covering")
+
+
+def test_the_command_line(tmp_path):
+    with (
+        daemon_process(tmp_path, mission={"autostart": False}) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        assert told(running, "status")["state"] == "idle"
+        begin_idle(outsider)
+        zone = "kitchen:0.3,0.9;1.5,0.9;1.5,1.5;0.3,1.5"
+        keep_out = "-1,-1;0,-1;0,0"
+        words = "start", "--zone", zone, "--keep-out", keep_out, "--passes", "2", "--return-home"
+        mission = told(running, *words)["mission"]
+        assert mission["zones"][0]["passes"] == 2
+        assert (mission["keep_out"], mission["return_home"]) == (1, True)
+        outsider.wait_status(lambda status: status["state"] == "covering")
+        assert told(running, "pause")["state"] == "paused"
+        assert told(running, "resume")["mission"]["paused"] is False
+        shown = fasaco_edge("mission", "status", "--connect", running.endpoint)
+        assert shown.code == 0
+        for word in ("kitchen", "pass 1 of 2", "covering", "keep-out zones"):
+            assert word in shown.out
+        file = tmp_path / "order.yaml"
+        file.write_text("keep_out:\n  - [[1, 1], [2, 1], [2, 2]]\npasses: 3\n")
+        mission = told(running, "start", "--order", str(file))["mission"]
+        assert (mission["passes"], mission["zones"]) == (3, [])
+        assert told(running, "reset")["reason"] == "reset: what was covered is forgotten"
+        assert told(running, "cancel")["state"] == "idle"
+        refused = fasaco_edge("mission", "pause", "--connect", running.endpoint)
+        assert refused.code == 1
+        assert refused.out == ""
+        assert refused.err == (
+            "fasaco-edge: there is no mission to pause\n"
+            "  hint: ask for the status, and start a mission first\n"
+        )
+        refused = fasaco_edge("mission", "resume", "--connect", running.endpoint, "--json")
+        assert (refused.code, json.loads(refused.out)["code"]) == (1, "not_now")
+        other = fasaco_edge("mission", "status", "--robot", "x", "--connect", running.endpoint)
+        assert other.code == 1
+        assert "no daemon answers at fasaco/@v1/x" in other.err
+        assert "of robots on this bus there are robot: give one as --robot" in other.err
+
+
+def begin_idle(outsider: Outsider) -> None:
+    outsider.put("map", map_bytes(room(6.0, 4.5)))
+    outsider.put("pose", pose_bytes(0.45, 0.45))
+    outsider.wait_status(lambda status: status["pose"] is not None)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("start", "--order", "missing.yaml"), "missing.yaml: No such file or directory"),
+        (("start", "--order", "order.yaml"), "order.yaml: zones[0]: missing member polygon"),
+        (("start", "--order", "order.json"), "order.json: neither YAML nor JSON"),
+        (("start", "--order", "order.yaml", "--passes", "2"), "--order says it all, got --passe"),
+        (("start", "--passes", "0"), "passes: expected int >= 1, got 0"),
+        (("start", "--zone", "a:0,0;1,1;1,0;0,1"), "zones[0].polygon crosses or touches itself"),
+        (("start", "--zone", "a:0,0;1,0;nan,1"), "zones[0].polygon[2] must be finite"),
+        (("status",), "Unable to connect to any of"),
+    ],
+)
+def test_mistakes_are_told_without_a_daemon(tmp_path: Path, monkeypatch, words, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "order.yaml").write_text("zones: [{name: a}]")
+    (tmp_path / "order.json").write_text("{")
+    ended = fasaco_edge("mission", *words, "--connect", "tcp/127.0.0.1:1")
+    assert ended.code == 1
+    assert said in ended.err
+    assert "\n  hint: " in ended.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "the following arguments are required: COMMAND"),
+        (("dance",), "invalid choice: 'dance'"),
+        (("start", "--zone", "0,0;1,0;1,1"), "must be NAME:x,y;x,y;..., got"),
+        (("start", "--zone", "a:0,0;1,0"), "must be x,y;x,y;x,y;... in metres, got '0,0;1,0'"),
+        (("start", "--keep-out", "-1,0;1;1,1"), "must be x,y;x,y;x,y;... in metres, got"),
+        (("status", "--timeout", "0"), "must be in (0, 3600] s, got '0'"),
+        (("pause", "--passes", "2"), "unrecognized arguments"),
+    ],
+)
+def test_words_nobody_understands_are_named(words, said):
+    ended = fasaco_edge("mission", *words)
+    assert ended.code == 2
+    assert said in ended.err

@@ -1,0 +1,124 @@
+"""A disk that is full, read-only, missing or hangs: it is told, and the mission goes on."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from fasaco_edge.daemon.ledger_writer import RETRY_S
+from tests.daemon.hall import begin, drive, lanes, wait_written
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import STOP_S, Daemon, daemon_process
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of a quarter of a megabyte."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(folder)]
+    if os.geteuid() != 0 or subprocess.run(mount, check=False, capture_output=True).returncode:
+        pytest.skip("needs the right to mount a tmpfs")
+    yield folder
+    subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+def fill(ballast: Path) -> None:
+    """Fill the disk to the last byte."""
+    with ballast.open("wb", buffering=0) as file:
+        try:
+            while file.write(bytes(4096)):
+                pass
+        except OSError:
+            return
+
+
+def check_trouble(running: Daemon, outsider: Outsider, said: str) -> None:
+    """Drive on while nothing can be written; check what is said, and that nothing stands still."""
+    drive(outsider, lanes(40)[20:])
+    status = outsider.wait_status(lambda status: status["ledger"]["fault"] is not None)
+    assert said in status["ledger"]["fault"]
+    assert "--state" in status["ledger"]["fault"]
+    assert status["state"] == "covering"
+    assert status["errors"]["by_code"] == {"ledger_file": 1}
+    status = drive(outsider, lanes(60)[40:])
+    assert status["coverage"]["covered"] == 60
+    time.sleep(1.5 * RETRY_S)
+    assert running.log_text().count(said) == 1, "said once"
+    assert outsider.ask_status()["errors"]["total"] == 1
+
+
+def test_a_full_disk_is_told_and_nothing_is_lost(tmp_path, small_disk):
+    ballast = small_disk / "ballast"
+    with (
+        daemon_process(tmp_path, "--state", str(small_disk)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        begin(outsider)
+        drive(outsider, lanes(20))
+        wait_written(outsider, 0.0)
+        fill(ballast)
+        check_trouble(running, outsider, "No space left on device")
+        ballast.unlink()
+        outsider.wait_status(lambda status: status["ledger"]["fault"] is None)
+        running.process.send_signal(signal.SIGKILL)
+        running.process.wait()
+    with (
+        daemon_process(tmp_path, "--state", str(small_disk)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        status = outsider.ask_status()
+        assert (status["ledger"]["restored_cells"], status["ledger"]["fault"]) == (60, None)
+
+
+def test_a_disk_that_turns_read_only_is_told_and_nothing_is_lost(tmp_path, small_disk):
+    def remount(how: str) -> None:
+        subprocess.run(["mount", "-o", f"remount,{how}", str(small_disk)], check=True)
+
+    with (
+        daemon_process(tmp_path, "--state", str(small_disk)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        begin(outsider)
+        drive(outsider, lanes(20))
+        wait_written(outsider, 0.0)
+        remount("ro")
+        check_trouble(running, outsider, "Read-only file system")
+        remount("rw")
+        outsider.wait_status(lambda status: status["ledger"]["fault"] is None)
+    with (
+        daemon_process(tmp_path, "--state", str(small_disk)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        assert outsider.ask_status()["ledger"]["restored_cells"] == 60
+
+
+def test_a_folder_that_cannot_be_is_told_and_the_mission_goes_on(tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    with (
+        daemon_process(tmp_path, "--state", str(tmp_path / "file")) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        begin(outsider)
+        drive(outsider, lanes(20))
+        check_trouble(running, outsider, f"cannot write {tmp_path / 'file' / 'robot.ledger'}")
+        running.stop()
+
+
+def test_a_disk_that_hangs_holds_neither_the_mission_nor_the_end_up(tmp_path):
+    """Who opens a pipe to write waits for a reader, as for a disk that does not answer."""
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        os.mkfifo(tmp_path / "state" / "robot.ledger.new")
+        begin(outsider)
+        status = drive(outsider, lanes(30))
+        assert status["coverage"]["covered"] == 30
+        since = status["uptime_s"]
+        outsider.wait_status(lambda status: status["uptime_s"] > since + 2.0)
+        assert running.stop() < STOP_S
+        assert "the disk is too slow" in running.log_text()

@@ -1,0 +1,227 @@
+"""Two generations on disk: whatever breaks, one of them is whole, and nothing is thrown away."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from fasaco_edge.daemon.ledger_codec import LedgerFileError, encode_ledger
+from fasaco_edge.daemon.ledger_file import LedgerFile
+from fasaco_edge.mission.ledger import LedgerMismatchError
+from tests.daemon.ledgers import CELL_M, NAMES, contents, driven, lane, load, names
+from tests.daemon.test_ledger_codec import enveloped
+
+
+def test_where_there_is_nothing_nothing_is_found(tmp_path):
+    found = load(tmp_path / "not yet")
+    assert (found.ledger, found.fault) == (None, None)
+    assert not (tmp_path / "not yet").exists()
+
+
+def test_the_newest_is_found_and_the_one_before_kept(written):
+    assert names(written) == list(NAMES)
+    assert contents(load(written).ledger) == contents(lane(4))
+    assert load(written).fault is None
+    assert (written / NAMES[1]).read_bytes() == encode_ledger(lane(3))
+
+
+def test_a_folder_is_made_when_something_is_written(tmp_path):
+    folder = tmp_path / "a" / "b"
+    LedgerFile(folder, "robot").write(lane(2))
+    assert contents(load(folder).ledger) == contents(lane(2))
+
+
+def test_each_robot_has_its_own(tmp_path):
+    LedgerFile(tmp_path, "robot").write(lane(2))
+    LedgerFile(tmp_path, "mower-2").write(lane(5))
+    assert contents(load(tmp_path).ledger) == contents(lane(2))
+
+
+def test_a_file_cut_at_any_byte_falls_back_to_the_one_before(written):
+    newest = written / NAMES[0]
+    whole, before = newest.read_bytes(), (written / NAMES[1]).read_bytes()
+    for length in range(len(whole)):
+        newest.write_bytes(whole[:length])
+        found = load(written)
+        assert contents(found.ledger) == contents(lane(3))
+        assert isinstance(found.fault, LedgerFileError)
+        assert str(found.fault).startswith("gone on from the ledger before the newest (robot.led")
+        assert "check the disk" in found.fault.hint
+        (aside,) = set(names(written)) - set(NAMES)
+        assert aside.startswith("robot.ledger.broken-")
+        assert aside in str(found.fault)
+        assert (written / aside).read_bytes() == whole[:length]
+        assert (written / NAMES[1]).read_bytes() == before
+        (written / aside).unlink()
+
+
+def test_after_a_fall_back_the_one_before_stays_until_there_is_a_newer(written):
+    (written / NAMES[0]).write_bytes(b"torn")
+    file = LedgerFile(written, "robot")
+    file.load(CELL_M)
+    file.write(lane(5))
+    assert contents(load(written).ledger) == contents(lane(5))
+    assert (written / NAMES[1]).read_bytes() == encode_ledger(lane(3))
+
+
+def test_a_newest_that_is_missing_is_said_too(written):
+    (written / NAMES[0]).unlink()
+    found = load(written)
+    assert contents(found.ledger) == contents(lane(3))
+    assert "no robot.ledger" in str(found.fault)
+
+
+def test_two_broken_ones_are_said_and_kept(written):
+    for name in NAMES:
+        (written / name).write_bytes(b"torn " + name.encode())
+    found = load(written)
+    assert found.ledger is None
+    assert isinstance(found.fault, LedgerFileError)
+    for said in (
+        "robot.ledger: torn",
+        "robot.ledger.previous: not a ledger",
+        "begun anew",
+        "kept as",
+    ):
+        assert said in str(found.fault)
+    kept = {path.read_bytes() for path in written.iterdir()}
+    assert kept == {b"torn robot.ledger", b"torn robot.ledger.previous"}
+    assert not set(names(written)) & set(NAMES)
+    assert load(written).fault is None
+
+
+def test_what_is_no_file_is_kept_aside(written):
+    (written / NAMES[0]).unlink()
+    (written / NAMES[0]).mkdir()
+    file = LedgerFile(written, "robot")
+    found = file.load(CELL_M)
+    assert contents(found.ledger) == contents(lane(3))
+    assert "no plain file" in str(found.fault)
+    file.write(lane(6))
+    assert contents(load(written).ledger) == contents(lane(6))
+
+
+def test_nothing_kept_aside_overwrites_another(written):
+    for count in range(4):
+        (written / NAMES[0]).write_bytes(bytes([count]))
+        load(written)
+    aside = [path.read_bytes() for path in written.iterdir() if "broken" in path.name]
+    assert sorted(aside) == [bytes([count]) for count in range(4)]
+
+
+@pytest.mark.parametrize(
+    ("newest", "said"),
+    [
+        (encode_ledger(driven((0, 0), cell_m=0.5)), r"are 0\.5 m wide, the configuration's 0\.3"),
+        (None, "version 7"),
+    ],
+)
+def test_a_ledger_of_something_else_is_kept_and_not_overwritten(written, newest, said):
+    if newest is None:
+        newest = enveloped(b"?", version=7)
+    (written / NAMES[0]).write_bytes(newest)
+    file = LedgerFile(written, "robot")
+    found = file.load(CELL_M)
+    assert found.ledger is None
+    assert isinstance(found.fault, LedgerMismatchError)
+    assert re.search(said, str(found.fault))
+    assert "to go on with it" in found.fault.hint
+    file.write(lane(1))
+    kept = {path.read_bytes() for path in written.iterdir() if "mismatch" in path.name}
+    assert kept == {newest, encode_ledger(lane(3))}
+    assert contents(load(written).ledger) == contents(lane(1))
+
+
+def test_what_is_set_aside_is_all_there(written):
+    file = LedgerFile(written, "robot")
+    kept = file.set_aside("fresh")
+    assert sorted(kept) == names(written)
+    assert all(".fresh-" in name for name in kept)
+    assert load(written).ledger is None
+    # Renamed back, it is there again.
+    for name in kept:
+        (written / name).rename(written / name.partition(".fresh-")[0])
+    assert contents(load(written).ledger) == contents(lane(4))
+
+
+def test_what_could_not_be_set_aside_is_before_anything_is_written(written, monkeypatch):
+    file = LedgerFile(written, "robot")
+
+    def failing(*_):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "rename", failing)
+        for attempt in (lambda: file.set_aside("fresh"), lambda: file.write(lane(1))):
+            with pytest.raises(OSError, match="Read-only"):
+                attempt()
+        assert names(written) == list(NAMES)
+    file.write(lane(1))
+    kept = {path.read_bytes() for path in written.iterdir() if "fresh" in path.name}
+    assert kept == {encode_ledger(lane(3)), encode_ledger(lane(4))}
+
+
+def test_a_second_process_is_refused(tmp_path):
+    first = LedgerFile(tmp_path, "robot")
+    first.lock()
+    with pytest.raises(LedgerFileError, match="another daemon keeps the ledger") as told:
+        LedgerFile(tmp_path, "robot").lock()
+    assert "--state" in told.value.hint
+    LedgerFile(tmp_path, "mower-2").lock()
+
+
+def test_a_folder_that_cannot_be_is_no_reason_not_to_start(tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    file = LedgerFile(tmp_path / "file", "robot")
+    file.lock()
+    assert file.load(CELL_M).ledger is None
+    with pytest.raises(OSError, match=r"exists|Not a directory"):
+        file.write(lane(1))
+
+
+def test_what_appears_after_the_start_is_not_overwritten(tmp_path, written):
+    """The disk with the ledger on it is mounted after the daemon has looked for it."""
+    folder = tmp_path / "mounted late"
+    file = LedgerFile(folder, "robot")
+    file.lock()
+    assert file.load(CELL_M).ledger is None
+    folder.mkdir(exist_ok=True)
+    for name in NAMES:
+        shutil.copy(written / name, folder)
+    kept = file.write(lane(1))
+    assert sorted(name.partition(".unread-")[0] for name in kept) == list(NAMES)
+    assert {(folder / name).read_bytes() for name in kept} == {
+        (written / name).read_bytes() for name in NAMES
+    }
+    assert contents(load(folder).ledger) == contents(lane(1))
+    assert file.write(lane(2)) == []
+
+
+def test_a_folder_that_comes_later_is_locked_before_it_is_written(tmp_path):
+    folder = tmp_path / "later"
+    folder.write_text("in the way")
+    first, second = LedgerFile(folder, "robot"), LedgerFile(folder, "robot")
+    first.lock()
+    second.lock()
+    folder.unlink()
+    first.write(lane(1))
+    with pytest.raises(LedgerFileError, match="another daemon keeps the ledger"):
+        second.write(lane(2))
+    first.write(lane(3))
+    assert contents(load(folder).ledger) == contents(lane(3))
+
+
+def test_a_disk_without_locks_is_written_all_the_same(tmp_path, monkeypatch):
+    def failing(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", failing)
+    file = LedgerFile(tmp_path, "robot")
+    file.lock()
+    file.write(lane(1))
+    assert contents(load(tmp_path).ledger) == contents(lane(1))

@@ -1,0 +1,231 @@
+"""The thread that writes: it never holds anybody up, and gives up nothing."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import time
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fasaco_edge.daemon import ledger_writer
+from fasaco_edge.daemon.ledger_codec import LedgerFileError, decode_ledger, encode_ledger
+from fasaco_edge.daemon.ledger_file import LedgerFile
+from fasaco_edge.daemon.ledger_writer import LedgerWriter, open_ledger
+from fasaco_edge.mission.ledger import LedgerMismatchError
+from tests.daemon.ledgers import CELL_M, contents, lane
+
+DEADLINE_S = 10.0
+
+
+def on_disk(folder: Path) -> object:
+    """Return what the newest holds; changes nothing, as the writer may be at work."""
+    try:
+        payload = (folder / "robot.ledger").read_bytes()
+    except FileNotFoundError:
+        return None
+    return contents(decode_ledger(payload, CELL_M))
+
+
+def wait_until(holds: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + DEADLINE_S
+    while not holds():
+        assert time.monotonic() < deadline, "it never came to that"
+        time.sleep(0.005)
+
+
+def document(writer: LedgerWriter) -> dict[str, Any]:
+    return writer.document(time.monotonic())
+
+
+@pytest.fixture
+def retry_soon(monkeypatch):
+    monkeypatch.setattr(ledger_writer, "RETRY_S", 0.05)
+
+
+def test_what_is_put_is_written(tmp_path):
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    assert writer.restored is None
+    path = str(tmp_path / "robot.ledger")
+    assert document(writer) == {"path": path, "age_s": None, "restored_cells": 0, "fault": None}
+    writer.put(lane(3))
+    wait_until(lambda: document(writer)["age_s"] is not None)
+    assert on_disk(tmp_path) == contents(lane(3))
+    assert 0 <= document(writer)["age_s"] < DEADLINE_S
+    writer.close(1.0)
+    assert document(writer)["fault"] is None
+    assert writer.take_faults() == []
+
+
+def test_the_last_thing_put_is_on_disk_when_it_is_closed(tmp_path):
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    for length in range(1, 50):
+        writer.put(lane(length))
+    writer.close(5.0)
+    assert on_disk(tmp_path) == contents(lane(49))
+
+
+def test_what_was_written_is_restored(tmp_path):
+    LedgerFile(tmp_path, "robot").write(lane(7))
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    assert contents(writer.restored) == contents(lane(7))
+    assert document(writer)["restored_cells"] == 7
+    writer.close(1.0)
+
+
+def test_a_fresh_start_keeps_what_there_was_aside(tmp_path):
+    LedgerFile(tmp_path, "robot").write(lane(7))
+    writer = open_ledger(tmp_path, "robot", CELL_M, fresh=True)
+    assert writer.restored is None
+    assert document(writer)["fault"] is None
+    writer.close(1.0)
+    (aside,) = tmp_path.glob("robot.ledger.fresh-*")
+    aside.rename(tmp_path / "robot.ledger")
+    assert on_disk(tmp_path) == contents(lane(7))
+
+
+def test_what_was_wrong_on_disk_is_told(tmp_path, caplog):
+    LedgerFile(tmp_path, "robot").write(lane(7))
+    (tmp_path / "robot.ledger").write_bytes(b"torn")
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    (fault,) = writer.take_faults()
+    assert isinstance(fault, LedgerFileError)
+    assert writer.take_faults() == []
+    writer.put(lane(1))
+    wait_until(lambda: document(writer)["age_s"] is not None)
+    # It is still worth knowing after all is well again.
+    assert document(writer)["fault"] == f"{fault}: {fault.hint}"
+    assert str(fault) in caplog.text
+    writer.close(1.0)
+
+
+def test_another_ledger_never_overwrites_the_one_kept_aside(tmp_path):
+    LedgerFile(tmp_path, "robot").write(lane(7))
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    writer.put(lane(8))
+    writer.begin_anew(LedgerMismatchError("of another building"), "mismatch")
+    writer.put(lane(2))
+    writer.close(5.0)
+    assert on_disk(tmp_path) == contents(lane(2))
+    aside = tmp_path / "aside"
+    aside.mkdir()
+    for path in tmp_path.glob("*.mismatch-*"):
+        path.rename(aside / path.name.partition(".mismatch-")[0])
+    # What still waited was of the old building, and may be written or not.
+    assert on_disk(aside) in (contents(lane(7)), contents(lane(8)))
+    assert document(writer)["restored_cells"] == 0
+    assert document(writer)["fault"].startswith("of another building: it was kept aside")
+
+
+def test_each_new_beginning_keeps_what_there_was_until_then(tmp_path, caplog):
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    for length in (3, 5):
+        writer.put(lane(length))
+        wait_until(lambda length=length: on_disk(tmp_path) == contents(lane(length)))
+        writer.begin_anew(LedgerMismatchError("of another building"), "mismatch")
+        wait_until(lambda: not (tmp_path / "robot.ledger").exists())
+    writer.close(1.0)
+    aside = sorted(path.read_bytes() for path in tmp_path.glob("robot.ledger.mismatch-*"))
+    assert aside == sorted(encode_ledger(lane(length)) for length in (3, 5))
+    assert caplog.text.count("the ledger before is kept as robot.ledger.mismatch-") == 2
+
+
+def test_the_files_are_kept_aside_although_nothing_follows(tmp_path):
+    LedgerFile(tmp_path, "robot").write(lane(7))
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    writer.begin_anew(LedgerMismatchError("of another building"), "mismatch")
+    wait_until(lambda: not (tmp_path / "robot.ledger").exists())
+    writer.close(1.0)
+    assert on_disk(tmp_path) is None
+
+
+def test_a_disk_that_fails_is_told_once_and_tried_again(tmp_path, monkeypatch, caplog, retry_soon):
+    caplog.set_level(logging.INFO)
+    tries, real = [], os.fsync
+
+    def failing(descriptor: int) -> None:
+        tries.append(time.monotonic())
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", failing)
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    writer.put(lane(3))
+    wait_until(lambda: len(tries) >= 4)
+    told = document(writer)["fault"]
+    assert f"cannot write {tmp_path / 'robot.ledger'}: No space left on device" in told
+    assert "kept in memory and tried again" in told
+    assert caplog.text.count("No space left") == 1
+    assert len(writer.take_faults()) == 1
+    assert min(b - a for a, b in pairwise(tries)) >= 0.05, "no busy loop"
+    writer.put(lane(4))
+    monkeypatch.setattr(os, "fsync", real)
+    wait_until(lambda: document(writer)["fault"] is None)
+    assert on_disk(tmp_path) == contents(lane(4))
+    assert "written again" in caplog.text
+    writer.close(1.0)
+
+
+def test_new_ledgers_do_not_make_a_failing_disk_busy(tmp_path, monkeypatch):
+    tries = []
+
+    def failing(descriptor: int) -> None:
+        tries.append(descriptor)
+        raise OSError(errno.EIO, "Input/output error")
+
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    monkeypatch.setattr(os, "fsync", failing)
+    for length in range(1, 60):
+        writer.put(lane(length))
+        time.sleep(0.005)
+    assert len(tries) == 1
+    # One last try, then it ends.
+    writer.close(5.0)
+    assert len(tries) == 2
+
+
+def test_set_aside_comes_first_also_after_failures(tmp_path, monkeypatch, retry_soon):
+    LedgerFile(tmp_path, "robot").write(lane(7))
+    tries = []
+
+    def failing(*_):
+        tries.append(1)
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "rename", failing)
+        writer.begin_anew(LedgerMismatchError("of another building"), "mismatch")
+        writer.put(lane(2))
+        wait_until(lambda: len(tries) >= 3)
+        assert on_disk(tmp_path) == contents(lane(7))
+    wait_until(lambda: on_disk(tmp_path) == contents(lane(2)))
+    writer.close(1.0)
+    assert list(tmp_path.glob("robot.ledger.mismatch-*"))
+
+
+def test_a_disk_that_hangs_holds_nobody_up(tmp_path, caplog, retry_soon):
+    """Who opens a pipe to write waits for a reader, as for a disk that does not answer."""
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    pipe = tmp_path / "robot.ledger.new"
+    os.mkfifo(pipe)
+    started = time.monotonic()
+    for length in range(1, 10):
+        writer.put(lane(length))
+        document(writer)
+    assert time.monotonic() - started < 0.5
+    writer.close(0.1)
+    assert time.monotonic() - started < 1.0
+    assert "the disk is too slow" in caplog.text
+    os.close(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK))  # so that the thread can end
+
+
+def test_a_ledger_that_somebody_writes_is_refused(tmp_path):
+    writer = open_ledger(tmp_path, "robot", CELL_M)
+    with pytest.raises(LedgerFileError, match="another daemon"):
+        open_ledger(tmp_path, "robot", CELL_M)
+    writer.close(1.0)

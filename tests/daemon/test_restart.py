@@ -1,0 +1,216 @@
+"""Progress outlives the daemon: whatever ends it, the next one goes on where it stopped."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fasaco_edge.daemon.ledger_writer import PERIOD_S
+from tests.daemon.hall import HALL, begin, drive, lanes, pillars, wait_written
+from tests.daemon.kill_campaign import MOST_LOST_S, run_campaign
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import daemon_process
+from tests.daemon.rooms import FREE, map_bytes, pose_bytes
+
+# The full campaign, two hundred, is a command: see kill_campaign.py.
+KILLS = 3
+# Cells of the hall.
+COVERED = 100
+
+
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a daemon left whose robot has covered a part of the hall."""
+    folder = tmp_path_factory.mktemp("ended")
+    with daemon_process(folder) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider)
+        assert drive(outsider, lanes(COVERED))["coverage"]["covered"] == COVERED
+    return folder / "state"
+
+
+@pytest.fixture
+def covered(ended: Path, tmp_path: Path) -> Path:
+    """A folder with a copy of that."""
+    shutil.copytree(ended, tmp_path / "state")
+    return tmp_path
+
+
+def state_files(folder: Path) -> list[str]:
+    return sorted(path.name for path in (folder / "state").iterdir() if path.suffix != ".lock")
+
+
+@pytest.mark.timeout(300)
+def test_a_daemon_that_is_killed_at_random_moments_goes_on(tmp_path):
+    figures = run_campaign(tmp_path, KILLS, "office")
+    print(figures)
+    assert figures["resumed"] == KILLS
+    assert figures["lost_s_max"] <= MOST_LOST_S
+
+
+def test_it_goes_on_where_it_was_told_to_end(covered):
+    """SIGTERM loses nothing at all."""
+    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
+        status = outsider.ask_status()
+        assert status["state"] == "waiting for map"
+        assert status["ledger"] == {
+            "path": str(covered / "state" / "robot.ledger"),
+            "age_s": None,
+            "restored_cells": COVERED,
+            "fault": None,
+        }
+        assert f"{COVERED} cells covered before" in running.log_text()
+        status = begin(outsider, at=COVERED - 1)
+        assert status["coverage"]["covered"] == COVERED
+        assert status["coverage"]["recovered"] == 0
+        assert status["path"]["reason"] == f"first plan, {COVERED} cells were covered before"
+        assert status["path"]["steps"] < 13 * 18 - COVERED + 30
+        status = drive(outsider, lanes(COVERED + 10)[COVERED:])
+        assert status["coverage"]["covered"] == COVERED + 10
+
+
+def test_what_is_a_second_old_outlives_a_kill(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider)
+        drive(outsider, lanes(20))
+        time.sleep(MOST_LOST_S)
+        drive(outsider, lanes(23)[20:])
+        running.process.send_signal(signal.SIGKILL)
+        running.process.wait()
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        assert 20 <= outsider.ask_status()["ledger"]["restored_cells"] <= 23
+
+
+def test_it_writes_now_and_then_while_the_robot_drives(tmp_path):
+    """Often enough to lose no second, and no more often: memory cards wear out."""
+    newest, seen = tmp_path / "state" / "robot.ledger", set()
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider)
+        started = time.monotonic()
+        for point in lanes(60):
+            outsider.put("pose", pose_bytes(*point))
+            time.sleep(0.06)
+            with contextlib.suppress(FileNotFoundError):
+                seen.add(newest.stat().st_mtime_ns)
+        lasted = time.monotonic() - started
+        # One was there already, and the first is written at once.
+        assert lasted / MOST_LOST_S <= len(seen) <= lasted / PERIOD_S + 2
+        # Once it stands still, nothing is written any more.
+        time.sleep(2 * PERIOD_S)
+        before = newest.stat().st_mtime_ns
+        time.sleep(2 * PERIOD_S)
+        assert newest.stat().st_mtime_ns == before
+
+
+def test_a_fresh_start_covers_everything_and_throws_nothing_away(covered):
+    with daemon_process(covered, "--fresh") as running, Outsider(running.endpoint) as outsider:
+        status = begin(outsider)
+        assert status["ledger"]["restored_cells"] == 0
+        assert status["ledger"]["fault"] is None
+        assert status["coverage"]["covered"] == 1
+    assert [name for name in state_files(covered) if name.startswith("robot.ledger.fresh-")]
+
+
+def test_a_torn_file_is_told(covered):
+    newest = covered / "state" / "robot.ledger"
+    whole = newest.read_bytes()
+    (covered / "state" / "robot.ledger.previous").write_bytes(whole)
+    newest.write_bytes(whole[:-3])
+    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
+        status = outsider.wait_status(lambda status: status["errors"]["total"] > 0)
+        assert status["errors"]["by_code"] == {"ledger_file": 1}
+        assert "gone on from the ledger before the newest" in status["ledger"]["fault"]
+        assert status["ledger"]["restored_cells"] == COVERED
+        assert "WARNING" in running.log_text()
+        assert status["ledger"]["fault"] in running.log_text()
+
+
+def test_two_torn_files_are_told_and_it_begins_anew(covered):
+    for name in state_files(covered):
+        (covered / "state" / name).write_bytes(b"")
+    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
+        status = begin(outsider)
+        assert "begun anew" in status["ledger"]["fault"]
+        assert status["coverage"]["covered"] == 1
+    assert [name for name in state_files(covered) if ".broken-" in name]
+
+
+def test_another_tool_needs_another_ledger(covered):
+    robot = {"tool_width_m": 0.5}
+    with daemon_process(covered, robot=robot) as running, Outsider(running.endpoint) as outsider:
+        status = outsider.wait_status(lambda status: status["errors"]["total"] > 0)
+        assert status["errors"]["by_code"] == {"ledger_mismatch": 1}
+        assert "set robot.tool_width_m to 0.3" in status["ledger"]["fault"]
+        assert status["ledger"]["restored_cells"] == 0
+    (aside,) = (name for name in state_files(covered) if name.startswith("robot.ledger.mismatch-"))
+    assert aside in status["ledger"]["fault"]
+    # As the hint says.
+    (covered / "state" / aside).rename(covered / "state" / "robot.ledger")
+    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
+        assert outsider.ask_status()["ledger"]["restored_cells"] == COVERED
+
+
+def test_another_building_is_told_and_begun_anew(covered):
+    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
+        outsider.put("pose", pose_bytes(0.45, 0.45))
+        outsider.put("map", map_bytes(pillars()))
+        status = outsider.wait_status(lambda status: status["state"] == "covering")
+        said = f"the ledger of {COVERED} covered cells is of another building than the map"
+        assert status["path"]["reason"] == f"{said}: begun anew"
+        assert status["ledger"]["fault"].startswith(said)
+        assert status["ledger"]["restored_cells"] == 0
+        assert status["errors"]["by_code"] == {"ledger_mismatch": 1}
+        assert status["coverage"]["covered"] == 1
+        wait_written(outsider, 0.0)
+    assert [name for name in state_files(covered) if ".mismatch-" in name]
+    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
+        assert outsider.ask_status()["ledger"]["restored_cells"] == 1
+
+
+def test_a_map_that_has_just_begun_costs_nothing(covered):
+    """A mapper restarted with the daemon knows only what is around the robot."""
+    small = np.where(np.hypot(*np.indices(HALL.shape)) < 20, HALL, -1).astype(np.int8)
+    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider, small)
+        status = begin(outsider, HALL)
+        assert status["errors"]["total"] == 0
+        assert (
+            outsider.wait_status(lambda s: s["map"]["revision"] == 2)["coverage"]["covered"]
+            == COVERED
+        )
+
+
+def test_a_second_daemon_for_the_robot_is_refused(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        outsider.ask_status()
+        with daemon_process(tmp_path) as second:
+            assert second.process.wait(20) == 1
+            assert "another daemon keeps the ledger" in second.log_text()
+            assert "hint: end it, or give this one another robot.name" in second.log_text()
+            second.process.returncode = 0
+
+
+def test_systemd_s_folder_is_used_and_the_configuration_s_before_it(tmp_path):
+    environment = {"STATE_DIRECTORY": str(tmp_path / "systemd")}
+    for folder, sections in (
+        ("systemd", {}),
+        ("configured", {"mission": {"state_dir": str(tmp_path / "configured")}}),
+    ):
+        with (
+            daemon_process(tmp_path, state=False, env=environment, **sections) as running,
+            Outsider(running.endpoint) as outsider,
+        ):
+            begin(outsider)
+            assert outsider.ask_status()["ledger"]["path"] == str(
+                tmp_path / folder / "robot.ledger"
+            )
+        assert (tmp_path / folder / "robot.ledger").exists()
+
+
+def test_the_hall_is_as_the_lanes_say():
+    assert all(HALL[round(y / 0.05), round(x / 0.05)] == FREE for x, y in lanes(13 * 18))

@@ -1,0 +1,491 @@
+"""A mission under orders: zones, passes, keep-out zones, the way home; paused, cancelled, reset."""
+
+import pytest
+
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.mission.assignment import Assignment, CommandError
+from fasaco_edge.mission.events import MapReceived, PoseReceived
+from fasaco_edge.mission.order import OrderError
+from fasaco_edge.mission.progress import State
+from tests.mission.world import (
+    CONFIG,
+    Drive,
+    answer,
+    building,
+    patch,
+    pose_at,
+    rectangle,
+    started,
+)
+
+ROOM = ("........",) * 6
+WEST, EAST = rectangle(0, 0, 6, 2), rectangle(0, 6, 6, 8)
+TWO_ZONES = {"zones": [{"name": "east", "polygon": EAST}, {"name": "west", "polygon": WEST}]}
+
+
+def cells(row0, col0, row1, col1):
+    return {(row, col) for row in range(row0, row1) for col in range(col0, col1)}
+
+
+def idle(*rows, cell=(0, 0)):
+    """A robot that waits for an order."""
+    events = MapReceived(building(*rows)), pose_at(*cell)
+    return Drive(cell, *events, assignment=Assignment.none("no order yet"))
+
+
+def follow(drive, ticks=600):
+    """Drive until the mission is done; return the states it was in, in order."""
+    states = []
+    for _ in range(ticks):
+        if not states or states[-1] != drive.mission.state:
+            states.append(drive.mission.state)
+        if drive.mission.state is State.DONE:
+            return states
+        if drive.request is not None:
+            drive.plan()
+        drive.go()
+    raise AssertionError(f"not done: {drive.mission.state}, {drive.mission.reason}")
+
+
+def test_without_an_order_it_stands_and_says_so():
+    drive = Drive((0, 0), assignment=Assignment.none("no order yet"))
+    assert (drive.mission.state, drive.mission.reason) == (State.IDLE, "no order yet")
+    drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0))
+    assert drive.mission.state is State.IDLE
+    assert drive.request is None
+    drive.cell = (0, 3)
+    drive.tell(pose_at(0, 1), pose_at(0, 2), pose_at(0, 3))
+    assert drive.visited == {(0, 0), (0, 1), (0, 2), (0, 3)}, "it counts all the same"
+
+
+def test_an_order_for_everything():
+    drive = idle(*ROOM)
+    decision = drive.command("start")
+    assert decision.plan.reason == "everything reachable"
+    assert drive.mission.state is State.PLANNING
+    follow(drive)
+    assert drive.visited == cells(0, 0, 6, 8)
+    assert drive.mission.reason == "every reachable cell is covered"
+
+
+def test_zones_are_covered_one_after_the_other_and_nothing_else():
+    drive = idle(*ROOM)
+    assert drive.command("start", TWO_ZONES).plan.reason == "zone 'east'"
+    assert drive.request.problem.cells == 12
+    follow(drive)
+    reasons = [update.reason for update in drive.updates]
+    assert reasons == ["zone 'east'", "zone 'west'", "every reachable cell of the zones is covered"]
+    assert cells(0, 6, 6, 8) | cells(0, 0, 6, 2) <= drive.visited
+    # What lies between is driven through, and no more.
+    assert len(drive.visited & cells(0, 2, 6, 6)) <= 8
+    first_west = next(i for i, cell in enumerate(drive.driven) if cell[1] < 2 and i > 10)
+    assert cells(0, 6, 6, 8) <= set(drive.driven[:first_west])
+
+
+def test_passes_count_from_their_beginning():
+    drive = idle(*ROOM)
+    drive.command("start", {"zones": [{"name": "west", "polygon": WEST, "passes": 3}]})
+    begun = []
+    while drive.mission.state is not State.DONE:
+        if drive.request is not None:
+            begun.append((drive.request.reason, drive.request.problem.cells, len(drive.driven)))
+            drive.plan()
+        drive.go()
+    # The robot stands on the one cell that is covered already.
+    assert [(reason, count) for reason, count, _ in begun] == [
+        (f"zone 'west', pass {turn} of 3", 11) for turn in (1, 2, 3)
+    ]
+    for (_, _, here), (_, _, there) in zip(begun, [*begun[1:], ("", 0, None)], strict=True):
+        assert cells(0, 0, 6, 2) <= set(drive.driven[here - 1 : there])
+
+
+def test_what_was_covered_before_the_order_is_covered_again_unless_it_says_so():
+    drive = started(*ROOM)
+    drive.finish()
+    assert drive.command("start").plan.problem.cells == 47
+    drive.plan()
+    for _ in range(20):
+        drive.go()
+    drive.command("cancel")
+    covered = len(drive.visited)
+    assert drive.command("start", {"keep_covered": True}).plan.problem.cells == 48 - covered
+    follow(drive)
+
+
+def test_a_zone_forgets_its_own_cells_alone():
+    drive = started(*ROOM)
+    drive.finish()
+    decision = drive.command("start", {"zones": [{"name": "west", "polygon": WEST}]})
+    assert decision.plan.problem.cells == 12 - (drive.cell in cells(0, 0, 6, 2))
+    assert cells(0, 2, 6, 8) <= drive.visited
+    follow(drive)
+    assert drive.visited == cells(0, 0, 6, 8)
+
+
+def test_the_robot_never_drives_into_a_keep_out_zone():
+    drive = idle(*ROOM)
+    drive.command("start", {"keep_out": [rectangle(1, 3, 4, 5)]})
+    follow(drive)
+    assert not set(drive.driven) & cells(1, 3, 4, 5)
+    assert drive.visited == cells(0, 0, 6, 8) - cells(1, 3, 4, 5)
+    (area,) = drive.mission.unreached()
+    assert (area.cells, area.reason) == (6, "in a keep-out zone")
+    assert area.cell in cells(1, 3, 4, 5)
+
+
+def test_what_lies_behind_a_keep_out_zone_is_not_blamed_on_obstacles():
+    drive = idle("........", "...#....")
+    drive.command("start", {"keep_out": [rectangle(0, 4, 2, 5)]})
+    follow(drive)
+    found = {(area.reason, area.cells) for area in drive.mission.unreached()}
+    assert found == {("in a keep-out zone", 2), ("closed off by a keep-out zone", 6)}
+
+
+def test_a_keep_out_zone_across_the_path_cuts_it_off_at_once():
+    drive = started("..........")
+    drive.go()
+    decision = drive.command("start", {"keep_out": [rectangle(0, 6, 1, 7)]})
+    assert decision.path.cells.tolist()[-1] == [0, 5]
+    follow(drive)
+    assert drive.driven[-1] == (0, 5)
+
+
+def test_a_robot_in_a_keep_out_zone_waits_to_be_let_out():
+    drive = idle(*ROOM, cell=(2, 2))
+    drive.command("start", {"keep_out": [rectangle(1, 1, 4, 4)]})
+    assert drive.mission.state is State.BLOCKED
+    assert drive.mission.reason.startswith("robot is in a keep-out zone: waits to be driven out")
+    drive.cell = (0, 0)
+    drive.tell(pose_at(0, 0))
+    follow(drive)
+    drive.command("start", {"keep_out": [rectangle(0, 0, 6, 8)]})
+    assert drive.mission.state is State.BLOCKED
+    drive.command("cancel")
+    assert drive.mission.state is State.IDLE
+    drive.command("start")
+    follow(drive)
+
+
+def test_home_is_where_the_mission_began():
+    drive = idle(*ROOM, cell=(3, 3))
+    drive.command("start", TWO_ZONES | {"return_home": True})
+    states = follow(drive)
+    assert drive.cell == (3, 3)
+    assert states[-1] is State.DONE
+    assert drive.mission.assignment.home == (3, 3)
+    assert cells(0, 6, 6, 8) | cells(0, 0, 6, 2) <= drive.visited
+    assert drive.mission.reason == "every reachable cell of the zones is covered"
+
+
+def test_a_walk_home_is_part_of_the_last_plan():
+    drive = idle("....", "....", cell=(0, 0))
+    drive.command("start", {"return_home": True})
+    assert drive.request.problem.end == (0, 0)
+    follow(drive)
+    # A closed walk over two rows visits each cell once.
+    assert len(drive.driven) == 9
+
+
+def test_a_way_home_that_is_closed_is_waited_for():
+    drive = idle("..........", cell=(0, 0))
+    zone = {"name": "end", "polygon": rectangle(0, 8, 1, 10)}
+    drive.command("start", {"zones": [zone], "return_home": True})
+    drive.plan()
+    while drive.cell != (0, 9):
+        drive.go()
+    drive.tell(patch("#", at=(0, 4)))
+    for _ in range(10):
+        drive.go()
+        if drive.request is not None:
+            drive.plan()
+    assert drive.mission.state is State.BLOCKED
+    assert drive.mission.reason == "no way home: waits for a map that shows one"
+    drive.tell(patch(".", at=(0, 4)))
+    assert State.RETURNING in follow(drive)
+    assert drive.cell == (0, 0)
+
+
+def test_a_robot_carried_off_on_its_way_home_finds_another():
+    drive = idle(*ROOM, cell=(0, 0))
+    zone = {"name": "far", "polygon": rectangle(5, 7, 6, 8)}
+    drive.command("start", {"zones": [zone], "return_home": True})
+    drive.plan()
+    while (5, 7) not in drive.visited:
+        drive.go()
+    drive.go()
+    drive.cell = (0, 7)
+    drive.tell(pose_at(0, 7), after=2.0)
+    drive.tell(pose_at(0, 7), after=2.0)
+    follow(drive)
+    assert drive.cell == (0, 0)
+
+
+def test_paused_it_stands_and_still_counts_what_it_passes_over():
+    drive = started(*ROOM)
+    for _ in range(5):
+        drive.go()
+    decision = drive.command("pause")
+    assert decision.path.cells.shape == (0, 2)
+    assert (drive.mission.state, drive.mission.reason) == (State.PAUSED, "paused by command")
+    before = drive.visited
+    row, col = drive.cell
+    drive.tell(pose_at(row + 0.5, col), pose_at(row + 1, col))
+    assert drive.visited == before | {(row + 1, col)}
+    drive.cell = (row + 1, col)
+    # A map that changes is taken in, and planned on when it goes on.
+    assert drive.tell(patch("#", at=(5, 7))).plan is None
+    assert drive.command("resume").plan.reason == "resumed"
+    drive.finish()
+    assert drive.visited == cells(0, 0, 6, 8) - {(5, 7)}
+
+
+def test_paused_while_planning_the_plan_comes_too_late():
+    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
+    drive.command("pause")
+    assert drive.plan().path is None
+    assert drive.mission.state is State.PAUSED
+    drive.command("resume")
+    drive.finish()
+
+
+def test_a_plan_for_the_order_before_is_not_driven():
+    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
+    stale = answer(drive.request)
+    assert drive.command("start", TWO_ZONES).plan is None, "one plan at a time"
+    drive.request = None
+    decision = drive.tell(stale)
+    assert decision.path is None
+    assert decision.plan.reason == "zone 'east'"
+    follow(drive)
+
+
+def test_cancelled_it_stops_and_forgets_the_order_and_remembers_what_is_covered():
+    drive = started(*ROOM)
+    for _ in range(5):
+        drive.go()
+    decision = drive.command("cancel")
+    assert decision.path.cells.shape == (0, 2)
+    assert not decision.forgotten
+    assert (drive.mission.state, drive.mission.reason) == (State.IDLE, "cancelled")
+    assert len(drive.visited) == 6
+    assert drive.tell(patch("#", at=(0, 0)), after=100.0).plan is None
+    assert drive.mission.unreached() == []
+
+
+def test_reset_forgets_what_is_covered_too():
+    drive = started(*ROOM)
+    for _ in range(5):
+        drive.go()
+    decision = drive.command("reset")
+    assert decision.forgotten
+    assert decision.path.cells.shape == (0, 2)
+    assert drive.mission.state is State.IDLE
+    assert drive.visited == {drive.cell}, "the tool lies there"
+    assert drive.tell().forgotten is False
+    drive.command("start")
+    follow(drive)
+
+
+def test_a_command_may_come_before_any_map():
+    drive = Drive((0, 0))
+    drive.command("start", TWO_ZONES)
+    assert drive.mission.state is State.WAITING_FOR_MAP
+    drive.command("pause")
+    drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0))
+    assert drive.mission.state is State.PAUSED
+    assert drive.command("resume").plan.problem.cells == 12
+    follow(drive)
+
+
+def test_a_zone_beyond_the_map_is_refused_and_changes_nothing():
+    drive = started(*ROOM)
+    walk = drive.walk
+    beyond = {"zones": [{"name": "moon", "polygon": rectangle(0, 8, 2, 12)}]}
+    drive.command("start", beyond)
+    assert isinstance(drive.refused, OrderError)
+    assert "zone 'moon' lies outside of the map, x 0.00..2.00 m" in str(drive.refused)
+    assert drive.mission.state is State.COVERING
+    assert drive.walk == walk
+    drive.finish()
+
+
+def test_a_command_that_makes_no_sense_is_refused():
+    drive = idle(*ROOM)
+    for name in ("pause", "resume"):
+        drive.command(name)
+        assert isinstance(drive.refused, CommandError)
+    drive.command("cancel")
+    assert drive.refused is None
+
+
+def test_a_started_mission_that_is_done_stays_so_whatever_the_map_shows():
+    drive = idle(*ROOM[:2])
+    drive.command("start")
+    follow(drive)
+    assert drive.tell(MapReceived(building(*ROOM))).plan is None
+    assert drive.mission.state is State.DONE
+    assert drive.command("start").plan is not None
+
+
+def test_unknown_parts_of_a_zone_are_named():
+    drive = idle("..??", "..??")
+    drive.command("start", {"zones": [{"name": "all", "polygon": rectangle(0, 0, 2, 4)}]})
+    follow(drive)
+    (area,) = drive.mission.unreached()
+    assert (area.cells, area.reason) == (4, "unknown to the map")
+
+
+def resumed(drive, cell, *rows):
+    """What comes after a kill -9: all that was kept, and nothing else."""
+    kept = drive.mission.snapshot()
+    again = Drive(cell, assignment=Assignment.of_note(kept.note))
+    again.mission.resume(kept)
+    again.tell(MapReceived(building(*rows)), pose_at(*cell))
+    return again
+
+
+@pytest.mark.parametrize("driven", [3, 14, 30, 45])
+def test_order_zone_pass_and_home_outlive_the_daemon(driven):
+    order = {"zones": [{"name": "west", "polygon": WEST, "passes": 2}], "return_home": True}
+    first = idle(*ROOM, cell=(3, 4))
+    first.command("start", order)
+    for _ in range(driven):
+        if first.request is not None:
+            first.plan()
+        first.go()
+    before = first.mission.assignment
+    again = resumed(first, first.cell, *ROOM)
+    assert again.mission.assignment == before
+    if again.mission.state is not State.DONE:
+        follow(again)
+    assert again.cell == (3, 4)
+    # Each cell twice in all, but what was covered in the pass is not covered again.
+    assert len(first.driven) + len(again.driven) < 2 * 12 + 30
+
+
+def test_paused_cancelled_and_done_outlive_the_daemon():
+    drive = started(*ROOM)
+    drive.command("pause")
+    again = resumed(drive, drive.cell, *ROOM)
+    assert again.mission.state is State.PAUSED
+    assert again.command("resume").plan is not None
+    again.command("cancel")
+    assert resumed(again, drive.cell, *ROOM).mission.state is State.IDLE
+    done = idle("..")
+    done.command("start")
+    follow(done)
+    assert resumed(done, (0, 1), *ROOM).mission.state is State.DONE
+
+
+def test_an_order_for_another_building_is_dropped():
+    hall = ("##############", *("#............#",) * 10, "##############")
+    pillars = (*("#.##.##.##.#.#", "#............#", "#.##.##.##.#.#") * 4,)
+    drive = idle(*hall, cell=(1, 1))
+    drive.command("start", {"zones": [{"name": "all", "polygon": rectangle(1, 1, 11, 13)}]})
+    follow(drive)
+    drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(1, 1, 3, 4)}]})
+    again = resumed(drive, (1, 1), *pillars)
+    assert again.mission.state is State.IDLE
+    assert "of another building than the map: the order was dropped" in again.mission.reason
+
+
+def test_a_pose_between_cells_counts_for_its_cell():
+    """Standing beside home is not being there."""
+    drive = idle("....", cell=(0, 0))
+    zone = {"name": "end", "polygon": rectangle(0, 3, 1, 4)}
+    drive.command("start", {"zones": [zone], "return_home": True})
+    drive.plan()
+    for _ in range(5):
+        drive.go()
+    drive.tell(PoseReceived(StampedPose(Pose2D(0.26, 0.12))))
+    assert drive.mission.state is not State.DONE
+    drive.tell(PoseReceived(StampedPose(Pose2D(0.24, 0.12))))
+    drive.tell(after=2.0)
+    assert drive.mission.state is State.DONE
+    assert CONFIG.retries == 0
+
+
+def test_keep_out_zones_outlive_the_daemon():
+    drive = idle(*ROOM)
+    drive.command("start", {"keep_out": [rectangle(1, 3, 4, 5)]})
+    for _ in range(3):
+        drive.plan() if drive.request else None
+        drive.go()
+    again = resumed(drive, drive.cell, *ROOM)
+    follow(again)
+    assert not set(again.driven) & cells(1, 3, 4, 5)
+
+
+def test_how_far_each_zone_is():
+    drive = idle(*ROOM)
+    drive.command("start", {**TWO_ZONES, "passes": 2})
+    seen = []
+    for _ in range(300):
+        zones = [(zone.begun, zone.cells, zone.covered) for zone in drive.mission.zone_progress()]
+        seen.append(zones)
+        if drive.mission.state is State.DONE:
+            break
+        drive.plan() if drive.request else None
+        drive.go()
+    assert seen[0] == [(1, 12, 0), (0, 12, 0)]
+    assert seen[-1] == [(2, 12, 12), (2, 12, 12)]
+    for east, west in seen:
+        assert west[0] == 0 or east == (2, 12, 12)
+    assert {east[0] for east, _ in seen} == {1, 2}
+    assert [zone.name for zone in drive.mission.zone_progress()] == ["east", "west"]
+    drive.command("start")
+    assert drive.mission.zone_progress() == []
+
+
+class Mapper:
+    """A map of which only what is near the robot is known; everything near becomes so."""
+
+    def __init__(self, *rows, reach=2):
+        self.rows, self.reach = rows, reach
+        self.known = set()
+
+    def event(self, cell):
+        for row, line in enumerate(self.rows[::-1]):
+            for col in range(len(line)):
+                if max(abs(row - cell[0]), abs(col - cell[1])) <= self.reach:
+                    self.known.add((row, col))
+        seen = [
+            "".join(letter if (row, col) in self.known else "?" for col, letter in enumerate(line))
+            for row, line in enumerate(self.rows[::-1])
+        ]
+        return MapReceived(building(*seen[::-1]))
+
+
+def explore(drive, mapper, ticks=600):
+    for _ in range(ticks):
+        if drive.mission.state is State.DONE:
+            return
+        if drive.request is not None:
+            drive.plan()
+        drive.go(mapper.event(drive.walk[0] if drive.walk else drive.cell))
+    raise AssertionError(f"not done: {drive.mission.state}, {drive.mission.reason}")
+
+
+HOUSE = ("....#.......", "....#.####..", "....#.#..#..", "......#.....", "....#.#..#..")
+
+
+def test_a_zone_nobody_has_seen_yet_is_looked_for():
+    mapper = Mapper(*HOUSE)
+    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), assignment=Assignment.none("none"))
+    # Through the door in the middle, around the corner, and in from behind.
+    decision = drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(0, 7, 3, 9)}]})
+    assert decision.plan.reason == "looking for a way to zone 'a'"
+    assert drive.request.problem.cells == 1
+    explore(drive, mapper)
+    assert cells(0, 7, 3, 9) <= drive.visited
+    assert drive.mission.unreached() == []
+    assert not drive.visited & {(3, 0), (4, 0), (4, 1)}, "the rest of the house was not asked for"
+
+
+def test_a_zone_without_a_way_to_it_is_given_up_once_all_is_seen():
+    mapper = Mapper(*(line.replace("#..#", "####", 1) for line in HOUSE))
+    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), assignment=Assignment.none("none"))
+    drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(1, 7, 2, 9)}]})
+    mapper.rows = tuple(line[:6] + "######" for line in HOUSE)
+    explore(drive, mapper)
+    assert [area.reason for area in drive.mission.unreached()] in ([], ["unknown to the map"])

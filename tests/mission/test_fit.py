@@ -1,0 +1,234 @@
+"""A ledger from before a restart: taken over where the map does not speak against it."""
+
+import numpy as np
+import pytest
+
+from fasaco_edge.errors import PatchWithoutBase
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
+from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
+from fasaco_edge.mission.events import Decision, MapReceived
+from fasaco_edge.mission.fit import Fit, Verdict
+from fasaco_edge.mission.ground import Ground, anchor_cell
+from fasaco_edge.mission.ledger import CoverageLedger, LedgerMismatchError
+from fasaco_edge.mission.progress import State
+from tests.mission.world import CELL, Drive, building, patch, placed, pose_at, started
+
+MAPS = ("office", "flat", "basement", "walled_grid", "warehouse")
+ROBOT = Footprint(0.3, 0.18)
+
+HALL = ("##############", *("#............#",) * 10, "##############")
+# The same walls, with pillars where the hall's floor is.
+PILLARS = (
+    "##############",
+    *("#.##.##.##.#.#", "#............#", "#.##.##.##.#.#") * 3,
+    "#............#",
+    "##############",
+)
+
+
+def moved(grid, x, y):
+    """A map with its place in the frame moved [m]."""
+    geometry = grid.geometry
+    origin = Pose2D(geometry.origin.x + x, geometry.origin.y + y, geometry.origin.yaw)
+    size = geometry.rows, geometry.cols, geometry.resolution
+    return OccupancyGrid(GridGeometry(*size, origin), grid.cells)
+
+
+def from_its_start(name):
+    """A building in the frame of a mapper that was switched on where the robot starts."""
+    x, y = suggested_start(find_map(name))
+    return moved(read_map(find_map(name)), -x, -y)
+
+
+def seen_within(grid, reach_m):
+    """What a mapper knows that was just switched on."""
+    pixels = np.argwhere(np.ones(grid.cells.shape, bool)) + 0.5
+    x, y = grid.geometry.to_map(pixels[:, 1], pixels[:, 0])
+    far = (np.hypot(x, y) > reach_m).reshape(grid.cells.shape)
+    return OccupancyGrid(grid.geometry, np.where(far, UNKNOWN, grid.cells).astype(np.int8))
+
+
+def covered_all(grid):
+    """The ledger of a robot that has covered all it could reach."""
+    lattice = CoverageLattice.from_map(grid, ROBOT)
+    reachable = Ground.around(lattice, anchor_cell(lattice, Pose2D(0, 0))).reachable
+    ledger = CoverageLedger(ROBOT.cell_m, "map")
+    for row, col in np.argwhere(reachable).tolist():
+        x, y = col + lattice.window.col0 + 0.5, row + lattice.window.row0 + 0.5
+        ledger.record(Pose2D(x * ROBOT.cell_m, y * ROBOT.cell_m))
+    return ledger.snapshot()
+
+
+@pytest.fixture(scope="module")
+def buildings():
+    return {name: from_its_start(name) for name in MAPS}
+
+
+@pytest.fixture(scope="module")
+def ledgers(buildings):
+    return {name: covered_all(grid) for name, grid in buildings.items()}
+
+
+def verdict(ledger, grid):
+    return Fit.of(ledger, CoverageLattice.from_map(grid, ROBOT)).verdict
+
+
+@pytest.mark.parametrize("name", MAPS)
+@pytest.mark.parametrize("reach_m", [2.0, 3.5, 8.0, 100.0])
+def test_a_building_is_never_taken_for_another(buildings, ledgers, name, reach_m):
+    """Nor if the mapper has just begun, and puts the walls a little elsewhere."""
+    for x, y in ((0.0, 0.0), (0.1, 0.0), (-0.06, 0.08)):
+        seen = seen_within(moved(buildings[name], x, y), reach_m)
+        assert verdict(ledgers[name], seen) in (Verdict.SAME, Verdict.OPEN)
+    assert verdict(ledgers[name], buildings[name]) is Verdict.SAME
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_most_other_buildings_are_told_by_their_whole_maps(buildings, ledgers, name):
+    others = [verdict(ledgers[name], buildings[other]) for other in MAPS if other != name]
+    assert others.count(Verdict.OTHER) >= (2 if name == "office" else 3)
+
+
+def fit(known, blocked, chance, covered=100):
+    return Fit(covered, known, blocked, chance).verdict
+
+
+def test_the_rule():
+    assert fit(0, 0, 0.0) is Verdict.OPEN
+    assert fit(9, 9, 1.0) is Verdict.OPEN, "too few to tell"
+    assert fit(30, 10, 1.0) is Verdict.OTHER
+    assert fit(31, 10, 1.0) is Verdict.OPEN
+    assert fit(100, 0, 0.3) is Verdict.SAME
+    assert fit(100, 0, 0.3, covered=200) is Verdict.SAME
+    assert fit(100, 0, 0.3, covered=201) is Verdict.OPEN, "the rest may tell"
+    assert fit(100, 9, 0.3) is Verdict.SAME
+    assert fit(100, 10, 0.3) is Verdict.OPEN
+    assert fit(100, 18, 0.3) is Verdict.OPEN
+    assert fit(100, 19, 0.3) is Verdict.OTHER
+    assert fit(1000, 40, 0.02) is Verdict.OPEN, "a new rack in a hall"
+
+
+def after(drive):
+    """The ledger of a robot that drove, as its successor gets it."""
+    return drive.mission.ledger.snapshot()
+
+
+def resumed(before, cell, *events):
+    """A robot whose mission goes on after a restart."""
+    drive = Drive(cell)
+    drive.mission.resume(before)
+    drive.tell(*events)
+    return drive
+
+
+def test_a_mission_goes_on_where_it_stopped():
+    first = started(*HALL, cell=(1, 1))
+    for _ in range(60):
+        first.go()
+    again = resumed(after(first), first.cell, MapReceived(building(*HALL)), pose_at(*first.cell))
+    assert again.visited == first.visited
+    assert again.mission.ledger.total == first.mission.ledger.total
+    assert again.request.reason == "first plan, 61 cells were covered before"
+    assert again.request.problem.cells == 120 - 61
+    again.plan()
+    again.finish()
+    assert len(again.driven) < 100, "what was covered is not driven all over again"
+    assert again.mission.coverage().remaining == 0
+
+
+def test_a_finished_mission_stays_finished():
+    first = started("....", "....")
+    first.finish()
+    again = resumed(after(first), (0, 0), MapReceived(building("....", "....")), pose_at(0, 0))
+    assert again.mission.state is State.DONE
+    assert again.decisions[-1] == Decision()
+
+
+def test_a_mapper_that_begins_again_does_not_cost_the_ledger():
+    first = started(*HALL, cell=(1, 1))
+    for _ in range(60):
+        first.go()
+    small = building("...", "...", at=(1, 1))
+    again = resumed(after(first), (1, 1), MapReceived(small), pose_at(1, 1))
+    assert again.decisions[-1].faults == ()
+    again.plan() if again.request else None
+    decision = again.tell(MapReceived(building(*HALL)))
+    assert decision.faults == ()
+    assert again.mission.ledger.snapshot().cells == 61
+
+
+def test_another_building_is_said_and_begun_anew():
+    first = started(*HALL, cell=(1, 1))
+    first.finish()
+    other = MapReceived(building(*PILLARS))
+    again = resumed(after(first), (1, 1), other, pose_at(1, 1))
+    (fault,) = again.decisions[-1].faults
+    assert isinstance(fault, LedgerMismatchError)
+    assert str(fault) == "the ledger of 120 covered cells is of another building than the map"
+    assert again.request.reason == f"{fault}: begun anew"
+    assert again.mission.reason == again.request.reason
+    assert again.visited == {(1, 1)}
+    again.plan()
+    again.finish()
+    assert again.mission.ledger.frame == "map"
+    # It is asked once.
+    assert again.tell(MapReceived(building(*HALL))).faults == ()
+
+
+def test_what_was_covered_since_the_restart_counts_in_the_other_building_too():
+    first = started(*HALL, cell=(1, 1))
+    first.finish()
+    corner = PILLARS[-2:]
+    again = resumed(after(first), (1, 1), MapReceived(building(*corner)), pose_at(1, 1))
+    assert again.decisions[-1].faults == ()
+    assert again.mission.state is State.DONE, "covered, as far as anybody knows"
+    again.tell(pose_at(1, 2))
+    decision = again.tell(MapReceived(building(*PILLARS)))
+    assert isinstance(decision.faults[0], LedgerMismatchError)
+    assert again.visited == {(1, 1), (1, 2)}
+    assert again.mission.state is not State.DONE
+    again.plan()
+    again.finish()
+
+
+def test_another_frame_is_another_building():
+    first = started(*HALL, cell=(1, 1))
+    for _ in range(5):
+        first.go()
+    hall = building(*HALL, frame="odom")
+    again = resumed(after(first), (1, 1), MapReceived(hall), pose_at(1, 1, frame="odom"))
+    (fault,) = again.decisions[-1].faults
+    assert isinstance(fault, LedgerMismatchError)
+    assert "lies in frame 'map', the map in 'odom'" in str(fault)
+    assert again.visited == {(1, 1)}
+    assert again.mission.ledger.frame == "odom"
+
+
+def test_new_furniture_does_not_cost_the_ledger():
+    first = started(*HALL, cell=(1, 1))
+    first.finish()
+    again = resumed(after(first), (1, 1), MapReceived(building(*HALL)))
+    again.tell(patch("##", "##", at=(5, 5)), pose_at(1, 1))
+    assert all(decision.faults == () for decision in again.decisions)
+    assert again.mission.state is State.DONE
+
+
+def test_other_faults_do_not_hide_it():
+    first = started(*HALL, cell=(1, 1))
+    first.finish()
+    again = resumed(after(first), (1, 1), patch("#"), MapReceived(building(*PILLARS)))
+    assert [type(fault) for fault in again.decisions[-1].faults] == [
+        PatchWithoutBase,
+        LedgerMismatchError,
+    ]
+
+
+def test_a_map_without_pixels_decides_nothing():
+    first = started(*HALL, cell=(1, 1))
+    first.finish()
+    empty = placed(np.zeros((0, 0), np.int8), (0, 0))
+    again = resumed(after(first), (1, 1), MapReceived(empty), pose_at(1, 1))
+    assert again.decisions[-1].faults == ()
+    assert again.mission.ledger.snapshot().cells * CELL == 120 * CELL

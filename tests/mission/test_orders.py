@@ -1,0 +1,227 @@
+"""Orders and commands as documents: what is read, and what is refused with which words."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.mission.assignment import Assignment, CommandError, Stage
+from fasaco_edge.mission.order import EVERYTHING_ONCE, MissionOrder, OrderError, Zone
+from fasaco_edge.mission.order_document import (
+    command_document,
+    command_schema,
+    order_document,
+    read_command,
+    read_order,
+)
+from fasaco_edge.resources import folder
+
+SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
+KITCHEN = {"name": "kitchen", "polygon": SQUARE}
+
+
+def zones(*polygons, **rest):
+    named = [{"name": f"z{i}", "polygon": polygon} for i, polygon in enumerate(polygons)]
+    return {"zones": named, **rest}
+
+
+def test_nothing_means_everything_once():
+    assert read_order(None) == read_order({}) == EVERYTHING_ONCE == MissionOrder()
+    assert read_order({"passes": 3}).zones == (Zone("everything", None, 3),)
+
+
+def test_an_order_with_all_there_is():
+    order = read_order(
+        {
+            "zones": [KITCHEN, {"name": "hall", "polygon": SQUARE, "passes": 3}],
+            "keep_out": [[[0.5, 0.5], [1, 0.5], [1, 1]]],
+            "passes": 2,
+            "return_home": True,
+            "keep_covered": True,
+        }
+    )
+    square = ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
+    assert order.zones == (Zone("kitchen", square, 2), Zone("hall", square, 3))
+    assert order.keep_out == (((0.5, 0.5), (1.0, 0.5), (1.0, 1.0)),)
+    assert order.return_home
+    assert order.keep_covered
+    assert read_order(json.loads(json.dumps(order_document(order)))) == order
+
+
+@pytest.mark.parametrize(
+    ("document", "said"),
+    [
+        ([], "the order: expected object, got []"),
+        ({"zone": []}, "the order: unknown member zone"),
+        ({"zones": [{"name": "k"}]}, "zones[0]: missing member polygon"),
+        ({"zones": [{**KITCHEN, "pass": 1}]}, "zones[0]: unknown member pass"),
+        ({"zones": [{**KITCHEN, "name": 3}]}, "zones[0].name: expected str, got 3"),
+        ({"zones": [{**KITCHEN, "name": ""}]}, "zones[0].name: expected str of length >= 1"),
+        ({"zones": [{**KITCHEN, "name": "a\n"}]}, "zones[0].name must be 1..64 printable"),
+        ({"zones": [{**KITCHEN, "name": "x" * 65}]}, "zones[0].name: expected str of length <= 64"),
+        ({"zones": [KITCHEN, KITCHEN]}, "zones[1].name: there is a zone 'kitchen' already"),
+        ({"zones": [{**KITCHEN, "passes": 0}]}, "zones[0].passes: expected int >= 1, got 0"),
+        ({"passes": 101}, "passes: expected int <= 100, got 101"),
+        ({"passes": True}, "passes: expected int, got True"),
+        ({"passes": 1.5}, "passes: expected int, got 1.5"),
+        ({"return_home": "yes"}, "return_home: expected bool, got 'yes'"),
+        (zones([[0, 0], [1, 0]]), "zones[0].polygon: expected array of length >= 3"),
+        (zones([[0, 0], [1, 0], [1]]), "zones[0].polygon[2]: expected array of length 2, got [1]"),
+        (zones([[0, 0], [1, 0], ["1", 1]]), "zones[0].polygon[2][0]: expected float, got '1'"),
+        (zones([[0, 0], [1, 0], [1, math.nan]]), "zones[0].polygon[2] must be finite and within"),
+        (zones([[0, 0], [1, 0], [1, -math.inf]]), "zones[0].polygon[2] must be finite and within"),
+        (zones([[0, 0], [1e9, 0], [1, 1]]), "zones[0].polygon[1] must be finite and within 1e+06"),
+        (zones([[0, 0], [2, 2], [2, 0], [0, 2]]), "zones[0].polygon crosses or touches itself"),
+        (zones([[0, 0], [2, 0], [1, 0]]), "zones[0].polygon crosses or touches itself"),
+        (zones([[0, 0], [2, 0], [2, 2], [1, 0], [0, 2]]), "crosses or touches itself"),
+        (zones([[0, 0], [0, 0], [1, 1]]), "zones[0].polygon has point 0 twice in a row"),
+        (zones([*SQUARE, [0, 0]]), "zones[0].polygon must not repeat its first point at the end"),
+        (zones([[0, 0], [1e-3, 0], [0, 1e-3]]), "must have an area of at least 0.0001 m2"),
+        ({"keep_out": [[[0, 0], [2, 2], [2, 0], [0, 2]]]}, "keep_out[0] crosses or touches itself"),
+        ({"keep_out": [SQUARE] * 101}, "keep_out: expected array of length <= 100"),
+        (zones([[0, 0]] * 1001), "zones[0].polygon: expected array of length <= 1000"),
+        (zones(*[[[0, 0]] * 1000] * 6), "polygons must have at most 5000 points, got 6000"),
+        (zones(*[SQUARE] * 101), "zones: expected array of length <= 100"),
+    ],
+)
+def test_what_is_wrong_is_named(document, said):
+    with pytest.raises(OrderError) as caught:
+        read_order(document)
+    assert said in str(caught.value)
+    assert len(str(caught.value)) < 300
+    assert (caught.value.code, bool(caught.value.hint)) == ("bad_order", True)
+
+
+def test_a_polygon_of_a_thousand_points_is_no_burden():
+    angles = [2 * math.pi * i / 1000 for i in range(1000)]
+    read_order(zones([[5 * math.cos(a), 5 * math.sin(a)] for a in angles]))
+
+
+def test_commands():
+    assert read_command({"command": "pause"}) == ("pause", EVERYTHING_ONCE)
+    assert read_command({"command": "start", "order": {"passes": 2}})[1].zones[0].passes == 2
+    for command in read_command({"command": "reset"}), ("start", TWO):
+        assert read_command(json.loads(json.dumps(command_document(*command)))) == command
+    for document, said in (
+        ({}, "the order: missing member command"),
+        ({"command": "go"}, "expected start, pause, resume, cancel, reset, status, got 'go'"),
+        ({"command": "pause", "order": {}}, "order goes with start alone"),
+        ({"command": "start", "order": {"zones": 3}}, "order.zones: expected array, got 3"),
+    ):
+        with pytest.raises(OrderError) as caught:
+            read_command(document)
+        assert said in str(caught.value)
+
+
+anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(
+            st.sampled_from(["zones", "name", "polygon", "passes", "keep_out", "x"]), inner
+        )
+    ),
+    max_leaves=15,
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(anything)
+def test_whatever_is_written_is_an_order_or_refused(document):
+    try:
+        order = read_order(document)
+    except OrderError:
+        return
+    assert read_order(order_document(order)) == order
+
+
+def test_the_schema_is_that_of_the_contract():
+    """To write it anew: json.dumps(command_schema(), indent=2)."""
+    written = json.loads((folder("protocol") / "schema" / "mission.json").read_text())
+    assert written == command_schema()
+
+
+TWO = read_order(zones(SQUARE, SQUARE, passes=2))
+
+
+def test_the_legs_of_an_order():
+    leg, titles = Assignment(TWO), []
+    while True:
+        titles.append(leg.title)
+        if leg.next_leg() is leg:
+            break
+        leg = leg.next_leg()
+    assert titles == [f"zone 'z{zone}', pass {turn} of 2" for zone in (0, 1) for turn in (1, 2)]
+    assert Assignment.by_itself().title == "everything reachable"
+
+
+@pytest.mark.parametrize(
+    "assignment",
+    [
+        Assignment.by_itself(),
+        Assignment.none("cancelled"),
+        Assignment(TWO, paused=True, zone=1, turn=2, begun=True, home=(-3, 4)),
+        Assignment(TWO, stage=Stage.RETRYING, tries=2),
+        Assignment(MissionOrder(return_home=True), stage=Stage.OVER),
+    ],
+)
+def test_what_is_kept_is_what_was(assignment):
+    assert Assignment.of_note(assignment.note()) == assignment
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"version": 2},
+        {"zone": 2},
+        {"zone": -1},
+        {"pass": 3},
+        {"pass": 0},
+        {"stage": "dancing"},
+        {"home": [1]},
+        {"more": 1},
+        {"order": {"zones": [{"name": "a", "polygon": [[0, 0], [0, 0], [0, 0]]}]}},
+    ],
+)
+def test_a_note_that_cannot_be_right_is_refused(change):
+    note = json.loads(Assignment(TWO).note()) | change
+    with pytest.raises(OrderError):
+        Assignment.of_note(json.dumps(note))
+    for torn in ("", "{", "[]", "null", '{"version":1}'):
+        with pytest.raises(OrderError):
+            Assignment.of_note(torn)
+
+
+def test_commands_may_come_twice():
+    running = Assignment(TWO, zone=1)
+    assert running.after("start", TWO) == running
+    paused = running.after("pause", TWO)
+    assert paused.paused
+    assert paused.after("pause", TWO) == paused
+    assert paused.after("start", TWO) == paused.after("resume", TWO) == running
+    assert running.after("resume", TWO) == running
+    idle = running.after("cancel", TWO)
+    assert idle.order is None
+    assert idle.after("cancel", TWO) == idle
+    # The one that began by itself is the same as one for everything.
+    assert Assignment.by_itself().after("start", EVERYTHING_ONCE) == Assignment.by_itself()
+
+
+def test_another_order_replaces_the_one_before_and_the_same_one_begins_again_when_over():
+    running = Assignment(TWO, zone=1)
+    assert running.after("start", EVERYTHING_ONCE) == Assignment(EVERYTHING_ONCE)
+    over = Assignment(TWO, zone=1, stage=Stage.OVER)
+    assert over.after("start", TWO) == Assignment(TWO)
+
+
+@pytest.mark.parametrize("command", ["pause", "resume"])
+@pytest.mark.parametrize(
+    "assignment", [Assignment.none("cancelled"), Assignment(TWO, stage=Stage.OVER)]
+)
+def test_there_has_to_be_a_mission_to_pause(command, assignment):
+    with pytest.raises(CommandError, match=f"there is no mission to {command}"):
+        assignment.after(command, TWO)

@@ -1,0 +1,189 @@
+"""Cells that are blocked or left over: tried again later, and named in the end."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.mission.events import MapReceived, PoseReceived
+from fasaco_edge.mission.progress import State
+from fasaco_edge.mission.unreached import viewpoints
+from tests.mission.world import CELL, CONFIG, Drive, answer, building, patch, pose_at, rectangle
+
+RETRIES = replace(CONFIG, retries=2, retry_s=30.0)
+# A room behind a door in column 4.
+ROOMS = ("....#....", "....#....", ".........", "....#....")
+DOOR = (1, 4)
+
+
+def drives(*rows, cell=(0, 0), config=RETRIES):
+    drive = Drive(cell, MapReceived(building(*rows)), pose_at(*cell), config=config)
+    drive.plan()
+    return drive
+
+
+def until(drive, state, ticks=300):
+    """Drive until the mission is in ``state``."""
+    for _ in range(ticks):
+        if drive.mission.state is state:
+            return
+        if drive.request is not None:
+            drive.plan()
+        drive.go()
+    raise AssertionError(f"{drive.mission.state}: {drive.mission.reason}")
+
+
+def reasons(drive):
+    return [(area.cells, area.reason) for area in drive.mission.unreached()]
+
+
+def test_a_room_whose_door_was_shut_is_looked_at_again_after_a_while():
+    drive = drives(*ROOMS)
+    drive.tell(patch("#", at=DOOR))
+    until(drive, State.BLOCKED)
+    waits = "17 cells not reached: tried again after 30 s (1 of 2)"
+    assert drive.mission.reason == waits
+    assert reasons(drive) == [
+        (16, "closed off by obstacles"),
+        (1, "blocked by an obstacle that was not there before"),
+    ]
+    assert drive.tell(after=29.0).plan is None
+    decision = drive.tell(after=2.0)
+    assert decision.plan.reason == "tried again, 1 of 2"
+    # The robot drives to the door, and to nowhere else.
+    assert np.argwhere(decision.plan.problem.to_cover).tolist() == [[1, 3]]
+    until(drive, State.BLOCKED)
+    assert drive.cell == (1, 3)
+    assert drive.mission.reason == waits.replace("1 of 2", "2 of 2")
+    # It still is shut; in the end nobody waits any more.
+    drive.tell(after=31.0)
+    until(drive, State.DONE)
+    assert drive.mission.reason == "every reachable cell is covered"
+    assert sum(cells for cells, _ in reasons(drive)) == 17
+    assert drive.tell(after=100.0).plan is None
+
+
+def test_a_door_that_has_opened_when_it_is_looked_at():
+    drive = drives(*ROOMS)
+    drive.tell(patch("#", at=DOOR))
+    until(drive, State.BLOCKED)
+    drive.tell(after=31.0)
+    drive.plan()
+    while drive.cell != (1, 3):
+        drive.go()
+    # From here the mapper sees that it is open.
+    assert drive.tell(patch(".", at=DOOR), after=2.0).plan.reason == "map: 17 cells more"
+    until(drive, State.DONE)
+    assert reasons(drive) == []
+    assert (0, 8) in drive.visited
+
+
+def test_a_door_that_opens_while_the_robot_waits_ends_the_waiting():
+    drive = drives(*ROOMS)
+    drive.tell(patch("#", at=DOOR))
+    until(drive, State.BLOCKED)
+    drive.tell(patch(".", at=DOOR), after=3.0)
+    until(drive, State.DONE)
+    assert drive.now < 30.0
+    assert reasons(drive) == []
+
+
+def test_what_never_could_be_reached_is_named_and_not_waited_for():
+    drive = drives("...#..", "...#..")
+    until(drive, State.DONE)
+    assert drive.now < 5.0
+    assert reasons(drive) == [(4, "closed off by obstacles")]
+    (area,) = drive.mission.unreached()
+    assert area.cell in {(row, col) for row in (0, 1) for col in (4, 5)}
+
+
+def test_rows_of_cells_along_a_wall_are_named_and_not_driven_along_again():
+    """A map that refines its walls closes many of them."""
+    drive = drives(*["......"] * 5)
+    drive.tell(patch("######", at=(4, 0)))
+    until(drive, State.DONE)
+    assert drive.now < 10.0
+    assert reasons(drive) == [(6, "blocked by an obstacle that was not there before")]
+
+
+def test_what_was_covered_before_it_was_closed_is_no_loss():
+    drive = drives(*["......"] * 4)
+    until(drive, State.DONE)
+    drive.tell(patch("###", "###", at=(1, 1)))
+    assert drive.mission.state is State.DONE
+    assert reasons(drive) == []
+
+
+def short_of(drive, row, col):
+    """The robot beside the centre of a cell: its tool does not come there."""
+    return PoseReceived(StampedPose(Pose2D((col + 0.02) * CELL, (row + 0.02) * CELL)))
+
+
+def stands_short(drive, ticks):
+    """The robot does not come to cell (0, 2), however often it is sent there."""
+    plans, drive.cell = 0, (0, 2)
+    for _ in range(ticks):
+        decision = drive.tell(short_of(drive, 0, 2), after=1.0)
+        if decision.plan is not None:
+            plans += 1
+            request, drive.request = drive.request, None
+            drive.tell(answer(request))
+    return plans
+
+
+def test_a_cell_left_over_after_several_tries_is_tried_again_later():
+    drive = drives("...")
+    drive.go()
+    assert stands_short(drive, 20) == 3
+    assert drive.mission.state is State.BLOCKED
+    assert drive.mission.reason.startswith("1 cell not reached: tried again after 30 s")
+    assert stands_short(drive, 20) == 1
+    assert drive.mission.state is State.BLOCKED
+    assert stands_short(drive, 100) == 1
+    assert drive.mission.state is State.DONE
+    assert drive.mission.reason == "every reachable cell is covered but 1 left over"
+    assert reasons(drive) == [(1, "left over after 6 tries")]
+
+
+def test_a_cell_left_over_can_be_covered_at_a_later_try():
+    drive = drives("...")
+    drive.go()
+    stands_short(drive, 20)
+    drive.tell(after=31.0)
+    until(drive, State.DONE)
+    assert drive.mission.reason == "every reachable cell is covered"
+
+
+def test_cells_left_over_in_one_zone_do_not_keep_the_robot_from_the_next():
+    drive = drives("......")
+    zones = [
+        {"name": "a", "polygon": rectangle(0, 2, 1, 3)},
+        {"name": "b", "polygon": rectangle(0, 0, 1, 1)},
+    ]
+    drive.command("start", {"zones": zones})
+    drive.plan()
+    drive.go()
+    for _ in range(30):
+        if drive.mission.assignment.zone == 1:
+            break
+        stands_short(drive, 1)
+    assert drive.now < 25.0
+    assert drive.request is None or drive.request.reason == "zone 'b'"
+    until(drive, State.BLOCKED)
+    assert reasons(drive) == [(1, "left over after 4 tries")]
+    drive.tell(after=31.0)
+    until(drive, State.DONE)
+    assert {(0, 0), (0, 2)} <= drive.visited
+
+
+def test_closed_areas_are_looked_at_from_beside_them():
+    closed, reachable = np.zeros((6, 6), bool), np.zeros((6, 6), bool)
+    reachable[0:2] = True
+    closed[2:4, 1:3] = True
+    closed[2, 5] = True
+    assert viewpoints(closed, reachable) == [(1, 2)]
+    closed[4:6, 4:6] = True  # out of sight
+    assert viewpoints(closed, reachable) == [(1, 2)]
+    assert viewpoints(~reachable, reachable) == [(1, 3)]
+    assert viewpoints(~reachable, np.zeros((6, 6), bool)) == []
+    assert viewpoints(np.zeros((0, 0), bool), np.zeros((0, 0), bool)) == []

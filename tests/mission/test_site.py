@@ -1,0 +1,85 @@
+"""Maps carried on from one to the next: the site is what it would be with its last map alone."""
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
+from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+from fasaco_edge.grid.occupancy import MapPatch
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.ground import Ground
+from fasaco_edge.mission.site import Site
+from fasaco_edge.mission.zones import kept_out, without
+from tests.grid.maps import displaced, grid, occupancy_grids, part_of, repainted
+
+FOOTPRINT = Footprint(cell_m=0.2, robot_radius_m=0.08)
+ZONE = ((0.3, 0.3), (0.9, 0.3), (0.9, 0.8), (0.3, 0.8))
+
+
+def take_something_in(draw, site, whole, zones):
+    """A map or an update of it comes, or the zones are others; return building and zones."""
+    match draw(st.sampled_from(["map", "part", "update", "jump", "zones"])):
+        case "map":
+            whole = repainted(draw, whole)
+            site.take_map(whole)
+        case "part":
+            site.take_map(part_of(draw, whole))
+        case "update" if site.grid is not None and site.grid.cells.size:
+            rows, cols = site.grid.cells.shape
+            row, col = draw(st.integers(0, rows - 1)), draw(st.integers(0, cols - 1))
+            window = Window(row, col, min(row + 5, rows), min(col + 5, cols))
+            cells = repainted(draw, site.grid).cells[row : row + 5, col : col + 5]
+            site.take_patch(MapPatch(window, cells.copy()))
+        case "jump":
+            whole = displaced(draw, whole)
+            site.take_map(whole)
+        case _:
+            zones = draw(st.sampled_from([(), (ZONE,)]))
+            site.keep_out(zones)
+            site.take_map(replace(site.grid or whole))
+    return whole, zones
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data(), occupancy_grids(max_side=30))
+def test_from_map_to_map_a_site_is_what_its_last_map_says(data, whole):
+    site = Site(MissionConfig(FOOTPRINT))
+    zones, radius_m = (), FOOTPRINT.robot_radius_m
+    x0, y0, x1, y1 = whole.geometry.bounds()
+    for _ in range(6):
+        whole, zones = take_something_in(data.draw, site, whole, zones)
+        free = CoverageLattice.from_map(site.grid, FOOTPRINT)
+        driven = without(free, kept_out(zones, free.window, free.cell_m, radius_m))
+        for ours, theirs in ((site.free, free), (site.lattice, driven)):
+            assert ours.window == theirs.window
+            assert np.array_equal(ours.states, theirs.states)
+            assert np.array_equal(ours.steps, theirs.steps)
+        share = data.draw(st.sampled_from([0.2, 0.5, 0.8]))
+        place = Pose2D(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
+        site.take_pose(StampedPose(place))
+        site.survey()
+        cell = site.cell()
+        assert (site.ground is None) == (cell is None)
+        if cell is not None:
+            reachable = Ground.around(driven, cell).reachable
+            assert np.array_equal(site.ground.reachable, reachable)
+
+
+def test_a_map_that_says_nothing_new_changes_nothing():
+    """Mappers send their map again and again: nothing that hangs on it is to be made anew."""
+    site = Site(MissionConfig(FOOTPRINT))
+    cells = np.zeros((60, 60), np.int8)
+    first = grid(cells)
+    site.take_map(first)
+    site.take_pose(StampedPose(Pose2D(1.0, 1.0)))
+    site.survey()
+    lattice, ground = site.lattice, site.ground
+    site.take_map(grid(cells))
+    site.survey()
+    assert site.map_revision == 2
+    assert site.grid is not first
+    assert site.lattice is lattice
+    assert site.ground is ground

@@ -1,0 +1,203 @@
+"""What the mission heard comes back byte for byte: over parts, after gaps, and slowly grows."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.bus.arrival import DIGEST_BYTES, PATH_DIGEST, Arrival, digest
+from fasaco_edge.bus.session import Sample
+from fasaco_edge.errors import UnreadableRecording
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.recording import input_log
+from fasaco_edge.recording.blueprint import build_blueprint
+from fasaco_edge.recording.input_log import InputLog
+from fasaco_edge.recording.journal import Journal, JournalState, Room
+from fasaco_edge.recording.runcard import RunDescription
+from fasaco_edge.recording.samples import RecordedSamples
+from fasaco_edge.recording.scene import Scene
+from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
+from fasaco_edge.wire.paths import encode_path
+from fasaco_edge.wire.poses import decode_pose, encode_pose_stamped
+from fasaco_edge.wire.schemas import POSE_STAMPED
+from fasaco_edge.wire.status import encode_json
+
+SECOND_NS = 1_000_000_000
+BEGAN_NS = 1_700_000_000 * SECOND_NS
+# What a recording may grow by in an hour of a mission [bytes].
+MOST_BYTES_H = 60e6
+
+
+@dataclass
+class Desk:
+    """A journal with an input log, and a clock that runs as fast as the test."""
+
+    folder: Path
+    part_bytes: int = 10**9
+    now_ns: int = 0
+    told: list[Arrival] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        room = Room(self.part_bytes, 0)
+        self.journal = Journal(self.folder, "run", room, build_blueprint(None))
+        self.inputs = InputLog(self.journal, BEGAN_NS)
+
+    def hear(self, topic: str, payload: bytes, attachment: bytes = b"", after_s: float = 0.1):
+        """Let a sample come."""
+        self.now_ns += round(after_s * SECOND_NS)
+        sample = Sample(f"robot/{topic}", payload, "some/msg/Type", attachment)
+        arrival = Arrival(topic, sample, self.now_ns, BEGAN_NS + self.now_ns)
+        self.journal.message(arrival.wall_ns)
+        self.inputs.add(arrival)
+        self.inputs.write_if_due(self.now_ns)
+        self.journal.sync(self.now_ns)
+        self.told.append(arrival)
+        return arrival
+
+    def close(self) -> list[Path]:
+        """End the recording; return its parts."""
+        self.inputs.write()
+        assert self.journal.close()
+        return parts(self.folder)
+
+
+def parts(folder: Path) -> list[Path]:
+    return sorted(folder.glob("*.rrd"), key=lambda path: int(path.stem.rpartition("part")[2]))
+
+
+def noise(seed: int, size: int = 30_000) -> bytes:
+    return np.random.default_rng(seed).bytes(size)
+
+
+def test_samples_come_back_over_parts(tmp_path):
+    desk = Desk(tmp_path, part_bytes=200_000)
+    for number in range(40):
+        desk.hear("map", noise(number), after_s=0.5)
+        desk.hear("map_update", noise(1000 + number, number))
+        desk.hear("pose", b"pose %3d" % number)
+    files = desk.close()
+    assert len(files) >= 4
+    samples = RecordedSamples(files[::-1])
+    assert list(samples) == desk.told
+    assert list(samples) == desk.told
+    assert samples.missing == 0
+
+
+def test_a_part_alone_begins_with_the_map_in_force(tmp_path):
+    desk = Desk(tmp_path, part_bytes=100_000)
+    whole = desk.hear("map", noise(0))
+    update = desk.hear("map_update", noise(1, 500))
+    desk.hear("path", b"a path", attachment=b"{}")
+    for number in range(60):
+        desk.hear("pose", noise(100 + number, 9000), after_s=0.5)
+    files = desk.close()
+    assert len(files) >= 3
+    told = RecordedSamples(files[2:])
+    samples = list(told)
+    assert samples[:2] == [whole, update]
+    assert samples[2].topic == PATH_DIGEST
+    assert {sample.topic for sample in samples[3:]} == {"pose"}
+    assert samples[3:] == desk.told[-len(samples) + 3 :]
+    assert told.missing == 0
+    # A part in between is missed.
+    begun = list(RecordedSamples(files[:1]))
+    told = RecordedSamples([files[0], *files[2:]])
+    assert list(told) == [*begun, *samples[3:]]
+    assert told.missing == len(desk.told) - len(begun) - len(samples[3:]) > 0
+
+
+def test_a_map_with_too_many_updates_is_not_told_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(input_log, "IN_FORCE_BYTES", 1000)
+    desk = Desk(tmp_path, part_bytes=50_000)
+    desk.hear("map", noise(0))
+    for number in range(3):
+        desk.hear("map_update", noise(number, 500))
+    for number in range(30):
+        desk.hear("pose", noise(100 + number, 9000), after_s=0.5)
+    files = desk.close()
+    assert {sample.topic for sample in RecordedSamples(files[2:])} == {"pose"}
+    assert list(RecordedSamples(files)) == desk.told
+
+
+def test_what_could_not_be_written_is_missed_and_the_rest_is_whole(tmp_path):
+    desk = Desk(tmp_path)
+    before = [desk.hear("map", noise(1)), desk.hear("pose", b"pose 1", after_s=1.0)]
+    desk.journal.state = JournalState.STALLED
+    lost = [desk.hear("map", noise(2), after_s=1.0), desk.hear("pose", b"pose 2")]
+    desk.inputs.write()
+    desk.journal.state = JournalState.RECORDING
+    after = [desk.hear("map", noise(2)[:-1] + b"?"), desk.hear("pose", b"pose 3")]
+    desk.inputs.note_lost(Counter(pose=3, status=7))
+    last = desk.hear("pose", b"pose 4")
+    samples = RecordedSamples(desk.close())
+    assert list(samples) == [*before, *after, last]
+    assert samples.missing == len(lost) + 3
+
+
+def test_of_a_path_there_is_a_digest_and_of_a_status_what_is_new(tmp_path):
+    desk = Desk(tmp_path)
+    xy = np.array([(0.15, 0.15), (0.45, 0.15)])
+    desk.hear("path", encode_path(xy, np.zeros(2), "map", 7), attachment=b'{"revision": 1}')
+    for state, rss_mb in (("covering", 1), ("covering", 2), ("done", 3)):
+        desk.hear("status", encode_json({"state": state, "rss_mb": rss_mb, "config": {}}))
+    desk.hear("status", b"no JSON")
+    desk.hear("coverage", b"a grid")
+    path, *statuses = RecordedSamples(desk.close())
+    assert path.sample.attachment == b'{"revision": 1}'
+    assert path.sample.payload == digest(xy.tobytes())
+    assert len(path.sample.payload) == DIGEST_BYTES
+    assert [one.sample for one in statuses] == [desk.told[1].sample, desk.told[3].sample]
+
+
+def test_a_recording_without_samples_is_named(tmp_path):
+    (path,) = Desk(tmp_path).close()
+    with pytest.raises(UnreadableRecording, match="holds no samples"):
+        RecordedSamples([path])
+    (tmp_path / "a.rrd").write_text("hello")
+    with pytest.raises(UnreadableRecording, match="no recording"):
+        RecordedSamples([tmp_path / "a.rrd"])
+
+
+def test_an_hour_takes_at_most_60_megabytes(tmp_path):
+    """A map of 1,024 x 1,024 at 1 Hz, poses at 20 Hz, as a robot in a large building gives them."""
+    desk = Desk(tmp_path)
+    scene = Scene(desk.journal, RunDescription("robot", "now"))
+    rng = np.random.default_rng(0)
+    grown = {}
+    for second in range(90):
+        grid = explored(second, rng)
+        payload = encode_occupancy_grid(grid)
+        desk.hear("map", payload, after_s=0.0)
+        scene.add_map(decode_occupancy_grid(payload))
+        for tick in range(20):
+            place = 0.0125 * (20 * second + tick) + rng.normal(0, 0.003, 3)
+            pose = StampedPose(Pose2D(*place.tolist()), "map", desk.now_ns)
+            payload = encode_pose_stamped(pose)
+            desk.hear("pose", payload, after_s=0.05)
+            desk.journal.at(BEGAN_NS + desk.now_ns)
+            scene.add_pose(decode_pose(payload, POSE_STAMPED))
+            scene.catch_up()
+        grown[second] = desk.journal.size
+    files = desk.close()
+    # What a recording begins with is no growth.
+    per_hour = (grown[89] - grown[40]) / 49 * 3600
+    print(f"{per_hour / 1e6:.1f} MB an hour, {files[0].stat().st_size / 1e6:.1f} MB in all")
+    assert per_hour < MOST_BYTES_H
+    assert [one.sample for one in RecordedSamples(files)] == [one.sample for one in desk.told]
+
+
+def explored(second: int, rng: np.random.Generator) -> OccupancyGrid:
+    """Return halls with walls that flicker, known from the left up to where the robot has come."""
+    cells = np.zeros((1024, 1024), np.int8)
+    cells[::128] = cells[:, ::128] = 100
+    cells[:, 1:][rng.random((1024, 1023)) < 1e-4] = 100
+    cells[:, 200 + 5 * second :] = -1
+    geometry = GridGeometry(1024, 1024, 0.05, Pose2D(0.0, 0.0))
+    return OccupancyGrid(geometry, cells, "map", second * SECOND_NS)
