@@ -69,14 +69,14 @@ class DaemonProcess:
         self._bus: Bus | None = None
 
     def __enter__(self) -> Self:
-        file = Path(self._folder.name) / "config.yaml"
+        folder = Path(self._folder.name)
+        file = folder / "config.yaml"
         file.write_text(yaml.safe_dump(self._config), encoding="utf-8")
         with self._log.open("wb") as log:
             self._started = time.monotonic()
+            command = [*PROGRAM, "run", "--config", str(file), "--state", str(folder / "state")]
             self._process = subprocess.Popen(
-                [*PROGRAM, "run", "--config", str(file), "--with-parent", str(os.getpid())],
-                stdout=log,
-                stderr=log,
+                [*command, "--with-parent", str(os.getpid())], stdout=log, stderr=log
             )
         return self
 
