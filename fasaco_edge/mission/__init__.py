@@ -7,7 +7,8 @@ Read in this order:
     intake       each event changes the parts
     pilot        then the parts decide: states, and what the robot does next
     parts        site    the map, the robot's place in it, what it can reach (ground)
-                 log     what is covered (ledger), and whether a map contradicts it (fit)
+                 log     what is covered (ledger), and whether a map contradicts it (fit) or has
+                         moved (loop_closure)
                  watch   whether map and pose keep coming, and can be believed
                  agenda  what is still to be done: zones, passes, tries, the way home
                  route   the path, and the plan under way

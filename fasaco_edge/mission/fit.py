@@ -128,6 +128,10 @@ class ResumedLedger:
         """Note what ``ledger`` has noted too: see there."""
         self._since.lift()
 
+    def part(self) -> None:
+        """Note what ``ledger`` has noted too: see there."""
+        self._since.part()
+
     def forget(self, inside: Callable[[Window], NDArray[np.bool_]]) -> None:
         """Forget what ``ledger`` has forgotten too: see there."""
         self._since.forget(inside)

@@ -60,7 +60,10 @@ class Intake:
         assert site.free is not None
         assert site.grid is not None
         parts.watch.map_came(parts.now)
-        self._record()  # the pose may have come before the map
+        if site.map_moved:
+            parts.log.part()
+        else:
+            self._record()  # the pose may have come before the map
         misfit = parts.log.check(site.free, site.grid.frame)
         if misfit is not None:
             parts.take_order(parts.agenda.assignment.elsewhere(str(misfit)))
@@ -75,12 +78,15 @@ class Intake:
         astray = parts.watch.pose_came(stamped.pose, parts.now)
         if astray:
             parts.log.lift()
+        again = parts.log.follow(stamped.pose)
         self._record()
         cell = site.cell()
         if cell is None:
             return
         if astray or site.ground is None or not site.ground.holds(cell):
             parts.survey()
+        if again:
+            route.wanted = f"map and pose moved: {again} cells to be covered again"
         parts.agenda.pass_by(cell)
         route.path = route.path.driven_to(cell, parts.log.ledger.has_visited)
 

@@ -11,6 +11,7 @@ from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.fit import ResumedLedger, Verdict
 from fasaco_edge.mission.ledger import CoverageLedger, LedgerMismatchError, LedgerSnapshot
+from fasaco_edge.mission.loop_closure import Motion, doubtful
 
 
 class Logbook:
@@ -25,6 +26,8 @@ class Logbook:
         self.ledger = CoverageLedger(cell_m)
         self.opening = "first plan"
         self._resumed: ResumedLedger | None = None
+        # The robot's last pose on a map that has moved since.
+        self._parted_at: Pose2D | None = None
 
     def resume(self, before: LedgerSnapshot) -> None:
         """Go on with the ledger from before a restart."""
@@ -43,6 +46,21 @@ class Logbook:
         self.ledger.lift()
         if self._resumed is not None:
             self._resumed.lift()
+
+    def part(self) -> None:
+        """Note that the map has moved; where to, the next pose tells."""
+        self._parted_at = self.ledger.part()
+        if self._resumed is not None:
+            self._resumed.part()
+
+    def follow(self, pose: Pose2D) -> int:
+        """Forget what nobody can know any more to be covered; return how many cells that are."""
+        start, self._parted_at = self._parted_at, None
+        if start is None or (motion := Motion(start, pose)).is_still:
+            return 0
+        before = self.ledger.snapshot()
+        self.forget(doubtful(before, motion))
+        return before.cells - self.ledger.snapshot().cells
 
     def forget(self, inside: Callable[[Window], NDArray[np.bool_]]) -> None:
         """Forget all visits to cells ``inside``, see ``CoverageLedger.forget``."""

@@ -11,6 +11,7 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.free_area import FreeArea
 from fasaco_edge.mission.ground import Ground, anchor_cell
 from fasaco_edge.mission.ledger import CoverageLedger
+from fasaco_edge.mission.loop_closure import has_moved
 from fasaco_edge.mission.order import MissionOrder, OrderError
 from fasaco_edge.mission.polygons import Polygon, bounds
 from fasaco_edge.mission.progress import Coverage
@@ -26,6 +27,7 @@ class Site:
         free: the lattice over it.
         lattice: the same without the cells the robot must keep out of.
         pose: the newest pose in the map's frame; before there is a map in any frame.
+        map_moved: whether the newest map shows the walls elsewhere: a loop closure.
         ground: what can be reached, as of the last ``survey``; None where the robot stands ill.
     """
 
@@ -36,6 +38,7 @@ class Site:
         self.lattice: CoverageLattice | None = None
         self.pose: StampedPose | None = None
         self.ground: Ground | None = None
+        self.map_moved = False
         self._config = config
         self._change: LatticeChange | None = None
         self._keep_out: tuple[Polygon, ...] = ()
@@ -78,6 +81,7 @@ class Site:
         else:
             maps = self.grid, grid
             change = LatticeChange.between(maps, self.free, footprint, most, within)
+        self.map_moved = has_moved(change)
         before, self.grid = self.lattice, grid
         if change.after is not self.free:
             self.free, self.lattice = change.after, self._without_kept_out(change.after)

@@ -1,0 +1,103 @@
+"""Loop closures: the mapper finds that all lies elsewhere, and moves map and pose at once.
+
+The ledger's cells are places in the map's frame: after such a jump nobody knows which of them
+the tool passed over, only that the map was somewhere between its old place and the new one, as
+far as it moved at all. What counts still is what was covered wherever in between it lay.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.changes import LatticeChange
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.lattice import UNKNOWN
+from fasaco_edge.mission.ledger import LedgerSnapshot
+
+# So many cells turn from free to blocked or back in one map, and such a share of those that were
+# known: no door and no passer-by does that.
+LEAST_CELLS, LEAST_SHARE = 20, 0.1
+# Whoever moved less than this stayed where it was: [m], [rad].
+STILL_M, STILL_RAD = 0.02, math.radians(0.2)
+# How far a cell's centre may lie from the middle of four [cells] to be one with the nearest.
+NEAR = 0.1
+# Where the map may have lain, as shares of the way.
+BETWEEN = (0.25, 0.5, 0.75, 1.0)
+
+
+def has_moved(change: LatticeChange) -> bool:
+    """Tell whether a map shows walls elsewhere all over."""
+    if change.before is None or len(change.cells) < LEAST_CELLS:
+        return False
+    old, new = change.before.window, change.after.window
+    common = old.intersection(new)
+    if common is None:
+        return False
+    then = change.before.states[common.slices_in(old)]
+    now = change.after.states[common.slices_in(new)]
+    known = then != UNKNOWN
+    turned = int(np.count_nonzero(known & (now != UNKNOWN) & (then != now)))
+    return turned >= max(LEAST_CELLS, LEAST_SHARE * int(np.count_nonzero(known)))
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """How a rigid map moved, as the robot's pose tells: it stood in ``start``, now in ``end``."""
+
+    start: Pose2D
+    end: Pose2D
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it did not."""
+        start, end = self.start, self.end
+        distance = math.hypot(end.x - start.x, end.y - start.y)
+        turn = math.remainder(end.yaw - start.yaw, math.tau)
+        return distance < STILL_M and abs(turn) < STILL_RAD
+
+    def back(
+        self, share: float, x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where points [m] were before such a share of the motion."""
+        start, end = self.start, self.end
+        turn = -share * math.remainder(end.yaw - start.yaw, math.tau)
+        dx = x - start.x - share * (end.x - start.x)
+        dy = y - start.y - share * (end.y - start.y)
+        cos, sin = math.cos(turn), math.sin(turn)
+        return cos * dx - sin * dy + start.x, sin * dx + cos * dy + start.y
+
+
+def doubtful(before: LedgerSnapshot, motion: Motion) -> Callable[[Window], NDArray[np.bool_]]:
+    """Return what tells which cells of a window, bool (rows, cols), may not have been covered."""
+
+    def inside(window: Window) -> NDArray[np.bool_]:
+        rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1]
+        x, y = (cols + 0.5) * before.cell_m, (rows + 0.5) * before.cell_m
+        doubt = np.zeros(rows.shape, bool)
+        for share in BETWEEN:
+            doubt |= ~_covered(before, *motion.back(share, x, y))
+        return doubt
+
+    return inside
+
+
+def _covered(
+    before: LedgerSnapshot, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Tell for points [m] whether all cells were covered whose centres they lie between."""
+    row, col = y / before.cell_m - 0.5, x / before.cell_m - 0.5
+    low_row, high_row = np.floor(row + NEAR).astype(int), np.ceil(row - NEAR).astype(int)
+    low_col, high_col = np.floor(col + NEAR).astype(int), np.ceil(col - NEAR).astype(int)
+    row0, col0 = int(low_row.min()), int(low_col.min())
+    window = Window(row0, col0, int(high_row.max()) + 1, int(high_col.max()) + 1)
+    visited = before.visits(window) > 0
+    covered = np.ones(x.shape, bool)
+    for rows in (low_row, high_row):
+        for cols in (low_col, high_col):
+            covered &= visited[rows - row0, cols - col0]
+    return covered

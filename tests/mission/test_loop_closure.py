@@ -1,0 +1,97 @@
+"""What counts as covered after the mapper has moved map and pose at once."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.changes import LatticeChange
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.lattice import Footprint
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.ledger import CoverageLedger
+from fasaco_edge.mission.loop_closure import Motion, doubtful, has_moved
+
+FOOTPRINT = Footprint(0.3, 0.15)
+HOME = Pose2D(0.0, 0.0)
+
+
+def rooms(origin=HOME, door=True, known=1.0):
+    """Return a map of two rooms with pillars, 12 m x 6 m."""
+    pixels = np.zeros((120, 240), np.int8)
+    pixels[:3] = pixels[-3:] = pixels[:, :3] = pixels[:, -3:] = 100
+    pixels[:, 118:122] = 100
+    pixels[20:100:20, 20:230:20] = 100
+    if door:
+        pixels[50:65, 118:122] = 0
+    pixels[:, round(240 * known) :] = -1
+    return OccupancyGrid(GridGeometry(*pixels.shape, 0.05, origin), pixels)
+
+
+def change(before, after):
+    lattice = LatticeChange.first(before, FOOTPRINT).after
+    return LatticeChange.between((before, after), lattice, FOOTPRINT)
+
+
+@pytest.mark.parametrize("jump", [Pose2D(0.4, 0.1), Pose2D(0.3, 0.3, math.radians(3.0))])
+def test_walls_elsewhere_all_over_are_a_loop_closure(jump):
+    assert has_moved(change(rooms(), rooms(jump)))
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        (rooms(), rooms()),
+        (rooms(), rooms(door=False)),
+        (rooms(known=0.3), rooms(known=0.6)),
+        (rooms(), rooms(known=0.5)),
+    ],
+)
+def test_doors_and_news_are_none(before, after):
+    assert not has_moved(change(before, after))
+
+
+def test_a_first_map_has_not_moved():
+    assert not has_moved(LatticeChange.first(rooms(), FOOTPRINT))
+
+
+def test_a_motion_is_gone_back_by_shares():
+    motion = Motion(Pose2D(1.0, 2.0, 0.1), Pose2D(1.5, 2.0, 0.1 + math.pi / 2))
+    x, y = motion.back(1.0, np.array([1.5, 1.5]), np.array([2.0, 3.0]))
+    np.testing.assert_allclose((x[0], y[0]), (1.0, 2.0), atol=1e-12)
+    np.testing.assert_allclose((x[1], y[1]), (2.0, 2.0), atol=1e-12)
+    x, y = motion.back(0.5, np.array([1.25]), np.array([2.0]))
+    np.testing.assert_allclose((x[0], y[0]), (1.0, 2.0), atol=1e-12)
+    assert not motion.is_still
+    assert Motion(HOME, Pose2D(0.01, 0.01, math.tau)).is_still
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_counts_that_the_tool_did_not_pass_over(seed):
+    """Wherever the map came to lie, what is left is a part of what was covered, moved along."""
+    rng = np.random.default_rng(seed)
+    ledger = CoverageLedger(0.3)
+    for step in range(40):
+        along = 0.3 * min(step % 20, 12)
+        ledger.record(Pose2D(along if step < 20 else 3.6 - along, 0.15 + 0.3 * (step // 4)))
+    start = Pose2D(2.0, 1.5, 0.3)
+    end = Pose2D(2.0 + rng.uniform(-0.5, 0.5), 1.5 + rng.uniform(-0.5, 0.5), rng.uniform(0.2, 0.4))
+    motion, before = Motion(start, end), ledger.snapshot()
+    window = Window(-5, -5, 40, 40)
+    was = before.visits(window) > 0
+    ledger.part()
+    ledger.forget(doubtful(before, motion))
+    left = np.argwhere(ledger.visits(window) > 0) + np.array((window.row0, window.col0))
+    assert (ledger.visits(window)[~was] == 0).all()
+    x, y = motion.back(1.0, (left[:, 1] + 0.5) * 0.3, (left[:, 0] + 0.5) * 0.3)
+    for row, col in zip(np.floor(y / 0.3).astype(int), np.floor(x / 0.3).astype(int), strict=True):
+        assert was[row - window.row0, col - window.col0]
+
+
+def test_who_stood_still_forgets_nothing():
+    ledger = CoverageLedger(0.3)
+    for step in range(40):
+        ledger.record(Pose2D(0.1 * step, 0.15))
+    before = ledger.snapshot()
+    ledger.forget(doubtful(before, Motion(HOME, HOME)))
+    assert ledger.snapshot().cells == before.cells > 5
