@@ -50,7 +50,7 @@ class PatchWithoutBase(FasacoError):
     """A map update came before any map, or does not fit the one there is."""
 
     code = "patch_without_base"
-    hint = "publish the full map once; updates refer to it"
+    hint = "publish the full map once, latched, or again: it was asked for; updates refer to it"
 
 
 class StartOutsideMap(FasacoError):

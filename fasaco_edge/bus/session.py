@@ -118,6 +118,19 @@ class Publisher:
         return bool(status.matching)
 
 
+class Subscription:
+    """A subscriber that can be declared anew."""
+
+    def __init__(self, declare: Callable[[], object]) -> None:
+        self._declare = declare
+        self._subscriber: Any = declare()
+
+    def renew(self) -> None:
+        """Declare it anew: a latched one receives the newest sample again."""
+        self._subscriber.undeclare()
+        self._subscriber = self._declare()
+
+
 class Bus:
     """A session, with everything declared on it; close it on every way out."""
 
@@ -137,7 +150,7 @@ class Bus:
 
     def subscribe(
         self, key: str, callback: Callable[[Sample], None], latched: bool = False
-    ) -> None:
+    ) -> Subscription:
         """Call ``callback`` with each sample on ``key``, on a Zenoh thread.
 
         A latched subscription receives the newest sample of latched publishers
@@ -147,9 +160,10 @@ class Bus:
         def receive(sample: zenoh.Sample) -> None:
             callback(_sample(sample))
 
-        subscriber: Any
-        if latched:
-            subscriber = zenoh.ext.declare_advanced_subscriber(
+        def declare() -> object:
+            if not latched:
+                return self._session.declare_subscriber(key, receive)
+            return zenoh.ext.declare_advanced_subscriber(
                 self._session,
                 key,
                 receive,
@@ -157,9 +171,10 @@ class Bus:
                 recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
                 subscriber_detection=True,
             )
-        else:
-            subscriber = self._session.declare_subscriber(key, receive)
-        self._declared.append(subscriber)
+
+        subscription = Subscription(declare)
+        self._declared.append(subscription)
+        return subscription
 
     def serve(self, key: str, answer: Callable[[dict[str, str]], Reply]) -> None:
         """Answer queries on ``key``; ``answer`` gets the parameters, on a Zenoh thread."""

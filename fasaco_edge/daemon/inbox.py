@@ -43,8 +43,13 @@ class Inbox:
 
     def __init__(self, bus: Bus, keys: Keys, mailbox: Mailbox[object], pose_schema: str) -> None:
         self._pose_schema = pose_schema
-        for kind, key in (("map", keys.map), ("map_update", keys.map_update), ("pose", keys.pose)):
-            bus.subscribe(key, _poster(mailbox, kind), latched=kind == "map")
+        self._map = bus.subscribe(keys.map, _poster(mailbox, "map"), latched=True)
+        for kind, key in (("map_update", keys.map_update), ("pose", keys.pose)):
+            bus.subscribe(key, _poster(mailbox, kind))
+
+    def ask_for_map(self) -> None:
+        """Ask whoever publishes the map, and keeps the newest for late joiners, for it."""
+        self._map.renew()
 
     def decode(
         self, items: Sequence[tuple[str, object]], patches_lost: int

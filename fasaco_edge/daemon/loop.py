@@ -18,7 +18,7 @@ from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.daemon.outbox import Outbox
 from fasaco_edge.daemon.status import StatusBoard, plan_figures
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.errors import FasacoError, PatchWithoutBase
 from fasaco_edge.mission.assignment import Assignment
 from fasaco_edge.mission.events import (
     Answer,
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
 TICK_S = 0.1
 COVERAGE_PERIOD_S = 0.5
+# Updates without their map come in swarms; it is asked for no more often than this [s].
+ASK_FOR_MAP_S = 2.0
 
 
 class Loop:
@@ -72,7 +74,7 @@ class Loop:
         # that the plan under way was asked for.
         self._unanswered_map: float | None = None
         self._asked_map: float | None = None
-        self._coverage_at = float("-inf")
+        self._asked_for_map_at = self._coverage_at = float("-inf")
         self._coverage_key: tuple[object, ...] = ()
         if self._keeping.fault is not None:
             self._status.faults.count([self._keeping.fault])
@@ -83,7 +85,7 @@ class Loop:
             items = self._mailbox.take(TICK_S)
             started = time.monotonic()
             events, faults = self._inbox.decode(items, self._mailbox.take_lost("map_update"))
-            self._status.faults.count(faults)
+            self._refuse(faults)
             self._note(items)
             commands = self._commands.take(items)
             mission = self._mission or self._begin(events)
@@ -112,7 +114,7 @@ class Loop:
 
     def _begin(self, events: list[Event]) -> Mission | None:
         """Hold ``events`` until there is a mission; once it is there, they are all that was."""
-        self._status.faults.count(self._beginning.take(events))
+        self._refuse(self._beginning.take(events))
         loaded = self._beginning.loaded()
         if loaded is None:
             return None
@@ -160,7 +162,7 @@ class Loop:
                 self._map_arrived = item.at
 
     def _perform(self, mission: Mission, decision: Decision) -> None:
-        self._status.faults.count(decision.faults)
+        self._refuse(decision.faults)
         self._keeping.note_faults(decision.faults)
         if decision.forgotten:
             self._keeping.forget()
@@ -171,6 +173,15 @@ class Loop:
             if decision.plan is None and decision.path.plan is None and self._worker is not None:
                 self._worker.interrupt()  # the robot had to stop: its plan is for another map
             self._publish_path(mission, decision.path)
+
+    def _refuse(self, faults: Sequence[FasacoError]) -> None:
+        """Count what was refused; ask for the map that updates lack."""
+        self._status.faults.count(faults)
+        now = time.monotonic()
+        lacking = any(isinstance(fault, PatchWithoutBase) for fault in faults)
+        if lacking and now - self._asked_for_map_at >= ASK_FOR_MAP_S:
+            self._asked_for_map_at = now
+            self._inbox.ask_for_map()
 
     def _publish_path(self, mission: Mission, update: PathUpdate) -> None:
         assert mission.grid is not None

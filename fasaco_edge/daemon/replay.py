@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from fasaco_edge.bus.arrival import Arrival, digest
 from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.bus.session import Bus
+from fasaco_edge.bus.session import Bus, Subscription
 from fasaco_edge.daemon.beginning import Beginning
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.inbox import Inbox, Received, make_mailbox
@@ -210,9 +210,10 @@ class _SilentBus(Bus):
     def __init__(self) -> None:
         self.heard: set[str] = set()
 
-    def subscribe(self, key: str, callback: object, latched: bool = False) -> None:
+    def subscribe(self, key: str, callback: object, latched: bool = False) -> Subscription:
         """Note the key's topic."""
         self.heard.add(key.rpartition("/")[2])
+        return Subscription(lambda: None)
 
 
 class _NoDisk(LedgerWriter):

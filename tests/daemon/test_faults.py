@@ -8,6 +8,8 @@ import time
 
 import pytest
 
+from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.daemon.loop import ASK_FOR_MAP_S
 from fasaco_edge.errors import MalformedMessage
 from tests.daemon.fuzz_campaign import KINDS, run_campaign
 from tests.daemon.mutations import GOOD, REFUSES, mutant
@@ -66,6 +68,19 @@ def test_updates_that_do_not_fit_the_map_are_counted_apart(outsider):
         lambda status: status["errors"]["by_code"].get("patch_without_base") == counted + 2
     )
     assert after["map"]["revision"] == status["map"]["revision"]
+
+
+def test_an_update_that_lacks_its_map_asks_for_it(daemon, outsider):
+    """Who publishes the map latched need not do anything; the newest one comes again."""
+    with open_bus(BusSettings(connect=(daemon.endpoint,))) as mapper:
+        prefix = outsider.prefix
+        latched = mapper.publisher(f"{prefix}/map", "nav_msgs/msg/OccupancyGrid", latched=True)
+        before = (outsider.ask_status()["map"] or {"revision": 0})["revision"]
+        latched.put(map_bytes(room(3.0, 3.0)))
+        outsider.wait_status(lambda status: (status["map"] or {}).get("revision") == before + 1)
+        time.sleep(ASK_FOR_MAP_S)  # it was asked for by a test before, perhaps
+        outsider.put("map_update", update_bytes(room(9.0, 9.0), 5.0, 5.0, 6.0, 6.0))
+        outsider.wait_status(lambda status: status["map"]["revision"] == before + 2)
 
 
 def test_queries_with_junk_are_answered_or_not_but_harm_nothing(outsider):
