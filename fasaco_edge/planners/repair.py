@@ -32,7 +32,7 @@ from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.work import NO_WORK, SearchProgress
 
 # Kicks that a neighbourhood gets, and how many before it is asked whether to stop.
-KICKS = 100
+KICKS = 80
 KICKS_AT_ONCE = 20
 
 # So many of them hold still what is just ahead.
