@@ -76,19 +76,19 @@ class Sight:
         else:
             far = self._scan(self._misreading.far, at, self._reach_px)
             near = self._scan(self._misreading.near, at, SURE_M / self.geometry.resolution)
-            changed = _union(far, near)
+            changed = Window.around(far, near)
             if changed is not None:
                 here = changed.slices_in(Window(0, 0, *self._known.shape))
                 self._known[here] = self._misreading.believed(here)
-        self._extent = _union(self._extent, changed)
-        self._changed = _union(self._changed, changed)
+        self._extent = Window.around(self._extent, changed)
+        self._changed = Window.around(self._changed, changed)
 
     def news(self) -> MapReceived | PatchReceived | None:
         """Return what a mapper would publish now; None where there is nothing new."""
         if self._changed is None or self._extent is None:
             return None
         changed, self._changed = self._changed, None
-        extent = self._in_chunks(self._extent)
+        extent = self._extent.in_chunks(self._chunk_px, *self._known.shape)
         if extent == self._sent:
             rows, cols = changed.slices_in(Window(0, 0, *self._known.shape))
             patch = self._known[rows, cols].copy()
@@ -135,16 +135,7 @@ class Sight:
         scanner = Scanner(*at, reach_px, self._footprint.free_at_most)
         seen = cast_rays(self.truth, known, scanner, self._rays)
         stood_on = reveal_disc(self.truth, known, *at, self._hull_px)
-        return _union(_window(seen), _window(stood_on))
-
-    def _in_chunks(self, window: Window) -> Window:
-        chunk, (rows, cols) = self._chunk_px, self._known.shape
-        return Window(
-            window.row0 // chunk * chunk,
-            window.col0 // chunk * chunk,
-            min(-(-window.row1 // chunk) * chunk, rows),
-            min(-(-window.col1 // chunk) * chunk, cols),
-        )
+        return Window.around(Window(*map(int, seen)), Window(*map(int, stood_on)))
 
 
 def _rays(reach_px: float) -> NDArray[np.float64]:
@@ -156,19 +147,3 @@ def _rays(reach_px: float) -> NDArray[np.float64]:
     rays = max(math.ceil(2.0 * math.pi * reach_px), 4)
     angles = np.arange(rays) * (2.0 * math.pi / rays)
     return np.column_stack((np.cos(angles), np.sin(angles)))
-
-
-def _window(changed: tuple[int, int, int, int]) -> Window | None:
-    row0, col0, row1, col1 = (int(bound) for bound in changed)
-    return Window(row0, col0, row1, col1) if row0 < row1 else None
-
-
-def _union(one: Window | None, other: Window | None) -> Window | None:
-    if one is None or other is None:
-        return one or other
-    return Window(
-        min(one.row0, other.row0),
-        min(one.col0, other.col0),
-        max(one.row1, other.row1),
-        max(one.col1, other.col1),
-    )

@@ -44,6 +44,28 @@ class Window:
         row1, col1 = min(self.row1, other.row1), min(self.col1, other.col1)
         return Window(row0, col0, row1, col1) if row0 < row1 and col0 < col1 else None
 
+    @classmethod
+    def around(cls, *windows: Window | None) -> Window | None:
+        """Return the smallest rectangle around those with cells in them; None without any."""
+        held = [window for window in windows if window and window.rows > 0 and window.cols > 0]
+        if not held:
+            return None
+        return cls(
+            min(window.row0 for window in held),
+            min(window.col0 for window in held),
+            max(window.row1 for window in held),
+            max(window.col1 for window in held),
+        )
+
+    def in_chunks(self, chunk: int, rows: int, cols: int) -> Window:
+        """Return it rounded outward to whole chunks of a grid of ``rows`` x ``cols`` cells."""
+        return Window(
+            self.row0 // chunk * chunk,
+            self.col0 // chunk * chunk,
+            min(-(-self.row1 // chunk) * chunk, rows),
+            min(-(-self.col1 // chunk) * chunk, cols),
+        )
+
     def moved(self, rows: int, cols: int) -> Window:
         """Return the rectangle so many rows and columns further on."""
         return Window(self.row0 + rows, self.col0 + cols, self.row1 + rows, self.col1 + cols)

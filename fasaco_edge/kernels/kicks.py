@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 from fasaco_edge.kernels.local_search import accepts, improve
+from fasaco_edge.kernels.neighbourhood import neighbourhood
 from fasaco_edge.kernels.parity import (
     Tally,
     change_step,
@@ -68,7 +69,7 @@ class Memory(NamedTuple):
         best_counts: int64 (3,), its counts as in ``Walk``.
         touched: int32 (n,), cells that the kick changed something at.
         area: int32 (n,), their surroundings.
-        marked: int64 (n,), number of the last kick whose surroundings hold the cell.
+        marked: int32 (n,), number of the last kick whose surroundings hold the cell.
         work: int64 (2,), PROPOSALS and KICKS so far.
     """
 
@@ -77,7 +78,7 @@ class Memory(NamedTuple):
     best_counts: NDArray[np.int64]
     touched: NDArray[np.int32]
     area: NDArray[np.int32]
-    marked: NDArray[np.int64]
+    marked: NDArray[np.int32]
     work: NDArray[np.int64]
 
 
@@ -182,31 +183,6 @@ def _change_parity(
 
 
 @lean_kernel
-def _surroundings(ground: Ground, memory: Memory, touched: int, radius: int, number: int) -> int:
-    """List in ``area`` the cells within ``radius`` steps of those touched; return their number."""
-    size = 0
-    for index in range(touched):
-        cell = memory.touched[index]
-        if memory.marked[cell] != number:
-            memory.marked[cell] = number
-            memory.area[size] = cell
-            size += 1
-    first = 0
-    for _ in range(radius):
-        last = size
-        for index in range(first, last):
-            cell = memory.area[index]
-            for direction in range(4):
-                beside = cell + ground.offsets[direction]
-                if ground.steps[cell] >> direction & 1 and memory.marked[beside] != number:
-                    memory.marked[beside] = number
-                    memory.area[size] = beside
-                    size += 1
-        first = last
-    return size
-
-
-@lean_kernel
 def _settle(
     ground: Ground,
     walk: Walk,
@@ -222,7 +198,9 @@ def _settle(
         improve(ground, walk, prices, memory.area[:0], 0, proposals, random)
         memory.work[PROPOSALS] += proposals
         return
-    size = _surroundings(ground, memory, touched, rules.radius, memory.work[KICKS] + 1)
+    number = memory.work[KICKS] + 1
+    around = memory.touched[:touched]
+    size = neighbourhood(ground, around, rules.radius, memory.marked, number, memory.area)
     proposals = rules.mixing * size // COOLING.size
     for level in COOLING:
         heat = rules.heat_us * level >> 10

@@ -3,13 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
-from fasaco_edge.kernels.walk_array import Ground
-
-
-@inlined
-def _axis(one: int, other: int) -> int:
-    return 0 if abs(one - other) == 1 else 1
+from fasaco_edge.kernels.jit import lean_kernel
+from fasaco_edge.kernels.walk_array import Ground, axis_of
 
 
 @lean_kernel
@@ -33,15 +28,15 @@ def changed_cells(
     """
     for index in range(walk.size - 1):
         one, other = walk[index], walk[index + 1]
-        times[min(one, other), _axis(one, other)] += 1
+        times[min(one, other), axis_of(one, other)] += 1
     for index in range(before.size - 1):
         one, other = before[index], before[index + 1]
-        times[min(one, other), _axis(one, other)] -= 1
+        times[min(one, other), axis_of(one, other)] -= 1
     listed = 0
     for steps in (walk, before):
         for index in range(steps.size - 1):
             one, other = steps[index], steps[index + 1]
-            if times[min(one, other), _axis(one, other)] == 0:
+            if times[min(one, other), axis_of(one, other)] == 0:
                 continue
             for cell in (one, other):
                 if ground.steps[cell]:
@@ -56,15 +51,17 @@ def neighbourhood(
     cells: NDArray[np.int32],
     radius: int,
     labels: NDArray[np.int32],
+    label: int,
     found: NDArray[np.int32],
 ) -> int:
-    """Label some cells, and those around them, with 1.
+    """Label some cells, and those around them.
 
     Args:
         ground: where they lie.
         cells: int32 (n,).
         radius: steps from them to the rim.
-        labels: int32 (cells of the ground,), all 0; changed in place.
+        labels: int32 (cells of the ground,), changed in place.
+        label: one that no cell has yet.
         found: out, int32 (room,), the labelled cells, nearest first; no more are labelled
             than there is room for.
 
@@ -73,8 +70,8 @@ def neighbourhood(
     """
     size = 0
     for cell in cells:
-        if labels[cell] == 0 and size < found.size:
-            labels[cell] = 1
+        if labels[cell] != label and size < found.size:
+            labels[cell] = label
             found[size] = cell
             size += 1
     first = 0
@@ -84,9 +81,9 @@ def neighbourhood(
             cell = found[index]
             for direction in range(4):
                 beside = cell + ground.offsets[direction]
-                is_open = ground.steps[cell] >> direction & 1 and labels[beside] == 0
+                is_open = ground.steps[cell] >> direction & 1 and labels[beside] != label
                 if is_open and size < found.size:
-                    labels[beside] = 1
+                    labels[beside] = label
                     found[size] = beside
                     size += 1
         first = last

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.directions import NORTH
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 from fasaco_edge.kernels.random import draw, index_of
-from fasaco_edge.kernels.walk_array import LENGTH, Ground, Walk
+from fasaco_edge.kernels.walk_array import LENGTH, Ground, Walk, axis_of
 
 # Odds of a change that makes the walk longer by so many steps, from -16 on:
 # e ** (-steps / 3), in whole numbers.
@@ -81,11 +81,6 @@ class Tally(NamedTuple):
 
 
 @inlined
-def _axis(ground: Ground, one: int, other: int) -> int:
-    return 0 if abs(one - other) == 1 else 1
-
-
-@inlined
 def _direction(ground: Ground, one: int, other: int) -> int:
     for direction in range(4):
         if ground.offsets[direction] == other - one:
@@ -113,7 +108,7 @@ def count_steps(ground: Ground, walk: Walk, tally: Tally) -> None:
     for index in range(walk.counts[LENGTH] - 1):
         one, other = walk.cells[index], walk.cells[index + 1]
         if one < bound and other < bound:
-            tally.times[min(one, other), _axis(ground, one, other)] += 1
+            tally.times[min(one, other), axis_of(one, other)] += 1
 
 
 @lean_kernel
@@ -184,7 +179,7 @@ def _odds(growth: int) -> int:
 @inlined
 def change_step(ground: Ground, tally: Tally, one: int, other: int) -> None:
     """Walk a step once less where it is walked twice, else once more."""
-    edge, axis = min(one, other), _axis(ground, one, other)
+    edge, axis = min(one, other), axis_of(one, other)
     tally.times[edge, axis] += -1 if tally.times[edge, axis] >= 2 else 1
 
 

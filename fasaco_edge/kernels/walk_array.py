@@ -101,6 +101,12 @@ def leads(ground: Ground, here: int, there: int) -> bool:
 
 
 @inlined
+def axis_of(one: int, other: int) -> int:
+    """Return 0 for two cells side by side in a row, 1 in a column."""
+    return 0 if abs(one - other) == 1 else 1
+
+
+@inlined
 def turning(before: int, here: int, after: int, quarter_turn_us: int) -> int:
     """Return the cost [us] of the turn between two steps."""
     first, second = here - before, after - here

@@ -60,8 +60,8 @@ class Intake:
         assert site.free is not None
         assert site.grid is not None
         parts.watch.map_came(parts.now)
-        if site.map_moved:
-            parts.log.part()
+        if site.map_moved and site.pose is not None:
+            parts.log.part(site.pose.pose)
         else:
             self._record()  # the pose may have come before the map
         misfit = parts.log.check(site.free, site.grid.frame)

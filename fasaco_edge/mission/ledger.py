@@ -126,11 +126,10 @@ class CoverageLedger:
         """Note that nobody knows how the robot gets to its next pose."""
         self._last = None
 
-    def part(self) -> Pose2D | None:
-        """Note that the map moved under the robot; return its last pose on the old one."""
-        last, self._last = self._last, None
+    def part(self) -> None:
+        """Note that the map moved under the robot: nobody knows any more what the tool is on."""
+        self.lift()
         self._under_tool = frozenset()
-        return last
 
     def forget(self, inside: Callable[[Window], NDArray[np.bool_]]) -> None:
         """Forget all visits to some cells, but the one to what lies under the tool now.

@@ -47,9 +47,10 @@ class Logbook:
         if self._resumed is not None:
             self._resumed.lift()
 
-    def part(self) -> None:
-        """Note that the map has moved; where to, the next pose tells."""
-        self._parted_at = self.ledger.part()
+    def part(self, pose: Pose2D) -> None:
+        """Note that the map has moved under a robot at ``pose``; where to, the next one tells."""
+        self._parted_at = pose
+        self.ledger.part()
         if self._resumed is not None:
             self._resumed.part()
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.grid.lattice import UNKNOWN
+from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
 from fasaco_edge.mission.ledger import LedgerSnapshot
 
 # So many cells turn from free to blocked or back in one map, and such a share of those that were
@@ -34,15 +34,22 @@ def has_moved(change: LatticeChange) -> bool:
     """Tell whether a map shows walls elsewhere all over."""
     if change.before is None or len(change.cells) < LEAST_CELLS:
         return False
-    old, new = change.before.window, change.after.window
-    common = old.intersection(new)
-    if common is None:
-        return False
-    then = change.before.states[common.slices_in(old)]
-    now = change.after.states[common.slices_in(new)]
-    known = then != UNKNOWN
-    turned = int(np.count_nonzero(known & (now != UNKNOWN) & (then != now)))
-    return turned >= max(LEAST_CELLS, LEAST_SHARE * int(np.count_nonzero(known)))
+    then, now = _states(change.before, change.cells), _states(change.after, change.cells)
+    turned = int(np.count_nonzero((then != UNKNOWN) & (now != UNKNOWN) & (then != now)))
+    # The whole lattice is looked at only where that may matter: this is asked at every map.
+    return turned >= LEAST_CELLS and turned >= LEAST_SHARE * int(
+        np.count_nonzero(change.before.states != UNKNOWN)
+    )
+
+
+def _states(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """Return the states of cells (row, col), (n, 2); those beyond the lattice are UNKNOWN."""
+    window = lattice.window
+    rows, cols = cells[:, 0] - window.row0, cells[:, 1] - window.col0
+    inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
+    states = np.full(len(cells), UNKNOWN, np.uint8)
+    states[inside] = lattice.states[rows[inside], cols[inside]]
+    return states
 
 
 @dataclass(frozen=True, slots=True)

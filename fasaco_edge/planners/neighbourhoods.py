@@ -67,7 +67,7 @@ def _around(
     labels = np.zeros(framed.ground.bound, np.int32)
     found = np.empty(MOST_CELLS, np.int32)
     begin = np.concatenate((ahead, changed[:MOST_CHANGED]))
-    size = neighbourhood(framed.ground, begin, RADIUS, labels, found)
+    size = neighbourhood(framed.ground, begin, RADIUS, labels, 1, found)
     rows, cols = np.divmod(found[:size], framed.width)
     row, col = int(rows.min()), int(cols.min())
     box = Box(labels, 1, row, col, int(rows.max()) - row + 1, int(cols.max()) - col + 1)

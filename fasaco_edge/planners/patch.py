@@ -58,7 +58,7 @@ class Patch:
             best_counts=np.zeros(3, np.int64),
             touched=np.empty(size, np.int32),
             area=np.empty(size, np.int32),
-            marked=np.zeros(size, np.int64),
+            marked=np.zeros(size, np.int32),
             work=np.zeros(2, np.int64),
         )
         self._sections = np.empty((jumps, 2), np.int32)

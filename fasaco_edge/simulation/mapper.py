@@ -61,8 +61,8 @@ class Mapper:
         scanner = Scanner(x, y, self._reach_px, self._free_at_most)
         seen = cast_rays(truth, known, scanner, directions)
         stood_on = reveal_disc(truth, known, x, y, self._hull_px)
-        changed = _union(_window(seen), _window(stood_on))
-        self._extent = _union(self._extent, changed)
+        changed = Window.around(Window(*map(int, seen)), Window(*map(int, stood_on)))
+        self._extent = Window.around(self._extent, changed)
         return changed
 
     def is_clear(self, start: Point, end: Point) -> bool:
@@ -92,34 +92,9 @@ class Mapper:
         """
         if self._extent is None:
             return None
-        window = self._in_chunks(self._extent)
+        window = self._extent.in_chunks(self._chunk_px, *self._known.shape)
         geometry = self._truth.geometry
         origin = Pose2D(*geometry.to_map(window.col0, window.row0), geometry.origin.yaw)
         cells = self._known[window.row0 : window.row1, window.col0 : window.col1].copy()
         placed = GridGeometry(window.rows, window.cols, geometry.resolution, origin)
         return OccupancyGrid(placed, cells, self._truth.frame, stamp_ns)
-
-    def _in_chunks(self, window: Window) -> Window:
-        chunk, (rows, cols) = self._chunk_px, self._known.shape
-        return Window(
-            window.row0 // chunk * chunk,
-            window.col0 // chunk * chunk,
-            min(-(-window.row1 // chunk) * chunk, rows),
-            min(-(-window.col1 // chunk) * chunk, cols),
-        )
-
-
-def _window(changed: tuple[int, int, int, int]) -> Window | None:
-    row0, col0, row1, col1 = (int(bound) for bound in changed)
-    return Window(row0, col0, row1, col1) if row0 < row1 else None
-
-
-def _union(one: Window | None, other: Window | None) -> Window | None:
-    if one is None or other is None:
-        return one or other
-    return Window(
-        min(one.row0, other.row0),
-        min(one.col0, other.col0),
-        max(one.row1, other.row1),
-        max(one.col1, other.col1),
-    )

@@ -136,3 +136,14 @@ def test_slices_pick_a_window_out_of_an_array(inner, outer):
     assert rows[picked].shape == (common.rows, common.cols)
     cells = zip(rows[picked].ravel().tolist(), cols[picked].ravel().tolist(), strict=True)
     assert set(cells) == cells_of(common)
+
+
+def test_a_window_is_laid_around_those_with_cells():
+    one, other, empty = Window(1, 2, 3, 4), Window(0, 5, 2, 9), Window(7, 7, 7, 9)
+    assert Window.around(one, None, other, empty) == Window(0, 2, 3, 9)
+    assert Window.around(None, one) == one
+    assert Window.around(empty, None) is None
+
+
+def test_a_window_is_rounded_outward_to_chunks():
+    assert Window(5, 8, 9, 12).in_chunks(4, 10, 40) == Window(4, 8, 10, 12)

@@ -171,7 +171,7 @@ def memory_on(ground, room):
         best_counts=guarded(3, np.int64),
         touched=guarded(size, np.int32),
         area=guarded(size, np.int32),
-        marked=guarded(size, np.int64),
+        marked=guarded(size, np.int32),
         work=guarded(2, np.int64),
     )
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fasaco_edge.kernels.costs import walk_cost
 from fasaco_edge.kernels.local_search import accepts, improve
 from fasaco_edge.kernels.random import draw, index_of
 from fasaco_edge.kernels.walk_array import COST, LENGTH
@@ -196,3 +197,33 @@ def test_on_an_open_floor_next_to_no_cell_is_visited_twice(seed):
 def test_a_corridor_is_walked_once(seed):
     assert improved(lattice("." * 30), PRICES[0], (0, 0), seed)[0] == 29
     assert improved(lattice(*"." * 30), PRICES[2], (0, 0), seed)[0] == 29
+
+
+def cost_of(cells, prices):
+    return walk_cost(np.array(cells, np.int32), prices.step_us, prices.quarter_turn_us)
+
+
+@pytest.mark.parametrize("prices", [PRICES[0], PRICES[2]])
+@pytest.mark.parametrize("held", [0, 12])
+def test_held_visits_move_only_where_something_is_gained(prices, held):
+    """Proposal by proposal; that without a hold they move shows that there is something to hold."""
+    moved = 0
+    for seed in range(12):
+        task = task_on(ROOMS["rooms"][0].steps, (0, 0), np.random.default_rng(seed))
+        ground, random = task.ground(), stream(seed)
+        walk = walk_on(ground, task.cells(), prices)
+        for _ in range(2000):
+            before = cells_of(walk)
+            improve(
+                ground,
+                walk,
+                prices._replace(held=held),
+                EVERYWHERE,
+                prices.quarter_turn_us,
+                1,
+                random,
+            )
+            after = cells_of(walk)
+            gained = cost_of(after, prices) < cost_of(before, prices)
+            moved += not gained and after[:12] != before[:12]
+    assert (moved == 0) == (held > 0)

@@ -157,19 +157,6 @@ def test_many_changes_on_a_large_ground_are_all_repaired():
     assert path.gap < 0.5 * (only_mended / path.lower_bound_steps - 1)
 
 
-def test_just_ahead_of_the_robot_nothing_moves_for_nothing():
-    held = []
-    for seed in range(20):
-        problem = driven_halfway(seed, change=0.0, cost=CoverageCost())
-        path = repaired(problem, "fasaco", 0, WorkLimit(SearchWork(kicks=1)))
-        framed = FramedGround.of(problem)
-        flat = framed.unframed(mended(problem, framed, problem.before))
-        if path.steps == len(flat) - 1:
-            held.append(np.array_equal(path.cells, np.column_stack(np.divmod(flat, framed.cols))))
-    assert held
-    assert all(held)
-
-
 def test_a_walk_far_above_its_bound_is_planned_anew():
     free = np.ones((12, 12), bool)
     lattice = CoverageLattice.from_free(free)
