@@ -64,7 +64,22 @@ def effort_for(cost: CoverageCost) -> Effort:
     return Effort(heats, 250, heating, 500)
 
 
-def repair_for(cost: CoverageCost) -> KickRules:
+@dataclass(frozen=True, slots=True)
+class RepairEffort:
+    """The plan of a repair.
+
+    Attributes:
+        rules: how to kick.
+        kicks: that a neighbourhood gets.
+        held_kicks: so many of them hold still what is just ahead of the robot.
+    """
+
+    rules: KickRules
+    kicks: int
+    held_kicks: int
+
+
+def repair_for(cost: CoverageCost) -> RepairEffort:
     """Return how to improve a mended walk: nothing is taken that gains nothing.
 
     What is kicked is the neighbourhood of what changed, small enough to be mixed whole
@@ -81,6 +96,7 @@ def repair_for(cost: CoverageCost) -> KickRules:
         strict=True,
     )
     if not cost.quarter_turn_us:
-        return rules
+        return RepairEffort(rules, 50, 40)
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
-    return rules._replace(mixing=40, radius=6, heat_us=unit * 3 // 2, loops_of_256=128)
+    rules = rules._replace(mixing=40, radius=6, heat_us=unit * 3 // 2, loops_of_256=128)
+    return RepairEffort(rules, 80, 60)

@@ -13,7 +13,7 @@ from fasaco_edge.planners.problem import CoverageProblem
 
 
 def mended(
-    problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32]
+    problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32], held: int = 0
 ) -> NDArray[np.int32]:
     """Return a walk that solves ``problem`` and keeps what holds of ``before``.
 
@@ -21,6 +21,7 @@ def mended(
         problem: as it is now.
         framed: its ground.
         before: int32 (n, 2), the walk that was still to be driven, cells (row, col).
+        held: so many first visits stay as they are where they can.
 
     Returns:
         Framed cells, int32 (m,).
@@ -31,7 +32,7 @@ def mended(
     kept = np.empty(room, np.int32)
     length = keep_legal(framed.ground, cells, start, kept)
     whole = np.empty(length + 2 * framed.ground.bound, np.int32)
-    size = put_in_new(framed.ground, kept[:length], problem.end is None, whole)
+    size = put_in_new(framed.ground, kept[:length], problem.end is None, held, whole)
     walk = whole[:size].copy()
     return walk if problem.end is None else _with_end(problem, framed, walk)
 

@@ -31,12 +31,8 @@ from fasaco_edge.planners.planner import StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.work import NO_WORK, SearchProgress
 
-# Kicks that a neighbourhood gets, and how many before it is asked whether to stop.
-KICKS = 80
-KICKS_AT_ONCE = 20
-
-# So many of them hold still what is just ahead.
-HELD_KICKS = 60
+# Kicks before it is asked whether to stop.
+KICKS_AT_ONCE = 10
 
 # The robot is about to drive these cells: five metres of common ones.
 HELD = 18
@@ -74,8 +70,8 @@ class _Repair:
         self._problem = problem
         self._framed = FramedGround.of(problem)
         self._prices = Prices(cost.step_us, cost.quarter_turn_us, problem.end is None)
-        self._rules = repair_for(cost)
-        self._walk = mended(problem, self._framed, problem.before)
+        self._effort = repair_for(cost)
+        self._walk = mended(problem, self._framed, problem.before, HELD)
         self._first_walk_s = time.perf_counter() - began
         before = framed_cells(problem, self._framed, problem.before)
         self._changed = _changed(self._framed, before, self._walk)
@@ -103,13 +99,13 @@ class _Repair:
         """
         for held in (HELD, 0) if place.is_first else (0,):
             patch.hold(held)
-            patch.touch_up(place.changed, self._rules, self._random)
+            patch.touch_up(place.changed, self._effort.rules, self._random)
             yield
-        for kicks in range(0, KICKS, KICKS_AT_ONCE):
+        for kicks in range(0, self._effort.kicks, KICKS_AT_ONCE):
             if not self._prices.quarter_turn_us and self.progress().steps == self._bound:
                 return
-            patch.hold(HELD if place.is_first and kicks < HELD_KICKS else 0)
-            patch.kick(self._rules, KICKS_AT_ONCE, self._random)
+            patch.hold(HELD if place.is_first and kicks < self._effort.held_kicks else 0)
+            patch.kick(self._effort.rules, KICKS_AT_ONCE, self._random)
             yield
 
     def _unload(self) -> None:
