@@ -55,10 +55,8 @@ class Summary:
 
     @property
     def unchanged(self) -> float | None:
-        """Share of new paths that changed nothing of the next metres, median of missions."""
-        return _median(
-            sum(share == 1.0 for share in run.kept) / len(run.kept) for run in self.runs if run.kept
-        )
+        """Share of maps that changed nothing of the next metres, median of missions."""
+        return _median(sum(run.updates) / len(run.updates) for run in self.runs if run.updates)
 
     def replan_ms(self, percent: float, *, cpu: bool = False) -> float | None:
         """Return a percentile of all replans, by the clock or of processors [ms]."""

@@ -39,8 +39,11 @@ def goals(summary: Summary, misread: float, *, with_turns: bool) -> Iterator[Goa
     yield _goal("replan, p99", summary.replan_ms(99), REPLAN_MS, "ms")
     yield _goal("replan p99 to a full plan, median", summary.replan_to_full, REPLAN_TO_FULL)
     yield _goal("map ingest, p99", summary.ingest_ms(99), INGEST_MS, "ms")
-    kept = summary.kept
-    yield Goal("next 5 m kept", None if kept is None else round(kept, 4), KEPT, at_least=True)
+    for what, share in (
+        ("next 5 m kept at new paths, share", summary.kept),
+        ("maps that leave the next 5 m as they were, share", summary.unchanged),
+    ):
+        yield Goal(what, None if share is None else round(share, 4), KEPT, at_least=True)
     yield _goal("robot waiting, share of time", summary.waiting, WAITING)
 
 

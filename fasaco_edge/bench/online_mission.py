@@ -131,11 +131,11 @@ class OnlineMission:
             self._on_its_way = None
         before, paths = self.robot.ahead, self.watch.paths
         self._decide(events, with_map=news is not None)
-        lattice = self._mission.lattice
-        if lattice is not None and (news is not None or self.watch.paths > paths):
-            self._stale = len(self.robot.ahead) > 1 and not is_legal(self.robot.ahead, lattice)
-            if self.watch.paths > paths:
-                self.watch.compare(before, self.robot.ahead, lattice)
+        lattice, ahead = self._mission.lattice, self.robot.ahead
+        with_map, with_path = news is not None, self.watch.paths > paths
+        if lattice is not None and (with_map or with_path):
+            self._stale = len(ahead) > 1 and not is_legal(ahead, lattice)
+            self.watch.compare(before, ahead, lattice, with_path=with_path, with_map=with_map)
 
     def _decide(self, events: list[Event], *, with_map: bool) -> None:
         decision, stepping = self._step(events)

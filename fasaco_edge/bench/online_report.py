@@ -30,7 +30,7 @@ REMARKS = (
     "to known: to the near-optimal walk of a robot that knew the building from the start; the "
     "median over missions, below it the worst. overlap, turns: revisits and quarter-turns a "
     "cell. kept: how much of the next 5 m stayed the same, up to the first change, at each new "
-    "path in place of one still valid; same: the share of new paths that changed nothing of it. "
+    "path in place of one still valid; same: the share of maps that changed nothing of it. "
     "stale: driven on a path that the newest map had blocked further on.",
     "replan: from the request to the path, but for the first; full plan: of all the building by "
     "the same planner; p99 to full: of a mission, the median. ingest: a step of the mission with "

@@ -46,7 +46,7 @@ class MissionRun:
         plans, paths: how many were asked for, and published.
         held_up: how often the robot stood before an obstacle that its path led into.
         stale_m: way driven on a path that the newest map had blocked further on [m].
-        replans, ingests, kept: see ``Watch``.
+        replans, ingests, kept, updates: see ``Watch``.
     """
 
     building: str
@@ -74,6 +74,7 @@ class MissionRun:
     replans: tuple[Elapsed, ...]
     ingests: tuple[Elapsed, ...]
     kept: tuple[float, ...]
+    updates: tuple[bool, ...]
 
     @property
     def covered_all(self) -> bool:
@@ -93,7 +94,7 @@ class MissionRun:
     def document(self) -> dict[str, Any]:
         """Return this as JSON values."""
         document = asdict(self)
-        for name in ("replans", "ingests", "kept"):
+        for name in ("replans", "ingests", "kept", "updates"):
             del document[name]
         for name, times in (("replan", self.replans), ("ingest", self.ingests)):
             for percent in (50, 99, 100):

@@ -160,4 +160,5 @@ def _run(
         replans=tuple(watch.replans),
         ingests=tuple(watch.ingests),
         kept=tuple(watch.kept),
+        updates=tuple(watch.updates),
     )

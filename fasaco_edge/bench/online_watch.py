@@ -48,6 +48,7 @@ class Watch:
         replans: of each path but the first, how long it took from the decision to it.
         kept: of each path that took the place of one still valid, the share of the next
             steps that stayed the same up to the first that did not.
+        updates: of each map that left the next steps valid, whether they stayed the same.
         paths: how many were published.
         requests: how many plans were asked for.
         waiting_s: how long the robot stood without a way to go [s].
@@ -60,6 +61,7 @@ class Watch:
     ingests: list[Elapsed] = field(default_factory=list)
     replans: list[Elapsed] = field(default_factory=list)
     kept: list[float] = field(default_factory=list)
+    updates: list[bool] = field(default_factory=list)
     paths: int = 0
     requests: int = 0
     waiting_s: float = 0.0
@@ -68,16 +70,31 @@ class Watch:
     faults: list[str] = field(default_factory=list)
 
     def compare(
-        self, before: NDArray[np.int32], after: NDArray[np.int32], lattice: CoverageLattice
+        self,
+        before: NDArray[np.int32],
+        after: NDArray[np.int32],
+        lattice: CoverageLattice,
+        *,
+        with_path: bool,
+        with_map: bool,
     ) -> None:
-        """Note what a new path keeps of the one before, both from the robot's cell on."""
+        """Note what is kept of the way ahead, from the robot's cell on.
+
+        Args:
+            before, after: int32 (n, 2), the way ahead then and now.
+            lattice: as it is now.
+            with_path, with_map: whether a path was published, and a map came.
+        """
         last, then = before[: self.next_cells + 1], after[: self.next_cells + 1]
         if len(last) < 2 or not len(then) or not is_legal(last, lattice):
             return
         common = min(len(last), len(then))
         same = (last[:common] == then[:common]).all(axis=1)
-        kept = common if same.all() else int(np.argmin(same))
-        self.kept.append(max(kept - 1, 0) / (len(last) - 1))
+        kept = max((common if same.all() else int(np.argmin(same))) - 1, 0) / (len(last) - 1)
+        if with_path:
+            self.kept.append(kept)
+        if with_map:
+            self.updates.append(kept == 1.0)
 
 
 def is_legal(walk: NDArray[np.int32], lattice: CoverageLattice) -> bool:

@@ -214,18 +214,24 @@ def test_kept_is_counted_up_to_the_first_change():
     lattice = CoverageLattice.from_free(np.ones((3, 6), bool))
     before = np.array([(0, col) for col in range(6)], np.int32)
     watch = Watch(next_cells=4)
-    watch.compare(before, before[:3], lattice)
+
+    def compare(before, after, lattice, *, with_path=True, with_map=True):
+        watch.compare(before, after, lattice, with_path=with_path, with_map=with_map)
+
     detour = np.array([(0, 0), (0, 1), (1, 1), (1, 2), (0, 2), (0, 3)], np.int32)
-    watch.compare(before, detour, lattice)
-    watch.compare(before, before[::-1], lattice)
-    watch.compare(before, before, lattice)
+    compare(before, before[:3], lattice)
+    compare(before, detour, lattice, with_map=False)
+    compare(before, before[::-1], lattice)
+    compare(before, before, lattice)
+    compare(before, before, lattice, with_path=False)
     assert watch.kept == [0.5, 0.25, 0.0, 1.0]
+    assert watch.updates == [False, False, True, True]
     # One that could not have been driven is no standard, nor one that was at its end.
     walled = CoverageLattice.from_free(free_of("......", "......", "..#..."))
-    watch.compare(before, detour, walled)
-    watch.compare(before[:1], before, lattice)
-    watch.compare(before, before[:0], lattice)
-    assert len(watch.kept) == 4
+    compare(before, detour, walled)
+    compare(before[:1], before, lattice)
+    compare(before, before[:0], lattice)
+    assert (len(watch.kept), len(watch.updates)) == (4, 4)
 
 
 @pytest.mark.parametrize("misread", [0.0, 0.3])
@@ -367,7 +373,8 @@ def test_figures(capsys, tmp_path):
     assert document["full_plan_ms"] > 0.0
     assert document["ingest_ms_p99"] > 0.0
     assert 0.0 < document["replan_cpu_ms_p50"] <= document["replan_cpu_ms_p99"]
-    assert 0.0 <= document["unchanged_share"] <= document["kept_share"] <= 1.0
+    assert 0.0 <= document["unchanged_share"] <= 1.0
+    assert 0.0 <= document["kept_share"] <= 1.0
     assert document["waiting_share"] == 0.0
     assert document["conditions"]["cost"] == "turns"
     assert document["beside"]["maze-s0"]["missions"] == 2
