@@ -130,10 +130,11 @@ def _open_late(mission: OnlineMission) -> bool:
 
 
 def _close_loop(mission: OnlineMission) -> bool:
-    """Let the mapper find out that all lies elsewhere."""
+    """Let the mapper find out that all lies elsewhere, and say so before the robot drives on."""
     if _share(mission) < LATE:
         return False
     mission.sight.place_anew(JUMP)
+    mission.sense()
     return True
 
 

@@ -94,14 +94,14 @@ class OnlineMission:
         """
         most = MOST_VISITS * int(np.count_nonzero(self.building.reachable)) + 1000
         moved_at = self.now
-        self._sense()
+        self.sense()
         while not self.done and len(self.robot.trail) < most:
             act(self)
             if self._go():
                 moved_at = self.now
             elif self.now - moved_at > PATIENCE_S:
                 return
-            self._sense()
+            self.sense()
 
     def _go(self) -> bool:
         """Drive a leg, or stand for a tick; tell which."""
@@ -119,7 +119,7 @@ class OnlineMission:
         self.now = until
         return False
 
-    def _sense(self) -> None:
+    def sense(self) -> None:
         """Look around, tell the mission, and do what it decides."""
         self.sight.look(self.robot.at)
         news = self.sight.news()

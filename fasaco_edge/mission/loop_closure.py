@@ -88,7 +88,7 @@ def doubtful(before: LedgerSnapshot, motion: Motion) -> Callable[[Window], NDArr
         doubt = np.zeros(rows.shape, bool)
         for share in BETWEEN:
             doubt |= ~_covered(before, *motion.back(share, x, y))
-        return doubt
+        return doubt | _between_cells(before.cell_m, *motion.back(1.0, x, y))
 
     return inside
 
@@ -108,3 +108,15 @@ def _covered(
         for cols in (low_col, high_col):
             covered &= visited[rows - row0, cols - col0]
     return covered
+
+
+def _between_cells(
+    cell_m: float, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Tell which points [m] a round tool may have missed that was in the middle of each cell.
+
+    A map most often moves as a whole, to where it is now: only there is looked at it.
+    """
+    row, col = y / cell_m - 0.5, x / cell_m - 0.5
+    away: NDArray[np.bool_] = np.hypot(row - np.rint(row), col - np.rint(col)) >= 0.5
+    return away

@@ -88,6 +88,20 @@ def test_nothing_counts_that_the_tool_did_not_pass_over(seed):
         assert was[row - window.row0, col - window.col0]
 
 
+@pytest.mark.parametrize(("shift", "counts"), [((0.3, 0.0), True), ((0.15, 0.15), False)])
+def test_the_corner_of_four_cells_was_not_under_a_round_tool(shift, counts):
+    """It was in the middle of each of them; the map moved by a whole cell, or by half a cell."""
+    ledger = CoverageLedger(0.3)
+    for row in range(10):
+        for col in range(10):
+            ledger.lift()
+            ledger.record(Pose2D(0.3 * (col + 0.5), 0.3 * (row + 0.5)))
+    motion = Motion(Pose2D(1.5, 1.5), Pose2D(1.5 + shift[0], 1.5 + shift[1]))
+    doubt = doubtful(ledger.snapshot(), motion)(Window(3, 3, 7, 7))
+    assert doubt.all() != counts
+    assert doubt.any() != counts
+
+
 def test_who_stood_still_forgets_nothing():
     ledger = CoverageLedger(0.3)
     for step in range(40):
