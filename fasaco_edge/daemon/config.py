@@ -83,6 +83,9 @@ class PoseConfig(_Section, frozen=True):
 class PlannerConfig(_Section, frozen=True):
     """The colony, see ``planners.colony.ColonyConfig``; and the time one plan may take [s].
 
+    While the robot drives, ``spare_share`` of a processor core goes into making the rest of its
+    path better; fasaco with local search alone can do that.
+
     ``local_search`` is for fasaco alone; without it a plan may end before its budget.
 
     ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
@@ -102,6 +105,7 @@ class PlannerConfig(_Section, frozen=True):
     threads: Annotated[int, Meta(ge=1, le=64)] = 1
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.1
+    spare_share: Annotated[float, Meta(ge=0, le=1)] = 0.05
 
     def colony(self) -> ColonyConfig:
         """Return these as a colony.

@@ -52,6 +52,7 @@ class Loader:
         from fasaco_edge.mission.assignment import NO_ORDER, Assignment  # noqa: PLC0415
         from fasaco_edge.mission.config import MissionConfig  # noqa: PLC0415
         from fasaco_edge.mission.mission import Mission  # noqa: PLC0415
+        from fasaco_edge.planners.near_optimal import NearOptimal  # noqa: PLC0415
         from fasaco_edge.planners.table import planner_of  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
@@ -72,6 +73,7 @@ class Loader:
             retry_s=patience.retry_s,
             lost_pose_s=patience.lost_pose_s,
             stale_map_s=patience.stale_map_s,
+            spare_share=planner.spare_share if isinstance(chosen, NearOptimal) else 0.0,
         )
         first = Assignment.by_itself() if patience.autostart else Assignment.none(NO_ORDER)
         return Mission(mission, first), worker

@@ -130,6 +130,8 @@ class Loop:
             self._status.ingest_s = time.monotonic() - started
             if decision.plan is not None or mission.wants_plan:
                 self._unanswered_map = self._unanswered_map or self._map_arrived
+        if mission.wants_plan and mission.is_improving and self._worker is not None:
+            self._worker.interrupt()  # what is needed comes before what is only better
         try:
             self._perform(mission, decision)
             self._publish_coverage(mission, started)
@@ -157,7 +159,8 @@ class Loop:
             elif isinstance(item, BaseException):
                 raise item
             elif isinstance(item, PlanReady):
-                self._status.plan_s = item.seconds
+                if not (self._mission and self._mission.is_improving):
+                    self._status.plan_s = item.seconds
             elif kind in ("map", "map_update") and isinstance(item, Received):
                 self._map_arrived = item.at
 

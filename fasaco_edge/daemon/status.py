@@ -122,6 +122,7 @@ class StatusBoard:
             "path": self._path(mission),
             "plan": {
                 "plans": mission.plans if mission else 0,
+                "attempts": mission.attempts if mission else 0,
                 "planning": bool(mission and mission.planning),
             },
             "latency_ms": {

@@ -12,6 +12,9 @@ from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.planners.planner import CoveragePlanner, ignore
 from fasaco_edge.planners.stopping import AnyOf, Interrupt, TimeBudget
 
+# An attempt to make a path better takes so long [s].
+SPARE_S = 0.05
+
 
 class PlanningWorker:
     """Plans one request at a time and posts the result."""
@@ -61,7 +64,8 @@ class PlanningWorker:
         self._interrupt.clear()
         if self._stopping.is_set():
             return
-        stop = AnyOf(TimeBudget(self._budget_s), Interrupt(self._interrupt))
+        budget_s = min(self._budget_s, SPARE_S) if request.problem.only_better else self._budget_s
+        stop = AnyOf(TimeBudget(budget_s), Interrupt(self._interrupt))
         # To look at the trail costs time: only where somebody does.
         observe = self._observe if self._is_watched() else ignore
         path = self._planner.plan(request.problem, stop, observe)

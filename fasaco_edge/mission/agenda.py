@@ -102,8 +102,21 @@ class Agenda:
             self._memory.looked.clear()
         return "" if assignment.standing else assignment.title
 
-    def problem(self, cell: Cell, before: NDArray[np.int32]) -> CoverageProblem:
+    def problem(
+        self,
+        cell: Cell,
+        before: NDArray[np.int32],
+        *,
+        driven: NDArray[np.int32] | None = None,
+        only_better: bool = False,
+    ) -> CoverageProblem:
         """Return the problem of what is still to be covered now.
+
+        Args:
+            cell: where the robot is, or will be.
+            before: int32 (n, 2), the path from there on.
+            driven: int32 (m, 2), cells it will have driven by then; None for none.
+            only_better: see ``CoverageProblem``.
 
         Raises:
             NothingToCover: nothing is.
@@ -119,13 +132,17 @@ class Agenda:
             and lattice.contains(home)
             and ground.holds(home)
         )
+        covered = ~self.open_cells(lattice.window)
+        if driven is not None:
+            covered[tuple((driven - (lattice.window.row0, lattice.window.col0)).T)] = True
         return CoverageProblem.of(
             lattice,
             cell,
-            covered=~self.open_cells(lattice.window),
+            covered=covered,
             end=home if ends_home else None,
             cost=self._config.cost,
             before=before,
+            only_better=only_better,
         )
 
     def seek(self, cell: Cell) -> str:

@@ -19,6 +19,8 @@ class MissionConfig:
         retries: how often what is blocked or left over in the end is tried again.
         retry_s: how long to wait before each time [s].
         lost_pose_s: without a pose for so long nobody knows where the robot is [s]; 0 for never.
+        spare_share: share of a processor core that may go into making a path better that nothing
+            forces to be changed; 0 for none.
         stale_map_s: without a map or an update for so long the map is stale [s]; 0 for never.
     """
 
@@ -29,3 +31,4 @@ class MissionConfig:
     retry_s: float = 30.0
     lost_pose_s: float = 0.0
     stale_map_s: float = 0.0
+    spare_share: float = 0.0

@@ -102,6 +102,8 @@ class Intake:
     def _take_plan(self, event: PlanReady) -> PathUpdate | None:
         route, watch = self._parts.route, self._parts.watch
         asked = route.asked
+        if route.is_improving:
+            self._parts.spare.spend(event.seconds, self._parts.now, route.revision)
         update = route.take_plan(event)
         if asked is not None and route.asked is None and not route.wanted:
             watch.plan_made(asked.number)

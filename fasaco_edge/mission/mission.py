@@ -145,9 +145,19 @@ class Mission:
         return self._parts.route.plans
 
     @property
+    def attempts(self) -> int:
+        """How often a better path was looked for that nothing forced to be changed."""
+        return self._parts.route.attempts
+
+    @property
     def planning(self) -> bool:
-        """Whether a plan has been asked for and is not there yet."""
-        return self._parts.route.asked is not None
+        """Whether a plan that is needed has been asked for and is not there yet."""
+        return self._parts.route.asked is not None and not self.is_improving
+
+    @property
+    def is_improving(self) -> bool:
+        """Whether the plan under way is only to make the path better."""
+        return self._parts.route.is_improving
 
     @property
     def wants_plan(self) -> bool:

@@ -10,6 +10,7 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.logbook import Logbook
 from fasaco_edge.mission.route import Route
 from fasaco_edge.mission.site import Site
+from fasaco_edge.mission.spare_time import SpareTime
 from fasaco_edge.mission.watch import Watch
 
 
@@ -23,6 +24,7 @@ class Parts:
         watch: whether map and pose keep coming.
         agenda: what is still to be done.
         route: the path, and the plan under way.
+        spare: time to make the path better.
         now: time of the step [s].
     """
 
@@ -31,6 +33,7 @@ class Parts:
     watch: Watch
     agenda: Agenda
     route: Route
+    spare: SpareTime
     now: float = 0.0
 
     @classmethod
@@ -38,7 +41,8 @@ class Parts:
         """Return the parts of a mission that has heard nothing yet."""
         site, log = Site(config), Logbook(config.footprint.cell_m)
         agenda = Agenda(config, site, log)
-        return cls(site, log, Watch(config), agenda, Route(site, agenda))
+        route, spare = Route(site, agenda), SpareTime(config.spare_share)
+        return cls(site, log, Watch(config), agenda, route, spare)
 
     def take_order(self, assignment: Assignment) -> None:
         """Begin with another order, or with none; a survey has to follow."""

@@ -9,7 +9,7 @@ import numpy as np
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.assignment import Stage
-from fasaco_edge.mission.events import Decision, PathUpdate
+from fasaco_edge.mission.events import Decision, PathUpdate, PlanRequest
 from fasaco_edge.mission.parts import Parts
 from fasaco_edge.mission.progress import DrivenPath, State
 
@@ -64,7 +64,13 @@ class Pilot:
         ):
             return self._settle(update)
         self._tell()
-        return Decision(path=update)
+        return Decision(path=update, plan=self._use_spare_time())
+
+    def _use_spare_time(self) -> PlanRequest | None:
+        """Ask for a better path, if nothing else is to be done."""
+        parts, route = self._parts, self._parts.route
+        is_free = self._state is State.COVERING and route.asked is None and not route.wanted
+        return route.ask_for_better() if is_free and parts.spare.is_there(parts.now) else None
 
     def _resting(self) -> tuple[State, str] | None:
         """Return why there is nothing to decide, if so."""

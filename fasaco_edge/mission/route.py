@@ -11,6 +11,7 @@ from fasaco_edge.mission.events import PathUpdate, PlanReady, PlanRequest
 from fasaco_edge.mission.ground import Ground
 from fasaco_edge.mission.progress import DrivenPath
 from fasaco_edge.mission.site import Site
+from fasaco_edge.mission.spare_time import Attempt
 from fasaco_edge.planners.problem import CoverageProblem
 
 
@@ -20,7 +21,7 @@ class Route:
     Attributes:
         path: the published path, and how far the robot is on it.
         revision: counts the published paths.
-        plans: counts the plans that came back.
+        plans, attempts: count the plans that came back, and the attempts at better paths.
         wanted: why a new plan is wanted; "" where none is.
         asked: the plan under way.
         now: time of the step [s].
@@ -30,7 +31,7 @@ class Route:
     def __init__(self, site: Site, agenda: Agenda) -> None:
         self.path = DrivenPath.none()
         self.revision = 0
-        self.plans = 0
+        self.plans = self.attempts = 0
         self.wanted = ""
         self.asked: PlanRequest | None = None
         self.now = 0.0
@@ -39,11 +40,29 @@ class Route:
         self._agenda = agenda
         self._disowned = False
         self._checked_on: Ground | None = None
+        self._attempt: Attempt | None = None
+
+    @property
+    def is_improving(self) -> bool:
+        """Whether the plan under way is only to make the path better."""
+        return self.asked is not None and self._attempt is not None
+
+    @property
+    def _number(self) -> int:
+        return self.plans + self.attempts + 1
 
     def ask(self, problem: CoverageProblem) -> PlanRequest:
         """Ask for the plan that is wanted."""
-        self.asked = PlanRequest(self.plans + 1, problem, self.wanted)
+        self.asked = PlanRequest(self._number, problem, self.wanted)
         self.wanted = ""
+        return self.asked
+
+    def ask_for_better(self) -> PlanRequest | None:
+        """Ask for a better path; None where too little is left of it."""
+        self._attempt = Attempt.at(self.path, self.revision, self._agenda)
+        if self._attempt is None:
+            return None
+        self.asked = PlanRequest(self._number, self._attempt.problem, "spare time")
         return self.asked
 
     def disown(self) -> None:
@@ -57,11 +76,15 @@ class Route:
         if asked is None or asked.number != event.number:
             return None
         self.asked = None
-        self.plans += 1
         disowned, self._disowned = self._disowned, False
+        attempt, self._attempt = self._attempt, None
+        self.plans += attempt is None
+        self.attempts += attempt is not None
         cell = self._site.cell()
         if disowned or cell is None or ground is None:
             return None
+        if attempt is not None:
+            return self._take_better(attempt, event, ground)
         cells = self._from_here(event.path.cells, cell, ground)
         if not len(cells) or ground.legal_steps(cells) < len(cells) - 1:
             self.wanted = self.wanted or "the map changed while planning"
@@ -71,6 +94,15 @@ class Route:
             self.published_at = self.now
             return None
         return self.publish(cells, asked.reason, event)
+
+    def _take_better(self, attempt: Attempt, event: PlanReady, ground: Ground) -> PathUpdate | None:
+        """Publish the path with a better rest; None where that is not worth it."""
+        if attempt.revision != self.revision:
+            return None
+        cells = attempt.joined(self.path, event.path.cells)
+        if cells is None or ground.legal_steps(cells) < len(cells) - 1:
+            return None
+        return self.publish(cells, "better further on", event)
 
     def _from_here(self, cells: NDArray[np.int32], here: Cell, ground: Ground) -> NDArray[np.int32]:
         """Return a fresh plan without what was covered while it was made.

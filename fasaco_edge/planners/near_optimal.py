@@ -63,7 +63,7 @@ class NearOptimal:
         path = None
         if can_repair(problem):
             path = repaired(problem, self.name, self.config.seed, stop)
-            if not is_poor(path):
+            if problem.only_better or not is_poor(path):
                 return path
         found = self._search(problem, stop, observe)
         return found if path is None or found.cost_s < path.cost_s else path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -18,6 +19,9 @@ from fasaco_edge.planners.patch import Patch
 RADIUS = 6
 # Changed cells that one neighbourhood begins with at most, and its cells.
 MOST_CHANGED, MOST_CELLS = 1_000, 3_000
+# The same where nothing has changed, and a walk is to be made better somewhere.
+SPOT_RADIUS = 20
+GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
 # A walk may become longer for a while.
 ROOM = 600
 
@@ -61,13 +65,27 @@ def neighbourhoods(
         left = left[place.box.labels[left] == 0]
 
 
+def spot(framed: FramedGround, walk: NDArray[np.int32], number: int) -> Neighbourhood:
+    """Return a neighbourhood somewhere along a walk, framed cells int32 (n,).
+
+    Those of successive numbers lie evenly along it, wherever one begins to count.
+    """
+    at = int(walk.size * (number * GOLDEN_RATIO % 1.0))
+    return _around(framed, walk[:0], walk[at : at + 1], is_first=False, radius=SPOT_RADIUS)
+
+
 def _around(
-    framed: FramedGround, ahead: NDArray[np.int32], changed: NDArray[np.int32], *, is_first: bool
+    framed: FramedGround,
+    ahead: NDArray[np.int32],
+    changed: NDArray[np.int32],
+    *,
+    is_first: bool,
+    radius: int = RADIUS,
 ) -> Neighbourhood:
     labels = np.zeros(framed.ground.bound, np.int32)
     found = np.empty(MOST_CELLS, np.int32)
     begin = np.concatenate((ahead, changed[:MOST_CHANGED]))
-    size = neighbourhood(framed.ground, begin, RADIUS, labels, 1, found)
+    size = neighbourhood(framed.ground, begin, radius, labels, 1, found)
     rows, cols = np.divmod(found[:size], framed.width)
     row, col = int(rows.min()), int(cols.min())
     box = Box(labels, 1, row, col, int(rows.max()) - row + 1, int(cols.max()) - col + 1)

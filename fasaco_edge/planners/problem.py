@@ -37,6 +37,7 @@ class CoverageProblem:
         cost: what a walk is to have little of.
         before: int32 (n, 2), the walk that was still to be driven when the problem changed
             to this one; a planner that can keeps of it what holds. None for none.
+        only_better: whether all of ``before`` holds, and is only to be made better.
     """
 
     lattice: CoverageLattice
@@ -46,6 +47,7 @@ class CoverageProblem:
     end: Cell | None = None
     cost: CoverageCost = STEPS_ALONE
     before: NDArray[np.int32] | None = None
+    only_better: bool = False
 
     @classmethod
     def of(
@@ -57,6 +59,7 @@ class CoverageProblem:
         end: Cell | None = None,
         cost: CoverageCost = STEPS_ALONE,
         before: NDArray[np.int32] | None = None,
+        only_better: bool = False,
     ) -> CoverageProblem:
         """Pose the problem of covering what is reachable and not yet ``covered``.
 
@@ -67,6 +70,7 @@ class CoverageProblem:
             end: cell (row, col) to end in; the start for home, None for anywhere.
             cost: of steps and turns; by default of steps alone.
             before: int32 (n, 2), the walk that was still to be driven; None for none.
+            only_better: whether that holds, and is only to be made better.
 
         Raises:
             StartOutsideMap, EndOutsideMap: the lattice does not span the start, or the end.
@@ -85,7 +89,7 @@ class CoverageProblem:
         if not to_cover.any():
             raise NothingToCover("every reachable cell is covered")
         to_cover.flags.writeable = unreachable.flags.writeable = False
-        return cls(lattice, start, to_cover, unreachable, end, cost, before)
+        return cls(lattice, start, to_cover, unreachable, end, cost, before, only_better)
 
     @property
     def cells(self) -> int:

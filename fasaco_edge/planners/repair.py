@@ -9,6 +9,7 @@ passes over the walk happens in the neighbourhoods of that.
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Iterator
 
@@ -24,7 +25,7 @@ from fasaco_edge.planners.effort import repair_for
 from fasaco_edge.planners.framed import FramedGround
 from fasaco_edge.planners.graph import cells_of
 from fasaco_edge.planners.mending import framed_cells, mended
-from fasaco_edge.planners.neighbourhoods import Neighbourhood, neighbourhoods
+from fasaco_edge.planners.neighbourhoods import Neighbourhood, neighbourhoods, spot
 from fasaco_edge.planners.patch import Patch
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import StoppingCriterion
@@ -33,6 +34,10 @@ from fasaco_edge.planners.work import NO_WORK, SearchProgress
 
 # Kicks before it is asked whether to stop.
 KICKS_AT_ONCE = 10
+
+# Where there is nothing to repair: how far apart attempts begin, about how many cells a spot
+# has, and how many times all spots may gain nothing.
+STRIDE, SPOT_CELLS, PASSES = 997, 400, 4
 
 # The robot is about to drive these cells: five metres of common ones.
 HELD = 18
@@ -84,13 +89,29 @@ class _Repair:
         self._loaded: tuple[Patch, Neighbourhood] | None = None
 
     def run(self) -> Iterator[None]:
-        """Improve the walk where it changed, one neighbourhood after the other."""
-        for place in neighbourhoods(self._framed, self._walk[:HELD], self._changed):
+        """Improve the walk, one neighbourhood after the other; pause after each piece of work."""
+        for place in self._places():
             patch = place.patch(self._walk)
             if patch.load(self._framed.ground, self._walk, place.box, self._prices):
                 self._loaded = patch, place
                 yield from self._improve(patch, place)
                 self._unload()
+
+    def _places(self) -> Iterator[Neighbourhood]:
+        """Yield where to look: around what changed; or here and there, until nothing is gained."""
+        if not self._problem.only_better:
+            yield from neighbourhoods(self._framed, self._walk[:HELD], self._changed)
+            return
+        # Another walk begins elsewhere, so that many short attempts come everywhere.
+        first, gainless = STRIDE * len(self._walk), 0
+        for number in itertools.count(first):
+            if self._is_proven():
+                return
+            before_us = self._cost_us
+            yield spot(self._framed, self._walk, number)
+            gainless = gainless + 1 if self._cost_us == before_us else 0
+            if gainless * SPOT_CELLS > PASSES * len(self._walk):
+                return
 
     def _improve(self, patch: Patch, place: Neighbourhood) -> Iterator[None]:
         """Improve around what changed, then kick; pause after each piece.
@@ -102,11 +123,15 @@ class _Repair:
             patch.touch_up(place.changed, self._effort.rules, self._random)
             yield
         for kicks in range(0, self._effort.kicks, KICKS_AT_ONCE):
-            if not self._prices.quarter_turn_us and self.progress().steps == self._bound:
+            if self._is_proven():
                 return
             patch.hold(HELD if place.is_first and kicks < self._effort.held_kicks else 0)
             patch.kick(self._effort.rules, KICKS_AT_ONCE, self._random)
             yield
+
+    def _is_proven(self) -> bool:
+        """Tell whether no walk can be better."""
+        return not self._prices.quarter_turn_us and self.progress().steps == self._bound
 
     def _unload(self) -> None:
         """Put what is under way back into the walk."""

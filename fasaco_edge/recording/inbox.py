@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections import Counter, deque
+from collections.abc import Callable
 
 from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.bus.session import Sample
 
 # So many samples waiting mean that the writer is behind: some ten seconds of poses.
 BEHIND_SAMPLES = 1024
@@ -28,17 +30,20 @@ class Inbox:
     once there is no room, samples are dropped. Both are counted as lost.
     """
 
-    def __init__(self, capacity_bytes: int) -> None:
+    def __init__(self, capacity_bytes: int, stamp: Callable[[str, Sample], Arrival]) -> None:
+        self._stamp = stamp
         self._changed = threading.Condition()
         self._waiting: deque[Arrival] = deque()
         self._capacity = capacity_bytes
         self._bytes = 0
         self._lost: Counter[str] = Counter()
 
-    def post(self, arrival: Arrival) -> None:
+    def post(self, topic: str, sample: Sample) -> None:
         """Leave a sample; safe from any thread, never waits for the writer."""
-        size = len(arrival.sample.payload)
+        size = len(sample.payload)
         with self._changed:
+            # Stamped here, so that of samples on several threads none is before an earlier one.
+            arrival = self._stamp(topic, sample)
             if len(self._waiting) >= BEHIND_SAMPLES or 2 * (self._bytes + size) > self._capacity:
                 self._forget(SUPERSEDED.get(arrival.topic, frozenset()))
             if self._bytes + size > self._capacity:

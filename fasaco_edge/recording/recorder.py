@@ -89,7 +89,7 @@ class Recorder:
         self._inputs = InputLog(self._journal, began_ns)
         description = RunDescription(settings.robot, f"{began:%Y-%m-%d %H:%M:%S} UTC")
         self._scene = Scene(self._journal, description)
-        self._inbox = Inbox(settings.queue_bytes)
+        self._inbox = Inbox(settings.queue_bytes, self._clock.arrival)
         self._readers: dict[str, Callable[[Sample], None]] = {
             "map": self._read_map,
             "map_update": self._read_map_update,
@@ -155,7 +155,7 @@ class Recorder:
 
     def _subscribe(self, topic: str, key: str, latched: bool = False) -> None:
         def post(sample: Sample) -> None:
-            self._inbox.post(self._clock.arrival(topic, sample))
+            self._inbox.post(topic, sample)
 
         self._bus.subscribe(key, post, latched)
 

@@ -9,30 +9,41 @@ from hypothesis import strategies as st
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
+from fasaco_edge.recording.clock import RunClock
 from fasaco_edge.recording.inbox import BEHIND_SAMPLES, Inbox
 
 TOPICS = ["map", "map_update", "pose", "path", "coverage", "pheromone", "status"]
 
 
-def arrival(topic: str, number: int = 0, size: int = 10) -> Arrival:
-    return Arrival(topic, Sample(topic, bytes(size)), number, number)
+def inbox_of(capacity: int) -> Inbox:
+    """Return an inbox whose clock is in the samples."""
+
+    def stamp(topic: str, sample: Sample) -> Arrival:
+        number = int(sample.key)
+        return Arrival(topic, sample, number, number)
+
+    return Inbox(capacity, stamp)
+
+
+def sample(number: int = 0, size: int = 10) -> Sample:
+    return Sample(str(number), bytes(size))
 
 
 def test_arrivals_come_out_in_order():
-    inbox = Inbox(10_000)
+    inbox = inbox_of(10_000)
     for number in range(20):
-        inbox.post(arrival(TOPICS[number % 7], number))
+        inbox.post(TOPICS[number % 7], sample(number))
     assert [one.wall_ns for one in inbox.take(0.0)] == list(range(20))
     assert inbox.take(0.0) == []
     assert not inbox.lost
 
 
 def test_behind_the_newest_pose_wins_and_every_path_stays():
-    inbox = Inbox(1_000_000)
+    inbox = inbox_of(1_000_000)
     for number in range(BEHIND_SAMPLES):
-        inbox.post(arrival("path", number))
+        inbox.post("path", sample(number))
     for number in range(50):
-        inbox.post(arrival("pose", number))
+        inbox.post("pose", sample(number))
     taken = inbox.take(0.0)
     assert [one.wall_ns for one in taken if one.topic == "path"] == list(range(BEHIND_SAMPLES))
     assert [one.wall_ns for one in taken if one.topic == "pose"] == [49]
@@ -40,25 +51,45 @@ def test_behind_the_newest_pose_wins_and_every_path_stays():
 
 
 def test_behind_a_full_map_clears_the_patches_of_the_one_before():
-    inbox = Inbox(100)
-    inbox.post(arrival("map", 0, 30))
-    inbox.post(arrival("map_update", 1, 20))
-    inbox.post(arrival("map", 2, 40))
+    inbox = inbox_of(100)
+    inbox.post("map", sample(0, 30))
+    inbox.post("map_update", sample(1, 20))
+    inbox.post("map", sample(2, 40))
     assert [one.wall_ns for one in inbox.take(0.0)] == [2]
     assert inbox.lost == {"map": 1, "map_update": 1}
 
 
 @given(st.lists(st.tuples(st.sampled_from(TOPICS), st.integers(0, 400)), max_size=300))
 def test_memory_is_bounded_and_nothing_vanishes_uncounted(posts):
-    inbox = Inbox(1000)
+    inbox = inbox_of(1000)
     for topic, size in posts:
-        inbox.post(arrival(topic, size=size))
+        inbox.post(topic, sample(size=size))
     taken = inbox.take(0.0)
     assert sum(len(one.sample.payload) for one in taken) <= 1000
     assert len(taken) + inbox.lost.total() == len(posts)
 
 
+def test_no_sample_is_stamped_earlier_than_the_one_before_it():
+    """Whatever the threads are that samples come on."""
+    inbox = Inbox(10**9, RunClock().arrival)
+    together = threading.Barrier(4)
+
+    def post():
+        together.wait()
+        for _ in range(2000):
+            inbox.post("path", sample())
+
+    threads = [threading.Thread(target=post) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    stamps = [one.at_ns for one in inbox.take(0.0)]
+    assert len(stamps) == 8000
+    assert stamps == sorted(stamps)
+
+
 def test_a_waiting_reader_wakes():
-    inbox = Inbox(100)
-    threading.Timer(0.05, inbox.post, [arrival("pose")]).start()
+    inbox = inbox_of(100)
+    threading.Timer(0.05, inbox.post, ["pose", sample()]).start()
     assert len(inbox.take(5.0)) == 1

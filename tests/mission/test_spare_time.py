@@ -1,0 +1,125 @@
+"""While the robot drives, what lies further on of its path is made better."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fasaco_edge.bench.checking import check_walk
+from fasaco_edge.mission.events import MapReceived, PlanReady
+from fasaco_edge.mission.spare_time import HELD_CELLS
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.planner import never
+from fasaco_edge.planners.stopping import WorkLimit
+from fasaco_edge.planners.work import SearchWork
+from tests.mission.world import CONFIG, Drive, building, patch, pose_at
+
+HALL = ["." * 12 for _ in range(12)]
+SHARE = 0.1
+BETTER = "better further on"
+
+
+def lanes(rows, cols, gap):
+    """Return a walk over a hall, lane after lane; from ``gap`` on each ends there and back."""
+    cells = []
+    for row in range(rows):
+        lane = [(row, col) for col in range(cols)]
+        cells += lane if row % 2 == 0 else lane[::-1]
+        if row >= gap:
+            cells += [cells[-2], cells[-1]]
+    return np.array(cells, np.int32)
+
+
+def plan(request, cells, seconds=0.05):
+    """Answer a request with a walk."""
+    path = NearOptimal().plan(request.problem, WorkLimit(SearchWork(kicks=1)))
+    return PlanReady(request.number, replace(path, cells=cells), seconds)
+
+
+def driving(share=SHARE, gap=4):
+    """Return a robot that has been given a path that is poor further on."""
+    config = replace(CONFIG, spare_share=share, cost=CoverageCost())
+    drive = Drive((0, 0), MapReceived(building(*HALL)), pose_at(0, 0), config=config)
+    request, drive.request = drive.request, None
+    drive.tell(plan(request, lanes(12, 12, gap)))
+    return drive
+
+
+def test_a_poor_path_is_made_better_further_on():
+    drive = driving()
+    poor = drive.updates[-1].cells
+    request, drive.request = drive.request, None
+    assert request.reason == "spare time"
+    assert request.problem.start == tuple(poor[HELD_CELLS])
+    drive.tell(PlanReady(request.number, NearOptimal().plan(request.problem, never), 0.05))
+    update = drive.updates[-1]
+    assert update.reason == BETTER
+    assert len(update.cells) < len(poor)
+    assert np.array_equal(update.cells[: HELD_CELLS + 1], poor[: HELD_CELLS + 1])
+    lattice = drive.mission.lattice
+    verdict = check_walk(lattice.steps, lattice.coverable, update.cells, (0, 0))
+    assert verdict.legal
+    assert verdict.complete
+
+
+def test_attempts_take_their_share_of_the_time_and_less_in_vain():
+    drive = driving()
+    asked_at = []
+    for _ in range(600):
+        request, drive.request = drive.request, None
+        if request is not None:
+            asked_at.append(drive.now)
+            drive.tell(plan(request, request.problem.before, seconds=0.05), after=0.05)
+        else:
+            drive.tell(after=0.05)
+    assert drive.revision == 1  # nothing was better
+    gaps = np.diff(asked_at)
+    shortest = [0.05 / SHARE * halved for halved in (1, 2, 4, 8, 16, 16)]
+    assert len(gaps) >= len(shortest)
+    for gap, least in zip(gaps, shortest, strict=False):
+        assert least - 1e-9 <= gap < least + 0.15
+
+
+def test_without_a_share_nothing_is_asked_for():
+    assert driving(share=0.0).request is None
+
+
+def test_what_saves_next_to_nothing_is_no_reason_for_another_path():
+    drive = driving(gap=10)
+    request, drive.request = drive.request, None
+    shorter = request.problem.before[:-1]  # the last step led to a cell it had been in
+    drive.tell(plan(request, shorter))
+    assert drive.revision == 1
+
+
+@pytest.mark.parametrize("what", ["driven on", "path is new"])
+def test_what_comes_too_late_is_dropped(what):
+    drive = driving()
+    request, drive.request = drive.request, None
+    better = PlanReady(request.number, NearOptimal().plan(request.problem, never), 0.05)
+    if what == "driven on":
+        for cell in drive.updates[-1].cells[1 : HELD_CELLS + 3].tolist():
+            drive.tell(pose_at(*cell))
+    else:
+        # Something stands where the robot was about to drive: the path ends before it, at once.
+        drive.tell(patch("#", at=(0, 5)))
+        assert drive.mission.wants_plan
+        assert drive.mission.is_improving
+    drive.request = None
+    drive.tell(better)
+    assert BETTER not in [update.reason for update in drive.updates]
+    if what == "path is new":
+        assert drive.request.reason.startswith("path blocked")
+        assert not drive.mission.is_improving
+
+
+def test_what_is_needed_comes_next():
+    """A map that changes while an attempt is under way: its repair is asked for after it."""
+    drive = driving()
+    request, drive.request = drive.request, None
+    drive.tell(patch("#", at=(11, 11)))
+    assert drive.mission.wants_plan
+    drive.tell(plan(request, request.problem.before))
+    assert not drive.request.problem.only_better
+    assert not drive.mission.wants_plan
