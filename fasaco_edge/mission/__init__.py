@@ -10,9 +10,10 @@ Read in this order:
                  log     what is covered (ledger), and whether a map contradicts it (fit) or has
                          moved (loop_closure)
                  watch   whether map and pose keep coming, and can be believed
-                 agenda  what is still to be done: zones, passes, tries, the way home
-                 route   the path, and the plan under way
+                 agenda  what is still to be done: zones, passes, tries, the way home; where to
+                         look from only (lookout, frontier)
+                 route   the path, and the plan under way; attempts at a better one (spare_time)
     assignment   an order and how far it is; kept on disk with the ledger
     order        what can be ordered; order_document: the same as JSON or YAML
-    polygons, zones, connected, unreached, frontier: an order's areas on the lattice
+    polygons, zones, connected, unreached: an order's areas on the lattice
 """

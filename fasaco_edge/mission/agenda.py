@@ -11,11 +11,9 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.assignment import NO_ORDER, Assignment, Stage
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.frontier import next_frontier
-from fasaco_edge.mission.ground import Ground
 from fasaco_edge.mission.leftovers import Leftovers
 from fasaco_edge.mission.logbook import Logbook
-from fasaco_edge.mission.order import Zone
+from fasaco_edge.mission.lookout import Lookout
 from fasaco_edge.mission.progress import MOST_TRIES, LeftOver
 from fasaco_edge.mission.site import Site
 from fasaco_edge.mission.unreached import UnreachedArea
@@ -28,15 +26,13 @@ class _Memory:
     """What is only known as long as the daemon lives.
 
     Attributes:
-        viewpoints: cells (row, col) to look from, and not yet driven to.
-        looked: cells from which a way to the zone was looked for.
+        lookout: where to look from.
         left_over: whether paths still get anything done.
         retry_at: when what is blocked or left over is tried again [s]; None if nobody waits.
         ending: how the order came to its end.
     """
 
-    viewpoints: set[Cell] = field(default_factory=set)
-    looked: set[Cell] = field(default_factory=set)
+    lookout: Lookout = field(default_factory=Lookout)
     left_over: LeftOver = field(default_factory=LeftOver)
     retry_at: float | None = None
     ending: str = "the order was carried out"
@@ -81,7 +77,7 @@ class Agenda:
 
     def pass_by(self, cell: Cell) -> None:
         """Note that the robot has come to ``cell``."""
-        self._memory.viewpoints.discard(cell)
+        self._memory.lookout.viewpoints.discard(cell)
 
     def begin(self, cell: Cell, now: float) -> str:
         """Begin what is due, the robot being in ``cell``; return why a plan is wanted, or ""."""
@@ -99,7 +95,7 @@ class Agenda:
         self.assignment = replace(assignment, begun=True, home=assignment.home or cell)
         self._memory.left_over = LeftOver()
         if assignment.turn == 1:
-            self._memory.looked.clear()
+            self._memory.lookout.looked.clear()
         return "" if assignment.standing else assignment.title
 
     def problem(
@@ -123,9 +119,8 @@ class Agenda:
         """
         ground, assignment = self._site.ground, self.assignment
         assert ground is not None
-        lattice, home, zone = ground.lattice, assignment.home, assignment.current
-        if zone is not None and self._memory.viewpoints and self._in_reach(zone, ground):
-            self._memory.viewpoints.clear()
+        lattice, home = ground.lattice, assignment.home
+        self._memory.lookout.note(assignment.current, ground)
         ends_home = (
             home is not None
             and assignment.returns_after_this
@@ -146,24 +141,8 @@ class Agenda:
         )
 
     def seek(self, cell: Cell) -> str:
-        """Look for a way to a zone the robot cannot come to; return why a plan is wanted, or "".
-
-        At the border of the known, cell by cell, until the zone is in reach or all was looked at.
-        """
-        zone, ground, memory = self.assignment.current, self._site.ground, self._memory
-        if zone is None or zone.polygon is None or ground is None or self._in_reach(zone, ground):
-            return ""
-        memory.looked |= {cell}
-        goal = next_frontier(ground, zone.polygon, memory.looked)
-        if goal is None:
-            return ""
-        memory.looked.add(goal)
-        memory.viewpoints = {goal}
-        return f"looking for a way to zone {zone.name!r}"
-
-    def _in_reach(self, zone: Zone, ground: Ground) -> bool:
-        inside = in_zones((zone,), ground.lattice.window, self._config.footprint.cell_m)
-        return bool((inside & ground.reachable).any())
+        """Look for a way to a zone out of reach; return why a plan is wanted, or ""."""
+        return self._memory.lookout.seek(self.assignment.current, self._site.ground, cell)
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
@@ -174,9 +153,7 @@ class Agenda:
         zones = order.zones if zone is None else (zone,)
         wanted = in_zones(zones, window, self._config.footprint.cell_m)
         open_cells: NDArray[np.bool_] = wanted & (self._log.ledger.visits(window) == 0)
-        for row, col in self._memory.viewpoints:
-            if window.row0 <= row < window.row1 and window.col0 <= col < window.col1:
-                open_cells[row - window.row0, col - window.col0] = True
+        self._memory.lookout.mark(open_cells, window)
         return open_cells
 
     def gives_up(self) -> bool:
@@ -184,15 +161,12 @@ class Agenda:
         memory, cells = self._memory, self._left()
         self._leftovers.failures += cells > 0
         memory.left_over = memory.left_over.after(cells)
-        if memory.left_over.given_up and memory.looked and memory.viewpoints:
-            memory.viewpoints.clear()  # a way to the zone may be found from elsewhere
-            return False
-        return memory.left_over.given_up
+        return memory.left_over.given_up and not memory.lookout.gives_up()
 
     def go_on(self, now: float) -> None:
         """Go on to what comes next: all that could be done now is done."""
         assignment, memory = self.assignment, self._memory
-        memory.viewpoints.clear()
+        memory.lookout.viewpoints.clear()
         following = assignment.next_leg()
         if following is not assignment:
             self.assignment = following
@@ -232,7 +206,7 @@ class Agenda:
 
     def _begin_try(self, cell: Cell) -> str:
         memory = self._memory
-        memory.retry_at, memory.viewpoints = None, self._closed_off() - {cell}
+        memory.retry_at, memory.lookout.viewpoints = None, self._closed_off() - {cell}
         # One path that changes nothing is enough this time.
         memory.left_over = LeftOver(self._left(), MOST_TRIES)
         return f"tried again, {self.assignment.tries + 1} of {self._config.retries}"
