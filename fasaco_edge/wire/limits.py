@@ -20,6 +20,12 @@ QUATERNION_TOLERANCE: Final = 0.01
 MAX_GRID_TILT: Final = 0.01
 """Largest magnitude of the x and y of a grid's orientation: a map lies in the plane."""
 
+MAX_TRANSFORM_TILT: Final = 0.2
+"""The same of a transform between map and robot: a ramp of 23 degrees."""
+
 MAX_GRID_CELLS: Final = 64_000_000
 MAX_PATH_POSES: Final = 1_000_000
+MAX_TRANSFORMS: Final = 4096
+"""In one tf message, and frames that are remembered."""
+
 MAX_JSON_BYTES: Final = 1_048_576

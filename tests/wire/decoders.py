@@ -10,11 +10,22 @@ from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.poses import POSE_SCHEMAS, decode_pose
+from fasaco_edge.wire.tf import Transform, decode_transforms
+
+
+def decode_and_look(payload: bytes) -> tuple[Transform, ...]:
+    """Return transforms that all lie in the plane."""
+    transforms = decode_transforms(payload)
+    for transform in transforms:
+        transform.planar()
+    return transforms
+
 
 DECODERS: dict[str, Callable[[bytes], object]] = {
     schemas.OCCUPANCY_GRID: decode_occupancy_grid,
     schemas.OCCUPANCY_GRID_UPDATE: decode_map_update,
     schemas.PATH: decode_path,
     schemas.PHEROMONE_GRID: decode_pheromone,
+    schemas.TF_MESSAGE: decode_and_look,
     **{schema: partial(decode_pose, schema=schema) for schema in POSE_SCHEMAS},
 }

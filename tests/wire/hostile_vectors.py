@@ -28,7 +28,13 @@ RESOLUTION_AT, WIDTH_AT, HEIGHT_AT, ORIGIN_AT = 28, 32, 36, 44
 
 def hostile_vectors() -> list[Vector]:
     """Return payloads every decoder must refuse, with the reason."""
-    return [*_hostile_frames(), *_hostile_grids(), *_hostile_poses(), *_hostile_others()]
+    return [
+        *_hostile_frames(),
+        *_hostile_grids(),
+        *_hostile_poses(),
+        *_hostile_tf(),
+        *_hostile_others(),
+    ]
 
 
 def _at(payload: bytes, offset: int, new: bytes) -> bytes:
@@ -185,6 +191,35 @@ def _hostile_poses() -> list[Vector]:
         _hostile(name, schema, _at(good, POSE_AT + 8 * index, _float64(value)), why, field)
         for name, index, value, why, field in cases
     ]
+
+
+def _hostile_tf() -> list[Vector]:
+    schema = schemas.TF_MESSAGE
+    link = ("odom", "base", STAMP_NS, ROBOT)
+    good = oracle.to_bytes(schema, oracle.transforms(link, link))
+    longer = oracle.to_bytes(schema, oracle.transforms(("odom", "x" * 257, 0, ROBOT)))
+    # Of the first of the two: child's length, its text, x, and x of the quaternion.
+    child_length_at, child_at, x_at, turn_at = 28, 32, 44, 68
+    tilted = _at(_at(good, turn_at, _float64(0.3)), turn_at + 24, _float64(0.7416198487))
+    child, tilt = "transforms[0].child_frame_id", "rotation of 'base' in 'odom'"
+    cases = [
+        ("count", _at(good, 4, _uint32(2**31)), "2 billion transforms", "length of transforms"),
+        ("one_more", _at(good, 4, _uint32(3)), "one that is not there", "length of transforms"),
+        ("one_less", _at(good, 4, _uint32(1)), "one too many", "payload"),
+        ("child_of_length_max", _at(good, child_length_at, b"\xff" * 4), "4 GB of name", child),
+        ("child_without_nul", _at(good, child_at + 4, b"x"), "no NUL at the end", child),
+        ("child_not_utf8", _at(good, child_at, b"\xff"), "no UTF-8", child),
+        ("child_too_long", longer, "257 bytes of name", child),
+        ("nanosec", _at(good, 12, _uint32(10**9)), "a full second in nanosec", "stamp.nanosec"),
+        ("cut", good[:-1], "the last byte is missing", "transforms[1].transform"),
+        ("x_nan", _at(good, x_at, _float64(np.nan)), "not a number", "translation.x"),
+        ("y_far", _at(good, x_at + 8, _float64(1e300)), "beyond 1000 km", "translation.y"),
+        ("turn_nan", _at(good, turn_at, _float64(np.nan)), "not a number", "norm of rotation"),
+        ("turn_infinite", _at(good, turn_at, _float64(-np.inf)), "infinite", "norm of rotation"),
+        ("turn_of_zeros", _at(good, turn_at, bytes(32)), "no quaternion", "norm of rotation"),
+        ("tilted", tilted, "35 degrees off the plane", tilt),
+    ]
+    return [_hostile(f"tf_{name}", schema, *rest) for name, *rest in cases]
 
 
 def _hostile_others() -> list[Vector]:

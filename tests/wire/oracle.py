@@ -149,6 +149,31 @@ def path(frame: str, stamp_ns: int, poses: list[tuple[str, int, Any]]) -> Any:
     )
 
 
+def transforms(*each: tuple[str, str, int, Any]) -> Any:
+    """Return a tf2_msgs/TFMessage; of each transform frame, child, stamp [ns] and pose."""
+    return make(
+        schemas.TF_MESSAGE,
+        transforms=[
+            make(
+                "geometry_msgs/msg/TransformStamped",
+                header=header(frame, stamp_ns),
+                child_frame_id=child,
+                transform=make(
+                    "geometry_msgs/msg/Transform",
+                    translation=make(
+                        "geometry_msgs/msg/Vector3",
+                        x=where.position.x,
+                        y=where.position.y,
+                        z=where.position.z,
+                    ),
+                    rotation=where.orientation,
+                ),
+            )
+            for frame, child, stamp_ns, where in each
+        ],
+    )
+
+
 def pheromone_grid(
     frame: str, stamp_ns: int, geometry: GridGeometry, levels: Any, **fields: object
 ) -> Any:

@@ -23,6 +23,7 @@ from fasaco_edge.wire.poses import (
     encode_pose_stamped,
     encode_pose_with_covariance_stamped,
 )
+from fasaco_edge.wire.tf import Transform, decode_transforms
 from tests.wire import oracle
 
 STAMP_NS = 1_700_000_000_987_654_321
@@ -101,6 +102,26 @@ def test_covariance_and_twist_are_zero_unless_given() -> None:
     assert not odometry.pose.covariance.any()
     assert not odometry.twist.covariance.any()
     assert odometry.twist.twist.linear.x == odometry.twist.twist.angular.z == 0.0
+
+
+@each_frame
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 57])
+def test_transforms(frame: str, count: int) -> None:
+    rng = np.random.default_rng(count)
+    expected = []
+    for child in (*oracle.FRAMES, *map(str, range(count)))[:count]:
+        x, y, yaw = rng.uniform(-3.0, 3.0, 3).tolist()
+        where = oracle.pose(Pose2D(x, y, yaw))
+        expected.append((frame, child, STAMP_NS + count, where))
+    payload = oracle.to_bytes(schemas.TF_MESSAGE, oracle.transforms(*expected))
+    found = decode_transforms(payload)
+    for transform, (_, child, stamp_ns, where) in zip(found, expected, strict=True):
+        turn, at = where.orientation, where.position
+        floats = (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
+        assert transform == Transform(frame, child, stamp_ns, floats)
+        place = transform.planar()
+        assert (place.x, place.y) == (at.x, at.y)
+        assert place.yaw == pytest.approx(2 * np.arctan2(turn.z, turn.w), abs=1e-14)
 
 
 @each_frame

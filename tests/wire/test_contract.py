@@ -47,7 +47,8 @@ def test_defaults_are_those_of_the_table() -> None:
 
 
 def test_payloads_are_those_of_the_table() -> None:
-    named = {schema for entry in ENTRIES.values() for schema in entry["schema"]}
+    tables = [*ENTRIES.values(), *TABLE["ros2"]["topics"]]
+    named = {schema for entry in tables for schema in entry["schema"]}
     ours = {value for value in constants(schemas).values() if "/msg/" in str(value)}
     assert named == ours
     assert ENTRIES["pose"]["schema"] == list(POSE_SCHEMAS)
@@ -169,7 +170,7 @@ def test_error_reply() -> None:
 def test_reading_the_bus_needs_no_compiler() -> None:
     import subprocess
 
-    modules = ["maps", "poses", "paths", "pheromone", "coverage", "keys", "status"]
+    modules = ["maps", "poses", "tf", "paths", "pheromone", "coverage", "keys", "status"]
     program = "; ".join(f"import fasaco_edge.wire.{module}" for module in modules)
     check = f"{program}; import sys; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0

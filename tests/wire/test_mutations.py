@@ -15,9 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire import schemas
+from fasaco_edge.wire import limits, schemas
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.poses import POSE_SCHEMAS
+from fasaco_edge.wire.tf import decode_transforms
 from tests.wire.decoders import DECODERS
 from tests.wire.valid_vectors import valid_vectors
 
@@ -92,6 +93,13 @@ KINDS: tuple[Mutation, ...] = (
 
 def check_sound(message: object) -> None:
     """Check that what came through holds what the contract promises."""
+    if isinstance(message, tuple):
+        for transform in message:
+            place = transform.planar()
+            assert max(abs(place.x), abs(place.y)) <= 1e6
+            assert abs(place.yaw) <= np.pi
+            assert max(len(transform.frame.encode()), len(transform.child.encode())) <= 256
+        return
     cells = getattr(message, "cells", None)
     if cells is not None:
         assert cells.size > 0
@@ -133,6 +141,8 @@ def test_mutations_raise_only_malformed_message(schema: str) -> None:
 @given(payload=st.binary(max_size=200), schema=st.sampled_from(sorted(DECODERS)))
 def test_noise_is_refused(payload: bytes, schema: str) -> None:
     for noise in (payload, b"\0\1\0\0" + payload):
+        if schema == schemas.TF_MESSAGE and noise[4:8] == bytes(4):
+            continue  # so begins a message without transforms
         with pytest.raises(MalformedMessage):
             DECODERS[schema](noise)
 
@@ -184,3 +194,16 @@ def test_a_pose_must_come_in_a_known_type() -> None:
         with pytest.raises(MalformedMessage, match="a pose must come as one of") as caught:
             DECODERS[POSE_SCHEMAS[0]](payload, schema=schema)  # type: ignore[call-arg]
         assert repr(schema) in str(caught.value)
+
+
+def test_a_tf_message_has_so_many_transforms_and_no_more() -> None:
+    (seed,) = (v.payload for v in valid_vectors() if v.name == "tf_without_names")
+    # Each after the first is 80 bytes: no padding before its floats.
+    one = bytes(8) + struct.pack("<I", 1) + bytes(4) + struct.pack("<I", 1) + bytes(4) + seed[-56:]
+    for count in (limits.MAX_TRANSFORMS, limits.MAX_TRANSFORMS + 1):
+        payload = seed[:4] + struct.pack("<I", count) + seed[8:] + one * (count - 1)
+        if count == limits.MAX_TRANSFORMS:
+            assert len(decode_transforms(payload)) == count
+        else:
+            with pytest.raises(MalformedMessage, match="transforms must be at most 4096, got 4097"):
+                decode_transforms(payload)

@@ -34,7 +34,7 @@ class Vector:
 
 def valid_vectors() -> list[Vector]:
     """Return payloads every decoder must read, with the values in them."""
-    return [*_valid_grids(), *_valid_poses(), *_valid_paths(), *_valid_pheromone()]
+    return [*_valid_grids(), *_valid_poses(), *_valid_paths(), *_valid_tf(), *_valid_pheromone()]
 
 
 def _stamped(frame: str = "map") -> dict[str, Any]:
@@ -117,6 +117,31 @@ def _valid_paths() -> list[Vector]:
         facts = {**_stamped(), "xy": points, "yaw": [YAW] * len(points)}
         cases.append(Vector(name, schemas.PATH, payload, facts))
     return cases
+
+
+def _valid_tf() -> list[Vector]:
+    flat = oracle.turned(0.5, -0.25, 0.0, 1.0)
+    links = [("map", "odom", STAMP_NS, ROBOT), ("odom", "base_link", STAMP_NS + 1, flat)]
+    poses = [[1.5, -2.25, YAW], [0.5, -0.25, 0.0]]
+    nameless = [("", "", 0, flat)]
+    return [
+        Vector(
+            name,
+            schemas.TF_MESSAGE,
+            oracle.to_bytes(schemas.TF_MESSAGE, oracle.transforms(*each)),
+            {
+                "frames": [frame for frame, *_ in each],
+                "children": [child for _, child, *_ in each],
+                "stamps_ns": [stamp_ns for *_, stamp_ns, _ in each],
+                "poses": at,
+            },
+        )
+        for name, each, at in (
+            ("tf", links, poses),
+            ("tf_of_nothing", [], []),
+            ("tf_without_names", nameless, poses[1:]),
+        )
+    ]
 
 
 def pheromone_bytes(levels: Any, trail_min: float, trail_max: float) -> bytes:

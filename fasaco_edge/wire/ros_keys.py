@@ -1,0 +1,146 @@
+"""Names of ROS 2 on Zenoh: keys, liveliness tokens, attachments, type hashes.
+
+Sources: ros2/rmw_zenoh, docs/design.md at commit 99a6a2b (keys, tokens), rmw_zenoh_cpp at
+commit 3411fde (``liveliness_utils.cpp``: tokens, quality of service) and 5347477
+(``attachment_helpers.cpp``: as changed by #601, in 0.1.2 for Humble; older ones differ).
+eclipse-zenoh/zenoh-plugin-ros2dds at commit ebdb1e0 (``route_subscriber.rs``).
+
+Humble has no type hashes: it writes ``TypeHashNotSupported``, and does not hear who writes one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from dataclasses import dataclass
+from typing import Literal
+
+from fasaco_edge.wire import schemas
+
+TYPE_HASHES = {
+    schemas.OCCUPANCY_GRID: "8d348150c12913a31ee0ec170fbf25089e4745d17035792a1ba94d6f0bc0cfc7",
+    schemas.OCCUPANCY_GRID_UPDATE: (
+        "c4095b0be2e4363f8978a1570e0293ee093436f1e1c61d99b48502ac317025e8"
+    ),
+    schemas.POSE_STAMPED: "10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8",
+    schemas.POSE_WITH_COVARIANCE_STAMPED: (
+        "26432f9803e43727d3c8f668d1fdb3c630f548af631e2f4e31382371bfea3b6e"
+    ),
+    schemas.ODOMETRY: "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
+    schemas.TF_MESSAGE: "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
+    schemas.PATH: "1957a5bb3cee5da65c4e52e52b65a93df227efce4c20f8458b36e73066ca334b",
+}
+"""Of each type its definition's hash in hexadecimal, version 1 (REP 2016)."""
+
+GID_BYTES = 16
+
+# Sequence number, time [ns], length of the gid, gid: Zenoh's serialisation of two int64 and an
+# array of bytes.
+_ATTACHMENT = struct.Struct(f"<qqB{GID_BYTES}s")
+
+
+@dataclass(frozen=True, slots=True)
+class RosTopic:
+    """A topic, what it carries and how.
+
+    Attributes:
+        name: with its namespace, ``/robot1/map``.
+        schema: type of its messages, one of ``TYPE_HASHES``.
+        latched: whether who joins late gets the last sample: transient local.
+        depth: how many samples are kept.
+    """
+
+    name: str
+    schema: str
+    latched: bool = False
+    depth: int = 1
+
+    @property
+    def bridge_key(self) -> str:
+        """The key that zenoh-bridge-ros2dds gives it."""
+        return self.name.strip("/")
+
+    def rmw_key(self, domain: int, *, any_hash: bool = False) -> str:
+        """Return the key that rmw_zenoh gives it; ``any_hash``: whatever its type's hash."""
+        type_hash = "*" if any_hash else _type_hash(self.schema)
+        return f"{domain}/{self.bridge_key}/{_dds_type(self.schema)}/{type_hash}"
+
+    @property
+    def qos(self) -> str:
+        """Quality of service as in a token; what rmw_zenoh has for default is left out.
+
+        Reliability, durability, history and its depth, deadline, lifespan, liveliness; all are
+        reliable and keep the last ``depth``.
+        """
+        return f":{1 if self.latched else ''}:,{self.depth}:,:,:,,"
+
+
+@dataclass(frozen=True, slots=True)
+class RosNode:
+    """A node in the graph of rmw_zenoh.
+
+    Attributes:
+        domain: ROS_DOMAIN_ID.
+        session: id of its Zenoh session.
+        namespace: ``/`` for none.
+        name: its name.
+    """
+
+    domain: int
+    session: str
+    namespace: str
+    name: str
+
+    @property
+    def token(self) -> str:
+        """Liveliness token of the node: it is number 0 of its session."""
+        return f"{self._prefix(0)}/NN/{self._name}"
+
+    def endpoint_token(self, number: int, kind: Literal["MP", "MS"], topic: RosTopic) -> str:
+        """Return the liveliness token of a publisher (MP) or a subscriber (MS).
+
+        ``number`` is its own among those of the node, from 1 on.
+        """
+        what = f"{_mangled(topic.name)}/{_dds_type(topic.schema)}/{_type_hash(topic.schema)}"
+        return f"{self._prefix(number)}/{kind}/{self._name}/{what}/{topic.qos}"
+
+    def _prefix(self, number: int) -> str:
+        return f"@ros2_lv/{self.domain}/{self.session}/0/{number}"
+
+    @property
+    def _name(self) -> str:
+        """No security enclave, the namespace, the name."""
+        return f"{_mangled('/')}/{_mangled(self.namespace)}/{self.name}"
+
+
+def gid_of(token: str) -> bytes:
+    """Return ``GID_BYTES`` bytes that no other publisher's token has.
+
+    rmw_zenoh takes XXH3 for that, which no reader can tell from another hash: a gid that comes
+    with a sample is compared with those of other samples only.
+    """
+    return hashlib.blake2b(token.encode(), digest_size=GID_BYTES).digest()
+
+
+def attachment(sequence: int, time_ns: int, gid: bytes) -> bytes:
+    """Return what rmw_zenoh demands beside each sample.
+
+    Args:
+        sequence: number of the sample, from 1 on.
+        time_ns: when it was published [ns].
+        gid: of its publisher, ``GID_BYTES`` bytes.
+    """
+    return _ATTACHMENT.pack(sequence, time_ns, GID_BYTES, gid)
+
+
+def _dds_type(schema: str) -> str:
+    package, kind, name = schema.split("/")
+    return f"{package}::{kind}::dds_::{name}_"
+
+
+def _type_hash(schema: str) -> str:
+    return f"RIHS01_{TYPE_HASHES[schema]}"
+
+
+def _mangled(name: str) -> str:
+    return name.replace("/", "%")
