@@ -32,6 +32,13 @@ class WrongFrame(FasacoError):
     hint = "publish map and pose in the same frame"
 
 
+class TransformLoop(FasacoError):
+    """Transforms of ROS 2 hang frames on each other, so that none leads to the map."""
+
+    code = "transform_loop"
+    hint = "each frame has one parent: look for two programs that publish transforms of one frame"
+
+
 class MapTooLarge(FasacoError):
     """The map, or the lattice over it, is beyond the configured limit."""
 

@@ -6,6 +6,7 @@ import msgspec
 import yaml
 
 from fasaco_edge.daemon.config import DaemonConfig, load_config
+from fasaco_edge.daemon.ros_config import RosConfig
 
 EXAMPLE = Path(__file__).parent.parent / "deploy" / "fasaco-edge.yaml"
 
@@ -14,3 +15,14 @@ def test_example_configuration_holds_every_key_with_its_default():
     written = yaml.safe_load(EXAMPLE.read_text(encoding="utf-8"))
     assert load_config(EXAMPLE) == DaemonConfig()
     assert written == msgspec.json.decode(msgspec.json.encode(DaemonConfig()))
+
+
+def test_the_block_for_ros_holds_every_key_with_its_default_once_it_is_no_comment(tmp_path):
+    before, mark, block = EXAMPLE.read_text(encoding="utf-8").partition("#ros2:")
+    assert all(line.startswith("#") for line in block.splitlines()[1:])
+    with_ros = tmp_path / "ros.yaml"
+    with_ros.write_text(before + (mark + block).replace("\n#", "\n")[1:], encoding="utf-8")
+    default = RosConfig(kind="rmw_zenoh")
+    assert load_config(with_ros).ros2 == default
+    written = yaml.safe_load(with_ros.read_text(encoding="utf-8"))["ros2"]
+    assert written == msgspec.json.decode(msgspec.json.encode(default))

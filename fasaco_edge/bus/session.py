@@ -144,17 +144,26 @@ class Bus:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    @property
+    def id(self) -> str:
+        """Id of the session, which no other has."""
+        return str(self._session.zid())
+
     def publisher(self, key: str, schema: str = "", latched: bool = False) -> Publisher:
         """Declare a publisher; ``schema`` names a CDR type, "" means JSON."""
         return Publisher(self._session, key, schema, latched)
 
     def subscribe(
-        self, key: str, callback: Callable[[Sample], None], latched: bool = False
+        self,
+        key: str,
+        callback: Callable[[Sample], None],
+        latched: bool = False,
+        history: int = 1,
     ) -> Subscription:
         """Call ``callback`` with each sample on ``key``, on a Zenoh thread.
 
         A latched subscription receives the newest sample of latched publishers
-        first, also of those that come later.
+        first, or of those of each as many as ``history``, also of those that come later.
         """
 
         def receive(sample: zenoh.Sample) -> None:
@@ -167,7 +176,7 @@ class Bus:
                 self._session,
                 key,
                 receive,
-                history=zenoh.ext.HistoryConfig(max_samples=1, detect_late_publishers=True),
+                history=zenoh.ext.HistoryConfig(max_samples=history, detect_late_publishers=True),
                 recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
                 subscriber_detection=True,
             )

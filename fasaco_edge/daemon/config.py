@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import msgspec
@@ -13,6 +14,8 @@ import yaml
 from msgspec import Meta
 
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
+from fasaco_edge.daemon.config_section import Section as _Section
+from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.cost import CoverageCost
@@ -21,10 +24,6 @@ from fasaco_edge.wire.keys import Keys
 
 Metres = Annotated[float, Meta(gt=0, le=10)]
 Percent = Annotated[int, Meta(ge=0, le=100)]
-
-
-class _Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Unknown keys are errors."""
 
 
 class RobotConfig(_Section, frozen=True):
@@ -158,7 +157,7 @@ class MissionSettings(_Section, frozen=True):
 
 
 class DaemonConfig(_Section, frozen=True):
-    """The whole configuration."""
+    """The whole configuration; without ``ros2`` the daemon has nothing to do with ROS."""
 
     robot: RobotConfig = RobotConfig()
     bus: BusConfig = BusConfig()
@@ -166,6 +165,7 @@ class DaemonConfig(_Section, frozen=True):
     pose: PoseConfig = PoseConfig()
     planner: PlannerConfig = PlannerConfig()
     mission: MissionSettings = MissionSettings()
+    ros2: RosConfig | msgspec.UnsetType = msgspec.UNSET
 
     def keys(self) -> Keys:
         """Return the keys of this robot.
@@ -222,6 +222,11 @@ def _check_together(config: DaemonConfig) -> None:
     if "\0" in config.mission.state_dir:
         raise BadConfiguration("mission.state_dir must be a path, got one with a NUL")
     config.keys()
+    if config.ros2:
+        try:
+            config.ros2.check()
+        except BadConfiguration as error:
+            raise BadConfiguration(f"ros2.{error}") from error
     try:
         config.robot.cost()
     except BadConfiguration as error:
@@ -258,6 +263,8 @@ def _choices(key: str) -> str:
     kind: Any = DaemonConfig
     for part in key.split("."):
         kind = get_type_hints(kind).get(part) if isinstance(kind, type) else None
+        if get_origin(kind) is UnionType:  # of a section that may be left out
+            kind = get_args(kind)[0]
     if get_origin(kind) is not Literal:
         return ""
     *others, last = get_args(kind)

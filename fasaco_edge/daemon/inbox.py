@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.bus.session import Bus, Sample
@@ -19,6 +20,11 @@ from fasaco_edge.mission.events import (
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.schemas import TF_MESSAGE
+from fasaco_edge.wire.tf import decode_transforms
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.ros_bridge import RosBridge
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,21 +41,33 @@ def make_mailbox() -> Mailbox[object]:
     Poses are queued: each tells what the tool passed over. Some seconds of them
     are plenty. A map does not clear what was before it: it may be broken.
     """
-    return Mailbox({"map": 4, "map_update": 256, "pose": 1024, "snapshot": 8, "command": 16})
+    lengths = {"map": 4, "map_update": 256, "tf_static": 256, "pose": 1024}
+    return Mailbox({**lengths, "snapshot": 8, "command": 16})
 
 
 class Inbox:
     """Subscribes to what the mission needs, and decodes it."""
 
-    def __init__(self, bus: Bus, keys: Keys, mailbox: Mailbox[object], pose_schema: str) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        keys: Keys,
+        mailbox: Mailbox[object],
+        pose_schema: str,
+        ros: RosBridge | None = None,
+    ) -> None:
         self._pose_schema = pose_schema
-        self._map = bus.subscribe(keys.map, _poster(mailbox, "map"), latched=True)
+        self._transforms = ros.transforms if ros else None
+        self._maps = [bus.subscribe(keys.map, _poster(mailbox, "map"), latched=True)]
+        if ros is not None:
+            self._maps.append(ros.map)
         for kind, key in (("map_update", keys.map_update), ("pose", keys.pose)):
             bus.subscribe(key, _poster(mailbox, kind))
 
     def ask_for_map(self) -> None:
         """Ask whoever publishes the map, and keeps the newest for late joiners, for it."""
-        self._map.renew()
+        for subscription in self._maps:
+            subscription.renew()
 
     def decode(
         self, items: Sequence[tuple[str, object]], patches_lost: int
@@ -70,7 +88,9 @@ class Inbox:
                 events.append(PatchesLost(patches_lost))
                 patches_lost = 0
             try:
-                events.append(self._event(kind, item.sample))
+                event = self._event(kind, item.sample)
+                if event is not None:
+                    events.append(event)
             except FasacoError as error:
                 faults.append(error)
         if patches_lost:
@@ -85,20 +105,22 @@ class Inbox:
         for kind, item in reversed(items):
             if kind == "map" and isinstance(item, Received):
                 try:
-                    return [self._event(kind, item.sample)], faults, item.at
+                    grid = decode_occupancy_grid(item.sample.payload)
+                    return [MapReceived(grid)], faults, item.at
                 except FasacoError as error:
                     faults.append(error)
         return [], faults, float("-inf")
 
-    def _event(self, kind: str, sample: Sample) -> Event:
-        match kind:
-            case "map":
-                return MapReceived(decode_occupancy_grid(sample.payload))
-            case "map_update":
-                return PatchReceived(decode_map_update(sample.payload))
-            case _:
-                schema = sample.schema or self._pose_schema
-                return PoseReceived(decode_pose(sample.payload, schema))
+    def _event(self, kind: str, sample: Sample) -> Event | None:
+        """Return the event in a sample; None for transforms that tell no new pose."""
+        if kind == "map_update":
+            return PatchReceived(decode_map_update(sample.payload))
+        schema = sample.schema or self._pose_schema
+        if self._transforms is None or schema != TF_MESSAGE:
+            return PoseReceived(decode_pose(sample.payload, schema))
+        transforms = decode_transforms(sample.payload)
+        pose = self._transforms.take(transforms, is_static=kind == "tf_static")
+        return None if pose is None else PoseReceived(pose)
 
 
 def _poster(mailbox: Mailbox[object], kind: str) -> Callable[[Sample], None]:

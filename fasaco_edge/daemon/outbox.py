@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.session import Bus, Reply
+from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.errors import NotYet
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.wire import schemas
@@ -31,7 +32,8 @@ class Outbox:
     never waits for the loop.
     """
 
-    def __init__(self, bus: Bus, keys: Keys) -> None:
+    def __init__(self, bus: Bus, keys: Keys, ros: RosBridge | None = None) -> None:
+        self._ros = ros
         self._lock = threading.Lock()
         self._replies: dict[str, Reply] = {}
         self._path = bus.publisher(keys.path, schemas.PATH, latched=True)
@@ -60,6 +62,8 @@ class Outbox:
         attachment = encode_json(about)
         self._remember("path", Reply(payload, schemas.PATH, attachment))
         self._path.put(payload, attachment)
+        if self._ros is not None:
+            self._ros.path.put(payload)
 
     def status(self, document: dict[str, Any]) -> None:
         """Publish the status."""
@@ -76,6 +80,8 @@ class Outbox:
         payload = encode_occupancy_grid(grid)
         self._remember("coverage", Reply(payload, schemas.OCCUPANCY_GRID))
         self._coverage.put(payload)
+        if self._ros is not None:
+            self._ros.coverage.put(payload)
 
     def is_watched(self) -> bool:
         """Tell whether anyone listens to the pheromone field; safe from any thread."""

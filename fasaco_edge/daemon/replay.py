@@ -210,7 +210,9 @@ class _SilentBus(Bus):
     def __init__(self) -> None:
         self.heard: set[str] = set()
 
-    def subscribe(self, key: str, callback: object, latched: bool = False) -> Subscription:
+    def subscribe(
+        self, key: str, callback: object, latched: bool = False, history: int = 1
+    ) -> Subscription:
         """Note the key's topic."""
         self.heard.add(key.rpartition("/")[2])
         return Subscription(lambda: None)

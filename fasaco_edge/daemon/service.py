@@ -15,6 +15,7 @@ from fasaco_edge.daemon.inbox import Inbox, make_mailbox
 from fasaco_edge.daemon.ledger_writer import LedgerWriter, open_ledger
 from fasaco_edge.daemon.loop import Loop
 from fasaco_edge.daemon.outbox import Outbox
+from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 
 LOG = logging.getLogger(__name__)
@@ -69,8 +70,9 @@ def _serve(
 ) -> None:
     keys = config.keys()
     mailbox = make_mailbox()
-    outbox = Outbox(bus, keys)
-    inbox = Inbox(bus, keys, mailbox, config.pose.schema)
+    ros = RosBridge(bus, config.ros2, mailbox) if config.ros2 else None
+    outbox = Outbox(bus, keys, ros)
+    inbox = Inbox(bus, keys, mailbox, config.pose.schema, ros)
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
     commands = Commands(bus, keys, mailbox)
     loop = Loop(config, mailbox, inbox, commands, outbox, ledger, recorder)

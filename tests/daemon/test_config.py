@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.daemon.config import DaemonConfig, MissionSettings, load_config
+from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.errors import BadConfiguration
 from tests.daemon.processes import PROGRAM
 
@@ -210,7 +211,7 @@ VALUES = st.one_of(
     st.dictionaries(st.one_of(st.text(max_size=5), st.integers()), st.integers(), max_size=2),
 )
 NAMES = {
-    section: sorted(getattr(DaemonConfig(), section).__struct_fields__)
+    section: sorted((getattr(DaemonConfig(), section) or RosConfig).__struct_fields__)
     for section in DaemonConfig.__struct_fields__
 }
 
@@ -281,3 +282,44 @@ def test_the_command_ends_with_ex_config(tmp_path, text, said):
     assert str(file) in ended.stderr
     assert "hint: correct the named key" in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+def test_ros_is_left_out_unless_it_stands_there(load):
+    assert not load("").ros2
+    config = load("ros2: {kind: bridge, namespace: /robot1, pose: nav_msgs/msg/Odometry}")
+    assert config.ros2.map.name == "/robot1/map"
+    assert config.ros2.map.latched
+    assert {kind: topic.name for kind, topic in config.ros2.poses.items()} == {
+        "pose": "/robot1/pose"
+    }
+    assert list(load("ros2: {kind: rmw_zenoh}").ros2.poses) == ["tf_static", "pose"]
+
+
+@pytest.mark.parametrize(
+    ("block", "text"),
+    [
+        ("", "ros2: expected object, got None"),
+        ("{}", "ros2: object missing required field kind"),
+        ("{kind: dds}", "ros2.kind: expected bridge or rmw_zenoh, got 'dds'"),
+        ("{kind: bridge, domain: 3}", "ros2.domain and node are for kind rmw_zenoh"),
+        ("{kind: bridge, node: n}", "ros2.domain and node are for kind rmw_zenoh"),
+        ("{kind: rmw_zenoh, domain: -1}", "ros2.domain: expected int >= 0, got -1"),
+        ("{kind: rmw_zenoh, node: a-b}", "ros2.node must be letters, digits and _, got 'a-b'"),
+        ("{kind: rmw_zenoh, namespace: r}", "ros2.namespace must be / or like /robot1, got 'r'"),
+        ("{kind: rmw_zenoh, namespace: /r/}", "ros2.namespace must be / or like"),
+        ("{kind: rmw_zenoh, topics: {map: map}}", "ros2.topics.map must be like /robot1/map"),
+        ("{kind: rmw_zenoh, topics: {tf: /a/*}}", "ros2.topics.tf must be like /robot1/map"),
+        ("{kind: rmw_zenoh, topics: {tf: /1a}}", "ros2.topics.tf must be like /robot1/map"),
+        (f"{{kind: rmw_zenoh, topics: {{tf: /{'a' * 247}}}}}", "ros2.topics.tf must be like"),
+        ("{kind: rmw_zenoh, topics: {pose: /map}}", "topics.map and topics.pose must differ"),
+        ("{kind: rmw_zenoh, topics: {maps: /m}}", "unknown key ros2.topics.maps"),
+        ("{kind: rmw_zenoh, pose: Odometry}", "ros2.pose: expected tf, geometry_msgs/msg/Pose"),
+        ("{kind: rmw_zenoh, frames: {map: ''}}", "ros2.frames.map must be the name of a frame"),
+        ('{kind: rmw_zenoh, frames: {map: "\\ud800"}}', "ros2.frames.map must be the name of"),
+        ("{kind: rmw_zenoh, frames: {robot: map}}", "frames.map and frames.robot must differ"),
+    ],
+)
+def test_what_is_wrong_about_ros_is_named(load, block, text):
+    with pytest.raises(BadConfiguration) as caught:
+        load(f"ros2: {block}")
+    assert text in str(caught.value)

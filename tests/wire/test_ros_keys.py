@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 import yaml
 import zenoh
 import zenoh.ext
 
+from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.resources import folder
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.ros_keys import (
@@ -19,6 +22,7 @@ from fasaco_edge.wire.ros_keys import (
 )
 from tests.wire import oracle
 
+README = (folder("protocol") / "README.md").read_text()
 TABLE = yaml.safe_load((folder("protocol") / "keys.yaml").read_text())["ros2"]
 PATH = RosTopic("/robot1/coverage_path", schemas.PATH, latched=True)
 NODE = RosNode(2, "aac3178e146ba6f1fc6e6a4085e77f21", "/robot1", "fasaco_edge")
@@ -31,6 +35,27 @@ def test_hashes_are_those_of_the_definitions(schema: str) -> None:
 
 def test_hashes_are_those_of_the_table() -> None:
     assert {schema: f"RIHS01_{value}" for schema, value in TYPE_HASHES.items()} == TABLE["hashes"]
+
+
+def test_topics_are_those_of_the_table() -> None:
+    """What the daemon has by default, what keys.yaml says, and what the README shows."""
+    config = RosConfig(kind="rmw_zenoh")
+    by_pose = RosConfig(kind="rmw_zenoh", pose=schemas.ODOMETRY)
+    ours = [
+        *(config.map, config.map_updates, by_pose.poses["pose"]),
+        *(config.poses["pose"], config.poses["tf_static"]),
+        *(config.coverage_path, config.coverage_grid),
+    ]
+    shown = re.findall(r"^\| `(/\w+)` \| (in|out).* \| (.*) \| (.*) \|$", README, re.MULTILINE)
+    for topic, entry, row in zip(ours, TABLE["topics"], shown, strict=True):
+        facts = topic.name, topic.latched, topic.depth
+        assert facts == (entry["topic"], entry["latched"], entry["depth"])
+        assert topic.schema in entry["schema"]
+        durability = "transient local" if topic.latched else "volatile"
+        types = [schema.replace("/msg/", "/") for schema in entry["schema"]]
+        qos = f"reliable, {durability}, {topic.depth}"
+        assert row == (topic.name, entry["direction"], row[2], qos)
+        assert re.split(", | or ", row[2]) == types
 
 
 def test_keys_are_those_of_the_table() -> None:

@@ -1,0 +1,92 @@
+"""The daemon in a ROS 2 graph, without ROS: the same samples under the keys ROS has for them.
+
+What comes in goes into the mailbox with what comes by the native keys, and is decoded there;
+what goes out is encoded once. Whether rmw_zenoh or zenoh-bridge-ros2dds is on the other side
+changes keys, attachments and tokens alone.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.session import Bus, Publisher, Sample, Subscription
+from fasaco_edge.daemon.inbox import Received
+from fasaco_edge.daemon.ros_config import RosConfig
+from fasaco_edge.daemon.transforms import TransformTree
+from fasaco_edge.wire.ros_keys import RosNode, RosTopic, attachment, gid_of
+
+
+class RosBridge:
+    """The subscribers and publishers of the daemon under ROS 2.
+
+    Attributes:
+        map: the map's subscription, to be renewed where the map is lacking.
+        transforms: what poses come from; None where they have a topic of their own.
+        path, coverage: where to publish them.
+    """
+
+    def __init__(self, bus: Bus, config: RosConfig, mailbox: Mailbox[object]) -> None:
+        self._bus = bus
+        self._config = config
+        self._mailbox = mailbox
+        self._node = RosNode(config.domain, bus.id, config.namespace, config.node)
+        self._endpoints = 0
+        if config.kind == "rmw_zenoh":
+            bus.token(self._node.token)
+        frames = config.frames
+        by_tf = config.pose == "tf"
+        self.transforms = TransformTree(frames.map, frames.robot) if by_tf else None
+        self.map = self._subscribe("map", config.map)
+        self._subscribe("map_update", config.map_updates)
+        for kind, topic in config.poses.items():
+            self._subscribe(kind, topic)
+        self.path = self._publisher(config.coverage_path)
+        self.coverage = self._publisher(config.coverage_grid)
+
+    def _subscribe(self, kind: str, topic: RosTopic) -> Subscription:
+        post = _poster(self._mailbox, kind, topic.schema)
+        if self._config.kind == "bridge":
+            return self._bus.subscribe(topic.bridge_key, post, topic.latched, topic.depth)
+        key = topic.rmw_key(self._config.domain, any_hash=True)
+        subscription = self._bus.subscribe(key, post, topic.latched, topic.depth)
+        self._endpoints += 1
+        self._bus.token(self._node.endpoint_token(self._endpoints, "MS", topic))
+        return subscription
+
+    def _publisher(self, topic: RosTopic) -> RosPublisher:
+        if self._config.kind == "bridge":
+            publisher = self._bus.publisher(topic.bridge_key, topic.schema, topic.latched)
+            return RosPublisher(publisher)
+        key = topic.rmw_key(self._config.domain)
+        publisher = self._bus.publisher(key, topic.schema, topic.latched)
+        self._endpoints += 1
+        token = self._node.endpoint_token(self._endpoints, "MP", topic)
+        self._bus.token(token)
+        return RosPublisher(publisher, gid_of(token))
+
+
+class RosPublisher:
+    """Publishes one topic; with ``gid``, what rmw_zenoh demands goes with each sample."""
+
+    def __init__(self, publisher: Publisher, gid: bytes = b"") -> None:
+        self._publisher = publisher
+        self._gid = gid
+        self._count = 0
+
+    def put(self, payload: bytes) -> None:
+        """Send a message."""
+        self._count += 1
+        beside = attachment(self._count, time.time_ns(), self._gid) if self._gid else b""
+        self._publisher.put(payload, beside)
+
+
+def _poster(mailbox: Mailbox[object], kind: str, schema: str) -> Callable[[Sample], None]:
+    """Return what posts samples as messages of type ``schema``: ROS names none beside them."""
+
+    def post(sample: Sample) -> None:
+        named = Sample(sample.key, sample.payload, schema, sample.attachment)
+        mailbox.post(kind, Received(named, time.monotonic()))
+
+    return post

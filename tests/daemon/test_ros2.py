@@ -1,0 +1,239 @@
+"""A robot under ROS 2 gets its path: by rmw_zenoh's keys and by those of zenoh-bridge-ros2dds."""
+
+from __future__ import annotations
+
+import struct
+import time
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.geometry import Pose2D
+from tests.daemon.outsider import Heard, Outsider
+from tests.daemon.processes import daemon_process, resident_mb
+from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
+from tests.daemon.ros_robot import GRID, PATH, POSE, TF, UPDATE, Naming, RosRobot, ros_robot
+from tests.daemon.test_idle import IDLE_MB
+from tests.wire import oracle
+
+ROOM = pillared_room()
+BRIDGE, RMW = Naming(None), Naming(0)
+
+
+def ros2(naming: Naming, **keys):
+    kind = {"kind": "bridge"} if naming.domain is None else {"kind": "rmw_zenoh"}
+    domain = {"domain": naming.domain} if naming.domain else {}
+    return {**kind, **domain, "namespace": naming.namespace or "/", **keys}
+
+
+@contextmanager
+def ros_graph(folder, naming):
+    """Run a daemon with ROS keys; yield it and a robot, once the daemon is ready."""
+    with (
+        daemon_process(folder, ros2=ros2(naming)) as running,
+        ros_robot(running.endpoint, naming) as robot,
+        Outsider(running.endpoint),
+    ):
+        yield running, robot
+
+
+def put_map(robot: RosRobot) -> None:
+    robot.put("map", GRID, map_bytes(ROOM), latched=True)
+
+
+def is_walk(heard: Heard) -> bool:
+    return len(heard.payload) > 200
+
+
+def check_path(heard: Heard, near: tuple[float, float]) -> None:
+    """Check what a robot that follows the path needs."""
+    path = oracle.from_bytes(PATH, heard.payload)
+    assert path.header.frame_id == "map"
+    assert path.header.stamp.nanosec == 1  # the map's
+    xy = np.array([[pose.pose.position.x, pose.pose.position.y] for pose in path.poses])
+    assert len(xy) > 50
+    assert np.hypot(*(xy[0] - near)) < 0.5
+    for pose, step in zip(path.poses, np.diff(xy, axis=0), strict=False):
+        assert pose.header.frame_id == "map"
+        turn = pose.pose.orientation
+        ahead = [turn.w**2 - turn.z**2, 2 * turn.w * turn.z]
+        np.testing.assert_allclose(ahead, step / np.hypot(*step), atol=1e-6)
+
+
+def check_attachment(heard: Heard) -> int:
+    """Check what rmw_zenoh takes apart; return the sequence number."""
+    assert heard.attachment is not None
+    assert len(heard.attachment) == 33
+    sequence, time_ns, size = struct.unpack_from("<qqB", heard.attachment)
+    assert size == 16
+    assert abs(time_ns - time.time_ns()) < 60e9
+    return sequence
+
+
+@pytest.mark.parametrize("naming", [RMW, BRIDGE], ids=["rmw_zenoh", "bridge"])
+def test_a_robot_with_a_latched_map_and_tf_gets_its_path(naming, tmp_path):
+    with daemon_process(tmp_path, ros2=ros2(naming)) as running:
+        with ros_robot(running.endpoint, naming) as robot, Outsider(running.endpoint) as native:
+            path, grid = robot.listen("coverage_path", PATH), robot.listen("coverage_grid", GRID)
+            put_map(robot)
+            robot.put_tf("base_footprint", "base_link", Pose2D(0.0, 0.0), topic="tf_static")
+            robot.put_tf("map", "odom", Pose2D(0.5, 0.5, np.pi / 2))
+            assert native.wait_status(lambda status: status["map"])["pose"] is None
+            robot.put_tf("odom", "base_footprint", Pose2D(0.5, -0.5))
+            heard = path.wait(is_walk)
+            check_path(heard, near=(1.0, 1.0))
+            covered = oracle.from_bytes(GRID, grid.wait(is_walk).payload)
+            assert {0, 100} <= set(covered.data.tolist()) <= {-1, 0, 50, 75, 100}
+            assert covered.header.frame_id == "map"
+            status = native.ask_status()
+            assert status["pose"] == {"x": 1.0, "y": 1.0, "yaw": 1.5708}
+            assert status["errors"]["total"] == 0
+            assert native.ask("path").payload in [each.payload for each in path.heard]
+            if naming.domain is not None:
+                numbers = [check_attachment(each) for each in path.heard]
+                assert numbers == sorted(set(numbers))
+            else:
+                assert heard.attachment is None
+        with ros_robot(running.endpoint, naming) as late:
+            check_path(late.listen("coverage_path", PATH).wait(is_walk), near=(1.0, 1.0))
+            late.listen("coverage_grid", GRID).wait(is_walk)
+
+
+@pytest.mark.parametrize("naming", [RMW, BRIDGE], ids=["rmw_zenoh", "bridge"])
+def test_a_daemon_that_comes_late_gets_map_and_static_transforms(naming, tmp_path):
+    """Three programs say where frames lie for ever: what each said last counts.
+
+    Each has its own publisher under rmw_zenoh; a bridge speaks for all.
+    """
+    links = (("odom", "base_footprint"), ("base_footprint", "base"), ("base", "base_link"))
+    with (
+        daemon_process(tmp_path) as router,
+        ros_robot(router.endpoint, naming) as robot,
+    ):
+        put_map(robot)
+        fixed = oracle.pose(Pose2D(0.0, 0.0))
+        publisher = robot.another("tf_static", TF, latched=True)
+        for frame, child in links:
+            message = oracle.transforms((frame, child, 1, fixed))
+            publisher.put(oracle.to_bytes(TF, message))
+            if naming.domain is not None:
+                publisher = robot.another("tf_static", TF, latched=True)
+        path = robot.listen("coverage_path", PATH)
+        bus = {"listen": [], "connect": [router.endpoint], "mode": "client"}
+        names = {"robot": {"name": "second"}, "bus": bus, "ros2": ros2(naming)}
+        with daemon_process(tmp_path, **names), Outsider(router.endpoint, "second") as native:
+            native.wait_status(lambda status: status["map"])
+            robot.put_tf("map", "odom", Pose2D(1.0, 1.0))
+            check_path(path.wait(is_walk), near=(1.0, 1.0))
+
+
+@pytest.mark.parametrize("naming", [RMW, BRIDGE], ids=["rmw_zenoh", "bridge"])
+def test_updates_find_the_map_of_ros_and_poses_their_type(naming, tmp_path):
+    block = ros2(naming, pose=POSE, topics={"pose": "/slam/pose"})
+    with (
+        daemon_process(tmp_path, ros2=block, pose={"schema": "nav_msgs/msg/Odometry"}) as running,
+        ros_robot(running.endpoint, naming) as robot,
+        Outsider(running.endpoint) as native,
+    ):
+        path = robot.listen("coverage_path", PATH)
+        # An update without its map makes the daemon ask for the map, here too.
+        robot.put("map_updates", UPDATE, update_bytes(ROOM, 1.0, 1.0, 2.0, 2.0))
+        native.wait_status(lambda status: status["errors"]["by_code"].get("patch_without_base"))
+        put_map(robot)
+        robot.put("slam/pose", POSE, pose_bytes(1.0, 1.0))
+        check_path(path.wait(is_walk), near=(1.0, 1.0))
+        revision = native.ask_status()["map"]["revision"]
+        robot.put("map_updates", UPDATE, update_bytes(ROOM, 1.0, 1.0, 2.0, 2.0))
+        status = native.wait_status(lambda status: status["map"]["revision"] > revision)
+        assert status["errors"]["by_code"] == {"patch_without_base": 1}
+
+
+def test_broken_transforms_cost_themselves_alone(tmp_path):
+    with (
+        daemon_process(tmp_path, ros2=ros2(RMW)) as running,
+        ros_robot(running.endpoint, RMW) as robot,
+        Outsider(running.endpoint) as native,
+    ):
+        put_map(robot)
+        native.wait_status(lambda status: status["map"])
+        robot.put("tf", TF, b"no transforms")
+        robot.put_tf("map", "odom", Pose2D(float("nan"), 0.0))
+        robot.put_tf("odom", "base_link", Pose2D(1.0, 1.0))
+        robot.put_tf("base_link", "odom", Pose2D(0.0, 0.0))
+        refused = {"malformed_message": 2, "transform_loop": 1}
+        native.wait_status(lambda status: status["errors"]["by_code"] == refused)
+        robot.put_tf("map", "odom", Pose2D(0.0, 0.0))
+        robot.put_tf("odom", "base_link", Pose2D(1.0, 1.0))
+        status = native.wait_status(lambda status: status["pose"])
+        assert status["pose"] == {"x": 1.0, "y": 1.0, "yaw": 0.0}
+        assert status["errors"]["by_code"] == refused
+
+
+def test_the_graph_shows_node_publishers_and_subscribers(tmp_path):
+    """Each token has the parts of rmw_zenoh's, and vanishes with the daemon."""
+    naming = Naming(7, "/robot1")
+    with ros_graph(tmp_path, naming) as (running, robot):
+        tokens = robot.tokens()
+        nodes = [parts for parts in tokens if parts[5] == "NN"]
+        assert [parts[6:] for parts in nodes] == [["%", "%robot1", "fasaco_edge"]]
+        session = nodes[0][2]
+        endpoints = [parts for parts in tokens if parts[5] in ("MP", "MS")]
+        assert len(endpoints) == len(tokens) - 1
+        found = {}
+        for parts in endpoints:
+            assert parts[:4] == ["@ros2_lv", "7", session, "0"]
+            assert parts[6:9] == ["%", "%robot1", "fasaco_edge"]
+            topic, type_name, type_hash, qos = parts[9:]
+            schema = type_name.replace("::dds_::", "/").replace("::", "/").rstrip("_")
+            assert type_hash == oracle.STORE.hash_rihs01(schema)
+            reliability, durability, history, *others = qos.split(":")
+            assert (reliability, others) == ("", [",", ",", ",,"])
+            assert history.startswith(",")
+            found[topic.replace("%", "/")] = parts[5], schema, durability == "1"
+        assert len({parts[4] for parts in tokens}) == len(tokens)
+        running.stop()
+        assert robot.tokens() == []
+        assert found == {
+            "/robot1/map": ("MS", GRID, True),
+            "/robot1/map_updates": ("MS", UPDATE, False),
+            "/robot1/tf": ("MS", TF, False),
+            "/robot1/tf_static": ("MS", TF, True),
+            "/robot1/coverage_path": ("MP", PATH, True),
+            "/robot1/coverage_grid": ("MP", GRID, True),
+        }
+
+
+def test_two_robots_on_one_router_do_not_hear_each_other(tmp_path):
+    for naming in (RMW, BRIDGE):
+        first, second = Naming(naming.domain, "/robot1"), Naming(naming.domain, "/robot2")
+        folder = tmp_path / str(naming.domain)
+        folder.mkdir()
+        with daemon_process(folder, ros2=ros2(first)) as one:
+            bus = {"listen": [], "connect": [one.endpoint], "mode": "client"}
+            names = {"robot": {"name": "second"}, "bus": bus, "ros2": ros2(second)}
+            with (
+                daemon_process(folder, **names),
+                ros_robot(one.endpoint, second) as robot,
+                Outsider(one.endpoint) as native,
+                Outsider(one.endpoint, "second") as other,
+            ):
+                other_path = RosRobot(robot.session, first).listen("coverage_path", PATH)
+                path = robot.listen("coverage_path", PATH)
+                put_map(robot)
+                robot.put_tf("map", "base_link", Pose2D(1.0, 1.0))
+                check_path(path.wait(is_walk), near=(1.0, 1.0))
+                assert other.ask_status()["map"] is not None
+                assert native.ask_status()["map"] is None
+                assert other_path.heard == []
+
+
+def test_it_is_small_with_ros(tmp_path):
+    with ros_graph(tmp_path, RMW) as (running, robot), Outsider(running.endpoint) as native:
+        native.wait_status(lambda status: status["state"] == "waiting for map")
+        for _ in range(50):
+            robot.put_tf("odom", "base_link", Pose2D(1.0, 1.0))
+        time.sleep(0.3)
+        resident = resident_mb(running.pid)
+        print(f"idle with ros2: {resident:.1f} MB")
+        assert resident < IDLE_MB
