@@ -12,7 +12,7 @@ import pytest
 from fasaco_edge.grid.geometry import Pose2D
 from tests.daemon.outsider import Heard, Outsider
 from tests.daemon.processes import daemon_process, resident_mb
-from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
+from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, two_rooms, update_bytes
 from tests.daemon.ros_robot import GRID, PATH, POSE, TF, UPDATE, Naming, RosRobot, ros_robot
 from tests.daemon.test_idle import IDLE_MB
 from tests.wire import oracle
@@ -137,10 +137,11 @@ def test_updates_find_the_map_of_ros_and_poses_their_type(naming, tmp_path):
         Outsider(running.endpoint) as native,
     ):
         path = robot.listen("coverage_path", PATH)
-        # An update without its map makes the daemon ask for the map, here too.
-        robot.put("map_updates", UPDATE, update_bytes(ROOM, 1.0, 1.0, 2.0, 2.0))
-        native.wait_status(lambda status: status["errors"]["by_code"].get("patch_without_base"))
         put_map(robot)
+        native.wait_status(lambda status: status["map"])
+        # An update of another map makes the daemon ask for the map, and the robot's cache answers.
+        robot.put("map_updates", UPDATE, update_bytes(two_rooms(door=True), 5.0, 1.0, 6.0, 2.0))
+        native.wait_status(lambda status: status["map"]["revision"] == 2)
         robot.put("slam/pose", POSE, pose_bytes(1.0, 1.0))
         check_path(path.wait(is_walk), near=(1.0, 1.0))
         revision = native.ask_status()["map"]["revision"]
@@ -209,15 +210,14 @@ def test_two_robots_on_one_router_do_not_hear_each_other(tmp_path):
         first, second = Naming(naming.domain, "/robot1"), Naming(naming.domain, "/robot2")
         folder = tmp_path / str(naming.domain)
         folder.mkdir()
-        with daemon_process(folder, ros2=ros2(first)) as one:
+        with (
+            daemon_process(folder, ros2=ros2(first)) as one,
+            ros_robot(one.endpoint, second) as robot,
+            Outsider(one.endpoint) as native,
+        ):
             bus = {"listen": [], "connect": [one.endpoint], "mode": "client"}
             names = {"robot": {"name": "second"}, "bus": bus, "ros2": ros2(second)}
-            with (
-                daemon_process(folder, **names),
-                ros_robot(one.endpoint, second) as robot,
-                Outsider(one.endpoint) as native,
-                Outsider(one.endpoint, "second") as other,
-            ):
+            with daemon_process(folder, **names), Outsider(one.endpoint, "second") as other:
                 other_path = RosRobot(robot.session, first).listen("coverage_path", PATH)
                 path = robot.listen("coverage_path", PATH)
                 put_map(robot)
