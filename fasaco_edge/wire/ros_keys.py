@@ -116,8 +116,8 @@ class RosNode:
 def gid_of(token: str) -> bytes:
     """Return ``GID_BYTES`` bytes that no other publisher's token has.
 
-    rmw_zenoh takes XXH3 for that, which no reader can tell from another hash: a gid that comes
-    with a sample is compared with those of other samples only.
+    rmw_zenoh takes XXH3 for that, and tells samples apart by it. Who looks a sample's publisher
+    up in the graph by its gid does not find ours there.
     """
     return hashlib.blake2b(token.encode(), digest_size=GID_BYTES).digest()
 
