@@ -123,17 +123,10 @@ class RosRobot:
 @contextmanager
 def ros_robot(endpoint: str, naming: Naming) -> Iterator[RosRobot]:
     """Run a robot's session, once there is somebody at ``endpoint``."""
-    document = {
-        "mode": "client",
-        "connect": {"endpoints": [endpoint], "timeout_ms": 0},
-        "scouting": {"multicast": {"enabled": False}},
-        "timestamping": {"enabled": True},
-        "transport": {"shared_memory": {"enabled": False}},
-    }
     deadline = time.monotonic() + TIMEOUT_S
     while True:
         try:
-            session = zenoh.open(zenoh.Config.from_json5(json.dumps(document)))
+            session = _open(mode="client", connect={"endpoints": [endpoint], "timeout_ms": 0})
             break
         except zenoh.ZError:
             assert time.monotonic() < deadline, f"nobody listens at {endpoint}"
@@ -142,3 +135,25 @@ def ros_robot(endpoint: str, naming: Naming) -> Iterator[RosRobot]:
         yield RosRobot(session, naming)
     finally:
         session.close()  # type: ignore[no-untyped-call]
+
+
+@contextmanager
+def ros_node(router: str, naming: Naming) -> Iterator[RosRobot]:
+    """Run a session as rmw_zenoh's nodes have it by default: peers that meet at a router."""
+    listen = {"endpoints": ["tcp/localhost:0"]}
+    with _open(mode="peer", connect={"endpoints": [router]}, listen=listen) as session:
+        yield RosRobot(session, naming)
+
+
+@contextmanager
+def ros_router(endpoint: str) -> Iterator[None]:
+    """Run a router as rmw_zenohd is by default."""
+    with _open(mode="router", listen={"endpoints": [endpoint]}):
+        yield
+
+
+def _open(**document: Any) -> zenoh.Session:
+    document["scouting"] = {"multicast": {"enabled": False}, "gossip": {"enabled": True}}
+    document["timestamping"] = {"enabled": True}
+    document["transport"] = {"shared_memory": {"enabled": False}}
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(document)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import time
 from contextlib import contextmanager
 
@@ -10,10 +9,22 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.geometry import Pose2D
-from tests.daemon.outsider import Heard, Outsider
-from tests.daemon.processes import daemon_process, resident_mb
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import daemon_process, free_endpoint, resident_mb
 from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, two_rooms, update_bytes
-from tests.daemon.ros_robot import GRID, PATH, POSE, TF, UPDATE, Naming, RosRobot, ros_robot
+from tests.daemon.ros_checks import check_attachment, check_path, is_walk
+from tests.daemon.ros_robot import (
+    GRID,
+    PATH,
+    POSE,
+    TF,
+    UPDATE,
+    Naming,
+    RosRobot,
+    ros_node,
+    ros_robot,
+    ros_router,
+)
 from tests.daemon.test_idle import IDLE_MB
 from tests.wire import oracle
 
@@ -40,35 +51,6 @@ def ros_graph(folder, naming):
 
 def put_map(robot: RosRobot) -> None:
     robot.put("map", GRID, map_bytes(ROOM), latched=True)
-
-
-def is_walk(heard: Heard) -> bool:
-    return len(heard.payload) > 200
-
-
-def check_path(heard: Heard, near: tuple[float, float]) -> None:
-    """Check what a robot that follows the path needs."""
-    path = oracle.from_bytes(PATH, heard.payload)
-    assert path.header.frame_id == "map"
-    assert path.header.stamp.nanosec == 1  # the map's
-    xy = np.array([[pose.pose.position.x, pose.pose.position.y] for pose in path.poses])
-    assert len(xy) > 50
-    assert np.hypot(*(xy[0] - near)) < 0.5
-    for pose, step in zip(path.poses, np.diff(xy, axis=0), strict=False):
-        assert pose.header.frame_id == "map"
-        turn = pose.pose.orientation
-        ahead = [turn.w**2 - turn.z**2, 2 * turn.w * turn.z]
-        np.testing.assert_allclose(ahead, step / np.hypot(*step), atol=1e-6)
-
-
-def check_attachment(heard: Heard) -> int:
-    """Check what rmw_zenoh takes apart; return the sequence number."""
-    assert heard.attachment is not None
-    assert len(heard.attachment) == 33
-    sequence, time_ns, size = struct.unpack_from("<qqB", heard.attachment)
-    assert size == 16
-    assert abs(time_ns - time.time_ns()) < 60e9
-    return sequence
 
 
 @pytest.mark.parametrize("naming", [RMW, BRIDGE], ids=["rmw_zenoh", "bridge"])
@@ -226,6 +208,22 @@ def test_two_robots_on_one_router_do_not_hear_each_other(tmp_path):
                 assert other.ask_status()["map"] is not None
                 assert native.ask_status()["map"] is None
                 assert other_path.heard == []
+
+
+def test_nodes_that_are_peers_of_a_router_are_served_by_its_client(tmp_path):
+    """As rmw_zenoh is by default: rmw_zenohd is the router, each node a peer."""
+    router = free_endpoint()
+    bus = {"listen": [], "connect": [router], "mode": "client"}
+    with ros_router(router), ros_node(router, RMW) as mapper, ros_node(router, RMW) as driver:
+        put_map(mapper)
+        path = driver.listen("coverage_path", PATH)
+        with daemon_process(tmp_path, bus=bus, ros2=ros2(RMW)), Outsider(router) as native:
+            native.wait_status(lambda status: status["map"])
+            mapper.put_tf("map", "odom", Pose2D(0.0, 0.0))
+            driver.put_tf("odom", "base_link", Pose2D(1.0, 1.0))
+            check_path(path.wait(is_walk), near=(1.0, 1.0))
+            with ros_node(router, RMW) as late:
+                check_path(late.listen("coverage_path", PATH).wait(is_walk), near=(1.0, 1.0))
 
 
 def test_it_is_small_with_ros(tmp_path):
