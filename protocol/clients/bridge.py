@@ -57,10 +57,14 @@ def main() -> None:
     args = parser.parse_args()
     config = {
         "mode": "client",
-        "connect": {"endpoints": [args.connect]},
+        "connect": {"endpoints": [args.connect], "timeout_ms": 0},
         "scouting": {"multicast": {"enabled": False}},
     }
-    with zenoh.open(zenoh.Config.from_json5(json.dumps(config))) as session:
+    try:
+        session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
+    except zenoh.ZError as error:
+        sys.exit(f"nobody answers at {args.connect}: {error}")
+    with session:
         with suppress(KeyboardInterrupt, BrokenPipeError):
             pass_on(session, f"{args.base}/@v1/{args.robot}", args.topics, sys.stdout.buffer)
         # Python would flush what nobody reads any more.

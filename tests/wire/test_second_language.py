@@ -24,7 +24,7 @@ from fasaco_edge.wire import schemas
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.poses import decode_pose
 from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process
+from tests.daemon.processes import daemon_process, free_endpoint
 from tests.daemon.rooms import map_bytes, pillared_room
 from tests.wire.decoders import DECODERS
 from tests.wire.facts import facts_of, flat
@@ -182,6 +182,26 @@ def test_a_live_path_is_read(client: Path, tmp_path: Path) -> None:
     assert len(facts["xy"]) > 50
     check_facts(said["xy"], facts)
     assert said["state"]["robot"] == "robot"
+
+
+def test_a_bridge_to_nobody_says_so() -> None:
+    words = [str(CLIENTS / "bridge.py"), "--connect", free_endpoint(), "path"]
+    ended = subprocess.run([sys.executable, *words], capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("nobody answers at tcp/127.0.0.1:")
+
+
+def test_a_bridge_whose_program_ends_ends_too(tmp_path: Path) -> None:
+    with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint):
+        words = [str(CLIENTS / "bridge.py"), "--connect", daemon.endpoint, "status"]
+        with subprocess.Popen(
+            [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        ) as bridge:
+            assert bridge.stdout is not None
+            assert bridge.stdout.readline().startswith(b"json ")
+            bridge.stdout.close()
+            assert bridge.wait(20) == 0
+            assert bridge.stderr.read() == b""  # type: ignore[union-attr]
 
 
 def listen(client: Path, endpoint: str) -> dict[str, dict[str, Any]]:
