@@ -87,11 +87,6 @@ class CdrReader:
         self._offset = stop
         return layout.unpack_from(self._payload, start)
 
-    def uint32(self, field: str) -> int:
-        """Read an unsigned 32-bit integer."""
-        value: int = self.words(_UINT32, (field,))[0]
-        return value
-
     def doubles(self, layout: struct.Struct, field: str) -> tuple[Any, ...]:
         """Read 64-bit floats, as many as ``layout`` has; a tuple."""
         return layout.unpack_from(self._payload, self._take(8, layout.size, field))
@@ -133,8 +128,8 @@ class CdrReader:
 
     def length(self, field: str, least_bytes: int) -> int:
         """Read the length of a sequence whose items take at least ``least_bytes`` each."""
-        count = self.uint32(f"length of {field}")
-        if count * least_bytes > self.remaining:
+        count: int = self.words(_UINT32, _LENGTH, field)[0]
+        if count * least_bytes > self._size - self._offset:
             refuse(
                 self.message,
                 f"length of {field}",
@@ -200,14 +195,12 @@ class CdrWriter:
 
     def align(self, alignment: int) -> None:
         """Write zeros up to a multiple of ``alignment``."""
-        if padding := -self._size & (alignment - 1):
-            self.octets(bytes(padding))
+        self._put(alignment, b"")
 
     def words(self, layout: struct.Struct, names: Sequence[str], *values: float) -> None:
         """Write 32-bit numbers, as ``CdrReader.words`` reads them; ``names`` are theirs."""
-        self.align(4)
         try:
-            self.octets(layout.pack(*values))
+            self._put(4, layout.pack(*values))
         except struct.error:
             for name, code, value in zip(names, layout.format[1:], values, strict=True):
                 least, most, expected = _RANGES[code]
@@ -221,8 +214,7 @@ class CdrWriter:
 
     def doubles(self, layout: struct.Struct, *values: float) -> None:
         """Write 64-bit floats, as many as ``layout`` has."""
-        self.align(8)
-        self.octets(layout.pack(*values))
+        self._put(8, layout.pack(*values))
 
     def float64s(self, values: NDArray[np.float64]) -> None:
         """Write 64-bit floats of any shape, in row order."""
@@ -248,3 +240,9 @@ class CdrWriter:
     def payload(self) -> bytes:
         """Return the message."""
         return b"".join(self._parts)
+
+    def _put(self, alignment: int, packed: bytes) -> None:
+        if padding := -self._size & (alignment - 1):
+            packed = bytes(padding) + packed
+        self._parts.append(packed)
+        self._size += len(packed)
