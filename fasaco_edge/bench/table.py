@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fasaco_edge.bench.benchmark import Benchmark
+from fasaco_edge.bench.codec import CODEC
 from fasaco_edge.bench.footprint import FOOTPRINT
 from fasaco_edge.bench.ingest import INGEST
 from fasaco_edge.bench.latency import LATENCY
@@ -15,5 +16,5 @@ from fasaco_edge.bench.speed import SPEED
 from fasaco_edge.bench.table1 import TABLE1
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    SPEED, FOOTPRINT, INGEST, LATENCY, TABLE1, QUALITY, SCALE, ONLINE,
+    SPEED, FOOTPRINT, CODEC, INGEST, LATENCY, TABLE1, QUALITY, SCALE, ONLINE,
 )  # fmt: skip

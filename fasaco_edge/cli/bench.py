@@ -30,7 +30,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command and its benchmarks."""
     parser = commands.add_parser(
         "bench",
-        help="measure speed, footprint, latency, walks, missions, scale and the paper's Table I",
+        help="measure speed, footprint, codecs, latency, walks, missions, scale and Table I",
         description="Measure this installation on this machine.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

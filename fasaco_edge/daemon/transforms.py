@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from fasaco_edge.errors import MalformedMessage, TransformLoop
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.wire.cdr import refuse
 from fasaco_edge.wire.limits import MAX_TRANSFORMS
+from fasaco_edge.wire.refusal import refuse
 from fasaco_edge.wire.schemas import TF_MESSAGE
 from fasaco_edge.wire.tf import Transform
 

@@ -7,32 +7,34 @@ A primitive of n bytes is aligned to n, counted from the first byte after the he
 
 from __future__ import annotations
 
+import math
 import struct
-from typing import NoReturn
+from collections.abc import Sequence
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
+from fasaco_edge.wire.refusal import refuse
+from fasaco_edge.wire.strings import decoded_string, encoded_string
 
 ENCAPSULATION = b"\x00\x01\x00\x00"
 HEADER_SIZE = len(ENCAPSULATION)
+# The last byte counts padding.
+_FIXED_HEADER = ENCAPSULATION[:3]
 MAX_PADDING = 3
 
-_INT32 = struct.Struct("<i")
+_Cell = TypeVar("_Cell", np.int8, np.uint8)
+
 _UINT32 = struct.Struct("<I")
-_FLOAT32 = struct.Struct("<f")
-
-
-def refuse(message: str, field: str, expected: str, got: object) -> NoReturn:
-    """Raise MalformedMessage: ``message: field must be expected, got got``."""
-    raise MalformedMessage(f"{message}: {field} must be {expected}, got {got}")
-
-
-def aligned(offset: int, alignment: int) -> int:
-    """Return the first multiple of ``alignment`` from ``offset`` on."""
-    return offset + -offset % alignment
+_LENGTH = ("length of {}",)
+# What a number of a struct's format may be, and what it is called.
+_RANGES: dict[str, tuple[float, float, str]] = {
+    "i": (-(2**31), 2**31, "an int32"),
+    "I": (0, 2**32, "a uint32"),
+    "f": (-math.inf, math.inf, "a float32"),
+}
 
 
 class CdrReader:
@@ -40,70 +42,94 @@ class CdrReader:
 
     All methods raise MalformedMessage where the payload ends before the field does.
     Bytes skipped for alignment are not looked at: some writers leave them unset.
+    Numbers that follow each other are read at once, and fields named only once refused:
+    a small message takes as long as there are calls.
     """
 
-    __slots__ = ("_offset", "_payload", "message")
+    __slots__ = ("_offset", "_payload", "_size", "message")
 
     def __init__(self, payload: bytes, message: str) -> None:
         """Begin at the first field of ``payload``, a CDR message of type ``message``."""
-        header = payload[:HEADER_SIZE]
-        if len(header) < HEADER_SIZE or header[:3] != ENCAPSULATION[:3] or header[3] > MAX_PADDING:
-            refuse(message, "encapsulation header", "00 01 00 00", header.hex(" ") or "no bytes")
+        size = len(payload)
+        if size < HEADER_SIZE or payload[:3] != _FIXED_HEADER or payload[3] > MAX_PADDING:
+            header = payload[:HEADER_SIZE].hex(" ") or "no bytes"
+            refuse(message, "encapsulation header", "00 01 00 00", header)
         self.message = message
         self._payload = payload
+        self._size = size
         self._offset = HEADER_SIZE
 
     @property
     def remaining(self) -> int:
         """Number of bytes not yet read."""
-        return len(self._payload) - self._offset
+        return self._size - self._offset
 
     @property
     def position(self) -> int:
         """Number of bytes read since the header, what alignment is counted in."""
         return self._offset - HEADER_SIZE
 
-    def int32(self, field: str) -> int:
-        """Read a signed 32-bit integer."""
-        value: int = _INT32.unpack_from(self._payload, self._take(4, 4, field))[0]
-        return value
+    def words(
+        self, layout: struct.Struct, names: Sequence[str], field: str = ""
+    ) -> tuple[Any, ...]:
+        """Read 32-bit numbers that follow each other, as many as ``layout`` has; a tuple.
 
-    def uint32(self, field: str) -> int:
-        """Read an unsigned 32-bit integer."""
-        value: int = _UINT32.unpack_from(self._payload, self._take(4, 4, field))[0]
-        return value
+        Args:
+            layout: little endian, of the formats i, I and f.
+            names: of the numbers, each with ``{}`` where ``field`` belongs.
+            field: what they are part of.
+        """
+        start = self._offset + (-self._offset & 3)
+        stop = start + layout.size
+        if stop > self._size:
+            there = max(self._size - start, 0) // 4
+            self._cut(names[there].format(field), 4, start + 4 * there)
+        self._offset = stop
+        return layout.unpack_from(self._payload, start)
 
-    def float32(self, field: str) -> float:
-        """Read a 32-bit float."""
-        value: float = _FLOAT32.unpack_from(self._payload, self._take(4, 4, field))[0]
-        return value
+    def doubles(self, layout: struct.Struct, field: str) -> tuple[Any, ...]:
+        """Read 64-bit floats, as many as ``layout`` has; a tuple."""
+        return layout.unpack_from(self._payload, self._take(8, layout.size, field))
 
     def float64s(self, count: int, field: str) -> NDArray[np.float64]:
         """Read ``count`` 64-bit floats, float64 (count,), a read-only view of the payload."""
         start = self._take(8, 8 * count, field)
         return np.frombuffer(self._payload, "<f8", count, start)
 
+    def skip_float64s(self, count: int, field: str) -> None:
+        """Step over ``count`` 64-bit floats, whatever they are."""
+        self._take(8, 8 * count, field)
+
     def octets(self, count: int, field: str) -> NDArray[np.uint8]:
         """Read ``count`` bytes, uint8 (count,), a read-only view of the payload."""
         return np.frombuffer(self._payload, np.uint8, count, self._take(1, count, field))
 
+    def cells(
+        self, rows: int, cols: int, dtype: type[_Cell], field: str
+    ) -> np.ndarray[tuple[int, int], np.dtype[_Cell]]:
+        """Read rows * cols values of one byte, (rows, cols), a read-only view of the payload."""
+        start = self._take(1, rows * cols, field)
+        return np.ndarray((rows, cols), dtype, self._payload, start)
+
     def string(self, field: str) -> str:
         """Read a string: its length with the NUL, UTF-8, NUL."""
-        length = self.uint32(f"length of {field}")
+        return self.text(self.words(_UINT32, _LENGTH, field)[0], field)
+
+    def text(self, length: int, field: str) -> str:
+        """Read a string whose ``length`` with the NUL was read already."""
         if not 1 <= length <= MAX_STRING_BYTES + 1:
             refuse(self.message, f"length of {field}", f"1..{MAX_STRING_BYTES + 1}", length)
-        text = self.octets(length, field).tobytes()
-        if text.find(0) != length - 1:
-            refuse(self.message, field, "a string with one NUL, at its end", repr(text))
-        try:
-            return text[:-1].decode()
-        except UnicodeDecodeError as error:
-            refuse(self.message, field, "UTF-8", f"{text!r} ({error.reason})")
+        start = self._offset
+        stop = start + length
+        if stop > self._size:
+            self._cut(field, length, start)
+        self._offset = stop
+        return decoded_string(self._payload[start:stop], self.message, field)
 
     def length(self, field: str, least_bytes: int) -> int:
         """Read the length of a sequence whose items take at least ``least_bytes`` each."""
-        count = self.uint32(f"length of {field}")
-        if count * least_bytes > self.remaining:
+        count: int = self.words(_UINT32, _LENGTH, field)[0]
+        if count * least_bytes > self._size - self._offset:
             refuse(
                 self.message,
                 f"length of {field}",
@@ -125,8 +151,11 @@ class CdrReader:
         DDS pads its submessages so, and what comes over a bridge keeps it: zeros, counted
         in the header's last byte by some (XTypes), not counted by others (RTPS alone).
         """
-        tail, counted = self._payload[self._offset :], self._payload[HEADER_SIZE - 1]
-        rounded = not tail or (len(tail) <= MAX_PADDING and len(self._payload) % 4 == 0)
+        counted = self._payload[HEADER_SIZE - 1]
+        if self._offset == self._size and not counted:
+            return
+        tail = self._payload[self._offset :]
+        rounded = not tail or (len(tail) <= MAX_PADDING and self._size % 4 == 0)
         if not rounded or any(tail) or counted not in (0, len(tail)):
             expected = (
                 f"at its end after {self._offset} bytes, or {counted} counted ones of padding"
@@ -134,60 +163,73 @@ class CdrReader:
             refuse(self.message, "payload", expected, f"{len(tail)} bytes more")
 
     def _take(self, alignment: int, size: int, field: str) -> int:
-        start = HEADER_SIZE + aligned(self.position, alignment)
-        if start + size > len(self._payload):
-            refuse(
-                self.message,
-                field,
-                f"{size} bytes at offset {start}",
-                f"a payload of {len(self._payload)}",
-            )
+        start = self._offset + ((HEADER_SIZE - self._offset) & (alignment - 1))
+        if start + size > self._size:
+            self._cut(field, size, start)
         self._offset = start + size
         return start
 
+    def _cut(self, field: str, size: int, start: int) -> NoReturn:
+        expected = f"{size} bytes at offset {start}"
+        refuse(self.message, field, expected, f"a payload of {self._size}")
+
 
 class CdrWriter:
-    """Writes fields in order, with the alignment ``CdrReader`` expects."""
+    """Writes fields in order, with the alignment ``CdrReader`` expects.
 
-    __slots__ = ("_buffer", "message")
+    Arrays are not copied before ``payload``: until then they must not change.
+    """
+
+    __slots__ = ("_parts", "_size", "message")
 
     def __init__(self, message: str) -> None:
         """Begin a CDR message of type ``message``."""
         self.message = message
-        self._buffer = bytearray(ENCAPSULATION)
+        self._parts: list[bytes | memoryview] = [ENCAPSULATION]
+        self._size = 0
 
     @property
     def position(self) -> int:
         """Number of bytes written since the header, what alignment is counted in."""
-        return len(self._buffer) - HEADER_SIZE
+        return self._size
 
     def align(self, alignment: int) -> None:
         """Write zeros up to a multiple of ``alignment``."""
-        self._buffer += bytes(-self.position % alignment)
+        self._put(alignment, b"")
 
-    def int32(self, value: int, field: str) -> None:
-        """Write a signed 32-bit integer."""
-        if not -(2**31) <= value < 2**31:
-            refuse(self.message, field, "an int32", value)
-        self._put(4, _INT32.pack(value))
+    def words(self, layout: struct.Struct, names: Sequence[str], *values: float) -> None:
+        """Write 32-bit numbers, as ``CdrReader.words`` reads them; ``names`` are theirs."""
+        try:
+            self._put(4, layout.pack(*values))
+        except struct.error:
+            for name, code, value in zip(names, layout.format[1:], values, strict=True):
+                least, most, expected = _RANGES[code]
+                if not least <= value < most:
+                    refuse(self.message, name, expected, value)
+            raise
 
     def uint32(self, value: int, field: str) -> None:
         """Write an unsigned 32-bit integer."""
-        if not 0 <= value < 2**32:
-            refuse(self.message, field, "a uint32", value)
-        self._put(4, _UINT32.pack(value))
+        self.words(_UINT32, (field,), value)
 
-    def float32(self, value: float) -> None:
-        """Write a 32-bit float."""
-        self._put(4, _FLOAT32.pack(value))
+    def doubles(self, layout: struct.Struct, *values: float) -> None:
+        """Write 64-bit floats, as many as ``layout`` has."""
+        self._put(8, layout.pack(*values))
 
     def float64s(self, values: NDArray[np.float64]) -> None:
         """Write 64-bit floats of any shape, in row order."""
-        self._put(8, values.astype("<f8", copy=False).tobytes())
+        self.align(8)
+        self.array(values.astype("<f8", copy=False))
+
+    def array(self, values: NDArray[Any]) -> None:
+        """Write an array's bytes as they are, in row order."""
+        self._parts.append(np.ascontiguousarray(values).data)
+        self._size += values.nbytes
 
     def octets(self, values: bytes) -> None:
         """Write bytes as they are."""
-        self._buffer += values
+        self._parts.append(values)
+        self._size += len(values)
 
     def string(self, value: str, field: str) -> None:
         """Write a string: its length with the NUL, UTF-8, NUL."""
@@ -197,23 +239,10 @@ class CdrWriter:
 
     def payload(self) -> bytes:
         """Return the message."""
-        return bytes(self._buffer)
+        return b"".join(self._parts)
 
     def _put(self, alignment: int, packed: bytes) -> None:
-        self.align(alignment)
-        self._buffer += packed
-
-
-def encoded_string(value: str, message: str, field: str) -> bytes:
-    """Return ``value`` in UTF-8 with its NUL.
-
-    Raises:
-        MalformedMessage: it is too long, holds a NUL, or has no UTF-8.
-    """
-    try:
-        text = value.encode()
-    except UnicodeEncodeError as error:
-        refuse(message, field, "UTF-8", f"{value!r} ({error.reason})")
-    if len(text) > MAX_STRING_BYTES or 0 in text:
-        refuse(message, field, f"at most {MAX_STRING_BYTES} bytes without NUL", repr(value))
-    return text + b"\0"
+        if padding := -self._size & (alignment - 1):
+            packed = bytes(padding) + packed
+        self._parts.append(packed)
+        self._size += len(packed)

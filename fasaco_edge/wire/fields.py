@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+import struct
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.wire.cdr import CdrReader, CdrWriter
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
     MAX_GRID_TILT,
@@ -16,38 +20,43 @@ from fasaco_edge.wire.limits import (
     MIN_RESOLUTION_M,
     QUATERNION_TOLERANCE,
 )
+from fasaco_edge.wire.refusal import refuse
+from fasaco_edge.wire.strings import encoded_string
 
 SECOND_NS = 1_000_000_000
 POSE_FLOATS = 7
 """A geometry_msgs/Pose: position x, y, z and quaternion x, y, z, w."""
 
 
-def read_stamp(reader: CdrReader, field: str) -> int:
-    """Read a builtin_interfaces/Time; return it in nanoseconds."""
-    sec = reader.int32(f"{field}.sec")
-    nanosec = reader.uint32(f"{field}.nanosec")
-    if nanosec >= SECOND_NS:
-        refuse(reader.message, f"{field}.nanosec", f"less than {SECOND_NS}", nanosec)
-    return sec * SECOND_NS + nanosec
+_Cell = TypeVar("_Cell", np.int8, np.uint8)
 
-
-def write_stamp(writer: CdrWriter, stamp_ns: int, field: str) -> None:
-    """Write nanoseconds as a builtin_interfaces/Time."""
-    sec, nanosec = divmod(stamp_ns, SECOND_NS)
-    writer.int32(sec, f"{field}.sec")
-    writer.uint32(nanosec, f"{field}.nanosec")
+_POSE = struct.Struct("<7d")
+_HEADER = struct.Struct("<iII")
+_HEADER_NAMES = ("{}.stamp.sec", "{}.stamp.nanosec", "length of {}.frame_id")
+_SENT_HEADER_NAMES = tuple(name.format("header") for name in _HEADER_NAMES)
+_INFO = struct.Struct("<iIfII")
+_INFO_NAMES = (
+    "info.map_load_time.sec",
+    "info.map_load_time.nanosec",
+    "info.resolution",
+    "info.width",
+    "info.height",
+)
 
 
 def read_header(reader: CdrReader, field: str = "header") -> tuple[str, int]:
     """Read a std_msgs/Header; return its frame and its stamp [ns]."""
-    stamp_ns = read_stamp(reader, f"{field}.stamp")
-    return reader.string(f"{field}.frame_id"), stamp_ns
+    sec, nanosec, length = reader.words(_HEADER, _HEADER_NAMES, field)
+    if nanosec >= SECOND_NS:
+        _refuse_nanosec(reader, f"{field}.stamp", nanosec)
+    return reader.text(length, f"{field}.frame_id"), sec * SECOND_NS + nanosec
 
 
 def write_header(writer: CdrWriter, frame: str, stamp_ns: int) -> None:
     """Write a std_msgs/Header."""
-    write_stamp(writer, stamp_ns, "header.stamp")
-    writer.string(frame, "header.frame_id")
+    text = encoded_string(frame, writer.message, "header.frame_id")
+    writer.words(_HEADER, _SENT_HEADER_NAMES, *divmod(stamp_ns, SECOND_NS), len(text))
+    writer.octets(text)
 
 
 def check_poses(poses: NDArray[np.float64], message: str, field_of: Callable[[int], str]) -> None:
@@ -95,62 +104,74 @@ def planar_poses(xy: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[n
 
 def read_pose(reader: CdrReader, field: str) -> Pose2D:
     """Read a geometry_msgs/Pose; return its place in the plane."""
-    poses = reader.float64s(POSE_FLOATS, field).reshape(1, POSE_FLOATS)
-    check_poses(poses, reader.message, lambda _: field)
-    return Pose2D(float(poses[0, 0]), float(poses[0, 1]), float(yaw_of(poses[:, 3:])[0]))
+    pose = reader.doubles(_POSE, field)
+    _check_pose(pose, reader.message, field)
+    return _planar(pose)
 
 
 def write_pose(writer: CdrWriter, pose: Pose2D, field: str) -> None:
     """Write a pose in the plane as a geometry_msgs/Pose with z = 0."""
-    poses = planar_poses(np.array([[pose.x, pose.y]]), np.array([pose.yaw]))
-    check_poses(poses, writer.message, lambda _: field)
-    writer.float64s(poses)
+    # math refuses to turn by infinity; NaN it lets through, to be refused as all others.
+    half = pose.yaw / 2 if math.isfinite(pose.yaw) else math.nan
+    floats = (pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
+    _check_pose(floats, writer.message, field)
+    writer.doubles(_POSE, *floats)
 
 
 def read_grid_geometry(reader: CdrReader) -> GridGeometry:
     """Read a nav_msgs/MapMetaData; its time of loading is dropped."""
-    read_stamp(reader, "info.map_load_time")
-    # The shortest decimal that is this float32: 0.05 m stays 0.05 m.
-    resolution = float(str(np.float32(reader.float32("info.resolution"))))
+    _, nanosec, edge, cols, rows = reader.words(_INFO, _INFO_NAMES)
+    if nanosec >= SECOND_NS:
+        _refuse_nanosec(reader, "info.map_load_time", nanosec)
+    resolution = _shortest_decimal(edge)
     _check_resolution(resolution, reader.message)
-    cols, rows = reader.uint32("info.width"), reader.uint32("info.height")
-    origin = reader.float64s(POSE_FLOATS, "info.origin").reshape(1, POSE_FLOATS)
-    check_poses(origin, reader.message, lambda _: "info.origin")
-    tilt = float(np.abs(origin[0, 3:5]).max())
-    if tilt > MAX_GRID_TILT:
+    origin = reader.doubles(_POSE, "info.origin")
+    _check_pose(origin, reader.message, "info.origin")
+    if max(abs(origin[3]), abs(origin[4])) > MAX_GRID_TILT:
         refuse(
             reader.message,
             "info.origin.orientation",
             f"a turn about z (x and y within {MAX_GRID_TILT})",
-            origin[0, 3:].tolist(),
+            list(origin[3:]),
         )
-    x, y, yaw = float(origin[0, 0]), float(origin[0, 1]), float(yaw_of(origin[:, 3:])[0])
-    return GridGeometry(rows, cols, resolution, Pose2D(x, y, yaw))
+    return GridGeometry(rows, cols, resolution, _planar(origin))
 
 
 def write_grid_geometry(writer: CdrWriter, geometry: GridGeometry, stamp_ns: int) -> None:
     """Write a nav_msgs/MapMetaData, loaded at ``stamp_ns``."""
-    write_stamp(writer, stamp_ns, "info.map_load_time")
     _check_resolution(geometry.resolution, writer.message)
-    writer.float32(geometry.resolution)
-    writer.uint32(geometry.cols, "info.width")
-    writer.uint32(geometry.rows, "info.height")
+    writer.words(
+        _INFO,
+        _INFO_NAMES,
+        *divmod(stamp_ns, SECOND_NS),
+        geometry.resolution,
+        geometry.cols,
+        geometry.rows,
+    )
     write_pose(writer, geometry.origin, "info.origin")
 
 
 def read_cells(
-    reader: CdrReader, rows: int, cols: int, max_cells: int, field: str = "data"
-) -> NDArray[np.uint8]:
-    """Read the last field, rows * cols bytes; return uint8 (rows, cols), a read-only view."""
+    reader: CdrReader,
+    geometry: GridGeometry | Window,
+    dtype: type[_Cell],
+    max_cells: int,
+    field: str = "data",
+) -> NDArray[_Cell]:
+    """Read the last field, a byte for each of the cells of ``geometry``.
+
+    Returns a read-only view, (rows, cols), of type ``dtype``.
+    """
+    rows, cols = geometry.rows, geometry.cols
     count = reader.length(field, 1)
     if not 0 < count <= max_cells:
         refuse(reader.message, f"length of {field}", f"1..{max_cells}", count)
     if count != rows * cols:
         expected = f"width x height = {cols} x {rows} = {rows * cols}"
         refuse(reader.message, f"length of {field}", expected, count)
-    cells = reader.octets(count, field)
+    cells = reader.cells(rows, cols, dtype, field)
     reader.end()
-    return cells.reshape(rows, cols)
+    return cells
 
 
 def write_cells(writer: CdrWriter, cells: NDArray[np.generic], field: str = "data") -> None:
@@ -158,7 +179,38 @@ def write_cells(writer: CdrWriter, cells: NDArray[np.generic], field: str = "dat
     if not cells.size:
         refuse(writer.message, f"length of {field}", "at least 1", 0)
     writer.uint32(cells.size, f"length of {field}")
-    writer.octets(cells.tobytes())
+    writer.array(cells)
+
+
+def _check_pose(pose: Sequence[float], message: str, field: str) -> None:
+    """Check one pose: as ``check_poses``, which says what is wrong, without arrays."""
+    x, y, z, qx, qy, qz, qw = pose
+    far = MAX_COORDINATE_M
+    norm = math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
+    if not (
+        -far <= x <= far
+        and -far <= y <= far
+        and -far <= z <= far
+        and abs(norm - 1.0) <= QUATERNION_TOLERANCE
+    ):
+        check_poses(np.array([pose], np.float64), message, lambda _: field)
+
+
+def _planar(pose: Sequence[float]) -> Pose2D:
+    """Return the place in the plane of one pose; its yaw as ``yaw_of`` has it."""
+    px, py, _, x, y, z, w = pose
+    return Pose2D(px, py, math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z))
+
+
+def _refuse_nanosec(reader: CdrReader, field: str, nanosec: int) -> NoReturn:
+    refuse(reader.message, f"{field}.nanosec", f"less than {SECOND_NS}", nanosec)
+
+
+# A robot's maps have one resolution, and numpy takes a while to find its decimal.
+@lru_cache(maxsize=16)
+def _shortest_decimal(value: float) -> float:
+    """Return the shortest decimal that is this float32: 0.05 m stays 0.05 m."""
+    return float(str(np.float32(value)))
 
 
 def _check_resolution(resolution: float, message: str) -> None:

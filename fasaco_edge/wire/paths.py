@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter, aligned, encoded_string, refuse
+from fasaco_edge.wire.cdr import CdrReader, CdrWriter
 from fasaco_edge.wire.fields import (
     POSE_FLOATS,
     SECOND_NS,
@@ -22,7 +22,9 @@ from fasaco_edge.wire.fields import (
     yaw_of,
 )
 from fasaco_edge.wire.limits import MAX_PATH_POSES
+from fasaco_edge.wire.refusal import refuse
 from fasaco_edge.wire.schemas import PATH
+from fasaco_edge.wire.strings import encoded_string
 
 LEAST_POSE_BYTES = 72
 """Of a PoseStamped with an empty frame: stamp 8, length 4, NUL 1, padding 3, floats 56."""
@@ -77,7 +79,7 @@ def encode_path(
         records["length"] = len(text)
         records["frame"] = np.frombuffer(text, np.uint8)
         records["pose"] = some
-        writer.octets(records.tobytes())
+        writer.array(records)
     return writer.payload()
 
 
@@ -138,7 +140,8 @@ def _read_one_by_one(reader: CdrReader, frame: str, count: int) -> NDArray[np.fl
 def _record(start: int, frame_size: int) -> np.dtype[np.void]:
     """Return the layout of a PoseStamped that begins at ``start``, a multiple of four."""
     frame_at = 12
-    pose_at = aligned(start + frame_at + frame_size, 8) - start
+    pose_at = frame_at + frame_size
+    pose_at += -(start + pose_at) % 8
     return np.dtype(
         {
             "names": ["sec", "nanosec", "length", "frame", "pose"],

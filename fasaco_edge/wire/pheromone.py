@@ -8,6 +8,7 @@ cannot be covered.
 from __future__ import annotations
 
 import math
+import struct
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.planners.observation import ColonySnapshot
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
+from fasaco_edge.wire.cdr import CdrReader, CdrWriter
 from fasaco_edge.wire.coverage import lattice_geometry
 from fasaco_edge.wire.fields import (
     read_cells,
@@ -26,10 +27,14 @@ from fasaco_edge.wire.fields import (
     write_header,
 )
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
+from fasaco_edge.wire.refusal import refuse
 from fasaco_edge.wire.schemas import PHEROMONE_GRID
 
 TOP_STEP = 254
 """Steps of the scale between level 1, trail_min, and level 255, trail_max."""
+
+_COLONY = struct.Struct("<ffIIII")
+_COLONY_NAMES = ("trail_min", "trail_max", "cohort", "velocity", "ants", "best_steps")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,12 +86,16 @@ def encode_pheromone(snapshot: ColonySnapshot, frame: str, stamp_ns: int) -> byt
     if levels.shape != (geometry.rows, geometry.cols):
         refuse(writer.message, "levels", f"{geometry.rows, geometry.cols}", levels.shape)
     write_grid_geometry(writer, geometry, stamp_ns)
-    writer.float32(trail_min)
-    writer.float32(trail_max)
-    writer.uint32(snapshot.cohort, "cohort")
-    writer.uint32(snapshot.velocity, "velocity")
-    writer.uint32(snapshot.ants, "ants")
-    writer.uint32(snapshot.best_steps, "best_steps")
+    writer.words(
+        _COLONY,
+        _COLONY_NAMES,
+        trail_min,
+        trail_max,
+        snapshot.cohort,
+        snapshot.velocity,
+        snapshot.ants,
+        snapshot.best_steps,
+    )
     write_cells(writer, levels, "levels")
     return writer.payload()
 
@@ -100,10 +109,9 @@ def decode_pheromone(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> Pheromo
     reader = CdrReader(payload, PHEROMONE_GRID)
     frame, stamp_ns = read_header(reader)
     geometry = read_grid_geometry(reader)
-    trail_min, trail_max = reader.float32("trail_min"), reader.float32("trail_max")
-    cohort, velocity = reader.uint32("cohort"), reader.uint32("velocity")
-    ants, best_steps = reader.uint32("ants"), reader.uint32("best_steps")
-    levels = read_cells(reader, geometry.rows, geometry.cols, max_cells, "levels")
+    colony = reader.words(_COLONY, _COLONY_NAMES)
+    trail_min, trail_max, cohort, velocity, ants, best_steps = colony
+    levels = read_cells(reader, geometry, np.uint8, max_cells, "levels")
     empty = trail_min == trail_max == 0.0 and not levels.any()
     if not empty and not 0.0 < trail_min <= trail_max < math.inf:
         expected = "finite with 0 < trail_min <= trail_max, or 0 where no level is above 0"

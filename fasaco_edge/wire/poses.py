@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
+from fasaco_edge.wire.cdr import CdrReader, CdrWriter
 from fasaco_edge.wire.fields import read_header, read_pose, write_header, write_pose
+from fasaco_edge.wire.refusal import refuse
 from fasaco_edge.wire.schemas import ODOMETRY, POSE_STAMPED, POSE_WITH_COVARIANCE_STAMPED
 
 COVARIANCE_FLOATS = 36
@@ -102,7 +103,7 @@ def _decode_pose_with_covariance_stamped(payload: bytes) -> StampedPose:
     reader = CdrReader(payload, POSE_WITH_COVARIANCE_STAMPED)
     frame, stamp_ns = read_header(reader)
     pose = read_pose(reader, "pose.pose")
-    reader.float64s(COVARIANCE_FLOATS, "pose.covariance")
+    reader.skip_float64s(COVARIANCE_FLOATS, "pose.covariance")
     reader.end()
     return StampedPose(pose, frame, stamp_ns)
 
@@ -112,9 +113,9 @@ def _decode_odometry(payload: bytes) -> StampedPose:
     frame, stamp_ns = read_header(reader)
     reader.string("child_frame_id")
     pose = read_pose(reader, "pose.pose")
-    reader.float64s(COVARIANCE_FLOATS, "pose.covariance")
-    reader.float64s(TWIST_FLOATS, "twist.twist")
-    reader.float64s(COVARIANCE_FLOATS, "twist.covariance")
+    reader.skip_float64s(COVARIANCE_FLOATS, "pose.covariance")
+    reader.skip_float64s(TWIST_FLOATS, "twist.twist")
+    reader.skip_float64s(COVARIANCE_FLOATS, "twist.covariance")
     reader.end()
     return StampedPose(pose, frame, stamp_ns)
 
@@ -139,7 +140,10 @@ def _begin(schema: str, stamped: StampedPose) -> CdrWriter:
 def _write_floats(
     writer: CdrWriter, values: NDArray[np.float64] | None, count: int, field: str
 ) -> None:
-    floats = np.zeros(count) if values is None else values
-    if floats.shape != (count,):
-        refuse(writer.message, field, f"float64 ({count},)", f"{floats.dtype} {floats.shape}")
-    writer.float64s(floats)
+    if values is None:
+        writer.align(8)
+        writer.octets(bytes(8 * count))
+        return
+    if values.shape != (count,):
+        refuse(writer.message, field, f"float64 ({count},)", f"{values.dtype} {values.shape}")
+    writer.float64s(values)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.wire.cdr import CdrReader, refuse
+from fasaco_edge.wire.cdr import CdrReader
 from fasaco_edge.wire.fields import POSE_FLOATS, read_header
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
@@ -14,6 +14,7 @@ from fasaco_edge.wire.limits import (
     MAX_TRANSFORMS,
     QUATERNION_TOLERANCE,
 )
+from fasaco_edge.wire.refusal import refuse
 from fasaco_edge.wire.schemas import TF_MESSAGE
 
 LEAST_TRANSFORM_BYTES = 80

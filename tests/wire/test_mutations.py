@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import random
 import struct
 import tracemalloc
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -15,125 +13,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.wire import limits, schemas
-from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.maps import encode_map_update
+from fasaco_edge.wire.paths import decode_path, encode_path
 from fasaco_edge.wire.poses import POSE_SCHEMAS
 from fasaco_edge.wire.tf import decode_transforms
 from tests.wire.decoders import DECODERS
+from tests.wire.mutations import mutant, seeds_of
+from tests.wire.soundness import is_read, peak_bytes
 from tests.wire.valid_vectors import valid_vectors
 
 MUTATIONS = 3000
-ODD_NUMBERS = [0, 1, 2, 3, 4, 7, 8, 2**16, 2**24, 2**31 - 1, 2**31, 2**32 - 1]
-ODD_FLOATS = [0.0, -0.0, 5e-324, 1e-42, 1e308, float("inf"), float("-inf"), float("nan")]
-# A signalling NaN, and negative ones: arithmetic on them must not warn either.
-ODD_BITS = [0x7FF0000000000001, 0xFFF0000000000001, 0xFFFFFFFFFFFFFFFF]
-
-Mutation = Callable[[random.Random, bytearray], None]
-
-
-def flip(rng: random.Random, payload: bytearray) -> None:
-    for _ in range(rng.randint(1, 4)):
-        payload[rng.randrange(len(payload))] ^= 1 << rng.randrange(8)
-
-
-def overwrite(rng: random.Random, payload: bytearray) -> None:
-    for _ in range(rng.randint(1, 8)):
-        payload[rng.randrange(len(payload))] = rng.randrange(256)
-
-
-def cut(rng: random.Random, payload: bytearray) -> None:
-    at = rng.randrange(len(payload))
-    del payload[at : at + rng.randint(1, 16)]
-
-
-def insert(rng: random.Random, payload: bytearray) -> None:
-    at = rng.randrange(len(payload))
-    payload[at:at] = rng.randbytes(rng.randint(1, 16))
-
-
-def append(rng: random.Random, payload: bytearray) -> None:
-    payload += rng.randbytes(rng.randint(1, 16))
-
-
-def edit_number(rng: random.Random, payload: bytearray) -> None:
-    at = rng.randrange(4, len(payload) - 3) & ~3
-    (value,) = struct.unpack_from("<I", payload, at)
-    edited = rng.choice([*ODD_NUMBERS, (value + rng.choice([-8, -4, -1, 1, 4, 8])) % 2**32])
-    struct.pack_into("<I", payload, at, edited)
-
-
-def edit_float(rng: random.Random, payload: bytearray) -> None:
-    at = 4 + (rng.randrange(0, len(payload) - 11) & ~7)
-    odd = rng.choice([*(struct.pack("<d", value) for value in ODD_FLOATS), *map(uint64, ODD_BITS)])
-    payload[at : at + 8] = odd
-
-
-def edit_float32(rng: random.Random, payload: bytearray) -> None:
-    at = rng.randrange(4, len(payload) - 3) & ~3
-    payload[at : at + 4] = rng.choice(
-        [b"\1\0\x80\x7f", b"\1\0\xc0\xff", b"\0\0\x80\x7f", b"\1\0\0\0"]
-    )
-
-
-def uint64(bits: int) -> bytes:
-    return struct.pack("<Q", bits)
-
-
-KINDS: tuple[Mutation, ...] = (
-    flip,
-    overwrite,
-    cut,
-    insert,
-    append,
-    edit_number,
-    edit_float,
-    edit_float32,
-)
-
-
-def check_sound(message: object) -> None:
-    """Check that what came through holds what the contract promises."""
-    if isinstance(message, tuple):
-        for transform in message:
-            place = transform.planar()
-            assert max(abs(place.x), abs(place.y)) <= 1e6
-            assert abs(place.yaw) <= np.pi
-            assert max(len(transform.frame.encode()), len(transform.child.encode())) <= 256
-        return
-    cells = getattr(message, "cells", None)
-    if cells is not None:
-        assert cells.size > 0
-        assert cells.min() >= -1
-        assert cells.max() <= 100
-    geometry = getattr(message, "geometry", None)
-    if geometry is not None:
-        assert 1e-4 <= geometry.resolution <= 100
-        assert np.isfinite([geometry.origin.x, geometry.origin.y, geometry.origin.yaw]).all()
-    pose = getattr(message, "pose", None)
-    if pose is not None:
-        assert max(abs(pose.x), abs(pose.y)) <= 1e6
-        assert abs(pose.yaw) <= np.pi
-    if hasattr(message, "xy"):
-        assert np.isfinite(message.xy).all()
-        assert np.isfinite(message.yaw).all()
-        assert message.xy.shape == (len(message.yaw), 2)
-    assert len(message.frame.encode()) <= 256  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("schema", DECODERS)
 def test_mutations_raise_only_malformed_message(schema: str) -> None:
-    rng = random.Random(schema)
-    seeds = [vector.payload for vector in valid_vectors() if vector.schema == schema]
-    refused = 0
-    for _ in range(MUTATIONS):
-        payload = bytearray(rng.choice(seeds))
-        for mutate in rng.choices(KINDS, k=rng.choice([1, 1, 1, 2, 3])):
-            if len(payload) > 16:
-                mutate(rng, payload)
-        try:
-            check_sound(DECODERS[schema](bytes(payload)))
-        except MalformedMessage:
-            refused += 1
+    rng, seeds = random.Random(schema), seeds_of(schema)
+    refused = sum(not is_read(schema, mutant(rng, seeds)) for _ in range(MUTATIONS))
     assert MUTATIONS // 4 < refused < MUTATIONS
 
 
@@ -157,19 +55,28 @@ def test_a_message_of_another_type_is_refused(schema: str) -> None:
 
 @pytest.mark.parametrize("schema", [*DECODERS])
 def test_no_more_memory_than_the_payload_justifies(schema: str) -> None:
-    payloads = [bytearray(v.payload) for v in valid_vectors() if v.schema == schema]
     tracemalloc.start()
     try:
-        for payload in payloads:
+        for payload in seeds_of(schema):
             places = range(4, len(payload) - 3, 4)
             for at, lie in itertools.product(places, (900_000, 2**31 - 1, 2**32 - 1)):
                 lying = bytearray(payload)
                 struct.pack_into("<I", lying, at, lie)
-                tracemalloc.reset_peak()
-                before = tracemalloc.get_traced_memory()[0]
-                with contextlib.suppress(MalformedMessage):
-                    DECODERS[schema](bytes(lying))
-                assert tracemalloc.get_traced_memory()[1] - before < 64_000
+                peak_bytes(schema, bytes(lying))
+    finally:
+        tracemalloc.stop()
+
+
+def test_large_messages_take_no_more_memory_than_they_justify() -> None:
+    poses, cells = np.zeros((20_000, 2)), np.zeros((1000, 1000), np.int8)
+    grid = encode_map_update(MapPatch(Window(0, 0, 1000, 1000), cells))
+    stray = encode_path(poses, poses[:, 0], "map", 0)[:-8] + bytes(8)
+    tracemalloc.start()
+    try:
+        assert peak_bytes(schemas.OCCUPANCY_GRID_UPDATE, grid) < 8192
+        peak_bytes(schemas.OCCUPANCY_GRID_UPDATE, grid[:-1] + b"\x80")
+        assert peak_bytes(schemas.PATH, encode_path(poses, poses[:, 0], "map", 0)) > 20_000 * 24
+        peak_bytes(schemas.PATH, stray)
     finally:
         tracemalloc.stop()
 

@@ -9,12 +9,9 @@ import pytest
 import yaml
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.resources import folder
-from fasaco_edge.wire.paths import PathMessage
-from fasaco_edge.wire.pheromone import PheromoneMessage
 from tests.wire.decoders import DECODERS
+from tests.wire.facts import facts_of, flat
 from tests.wire.make_vectors import files
 
 VECTORS = folder("protocol") / "vectors"
@@ -27,50 +24,6 @@ def index(kind: str) -> list[Any]:
 
 def payload_of(kind: str, entry: dict[str, Any]) -> bytes:
     return (VECTORS / kind / entry["file"]).read_bytes()
-
-
-def placed(geometry: Any) -> dict[str, Any]:
-    origin = geometry.origin
-    return {
-        "rows": geometry.rows,
-        "cols": geometry.cols,
-        "resolution": geometry.resolution,
-        "origin": [origin.x, origin.y, origin.yaw],
-    }
-
-
-def facts_of(message: Any) -> dict[str, Any]:
-    """Return what an index says of a message."""
-    if isinstance(message, tuple):
-        poses = [transform.planar() for transform in message]
-        return {
-            "frames": [transform.frame for transform in message],
-            "children": [transform.child for transform in message],
-            "stamps_ns": [transform.stamp_ns for transform in message],
-            "poses": [[pose.x, pose.y, pose.yaw] for pose in poses],
-        }
-    facts: dict[str, Any] = {"frame": message.frame, "stamp_ns": message.stamp_ns}
-    match message:
-        case OccupancyGrid():
-            facts |= {**placed(message.geometry), "cells": message.cells.tolist()}
-        case MapPatch():
-            corner = {"row": message.window.row0, "col": message.window.col0}
-            facts |= {**corner, "cells": message.cells.tolist()}
-        case StampedPose():
-            facts["pose"] = [message.pose.x, message.pose.y, message.pose.yaw]
-        case PathMessage():
-            facts |= {"xy": message.xy.tolist(), "yaw": message.yaw.tolist()}
-        case PheromoneMessage():
-            names = ("cohort", "velocity", "ants", "best_steps", "trail_min", "trail_max")
-            facts |= {**placed(message.geometry), "levels": message.levels.tolist()}
-            facts |= {name: getattr(message, name) for name in names}
-    return facts
-
-
-def flat(value: Any) -> list[Any]:
-    if not isinstance(value, list):
-        return [value]
-    return [leaf for item in value for leaf in flat(item)]
 
 
 def test_the_files_are_what_the_generator_makes() -> None:

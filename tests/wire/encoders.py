@@ -1,0 +1,51 @@
+"""One encoder per message type: from what its decoder returns back to bytes.
+
+A type that is only ever read may be missing here; its decoder is then judged alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.wire import schemas
+from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
+from fasaco_edge.wire.paths import PathMessage, encode_path
+from fasaco_edge.wire.pheromone import PheromoneMessage, encode_pheromone
+from fasaco_edge.wire.poses import (
+    encode_odometry,
+    encode_pose_stamped,
+    encode_pose_with_covariance_stamped,
+)
+
+
+def _path(path: PathMessage) -> bytes:
+    return encode_path(path.xy, path.yaw, path.frame, path.stamp_ns)
+
+
+def _pheromone(message: PheromoneMessage) -> bytes:
+    """Encode the field at the map's origin: a colony knows no other place for its lattice."""
+    geometry = message.geometry
+    snapshot = ColonySnapshot(
+        Window(0, 0, geometry.rows, geometry.cols),
+        geometry.resolution,
+        message.trail(),
+        message.cohort,
+        message.velocity,
+        message.ants,
+        message.best_steps,
+    )
+    return encode_pheromone(snapshot, message.frame, message.stamp_ns)
+
+
+ENCODERS: dict[str, Callable[[Any], bytes]] = {
+    schemas.OCCUPANCY_GRID: encode_occupancy_grid,
+    schemas.OCCUPANCY_GRID_UPDATE: encode_map_update,
+    schemas.PATH: _path,
+    schemas.PHEROMONE_GRID: _pheromone,
+    schemas.POSE_STAMPED: encode_pose_stamped,
+    schemas.POSE_WITH_COVARIANCE_STAMPED: encode_pose_with_covariance_stamped,
+    schemas.ODOMETRY: encode_odometry,
+}
