@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.mailbox import Mailbox, Spacing
 from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.events import (
@@ -19,6 +19,10 @@ from fasaco_edge.mission.events import (
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.poses import decode_pose
+
+# From one map to the next that is taken in, at least [s]: a flood of maps, by mistake or malice,
+# must not take a core. No mapper is that fast.
+MAP_SPACING_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +37,13 @@ def make_mailbox() -> Mailbox[object]:
     """Return the mailbox of a daemon.
 
     Poses are queued: each tells what the tool passed over. Some seconds of them
-    are plenty. A map does not clear what was before it: it may be broken.
+    are plenty. A map does not clear what was before it: it may be broken. An update
+    patches the map before it, so it waits with that.
     """
-    return Mailbox({"map": 4, "map_update": 256, "pose": 1024, "snapshot": 8, "command": 16})
+    return Mailbox(
+        {"map": 4, "map_update": 256, "pose": 1024, "snapshot": 8, "command": 16},
+        Spacing("map", MAP_SPACING_S, followers=("map_update",)),
+    )
 
 
 class Inbox:
