@@ -1,0 +1,105 @@
+"""Roles become rules of Zenoh; what those do is tested in tests/daemon/test_security.py."""
+
+from __future__ import annotations
+
+import json
+
+import yaml
+import zenoh
+
+from fasaco_edge.bus import access
+from fasaco_edge.resources import folder
+
+PREFIX = "fasaco/@v1/robot"
+KEYS = yaml.safe_load((folder("protocol") / "keys.yaml").read_text())["keys"]
+MOST = access.Limits(64_001_024, 4096, 1_049_600, 20.0, 200.0, 20.0)
+
+
+def granted(control, role, message, flow):
+    """Return the topics on which a role may send a message, or have one sent to it."""
+    allowed = [policy["rules"] for policy in control["policies"] if policy["subjects"] == [role]]
+    rules = [rule for rule in control["rules"] if allowed and rule["id"] in allowed[0]]
+    return {
+        key.removeprefix(f"{PREFIX}/")
+        for rule in rules
+        if message in rule["messages"] and flow in rule["flows"]
+        for key in rule["key_exprs"]
+        if not key.endswith("/@adv/**")
+    }
+
+
+def control(**names):
+    return access.access_control({"": PREFIX}, names, "cert_common_names")
+
+
+def test_every_topic_of_the_contract_is_some_bodys():
+    topics = {entry["key"].removeprefix("{base}/@v1/{robot}/") for entry in KEYS}
+    ours = {"@rpc/{name}" if "@rpc" in topic else topic for topic in access.EVERYTHING}
+    assert topics == ours
+
+
+def test_what_a_robot_says_and_hears_is_what_the_contract_says():
+    by_direction = {entry["name"]: entry["direction"] for entry in KEYS}
+    incoming = {name for name, direction in by_direction.items() if direction == "in"}
+    assert set(access.ROLES["mapper"].speaks) == incoming
+    assert set(access.ROLES["robot"].listens) == incoming | {"recorder"}
+
+
+def test_a_map_comes_from_mappers_and_routers_alone():
+    everybody = {role: [role] for role in access.ROLES}
+    rules = control(**everybody)
+    may = {role for role in everybody if "map" in granted(rules, role, "put", "ingress")}
+    assert may == {"mapper", "router"}
+
+
+def test_a_mission_is_commanded_by_operators_and_routers_alone():
+    everybody = {role: [role] for role in access.ROLES}
+    rules = control(**everybody)
+    asks = {
+        role for role in everybody if "@rpc/mission" in granted(rules, role, "query", "ingress")
+    }
+    assert asks == {"operator", "router"}
+
+
+def test_nobody_may_delete():
+    rules = control(**{role: [role] for role in access.ROLES})["rules"]
+    assert not any("delete" in rule["messages"] for rule in rules)
+
+
+def test_a_role_that_nobody_has_is_left_out():
+    rules = control(viewer=["eye"], mapper=[])
+    assert [subject["id"] for subject in rules["subjects"]] == ["viewer"]
+    assert rules["subjects"][0]["cert_common_names"] == ["eye"]
+    assert {rule["id"] for rule in rules["rules"]} == {"viewer listens", "viewer is told"}
+    assert control()["default_permission"] == "deny"
+    assert control()["policies"] == []
+
+
+def test_keys_of_each_role_may_differ():
+    rules = access.access_control(
+        {"": "fasaco/@v1/*", "robot": PREFIX}, {"robot": ["r"], "viewer": ["v"]}, "usernames"
+    )
+    keys = {rule["id"]: rule["key_exprs"][0] for rule in rules["rules"]}
+    assert keys["robot speaks"] == f"{PREFIX}/path"
+    assert keys["viewer listens"] == "fasaco/@v1/*/path"
+
+
+def test_zenoh_takes_all_of_it():
+    everybody = {role: [role] for role in access.ROLES}
+    for transport in (
+        access.mutual_tls("ca.pem", "own.pem", "own.key"),
+        access.user_password("own", "secret", "others.txt"),
+    ):
+        document = {
+            "transport": transport,
+            "access_control": control(**everybody),
+            **access.limits(PREFIX, MOST),
+        }
+        zenoh.Config.from_json5(json.dumps(document))
+
+
+def test_updates_have_no_rate():
+    """One that is lost would spoil the map, and nobody would know."""
+    rules = [rule for part in access.limits(PREFIX, MOST)["downsampling"] for rule in part["rules"]]
+    assert f"{PREFIX}/map" in {rule["key_expr"] for rule in rules}
+    assert f"{PREFIX}/map_update" not in {rule["key_expr"] for rule in rules}
