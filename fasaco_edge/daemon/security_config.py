@@ -59,7 +59,7 @@ class LimitsConfig(Section, frozen=True):
     map_bytes: Annotated[int, Meta(ge=HEADER_BYTES)] = MAX_GRID_CELLS + HEADER_BYTES
     maps_hz: Hertz = 20.0
     poses_hz: Hertz = 200.0
-    queries_hz: Hertz = 20.0
+    queries_hz: Hertz = 100.0
 
 
 class SecurityConfig(Section, frozen=True):
