@@ -14,8 +14,8 @@ does, as ``protocol/README.md`` lists them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 SPEAK = ("put", "reply", "declare_queryable", "liveliness_token")
@@ -24,11 +24,15 @@ LISTEN = ("declare_subscriber", "query", "declare_liveliness_subscriber", "livel
 MAPS = ("map", "map_update")
 VIEWS = ("path", "status", "coverage", "pheromone", "alive")
 VIEW_QUERIES = ("@rpc/path", "@rpc/status", "@rpc/coverage")
-SAID_BY_ROBOT = (*VIEWS, "command", *VIEW_QUERIES, "@rpc/mission")
+# To ask this one is to command.
+MISSION = "@rpc/mission"
+SAID_BY_ROBOT = (*VIEWS, "command", *VIEW_QUERIES, MISSION)
 HEARD_BY_ROBOT = (*MAPS, "pose", "recorder")
 EVERYTHING = (*HEARD_BY_ROBOT, *SAID_BY_ROBOT)
-# To ask @rpc/mission is to command.
-TOPICS = (*HEARD_BY_ROBOT, *VIEWS, "command", *VIEW_QUERIES)
+LARGE = (*MAPS, "path", "coverage", "pheromone", "@rpc/path", "@rpc/coverage")
+NOT_JSON = (*LARGE, "pose", "alive")
+# Topics that answer queries with their last sample.
+ANSWERED = ("path", "status", "coverage")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,28 +40,57 @@ class Role:
     """What the other side may do, by topics: what its keys end with.
 
     Attributes:
+        told: the same for people.
         speaks: topics it may publish and answer for.
         listens: topics it may subscribe to and ask.
-        told: the same for people.
+        includes: another role whose rights it has too; "" for none.
     """
 
-    speaks: tuple[str, ...]
-    listens: tuple[str, ...]
     told: str
+    speaks: tuple[str, ...] = ()
+    listens: tuple[str, ...] = ()
+    includes: str = ""
 
 
 ROLES: Mapping[str, Role] = {
-    "mapper": Role((*MAPS, "pose"), (), "gives maps, map updates and poses"),
-    "viewer": Role((), (*VIEWS, *VIEW_QUERIES), "sees path, status, coverage and pheromone"),
+    "mapper": Role("gives maps, map updates and poses", speaks=(*MAPS, "pose")),
+    "viewer": Role("sees path, status, coverage and pheromone", listens=(*VIEWS, *VIEW_QUERIES)),
     "operator": Role(
-        (), (*VIEWS, "command", *VIEW_QUERIES, "@rpc/mission"), "commands the mission, and views"
+        "commands the mission, and views", listens=("command", MISSION), includes="viewer"
     ),
-    "recorder": Role(("recorder",), TOPICS, "hears everything, and says how it is itself"),
+    "recorder": Role(
+        "hears everything, and says how it is itself",
+        speaks=("recorder",),
+        listens=(*HEARD_BY_ROBOT, "command"),
+        includes="viewer",
+    ),
     # Whom a daemon connects to: what others may do there, the router itself has to restrict.
-    "router": Role(EVERYTHING, EVERYTHING, "passes everything on, both ways"),
+    "router": Role("passes everything on, both ways", speaks=EVERYTHING, listens=EVERYTHING),
     # The daemon itself, as a router sees it.
-    "robot": Role(SAID_BY_ROBOT, HEARD_BY_ROBOT, "plans: hears maps, says paths"),
+    "robot": Role("plans: hears maps, says paths", speaks=SAID_BY_ROBOT, listens=HEARD_BY_ROBOT),
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """Who has a role, and for which robot.
+
+    Attributes:
+        role: one of ROLES.
+        names: common names of certificates, or user names; who has several roles, may do all.
+        prefix: what the keys begin with: ``fasaco/@v1/robot``, ``fasaco/@v1/*`` for all robots.
+        of: tells grants of one role with several prefixes apart; "" where there is one.
+    """
+
+    role: str
+    names: Sequence[str]
+    prefix: str
+    of: str = ""
+
+    @property
+    def title(self) -> str:
+        """What it is called in Zenoh's configuration."""
+        return f"{self.role} of {self.of}" if self.of else self.role
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,31 +109,27 @@ class Limits:
     queries_hz: float
 
 
-def access_control(
-    prefixes: Mapping[str, str], names: Mapping[str, Sequence[str]], attribute: str
-) -> dict[str, Any]:
-    """Return Zenoh's ``access_control``: everything is denied but what roles allow.
+def access_control(grants: Sequence[Grant], attribute: str) -> dict[str, Any]:
+    """Return Zenoh's ``access_control``: everything is denied but what is granted.
 
     Args:
-        prefixes: of each role, what the keys it may use begin with: ``fasaco/@v1/robot``, or
-            ``fasaco/@v1/*`` for those of all robots. "" stands for all others.
-        names: who has each role; one name may have several.
-        attribute: what the names are: "cert_common_names" or "usernames".
+        grants: who may do what. One without a name is left out: to Zenoh, no name is everybody.
+        attribute: what names are: "cert_common_names" or "usernames".
     """
-    rules: list[dict[str, Any]] = []
+    rules: dict[str, dict[str, Any]] = {}
     subjects: list[dict[str, Any]] = []
     policies: list[dict[str, Any]] = []
-    for role, who in names.items():
-        if not who:
-            continue  # an empty list would mean everybody
-        of_role = _rules(role, prefixes.get(role, prefixes.get("", "")))
-        rules += of_role
-        subjects.append({"id": role, attribute: list(who)})
-        policies.append({"rules": [rule["id"] for rule in of_role], "subjects": [role]})
+    for grant in grants:
+        if not grant.names:
+            continue
+        granted = [rule for part in _parts(grant) for rule in _rules(part)]
+        rules |= {rule["id"]: rule for rule in granted}
+        subjects.append({"id": grant.title, attribute: list(grant.names)})
+        policies.append({"rules": [rule["id"] for rule in granted], "subjects": [grant.title]})
     return {
         "enabled": True,
         "default_permission": "deny",
-        "rules": rules,
+        "rules": list(rules.values()),
         "subjects": subjects,
         "policies": policies,
     }
@@ -108,26 +137,32 @@ def access_control(
 
 def limits(prefix: str, most: Limits) -> dict[str, Any]:
     """Return Zenoh's ``low_pass_filter`` and ``downsampling`` for what comes in."""
+    published = ["put", "reply"]
     sizes = (
-        ("maps", MAPS, most.map_bytes),
-        ("poses", ("pose",), most.pose_bytes),
-        ("the rest", ("recorder", *SAID_BY_ROBOT), most.json_bytes),
+        ("grids and paths", published, LARGE, most.map_bytes),
+        ("poses", published, ("pose",), most.pose_bytes),
+        (
+            "JSON",
+            published,
+            [topic for topic in EVERYTHING if topic not in NOT_JSON],
+            most.json_bytes,
+        ),
+        ("queries", ["query"], EVERYTHING, most.json_bytes),
     )
-    queries = (*VIEWS, *VIEW_QUERIES, "@rpc/mission")
     rates = (
         ("maps and poses", "put", {"map": most.maps_hz, "pose": most.poses_hz}),
-        ("queries", "query", dict.fromkeys(queries, most.queries_hz)),
+        ("queries", "query", dict.fromkeys((*ANSWERED, *VIEW_QUERIES, MISSION), most.queries_hz)),
     )
     return {
         "low_pass_filter": [
             {
                 "id": what,
                 "flows": ["ingress"],
-                "messages": ["put", "query", "reply"],
+                "messages": messages,
                 "key_exprs": _keys(prefix, topics),
                 "size_limit": size,
             }
-            for what, topics, size in sizes
+            for what, messages, topics, size in sizes
         ],
         "downsampling": [
             {
@@ -171,26 +206,34 @@ def user_password(user: str, password: str, dictionary_file: str = "") -> dict[s
     return {"auth": {"usrpwd": login}}
 
 
-def _rules(role: str, prefix: str) -> list[dict[str, Any]]:
-    part = ROLES[role]
-    grants = (
-        ("speaks", "ingress", SPEAK, part.speaks),
-        ("is heard", "egress", LISTEN, part.speaks),
-        ("listens", "ingress", LISTEN, part.listens),
-        ("is told", "egress", SPEAK, part.listens),
-    )
-    return [
-        {
-            "id": f"{role} {what}",
-            "permission": "allow",
-            "flows": [flow],
-            "messages": list(messages),
-            "key_exprs": _keys(prefix, topics),
-        }
-        for what, flow, messages, topics in grants
-        if topics
-    ]
+def _parts(grant: Grant) -> Iterator[Grant]:
+    """Yield the grant, and those of the roles that it includes."""
+    yield grant
+    included = ROLES[grant.role].includes
+    if included:
+        yield from _parts(replace(grant, role=included))
+
+
+def _rules(grant: Grant) -> Iterator[dict[str, Any]]:
+    role = ROLES[grant.role]
+    for what, flow, messages, topics in (
+        ("speaks", "ingress", SPEAK, role.speaks),
+        ("is heard", "egress", LISTEN, role.speaks),
+        ("listens", "ingress", LISTEN, role.listens),
+        ("is told", "egress", SPEAK, role.listens),
+    ):
+        if topics:
+            yield {
+                "id": f"{grant.title} {what}",
+                "permission": "allow",
+                "flows": [flow],
+                "messages": list(messages),
+                "key_exprs": _keys(grant.prefix, topics),
+            }
 
 
 def _keys(prefix: str, topics: Sequence[str]) -> list[str]:
-    return [f"{prefix}/{topic}{more}" for topic in topics for more in ("", "/@adv/**")]
+    """Return the keys of topics, and of what serves their late joiners."""
+    keys = [f"{prefix}/{topic}" for topic in topics]
+    published = [topic for topic in topics if topic != "alive" and not topic.startswith("@rpc/")]
+    return keys + [f"{prefix}/{topic}/@adv/**" for topic in published]

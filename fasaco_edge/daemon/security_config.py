@@ -115,8 +115,8 @@ class SecurityConfig(Section, frozen=True):
         if self.kind == "user" and self.user.dictionary_file:
             _read("user.dictionary_file", self.user.dictionary_file)
             part["transport"]["auth"]["usrpwd"]["dictionary_file"] = self.user.dictionary_file
-        names, attribute = self.names(), ATTRIBUTES[self.kind]
-        part["access_control"] = access.access_control({"": prefix}, names, attribute)
+        grants = [access.Grant(role, who, prefix) for role, who in self.names().items()]
+        part["access_control"] = access.access_control(grants, ATTRIBUTES[self.kind])
         return part | self.thinned(prefix)
 
     def thinned(self, prefix: str) -> dict[str, Any]:

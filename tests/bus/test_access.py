@@ -29,7 +29,8 @@ def granted(control, role, message, flow):
 
 
 def control(**names):
-    return access.access_control({"": PREFIX}, names, "cert_common_names")
+    grants = [access.Grant(role, who, PREFIX) for role, who in names.items()]
+    return access.access_control(grants, "cert_common_names")
 
 
 def test_every_topic_of_the_contract_is_some_bodys():
@@ -75,13 +76,23 @@ def test_a_role_that_nobody_has_is_left_out():
     assert control()["policies"] == []
 
 
-def test_keys_of_each_role_may_differ():
+def test_a_role_for_one_robot_is_none_for_another():
+    grants = [access.Grant("robot", [name], f"fasaco/@v1/{name}", of=name) for name in ("a", "b")]
     rules = access.access_control(
-        {"": "fasaco/@v1/*", "robot": PREFIX}, {"robot": ["r"], "viewer": ["v"]}, "usernames"
+        [*grants, access.Grant("viewer", ["v"], "fasaco/@v1/*")], "usernames"
     )
-    keys = {rule["id"]: rule["key_exprs"][0] for rule in rules["rules"]}
-    assert keys["robot speaks"] == f"{PREFIX}/path"
-    assert keys["viewer listens"] == "fasaco/@v1/*/path"
+    keys = {rule["id"]: rule["key_exprs"] for rule in rules["rules"]}
+    assert keys["robot of a speaks"][0] == "fasaco/@v1/a/path"
+    assert keys["robot of b speaks"][0] == "fasaco/@v1/b/path"
+    assert keys["viewer listens"][0] == "fasaco/@v1/*/path"
+    assert rules["policies"][1]["subjects"] == ["robot of b"]
+    assert all("of b" in rule for rule in rules["policies"][1]["rules"])
+
+
+def test_who_commands_may_view():
+    rules = control(operator=["boss"])
+    assert granted(rules, "operator", "query", "ingress") > {"@rpc/mission", "@rpc/status", "path"}
+    assert [subject["id"] for subject in rules["subjects"]] == ["operator"]
 
 
 def test_zenoh_takes_all_of_it():
