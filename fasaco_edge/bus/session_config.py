@@ -9,6 +9,8 @@ from typing import Any
 import zenoh
 
 MAX_MESSAGE_BYTES = 64 * 1024 * 1024
+# How long who connects may take to say who it is, and how many may do so at a time.
+ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
 
 
 def session_config(
@@ -38,6 +40,9 @@ def session_config(
         "timestamping": {"enabled": True},
         "transport": {
             "shared_memory": {"enabled": False},
+            # Who connects and says nothing must not keep others out: by default a hundred of
+            # those do, for twelve seconds.
+            "unicast": {"accept_timeout": ACCEPT_TIMEOUT_MS, "accept_pending": ACCEPT_PENDING},
             "link": {"rx": {"max_message_size": MAX_MESSAGE_BYTES}},
         },
     }

@@ -64,7 +64,9 @@ def roles(patient: Patient) -> Finding:
             details,
         )
     count = len({name for who in names.values() for name in who})
-    return Finding(Level.OK, f"{count} names; everybody else may do nothing", details=details)
+    return Finding(
+        Level.OK, f"names with a role: {count}; everybody else may do nothing", details=details
+    )
 
 
 def limits(patient: Patient) -> Finding:
