@@ -1,7 +1,7 @@
 """Whether a certificate, its key and its CA fit together: tried, not read.
 
-Both sides of a TLS connection are played in memory with the same files, as the daemon uses them:
-it listens and connects with them. What is found wrong is what others would find wrong.
+Both sides of a TLS connection are played in memory with the same files. What is found wrong is
+what others would find wrong with who connects with them; and with who listens with them.
 """
 
 from __future__ import annotations
@@ -33,16 +33,22 @@ class Certificate:
     ends: datetime
 
 
-def read_certificate(files: TlsConfig) -> Certificate:
+def read_certificate(files: TlsConfig, *, listens: bool = True) -> Certificate:
     """Return what the certificate says.
+
+    Args:
+        files: certificate, key and CA.
+        listens: whether others connect to whom it belongs, too.
 
     Raises:
         BadConfiguration: a file cannot be read, has ended, or does not fit the others.
     """
     try:
         listening, connecting = _context(files, server=True), _context(files, server=False)
+        if not listens:
+            connecting.verify_mode = ssl.CERT_NONE
         said = _shaken_hands(listening, connecting)
-        ends = [said["notAfter"], *(ca["notAfter"] for ca in connecting.get_ca_certs())]
+        ends = [said["notAfter"], *(ca["notAfter"] for ca in listening.get_ca_certs())]
     except ssl.SSLCertVerificationError as error:
         raise BadConfiguration(f"{files.certificate}: {error.verify_message}") from error
     except ssl.SSLError as error:
@@ -73,7 +79,7 @@ def _context(files: TlsConfig, *, server: bool) -> ssl.SSLContext:
 
 
 def _shaken_hands(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> dict[str, Any]:
-    """Return what the side that connects is shown."""
+    """Return what the side that listens is shown."""
     there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
     client = connecting.wrap_bio(back, there)
     server = listening.wrap_bio(there, back, server_side=True)
@@ -81,6 +87,6 @@ def _shaken_hands(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> dict
         for side in (client, server):
             with contextlib.suppress(ssl.SSLWantReadError):
                 side.do_handshake()
-    shown: dict[str, Any] | None = client.getpeercert()
+    shown: dict[str, Any] | None = server.getpeercert()
     assert shown is not None
     return shown

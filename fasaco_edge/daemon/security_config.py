@@ -57,7 +57,7 @@ class LimitsConfig(Section, frozen=True):
     """What each who takes part may send at most [bytes, 1/s]; see ``bus.access.Limits``."""
 
     map_bytes: Annotated[int, Meta(ge=HEADER_BYTES)] = MAX_GRID_CELLS + HEADER_BYTES
-    maps_hz: Hertz = 20.0
+    maps_hz: Hertz = 100.0
     poses_hz: Hertz = 200.0
     queries_hz: Hertz = 100.0
 

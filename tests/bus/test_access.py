@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import yaml
 import zenoh
@@ -10,6 +11,7 @@ import zenoh
 from fasaco_edge.bus import access
 from fasaco_edge.resources import folder
 
+README = (folder("protocol") / "README.md").read_text()
 PREFIX = "fasaco/@v1/robot"
 KEYS = yaml.safe_load((folder("protocol") / "keys.yaml").read_text())["keys"]
 MOST = access.Limits(64_001_024, 4096, 1_049_600, 20.0, 200.0, 20.0)
@@ -37,6 +39,16 @@ def test_every_topic_of_the_contract_is_some_bodys():
     topics = {entry["key"].removeprefix("{base}/@v1/{robot}/") for entry in KEYS}
     ours = {"@rpc/{name}" if "@rpc" in topic else topic for topic in access.EVERYTHING}
     assert topics == ours
+
+
+def test_the_readme_has_the_roles():
+    shown = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", README, re.MULTILINE))
+    for role in ("mapper", "viewer", "operator", "recorder", "router"):
+        speaks, _, listens = shown[role].partition(" | ")
+        own = set(re.findall("`([^`]+)`", speaks))
+        assert own == (set() if role == "router" else set(access.ROLES[role].speaks))
+        if role in ("viewer", "operator"):
+            assert set(re.findall("`([^`]+)`", listens)) == set(access.ROLES[role].listens)
 
 
 def test_what_a_robot_says_and_hears_is_what_the_contract_says():

@@ -110,6 +110,21 @@ def test_certificates_that_others_would_refuse(doctor, ca, tmp_path, spoil, said
 
 
 @needs_openssl
+def test_who_only_connects_needs_no_certificate_for_listening(doctor, ca):
+    files = ca.sign("robot", uses="clientAuth", names="DNS:robot")
+    told, code = doctor(**tls(files))
+    assert code == 1
+    assert "unsuitable certificate purpose" in told["identity"]["found"]
+    away = {"mode": "client", "listen": [], "connect": ["tls/router.example.org:7447"]}
+    told, code = doctor(**tls(files, roles={"router": ["router"]}) | away)
+    assert code == 0
+    assert told["identity"]["details"] == [
+        "to record with --record, add 'robot' to the recorders of the router"
+    ]
+    assert told["roles"]["level"] == "ok"
+
+
+@needs_openssl
 @pytest.mark.parametrize(("mode", "level"), [(0o600, "ok"), (0o640, "warn"), (0o644, "fail")])
 def test_who_can_read_the_key(doctor, ca, mode, level):
     files = ca.files("robot")

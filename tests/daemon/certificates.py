@@ -11,6 +11,7 @@ import pytest
 
 needs_openssl = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl")
 KEY = "-newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes"
+BOTH = "serverAuth,clientAuth"
 LOCAL = "DNS:localhost,IP:127.0.0.1"
 
 
@@ -30,12 +31,13 @@ class Authority:
         certificate, key = self.folder / f"{name}.pem", self.folder / f"{name}.key"
         return {"root_ca": self.root, "certificate": str(certificate), "private_key": str(key)}
 
-    def sign(self, name: str, *, days: int = 30, names: str = LOCAL) -> dict[str, str]:
+    def sign(
+        self, name: str, *, days: int = 30, names: str = LOCAL, uses: str = BOTH
+    ) -> dict[str, str]:
         """Make key and certificate for a name; it ends after so many days, or has ended."""
         extensions = self.folder / f"{name}.ext"
         extensions.write_text(
-            f"basicConstraints=CA:FALSE\nextendedKeyUsage=serverAuth,clientAuth\n"
-            f"subjectAltName={names}\n"
+            f"basicConstraints=CA:FALSE\nextendedKeyUsage={uses}\nsubjectAltName={names}\n"
         )
         self._openssl(f"req {KEY} -keyout {name}.key -out {name}.csr -subj /CN={name}")
         self._openssl(

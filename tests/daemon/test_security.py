@@ -11,6 +11,7 @@ import pytest
 import zenoh
 import zenoh.ext
 
+from fasaco_edge.daemon.inbox import MAP_SPACING_S
 from tests.daemon.certificates import authority, needs_openssl
 from tests.daemon.outsider import Ear, Outsider, open_client
 from tests.daemon.processes import PROGRAM, daemon_process, free_endpoint
@@ -152,6 +153,37 @@ def test_a_map_beyond_the_limit_is_dropped_before_it_is_looked_at(tmp_path):
             assert mission(boss.ask_status()) == mission(before)
             slam.put("map", good)
             boss.wait_status(lambda s: s["map"]["revision"] == before["map"]["revision"] + 1)
+
+
+def test_of_a_flood_few_are_taken_in_and_the_last_in_the_end(house, boss):
+    before = boss.ask_status()
+    flood, last = map_bytes(pillared_room()), map_bytes(pillared_room(), stamp_ns=7)
+    with house.voice("slam") as slam:
+        began = time.monotonic()
+        for _ in range(300):
+            slam.put("map", flood)
+        time.sleep(0.05)
+        slam.put("map", last)
+        after = boss.wait_status(lambda status: status["map"]["stamp_ns"] == 7)
+        taken = after["map"]["revision"] - before["map"]["revision"]
+        assert 1 <= taken <= (time.monotonic() - began) / MAP_SPACING_S + 2
+        slam.put("map", flood)
+        boss.wait_status(lambda status: status["map"]["stamp_ns"] == 1)
+    assert after["state"] == before["state"]
+    assert after["errors"] == before["errors"]
+
+
+def test_questions_without_end_are_thinned(tmp_path):
+    with (
+        secured_daemon(tmp_path, security={"limits": {"queries_hz": 20.0}}) as house,
+        house.guest("eye") as eye,
+    ):
+        time.sleep(0.1)
+        began = time.monotonic()
+        answered = sum(len(eye.get("@rpc/status")) for _ in range(100))
+        assert 1 <= answered <= 20 * (time.monotonic() - began) + 1
+        time.sleep(0.1)
+        assert len(eye.get("@rpc/status")) == 1
 
 
 def test_who_shows_no_certificate_or_a_foreign_one_does_not_get_in(house, tmp_path, unharmed):

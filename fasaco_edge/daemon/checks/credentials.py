@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fasaco_edge.daemon.certificates import read_certificate
 from fasaco_edge.daemon.checks.finding import Finding, Level, Patient, worst
-from fasaco_edge.daemon.security_config import SecurityConfig
+from fasaco_edge.daemon.config import BusConfig
 from fasaco_edge.errors import BadConfiguration
 
 SOON = timedelta(days=30)
@@ -21,21 +21,23 @@ HOW_TO = "protocol/README.md, Security, tells how to make them"
 
 def identity(patient: Patient) -> Finding:
     """Tell by what name others know the daemon, and until when."""
-    security = patient.config.bus.security
+    bus = patient.config.bus
+    security, listens = bus.security, bool(bus.listen)
     if security.kind == "none":
         return Finding(Level.OK, "shows no name, asks for none")
     try:
         security.of_daemon(patient.config.keys().prefix)
         if security.kind == "user":
-            return _login(security)
-        certificate = read_certificate(security.tls)
+            return _login(bus)
+        certificate = read_certificate(security.tls, listens=listens)
     except BadConfiguration as error:
         return Finding(Level.FAIL, str(error), HOW_TO)
     left = certificate.ends - datetime.now(UTC)
-    hosts = ", ".join(certificate.hosts) or "no host: nobody can connect to it"
-    details = [f"others connect to it as {hosts}", _recording(security, certificate.name)]
+    details = [_recording(bus, certificate.name)]
+    if listens:
+        details.insert(0, f"others connect to it as {', '.join(certificate.hosts) or 'nothing'}")
     found = f"certificate of {certificate.name!r}, ends {certificate.ends:%Y-%m-%d}"
-    if not certificate.name or not certificate.hosts:
+    if not certificate.name or (listens and not certificate.hosts):
         return Finding(Level.FAIL, f"{found}: a name is missing in it", HOW_TO, tuple(details))
     if left < SOON:
         return Finding(Level.WARN, f"{found}, in {left.days} days", "renew it", tuple(details))
@@ -65,9 +67,9 @@ def secret_files(patient: Patient) -> Finding:
     return Finding(level, f"can be read by {whom}", command, tuple(details))
 
 
-def _login(security: SecurityConfig) -> Finding:
+def _login(bus: BusConfig) -> Finding:
     """Tell about user and password; the files can be read."""
-    user = security.user
+    security, user = bus.security, bus.security.user
     names = []
     text = Path(user.dictionary_file).read_text(encoding="utf-8") if user.dictionary_file else ""
     for number, line in enumerate(text.splitlines(), start=1):
@@ -77,7 +79,7 @@ def _login(security: SecurityConfig) -> Finding:
             return Finding(Level.FAIL, f"{where}: no name:password", "correct the line")
         names.append(name)
     unknown = {name for who in security.names().values() for name in who} - set(names)
-    details = (f"may connect: {', '.join(names) or 'nobody'}", _recording(security, user.name))
+    details = (f"may connect: {', '.join(names) or 'nobody'}", _recording(bus, user.name))
     if user.dictionary_file and unknown:
         missing = ", ".join(sorted(unknown))
         found = f"user {user.name!r}; {missing}: a role, but no password"
@@ -87,10 +89,11 @@ def _login(security: SecurityConfig) -> Finding:
     )
 
 
-def _recording(security: SecurityConfig, name: str) -> str:
-    if name in security.roles.recorder:
+def _recording(bus: BusConfig, name: str) -> str:
+    if name in bus.security.roles.recorder:
         return "a recorder that it starts itself (--record) may hear everything"
-    return f"to record with --record, add {name!r} to bus.security.roles.recorder"
+    where = "bus.security.roles.recorder" if bus.listen else "the recorders of the router"
+    return f"to record with --record, add {name!r} to {where}"
 
 
 def _level(mode: int) -> Level:
