@@ -33,8 +33,8 @@ class Received:
     at: float
 
 
-def make_mailbox() -> Mailbox[object]:
-    """Return the mailbox of a daemon.
+def make_mailbox(map_spacing_s: float = MAP_SPACING_S) -> Mailbox[object]:
+    """Return the mailbox of a daemon; a replay, whose clock is another, spaces nothing.
 
     Poses are queued: each tells what the tool passed over. Some seconds of them
     are plenty. A map does not clear what was before it: it may be broken. An update
@@ -42,7 +42,7 @@ def make_mailbox() -> Mailbox[object]:
     """
     return Mailbox(
         {"map": 4, "map_update": 256, "pose": 1024, "snapshot": 8, "command": 16},
-        Spacing("map", MAP_SPACING_S, followers=("map_update",)),
+        Spacing("map", map_spacing_s, followers=("map_update",)),
     )
 
 

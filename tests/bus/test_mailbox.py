@@ -151,6 +151,13 @@ def test_of_a_flood_few_are_taken_and_the_newest_always():
     assert turns < 5 * takes
 
 
+def test_where_nothing_is_spaced_everything_is_taken_at_once():
+    box = Mailbox({"map": 2}, Spacing("map", 0.0))
+    for number in range(100):
+        box.post("map", number)
+        assert box.take(0) == [("map", number)]
+
+
 def test_what_follows_a_map_waits_with_it_and_nothing_else_does():
     box = spaced()
     box.post("map", "old")

@@ -30,7 +30,7 @@ class Arrivals:
     """A mailbox with its inbox; samples come in one after the other."""
 
     def __init__(self, bus):
-        self.mailbox = make_mailbox()
+        self.mailbox = make_mailbox(map_spacing_s=0.0)
         self.inbox = Inbox(bus, Keys(), self.mailbox, POSE_STAMPED)
         self.clock = 0.0
 
