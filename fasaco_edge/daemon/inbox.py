@@ -80,7 +80,7 @@ class Inbox:
             try:
                 events.append(self._event(kind, item.sample))
             except FasacoError as error:
-                faults.append(error)
+                faults.append(_bare(error))
         if patches_lost:
             events.append(PatchesLost(patches_lost))
         return events, faults
@@ -95,7 +95,7 @@ class Inbox:
                 try:
                     return [self._event(kind, item.sample)], faults, item.at
                 except FasacoError as error:
-                    faults.append(error)
+                    faults.append(_bare(error))
         return [], faults, float("-inf")
 
     def _event(self, kind: str, sample: Sample) -> Event:
@@ -107,6 +107,13 @@ class Inbox:
             case _:
                 schema = sample.schema or self._pose_schema
                 return PoseReceived(decode_pose(sample.payload, schema))
+
+
+def _bare(error: FasacoError) -> FasacoError:
+    """Return the error without its traceback, which would hold the payload until garbage is
+    collected: of a flood of broken maps, gigabytes.
+    """
+    return error.with_traceback(None)
 
 
 def _poster(mailbox: Mailbox[object], kind: str) -> Callable[[Sample], None]:
