@@ -116,6 +116,16 @@ class BadConfiguration(FasacoError):
     hint = "correct the named key or option"
 
 
+class OpenToEveryone(BadConfiguration):
+    """The daemon would listen beyond this computer without knowing who speaks to it."""
+
+    code = "open_to_everyone"
+    hint = (
+        "choose bus.security.kind tls or user (protocol/README.md, Security), listen on 127.0.0.1, "
+        "or say bus.open_to_everyone: true"
+    )
+
+
 class BusUnavailable(FasacoError):
     """No session could be opened on the Zenoh bus."""
 

@@ -8,7 +8,9 @@ passed over. Those stay in order.
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
@@ -36,6 +38,21 @@ class LatestSlot(Generic[Item]):
             return value
 
 
+@dataclass(frozen=True, slots=True)
+class Spacing:
+    """How often a kind may be taken, whatever comes in: a flood costs no more than that.
+
+    Attributes:
+        kind: what is held back, the newest kept; a queued kind.
+        seconds: from one take of it to the next, at least [s].
+        followers: kinds that are of no use before it, and wait where it waits.
+    """
+
+    kind: str
+    seconds: float
+    followers: tuple[str, ...] = ()
+
+
 class Mailbox(Generic[Item]):
     """Collects items of several kinds until the loop takes them all.
 
@@ -43,36 +60,49 @@ class Mailbox(Generic[Item]):
     length of its queue; a full queue loses its oldest.
     """
 
-    def __init__(self, queued: dict[str, int]) -> None:
+    def __init__(self, queued: dict[str, int], spacing: Spacing | None = None) -> None:
         self._changed = threading.Condition()
         self._newest: dict[str, Item] = {}
         self._queued = {kind: deque[Item](maxlen=length) for kind, length in queued.items()}
         self._lost = dict.fromkeys(queued, 0)
+        self._spacing = spacing
+        self._free_at = float("-inf")
 
     def post(self, kind: str, item: Item) -> None:
         """Leave an item; safe from any thread."""
         with self._changed:
             if kind not in self._queued:
                 self._newest[kind] = item
-            else:
-                queue = self._queued[kind]
-                self._lost[kind] += len(queue) == queue.maxlen
-                queue.append(item)
-            self._changed.notify()
+                self._changed.notify()
+                return
+            queue = self._queued[kind]
+            # Who waits learns of the first that is held back; the others need not wake it.
+            if not queue or kind not in self._held(time.monotonic()):
+                self._changed.notify()
+            self._lost[kind] += len(queue) == queue.maxlen
+            queue.append(item)
 
     def take(self, timeout_s: float) -> list[tuple[str, Item]]:
         """Return everything there is as (kind, item); wait up to ``timeout_s`` [s] for it.
 
-        Newest-only kinds come first, so that a full map precedes its patches.
+        Newest-only kinds come first. What is spaced stays until its time has come.
         """
+        deadline = time.monotonic() + timeout_s
         with self._changed:
-            if not self._newest and not any(self._queued.values()):
-                self._changed.wait(timeout_s)
+            while True:
+                now = time.monotonic()
+                held = self._held(now)
+                ready = [kind for kind in self._queued if self._queued[kind] and kind not in held]
+                if self._newest or ready or now >= deadline:
+                    break
+                self._changed.wait((min(deadline, self._free_at) if held else deadline) - now)
             items = list(self._newest.items())
             self._newest = {}
-            for kind, queue in self._queued.items():
-                items.extend((kind, item) for item in queue)
-                queue.clear()
+            for kind in ready:
+                items.extend((kind, item) for item in self._queued[kind])
+                self._queued[kind].clear()
+            if self._spacing is not None and self._spacing.kind in ready:
+                self._free_at = now + self._spacing.seconds
             return items
 
     def take_lost(self, kind: str) -> int:
@@ -80,3 +110,10 @@ class Mailbox(Generic[Item]):
         with self._changed:
             lost, self._lost[kind] = self._lost[kind], 0
             return lost
+
+    def _held(self, now: float) -> tuple[str, ...]:
+        """Return the kinds that have to wait."""
+        spacing = self._spacing
+        if spacing is None or now >= self._free_at or not self._queued[spacing.kind]:
+            return ()
+        return (spacing.kind, *spacing.followers)

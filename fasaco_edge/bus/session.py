@@ -13,18 +13,17 @@ Choices that hold for every process, and why:
 from __future__ import annotations
 
 import contextlib
-import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import zenoh
 import zenoh.ext
 
+from fasaco_edge.bus.session_config import session_config
 from fasaco_edge.errors import BusUnavailable
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-MAX_MESSAGE_BYTES = 64 * 1024 * 1024
 CDR = zenoh.Encoding.APPLICATION_CDR
 JSON = zenoh.Encoding.APPLICATION_JSON
 
@@ -37,12 +36,15 @@ class BusSettings:
         mode: "peer", "client" or "router".
         connect: endpoints to connect to.
         listen: endpoints to listen on. Where another process listens there
-            already, the session joins that one instead.
+            already, the session joins that one instead, unless it is secured.
+        secured: who may take part, as ``bus.access`` says it: a part of Zenoh's configuration.
+            It may hold a password, and is never shown.
     """
 
     mode: str = "client"
     connect: tuple[str, ...] = (DEFAULT_ENDPOINT,)
     listen: tuple[str, ...] = ()
+    secured: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,40 +240,24 @@ def open_bus(settings: BusSettings) -> Bus:
         BusUnavailable: nothing listens at the endpoints, or an address is wrong.
     """
     try:
-        return Bus(zenoh.open(_config(settings.mode, settings.connect, settings.listen)))
+        return Bus(zenoh.open(_config(settings)))
     except zenoh.ZError as error:
-        if not settings.listen or "Address already in use" not in str(error):
+        # A secured session joins nobody it was not told to.
+        taken = settings.listen and "Address already in use" in str(error)
+        if not taken or settings.secured:
             raise BusUnavailable(_first_line(error)) from error
     # Someone listens there: join them, as one more client.
+    joining = replace(
+        settings, mode="client", connect=settings.connect + settings.listen, listen=()
+    )
     try:
-        return Bus(zenoh.open(_config("client", settings.connect + settings.listen, ())))
+        return Bus(zenoh.open(_config(joining)))
     except zenoh.ZError as error:
         raise BusUnavailable(_first_line(error)) from error
 
 
-def _config(mode: str, connect: Sequence[str], listen: Sequence[str]) -> zenoh.Config:
-    return zenoh.Config.from_json5(
-        json.dumps(
-            {
-                "mode": mode,
-                "connect": {
-                    "endpoints": list(connect),
-                    # A client without its router fails at once; a peer keeps trying.
-                    "timeout_ms": 0 if mode == "client" else -1,
-                    "exit_on_failure": mode == "client",
-                    "retry": {"period_init_ms": 200, "period_max_ms": 1000},
-                },
-                "listen": {"endpoints": list(listen)},
-                "scouting": {"multicast": {"enabled": False}},
-                # Advanced publishers need timestamps for their cache.
-                "timestamping": {"enabled": True},
-                "transport": {
-                    "shared_memory": {"enabled": False},
-                    "link": {"rx": {"max_message_size": MAX_MESSAGE_BYTES}},
-                },
-            }
-        )
-    )
+def _config(settings: BusSettings) -> zenoh.Config:
+    return session_config(settings.mode, settings.connect, settings.listen, settings.secured)
 
 
 def _parameters(query: zenoh.Query) -> dict[str, str]:

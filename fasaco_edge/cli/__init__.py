@@ -12,6 +12,7 @@ from fasaco_edge import __version__
 from fasaco_edge.cli import (
     bench,
     demo,
+    doctor,
     exits,
     maps,
     mission,
@@ -26,7 +27,7 @@ from fasaco_edge.cli.arguments import with_negative_pairs
 from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
-COMMANDS = (demo, plan, run, mission, record, replay, simulate, bench, maps, warmup)
+COMMANDS = (demo, plan, run, mission, record, replay, simulate, bench, maps, warmup, doctor)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -66,8 +66,25 @@ def add_robot_on_bus(parser: argparse.ArgumentParser) -> None:
         metavar="ENDPOINT",
         help=f"Zenoh endpoint to connect to; may be repeated (default: {DEFAULT_ENDPOINT})",
     )
+    parser.add_argument(
+        "--security",
+        metavar="FILE",
+        help="YAML file that shows who this is, where that is asked: `kind: tls` with "
+        "`tls: {root_ca: ..., certificate: ..., private_key: ...}`, or `kind: user` with "
+        "`user: {name: ..., password_file: ...}`",
+    )
 
 
 def client_settings(args: argparse.Namespace) -> BusSettings:
-    """Return the session settings of a process that joins a daemon or router."""
-    return BusSettings("client", tuple(args.connect or (DEFAULT_ENDPOINT,)))
+    """Return the session settings of a process that joins a daemon or router.
+
+    Raises:
+        BadConfiguration: what shows who this is cannot be read.
+    """
+    connect = tuple(args.connect or (DEFAULT_ENDPOINT,))
+    if args.security is None:
+        return BusSettings("client", connect)
+    from fasaco_edge.daemon.client_security import read_client_security
+
+    security = read_client_security(args.security, connect)
+    return BusSettings("client", connect, secured=security.of_client())

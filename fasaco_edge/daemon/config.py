@@ -14,8 +14,9 @@ import yaml
 from msgspec import Meta
 
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
-from fasaco_edge.daemon.config_section import Section as _Section
 from fasaco_edge.daemon.ros_config import RosConfig
+from fasaco_edge.daemon.section import Section
+from fasaco_edge.daemon.security_config import SecurityConfig, check_security
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.cost import CoverageCost
@@ -26,7 +27,7 @@ Metres = Annotated[float, Meta(gt=0, le=10)]
 Percent = Annotated[int, Meta(ge=0, le=100)]
 
 
-class RobotConfig(_Section, frozen=True):
+class RobotConfig(Section, frozen=True):
     """The robot: its name on the bus, its size [m], and what driving takes it.
 
     ``quarter_turn_s`` is a turn by 90 degrees on the spot [s], braking and starting
@@ -48,20 +49,33 @@ class RobotConfig(_Section, frozen=True):
         return CoverageCost.for_robot(self.tool_width_m, self.speed_m_s, self.quarter_turn_s)
 
 
-class BusConfig(_Section, frozen=True):
-    """How to join the bus. Nothing beyond loopback is listened on unless it stands here."""
+class BusConfig(Section, frozen=True):
+    """How to join the bus, and who else may.
+
+    Beyond loopback nothing is listened on unless it stands here, and there nobody may speak
+    without a name (``security``), unless ``open_to_everyone`` says so.
+    """
 
     base: str = "fasaco"
     mode: Literal["peer", "client", "router"] = "peer"
     listen: tuple[str, ...] = (DEFAULT_ENDPOINT,)
     connect: tuple[str, ...] = ()
+    open_to_everyone: bool = False
+    security: SecurityConfig = SecurityConfig()
 
-    def settings(self) -> BusSettings:
-        """Return these as settings of a session."""
-        return BusSettings(self.mode, self.connect, self.listen)
+    def settings(self, prefix: str) -> BusSettings:
+        """Return these as settings of the session of a robot; its keys begin with ``prefix``.
+
+        Raises:
+            BadConfiguration: a file that shows who this is cannot be read.
+        """
+        part = self.security.of_daemon(prefix)
+        if self.open_to_everyone:
+            part |= self.security.thinned(prefix)
+        return BusSettings(self.mode, self.connect, self.listen, part)
 
 
-class MapConfig(_Section, frozen=True):
+class MapConfig(Section, frozen=True):
     """What in an occupancy grid is free and occupied [percent], and the largest lattice."""
 
     free_at_most: Percent = 25
@@ -69,7 +83,7 @@ class MapConfig(_Section, frozen=True):
     max_lattice_cells: Annotated[int, Meta(ge=1, le=100_000_000)] = 500_000
 
 
-class PoseConfig(_Section, frozen=True):
+class PoseConfig(Section, frozen=True):
     """The type of a pose whose sender names none, as ROS 2's do not."""
 
     schema: Literal[
@@ -79,7 +93,7 @@ class PoseConfig(_Section, frozen=True):
     ] = schemas.POSE_STAMPED
 
 
-class PlannerConfig(_Section, frozen=True):
+class PlannerConfig(Section, frozen=True):
     """The colony, see ``planners.colony.ColonyConfig``; and the time one plan may take [s].
 
     While the robot drives, ``spare_share`` of a processor core goes into making the rest of its
@@ -125,7 +139,7 @@ class PlannerConfig(_Section, frozen=True):
         )
 
 
-class MissionSettings(_Section, frozen=True):
+class MissionSettings(Section, frozen=True):
     """Whether to begin without being told to, how patient to be, and where progress is kept.
 
     What is blocked or left over in the end is tried again ``retries`` times, each after
@@ -156,7 +170,7 @@ class MissionSettings(_Section, frozen=True):
         return _home(Path("~/.local/state/fasaco-edge"))
 
 
-class DaemonConfig(_Section, frozen=True):
+class DaemonConfig(Section, frozen=True):
     """The whole configuration; without ``ros2`` the daemon has nothing to do with ROS."""
 
     robot: RobotConfig = RobotConfig()
@@ -199,7 +213,7 @@ def load_config(path: Path | None) -> DaemonConfig:
     except msgspec.ValidationError as error:
         raise BadConfiguration(f"{path}: {_explain(str(error), document)}") from error
     except BadConfiguration as error:
-        raise BadConfiguration(f"{path}: {error}") from error
+        raise type(error)(f"{path}: {error}", hint=error.hint) from error
     return config
 
 
@@ -219,6 +233,8 @@ def _check_together(config: DaemonConfig) -> None:
         )
     if not (config.bus.listen or config.bus.connect):
         raise BadConfiguration("bus.listen and bus.connect must not both be empty")
+    bus = config.bus
+    check_security(bus.security, bus.listen, bus.connect, open_to_everyone=bus.open_to_everyone)
     if "\0" in config.mission.state_dir:
         raise BadConfiguration("mission.state_dir must be a path, got one with a NUL")
     config.keys()

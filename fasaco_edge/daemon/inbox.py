@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.mailbox import Mailbox, Spacing
 from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.events import (
@@ -26,6 +26,10 @@ from fasaco_edge.wire.tf import decode_transforms
 if TYPE_CHECKING:
     from fasaco_edge.daemon.ros_bridge import RosBridge
 
+# From one map to the next that is taken in, at least [s]: a flood of maps, by mistake or malice,
+# must not take a core. No mapper is that fast.
+MAP_SPACING_S = 0.05
+
 
 @dataclass(frozen=True, slots=True)
 class Received:
@@ -35,14 +39,18 @@ class Received:
     at: float
 
 
-def make_mailbox() -> Mailbox[object]:
-    """Return the mailbox of a daemon.
+def make_mailbox(map_spacing_s: float = MAP_SPACING_S) -> Mailbox[object]:
+    """Return the mailbox of a daemon; a replay, whose clock is another, spaces nothing.
 
     Poses are queued: each tells what the tool passed over. Some seconds of them
-    are plenty. A map does not clear what was before it: it may be broken.
+    are plenty. A map does not clear what was before it: it may be broken. An update
+    patches the map before it, so it waits with that.
     """
     lengths = {"map": 4, "map_update": 256, "tf_static": 256, "pose": 1024}
-    return Mailbox({**lengths, "snapshot": 8, "command": 16})
+    return Mailbox(
+        {**lengths, "snapshot": 8, "command": 16},
+        Spacing("map", map_spacing_s, followers=("map_update",)),
+    )
 
 
 class Inbox:
@@ -92,7 +100,7 @@ class Inbox:
                 if event is not None:
                     events.append(event)
             except FasacoError as error:
-                faults.append(error)
+                faults.append(_bare(error))
         if patches_lost:
             events.append(PatchesLost(patches_lost))
         return events, faults
@@ -108,7 +116,7 @@ class Inbox:
                     grid = decode_occupancy_grid(item.sample.payload)
                     return [MapReceived(grid)], faults, item.at
                 except FasacoError as error:
-                    faults.append(error)
+                    faults.append(_bare(error))
         return [], faults, float("-inf")
 
     def _event(self, kind: str, sample: Sample) -> Event | None:
@@ -121,6 +129,13 @@ class Inbox:
         transforms = decode_transforms(sample.payload)
         pose = self._transforms.take(transforms, is_static=kind == "tf_static")
         return None if pose is None else PoseReceived(pose)
+
+
+def _bare(error: FasacoError) -> FasacoError:
+    """Return the error without its traceback, which would hold the payload until garbage is
+    collected: of a flood of broken maps, gigabytes.
+    """
+    return error.with_traceback(None)
 
 
 def _poster(mailbox: Mailbox[object], kind: str) -> Callable[[Sample], None]:

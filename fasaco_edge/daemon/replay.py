@@ -90,7 +90,7 @@ class Replay:
         self, config: DaemonConfig, run: RecordedRun | None = None, work: int | None = None
     ) -> None:
         self._run = run or RecordedRun()
-        self._mailbox = make_mailbox()
+        self._mailbox = make_mailbox(map_spacing_s=0.0)
         bus = _SilentBus()
         self._inbox = Inbox(bus, config.keys(), self._mailbox, config.pose.schema)
         self._heard = {*bus.heard, COMMAND}

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from fasaco_edge.daemon.config_section import Section
+from fasaco_edge.daemon.section import Section
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.limits import MAX_STRING_BYTES

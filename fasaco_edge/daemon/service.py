@@ -46,7 +46,7 @@ def run_daemon(
     Raises:
         BusUnavailable: no session could be opened.
         LedgerFileError: another process keeps this robot's ledger.
-        BadConfiguration: there is no place to keep it.
+        BadConfiguration: there is no place to keep it, or a file of bus.security is missing.
     """
     started = time.monotonic()
     stop = threading.Event()
@@ -55,7 +55,7 @@ def run_daemon(
     robot = config.robot
     folder = state or config.mission.state_folder()
     ledger = open_ledger(folder, robot.name, robot.tool_width_m, fresh=fresh)
-    with open_bus(config.bus.settings()) as bus:
+    with open_bus(config.bus.settings(config.keys().prefix)) as bus:
         _serve(config, bus, ledger, record_to, stop, started)
     LOG.info("stopped")
 

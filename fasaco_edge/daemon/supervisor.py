@@ -12,7 +12,9 @@ from typing import Any
 
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, Sample
+from fasaco_edge.daemon.client_security import client_words
 from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.daemon.endpoints import from_here
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.status import decode_json
 
@@ -103,7 +105,8 @@ class RecorderSupervisor:
 
 def _command(config: DaemonConfig, folder: Path) -> list[str]:
     endpoints = config.bus.listen or config.bus.connect
-    connect = [word for endpoint in endpoints for word in ("--connect", endpoint)]
+    connect = [word for endpoint in endpoints for word in ("--connect", from_here(endpoint))]
+    connect += client_words(config.bus.security)
     robot = ["--robot", config.robot.name, "--base", config.bus.base]
     pose = ["--pose-schema", config.pose.schema]
     program = [sys.executable, "-m", "fasaco_edge", "record"]

@@ -72,7 +72,8 @@ class Mission:
             try:
                 path = intake.take(event) or path
             except FasacoError as error:
-                faults.append(error)
+                # Its traceback would hold the map until garbage is collected.
+                faults.append(error.with_traceback(None))
         decision = self._pilot.decide()
         self.state, self.reason = self._pilot.told()
         return replace(

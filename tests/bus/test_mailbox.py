@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.bus.mailbox import LatestSlot, Mailbox
+from fasaco_edge.bus.mailbox import LatestSlot, Mailbox, Spacing
 
 
 def mailbox(length=3):
@@ -117,3 +117,68 @@ def test_a_slot_wakes_its_reader():
 def test_a_kind_that_is_not_queued_has_no_losses():
     with pytest.raises(KeyError):
         mailbox().take_lost("pose")
+
+
+SPACING_S = 0.2
+
+
+def spaced():
+    return Mailbox(
+        {"map": 2, "update": 9, "pose": 9}, Spacing("map", SPACING_S, followers=("update",))
+    )
+
+
+def test_of_a_flood_few_are_taken_and_the_newest_always():
+    box, taken, began = spaced(), [], time.monotonic()
+    flooding = threading.Event()
+
+    def flood():
+        for number in range(2000):
+            box.post("map", number)
+            time.sleep(0.0005)
+        flooding.set()
+
+    threading.Thread(target=flood).start()
+    turns = 0
+    while not (flooding.is_set() and taken[-1:] == [1999]):
+        taken += [item for _, item in box.take(0.1)]
+        turns += 1
+        assert time.monotonic() - began < 30.0
+    # At most two, the older and the newer, each time.
+    takes = (time.monotonic() - began) / SPACING_S + 1
+    assert len(taken) <= 2 * takes
+    # Who waits is not woken by each of them.
+    assert turns < 5 * takes
+
+
+def test_where_nothing_is_spaced_everything_is_taken_at_once():
+    box = Mailbox({"map": 2}, Spacing("map", 0.0))
+    for number in range(100):
+        box.post("map", number)
+        assert box.take(0) == [("map", number)]
+
+
+def test_what_follows_a_map_waits_with_it_and_nothing_else_does():
+    box = spaced()
+    box.post("map", "old")
+    assert box.take(0) == [("map", "old")]
+    box.post("update", 1)
+    assert box.take(0) == [("update", 1)]
+    box.post("update", 2)
+    box.post("map", "new")
+    box.post("update", 3)
+    box.post("pose", "here")
+    assert box.take(0) == [("pose", "here")]
+    began = time.monotonic()
+    assert box.take(10.0) == [("map", "new"), ("update", 2), ("update", 3)]
+    assert time.monotonic() - began < SPACING_S + 0.2
+
+
+def test_a_map_that_comes_while_somebody_waits_is_taken_in_its_time():
+    box = spaced()
+    box.post("map", "old")
+    box.take(0)
+    began = time.monotonic()
+    threading.Timer(0.05, box.post, ("map", "new")).start()
+    assert box.take(10.0) == [("map", "new")]
+    assert SPACING_S - 0.05 < time.monotonic() - began < SPACING_S + 0.5

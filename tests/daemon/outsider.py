@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -62,9 +62,11 @@ class Ear:
 class Outsider:
     """A client session; close it before the daemon goes."""
 
-    def __init__(self, endpoint: str, robot: str = "robot") -> None:
+    def __init__(
+        self, endpoint: str, robot: str = "robot", transport: Mapping[str, Any] | None = None
+    ) -> None:
         self.prefix = f"fasaco/@v1/{robot}"
-        self.session = open_client(endpoint)
+        self.session = open_client(endpoint, transport)
         deadline = time.monotonic() + TIMEOUT_S
         # The port is open a moment before anything is subscribed to.
         while not self.alive():
@@ -129,15 +131,18 @@ class Outsider:
         return any(reply.ok is not None for reply in replies)
 
 
-def open_client(endpoint: str) -> zenoh.Session:
-    """Open a session as somebody's client would, once there is somebody."""
+def open_client(endpoint: str, transport: Mapping[str, Any] | None = None) -> zenoh.Session:
+    """Open a session as somebody's client would, once there is somebody.
+
+    ``transport``: what shows who it is, as Zenoh's configuration has it.
+    """
     config = zenoh.Config.from_json5(
         json.dumps(
             {
                 "mode": "client",
                 "connect": {"endpoints": [endpoint], "timeout_ms": 0},
                 "scouting": {"multicast": {"enabled": False}},
-                "transport": {"shared_memory": {"enabled": False}},
+                "transport": {"shared_memory": {"enabled": False}, **(transport or {})},
             }
         )
     )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import pytest
 
 from fasaco_edge.bus.session import BusSettings, Sample, open_bus
@@ -30,7 +33,7 @@ class Arrivals:
     """A mailbox with its inbox; samples come in one after the other."""
 
     def __init__(self, bus):
-        self.mailbox = make_mailbox()
+        self.mailbox = make_mailbox(map_spacing_s=0.0)
         self.inbox = Inbox(bus, Keys(), self.mailbox, POSE_STAMPED)
         self.clock = 0.0
 
@@ -157,3 +160,17 @@ def test_what_is_no_sample_is_not_its_business(arrivals):
     arrivals.mailbox.post("plan", object())
     arrivals.mailbox.post("failed", RuntimeError())
     assert arrivals.decode() == ([], [])
+
+
+@pytest.mark.parametrize("kind", ["map", "map_update", "pose"])
+def test_a_broken_sample_is_held_by_nothing(arrivals, kind):
+    """Its error is let go, and with it the payload, before garbage is collected."""
+    gc.disable()
+    try:
+        arrivals.post(kind, MAP[:-1])
+        faults = arrivals.events()[1]
+        error = weakref.ref(faults[0])
+        del faults
+        assert error() is None
+    finally:
+        gc.enable()

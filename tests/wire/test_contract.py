@@ -76,7 +76,27 @@ def test_limits_are_those_of_the_table() -> None:
     assert table == {name.lower(): value for name, value in constants(limits).items()}
 
 
-@pytest.mark.parametrize("name", ["", "a/b", "@v1", "a b", "*", "**", "$*", "a#", "ä", "a\n", "a?"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "",
+        "a/b",
+        "@v1",
+        "a b",
+        "*",
+        "**",
+        "$*",
+        "a#",
+        "ä",
+        "a\n",
+        "a?",
+        ".",
+        "\u0661",
+        "a\u200b",
+        "ａ",
+        "a\0",
+    ],
+)
 def test_names_that_are_no_chunk(name: str) -> None:
     for make in (lambda: Keys(robot=name), lambda: Keys().rpc(name)):
         with pytest.raises(BadConfiguration, match="got"):

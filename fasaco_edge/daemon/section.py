@@ -1,6 +1,4 @@
-"""What all sections of the configuration have in common."""
-
-from __future__ import annotations
+"""What all sections of a configuration have in common."""
 
 import msgspec
 

@@ -1,0 +1,239 @@
+"""Who may speak: Zenoh's own access control, sizes and rates, made from roles.
+
+All of it is configuration of the session that listens (or of a router): Zenoh itself refuses what
+is not allowed, before a byte of it reaches this program. Roles are named by what the *other* side
+does, as ``protocol/README.md`` lists them.
+
+* Nothing is allowed that is not named. ``**`` does not match a chunk that begins with ``@``, so
+  every key is named, and beside it what Zenoh's advanced publishers and subscribers use to serve
+  late joiners: ``<key>/@adv/**``.
+* Who speaks on a key may publish it, answer for it, and say by a liveliness token that it is
+  there; who listens may subscribe to it, ask it, and look for tokens. Neither may delete.
+* Rules hold in both directions: what a role may not hear is not sent to it either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+SPEAK = ("put", "reply", "declare_queryable", "liveliness_token")
+LISTEN = ("declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query")
+
+MAPS = ("map", "map_update")
+VIEWS = ("path", "status", "coverage", "pheromone", "alive")
+VIEW_QUERIES = ("@rpc/path", "@rpc/status", "@rpc/coverage")
+# To ask this one is to command.
+MISSION = "@rpc/mission"
+SAID_BY_ROBOT = (*VIEWS, "command", *VIEW_QUERIES, MISSION)
+HEARD_BY_ROBOT = (*MAPS, "pose", "recorder")
+EVERYTHING = (*HEARD_BY_ROBOT, *SAID_BY_ROBOT)
+LARGE = (*MAPS, "path", "coverage", "pheromone", "@rpc/path", "@rpc/coverage")
+NOT_JSON = (*LARGE, "pose", "alive")
+# Topics that answer queries with their last sample.
+ANSWERED = ("path", "status", "coverage")
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """What the other side may do, by topics: what its keys end with.
+
+    Attributes:
+        told: the same for people.
+        speaks: topics it may publish and answer for.
+        listens: topics it may subscribe to and ask.
+        includes: another role whose rights it has too; "" for none.
+    """
+
+    told: str
+    speaks: tuple[str, ...] = ()
+    listens: tuple[str, ...] = ()
+    includes: str = ""
+
+
+ROLES: Mapping[str, Role] = {
+    "mapper": Role("gives maps, map updates and poses", speaks=(*MAPS, "pose")),
+    "viewer": Role("sees path, status, coverage and pheromone", listens=(*VIEWS, *VIEW_QUERIES)),
+    "operator": Role(
+        "commands the mission, and views", listens=("command", MISSION), includes="viewer"
+    ),
+    "recorder": Role(
+        "hears everything, and says how it is itself",
+        speaks=("recorder",),
+        listens=(*HEARD_BY_ROBOT, "command"),
+        includes="viewer",
+    ),
+    # Whom a daemon connects to: what others may do there, the router itself has to restrict.
+    "router": Role("passes everything on, both ways", speaks=EVERYTHING, listens=EVERYTHING),
+    # The daemon itself, as a router sees it.
+    "robot": Role("plans: hears maps, says paths", speaks=SAID_BY_ROBOT, listens=HEARD_BY_ROBOT),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """Who has a role, and for which robot.
+
+    Attributes:
+        role: one of ROLES.
+        names: common names of certificates, or user names; who has several roles, may do all.
+        prefix: what the keys begin with: ``fasaco/@v1/robot``, ``fasaco/@v1/*`` for all robots.
+        of: tells grants of one role with several prefixes apart; "" where there is one.
+    """
+
+    role: str
+    names: Sequence[str]
+    prefix: str
+    of: str = ""
+
+    @property
+    def title(self) -> str:
+        """What it is called in Zenoh's configuration."""
+        return f"{self.role} of {self.of}" if self.of else self.role
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How large [bytes] and how frequent [1/s] what comes in may be, for each who sends it.
+
+    Zenoh drops what is larger; of what is more frequent it passes the first of each period and
+    drops the others. Map updates have no rate: a lost one would spoil the map unnoticed.
+    """
+
+    map_bytes: int
+    pose_bytes: int
+    json_bytes: int
+    maps_hz: float
+    poses_hz: float
+    queries_hz: float
+
+
+def access_control(grants: Sequence[Grant], attribute: str) -> dict[str, Any]:
+    """Return Zenoh's ``access_control``: everything is denied but what is granted.
+
+    Args:
+        grants: who may do what. One without a name is left out: to Zenoh, no name is everybody.
+        attribute: what names are: "cert_common_names" or "usernames".
+    """
+    rules: dict[str, dict[str, Any]] = {}
+    subjects: list[dict[str, Any]] = []
+    policies: list[dict[str, Any]] = []
+    for grant in grants:
+        if not grant.names:
+            continue
+        granted = [rule for part in _parts(grant) for rule in _rules(part)]
+        rules |= {rule["id"]: rule for rule in granted}
+        subjects.append({"id": grant.title, attribute: list(grant.names)})
+        policies.append({"rules": [rule["id"] for rule in granted], "subjects": [grant.title]})
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": list(rules.values()),
+        "subjects": subjects,
+        "policies": policies,
+    }
+
+
+def limits(prefix: str, most: Limits) -> dict[str, Any]:
+    """Return Zenoh's ``low_pass_filter`` and ``downsampling`` for what comes in."""
+    published = ["put", "reply"]
+    sizes = (
+        ("grids and paths", published, LARGE, most.map_bytes),
+        ("poses", published, ("pose",), most.pose_bytes),
+        (
+            "JSON",
+            published,
+            [topic for topic in EVERYTHING if topic not in NOT_JSON],
+            most.json_bytes,
+        ),
+        ("queries", ["query"], EVERYTHING, most.json_bytes),
+    )
+    rates = (
+        ("maps and poses", "put", {"map": most.maps_hz, "pose": most.poses_hz}),
+        ("queries", "query", dict.fromkeys((*ANSWERED, *VIEW_QUERIES, MISSION), most.queries_hz)),
+    )
+    return {
+        "low_pass_filter": [
+            {
+                "id": what,
+                "flows": ["ingress"],
+                "messages": messages,
+                "key_exprs": _keys(prefix, topics),
+                "size_limit": size,
+            }
+            for what, messages, topics, size in sizes
+        ],
+        "downsampling": [
+            {
+                "id": what,
+                "flows": ["ingress"],
+                "messages": [message],
+                "rules": [
+                    {"key_expr": f"{prefix}/{key}", "freq": hz} for key, hz in by_key.items()
+                ],
+            }
+            for what, message, by_key in rates
+        ],
+    }
+
+
+def mutual_tls(root_ca: str, certificate: str, private_key: str) -> dict[str, Any]:
+    """Return Zenoh's ``transport`` where both sides show a certificate of the CA (PEM files)."""
+    tls = {
+        "root_ca_certificate": root_ca,
+        "enable_mtls": True,
+        "listen_certificate": certificate,
+        "listen_private_key": private_key,
+        "connect_certificate": certificate,
+        "connect_private_key": private_key,
+        "verify_name_on_connect": True,
+        "close_link_on_expiration": True,
+    }
+    return {"link": {"protocols": ["tls"], "tls": tls}}
+
+
+def user_password(user: str, password: str, dictionary_file: str = "") -> dict[str, Any]:
+    """Return Zenoh's ``transport`` where both sides know a password.
+
+    Args:
+        user, password: of this session.
+        dictionary_file: lines ``user:password`` of those that may connect to this session.
+    """
+    login: dict[str, str] = {"user": user, "password": password}
+    if dictionary_file:
+        login["dictionary_file"] = dictionary_file
+    return {"auth": {"usrpwd": login}}
+
+
+def _parts(grant: Grant) -> Iterator[Grant]:
+    """Yield the grant, and those of the roles that it includes."""
+    yield grant
+    included = ROLES[grant.role].includes
+    if included:
+        yield from _parts(replace(grant, role=included))
+
+
+def _rules(grant: Grant) -> Iterator[dict[str, Any]]:
+    role = ROLES[grant.role]
+    for what, flow, messages, topics in (
+        ("speaks", "ingress", SPEAK, role.speaks),
+        ("is heard", "egress", LISTEN, role.speaks),
+        ("listens", "ingress", LISTEN, role.listens),
+        ("is told", "egress", SPEAK, role.listens),
+    ):
+        if topics:
+            yield {
+                "id": f"{grant.title} {what}",
+                "permission": "allow",
+                "flows": [flow],
+                "messages": list(messages),
+                "key_exprs": _keys(grant.prefix, topics),
+            }
+
+
+def _keys(prefix: str, topics: Sequence[str]) -> list[str]:
+    """Return the keys of topics, and of what serves their late joiners."""
+    keys = [f"{prefix}/{topic}" for topic in topics]
+    published = [topic for topic in topics if topic != "alive" and not topic.startswith("@rpc/")]
+    return keys + [f"{prefix}/{topic}/@adv/**" for topic in published]

@@ -1,0 +1,92 @@
+"""Whether a certificate, its key and its CA fit together: tried, not read.
+
+Both sides of a TLS connection are played in memory with the same files. What is found wrong is
+what others would find wrong with who connects with them; and with who listens with them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ssl
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from fasaco_edge.daemon.security_config import TlsConfig
+from fasaco_edge.errors import BadConfiguration
+
+ROUND_TRIPS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What a certificate says.
+
+    Attributes:
+        name: its common name, by which roles are given.
+        hosts: the names and addresses by which others may connect to it.
+        ends: when it or its CA ends, whichever is first.
+    """
+
+    name: str
+    hosts: tuple[str, ...]
+    ends: datetime
+
+
+def read_certificate(files: TlsConfig, *, listens: bool = True) -> Certificate:
+    """Return what the certificate says.
+
+    Args:
+        files: certificate, key and CA.
+        listens: whether others connect to whom it belongs, too.
+
+    Raises:
+        BadConfiguration: a file cannot be read, has ended, or does not fit the others.
+    """
+    try:
+        listening, connecting = _context(files, server=True), _context(files, server=False)
+        if not listens:
+            connecting.verify_mode = ssl.CERT_NONE
+        said = _shaken_hands(listening, connecting)
+        ends = [said["notAfter"], *(ca["notAfter"] for ca in listening.get_ca_certs())]
+    except ssl.SSLCertVerificationError as error:
+        raise BadConfiguration(f"{files.certificate}: {error.verify_message}") from error
+    except ssl.SSLError as error:
+        # Where a file holds no PEM, or the key is locked, there is no reason given.
+        reason = (error.reason or "not PEM, or a key with a password").lower().replace("_", " ")
+        together = f"{files.certificate}, {files.private_key} and {files.root_ca}"
+        raise BadConfiguration(f"{together} do not fit together: {reason}") from error
+    except OSError as error:
+        raise BadConfiguration(
+            f"{error.filename or files.certificate}: {error.strerror}"
+        ) from error
+    names = [value for part in said["subject"] for key, value in part if key == "commonName"]
+    return Certificate(
+        name=names[-1] if names else "",
+        hosts=tuple(value for _, value in said.get("subjectAltName", ())),
+        ends=min(datetime.fromtimestamp(ssl.cert_time_to_seconds(end), UTC) for end in ends),
+    )
+
+
+def _context(files: TlsConfig, *, server: bool) -> ssl.SSLContext:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER if server else ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname = False
+    context.verify_mode = ssl.CERT_REQUIRED
+    # A key that needs a password must not make us ask for it.
+    context.load_cert_chain(files.certificate, files.private_key, password=lambda: "")
+    context.load_verify_locations(files.root_ca)
+    return context
+
+
+def _shaken_hands(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> dict[str, Any]:
+    """Return what the side that listens is shown."""
+    there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
+    client = connecting.wrap_bio(back, there)
+    server = listening.wrap_bio(there, back, server_side=True)
+    for _ in range(ROUND_TRIPS):
+        for side in (client, server):
+            with contextlib.suppress(ssl.SSLWantReadError):
+                side.do_handshake()
+    shown: dict[str, Any] | None = server.getpeercert()
+    assert shown is not None
+    return shown

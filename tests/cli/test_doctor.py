@@ -1,0 +1,178 @@
+"""The doctor says what is open to whom, and what to do; the exit code tells whether it is bad."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fasaco_edge.cli import main
+from fasaco_edge.daemon.checks.finding import Check, Finding, Level
+from fasaco_edge.daemon.checks.report import findings
+from tests.cli.commands import fasaco_edge
+from tests.daemon.certificates import authority, needs_openssl
+
+ROLES = {"mapper": ["slam"], "operator": ["boss"]}
+
+
+@pytest.fixture
+def doctor(tmp_path, capsys):
+    """Ask about a bus; return the findings by name, and the exit code."""
+
+    def ask(**bus):
+        file = tmp_path / "config.yaml"
+        file.write_text(yaml.safe_dump({"bus": bus}))
+        code = main(["doctor", "--config", str(file), "--json"])
+        told = json.loads(capsys.readouterr().out)
+        assert told["ok"] == (code == 0)
+        return {check["name"]: check for check in told["checks"]}, code
+
+    return ask
+
+
+@pytest.fixture
+def ca(tmp_path):
+    return authority(tmp_path / "ca", "robot")
+
+
+def tls(files, **more):
+    return {
+        "listen": ["tls/0.0.0.0:7447"],
+        "security": {"kind": "tls", "tls": files, "roles": ROLES, **more},
+    }
+
+
+def test_without_a_file_everything_is_as_it_should_be():
+    ended = fasaco_edge("doctor")
+    assert ended.code == 0
+    assert "tcp/127.0.0.1:7447: from this computer, by anybody there" in ended.out
+    assert "warn" not in ended.out
+    assert "fail" not in ended.out
+
+
+def test_a_configuration_that_is_refused_is_told_with_what_to_do(doctor):
+    told, code = doctor(listen=["tcp/0.0.0.0:7447"])
+    assert code == 1
+    assert list(told) == ["configuration"]
+    assert told["configuration"]["level"] == "fail"
+    assert "bus.open_to_everyone" in told["configuration"]["to_do"]
+
+
+def test_what_is_open_to_everyone_is_told(doctor):
+    told, code = doctor(listen=["tcp/0.0.0.0:7447"], open_to_everyone=True)
+    assert code == 0
+    assert told["endpoints"]["level"] == "warn"
+    assert "everybody in reach may give maps" in told["endpoints"]["found"]
+    assert told["endpoints"]["details"] == [
+        "tcp/0.0.0.0:7447: from other computers, by anybody there"
+    ]
+
+
+@needs_openssl
+def test_certificates_in_order(doctor, ca):
+    told, code = doctor(**tls(ca.files("robot")))
+    assert code == 0
+    # The test's certificates end soon.
+    assert told["identity"]["level"] == "warn"
+    assert "certificate of 'robot', ends 20" in told["identity"]["found"]
+    assert "others connect to it as localhost, 127.0.0.1" in told["identity"]["details"]
+    assert told["endpoints"]["level"] == told["secret files"]["level"] == "ok"
+    assert told["roles"]["level"] == "ok"
+    assert "operator (boss): commands the mission, and views" in told["roles"]["details"]
+
+
+@needs_openssl
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda ca, other: ca.sign("robot", days=-1), "certificate has expired"),
+        (lambda ca, other: ca.files("robot") | {"root_ca": other.root}, "issuer certificate"),
+        (
+            lambda ca, other: (
+                ca.files("robot") | {"private_key": other.files("thief")["private_key"]}
+            ),
+            "key values mismatch",
+        ),
+        (lambda ca, other: ca.files("nobody"), "nobody.pem: No such file"),
+        (lambda ca, other: ca.files("robot") | {"certificate": __file__}, "not pem"),
+    ],
+    ids=["expired", "another CA", "another key", "no file", "no certificate"],
+)
+def test_certificates_that_others_would_refuse(doctor, ca, tmp_path, spoil, said):
+    other = authority(tmp_path / "other", "thief")
+    told, code = doctor(**tls(spoil(ca, other)))
+    assert code == 1
+    assert told["identity"]["level"] == "fail"
+    assert said in told["identity"]["found"]
+    assert "protocol/README.md" in told["identity"]["to_do"]
+
+
+@needs_openssl
+def test_who_only_connects_needs_no_certificate_for_listening(doctor, ca):
+    files = ca.sign("robot", uses="clientAuth", names="DNS:robot")
+    told, code = doctor(**tls(files))
+    assert code == 1
+    assert "unsuitable certificate purpose" in told["identity"]["found"]
+    away = {"mode": "client", "listen": [], "connect": ["tls/router.example.org:7447"]}
+    told, code = doctor(**tls(files, roles={"router": ["router"]}) | away)
+    assert code == 0
+    assert told["identity"]["details"] == [
+        "to record with --record, add 'robot' to the recorders of the router"
+    ]
+    assert told["roles"]["level"] == "ok"
+
+
+@needs_openssl
+@pytest.mark.parametrize(("mode", "level"), [(0o600, "ok"), (0o640, "warn"), (0o644, "fail")])
+def test_who_can_read_the_key(doctor, ca, mode, level):
+    files = ca.files("robot")
+    Path(files["private_key"]).chmod(mode)
+    told, code = doctor(**tls(files))
+    assert told["secret files"]["level"] == level
+    assert code == (level == "fail")
+    if level != "ok":
+        assert told["secret files"]["to_do"] == f"chmod 600 {files['private_key']}"
+
+
+@needs_openssl
+def test_a_role_that_nobody_has(doctor, ca):
+    told, _ = doctor(**tls(ca.files("robot"), roles={"viewer": ["eye"]}))
+    assert told["roles"]["level"] == "warn"
+    assert told["roles"]["found"].startswith("nobody is mapper or operator")
+
+
+def test_user_and_password(doctor, tmp_path):
+    own, dictionary = tmp_path / "own.txt", tmp_path / "all.txt"
+    own.write_text("sesame\n")
+    dictionary.write_text("slam:one\n")
+    for file in (own, dictionary):
+        file.chmod(0o600)
+    who = {"name": "robot", "password_file": str(own), "dictionary_file": str(dictionary)}
+    bus = {
+        "listen": ["tcp/0.0.0.0:7447"],
+        "security": {"kind": "user", "user": who, "roles": ROLES},
+    }
+    told, code = doctor(**bus)
+    assert code == 0
+    assert told["identity"]["found"] == "user 'robot'; boss: a role, but no password"
+    assert "can be read on the way" in told["endpoints"]["found"]
+    dictionary.write_text("slam:one\nboss\n")
+    broken, code = doctor(**bus)
+    assert code == 1
+    assert broken["identity"]["found"] == f"{dictionary}, line 2: no name:password"
+    assert "sesame" not in json.dumps([told, broken])
+    assert "one" not in broken["identity"]["details"]
+
+
+def test_one_more_check_is_one_more_line():
+    seen = []
+
+    def look(patient):
+        seen.append(patient.config.robot.name)
+        return Finding(Level.WARN, "found", "do")
+
+    told = list(findings(None, (Check("more", look),)))
+    assert [name for name, _ in told] == ["configuration", "more"]
+    assert seen == ["robot"]

@@ -1,0 +1,83 @@
+"""Robots on one router: each hears its own maps alone, whatever the others are called."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+
+import pytest
+
+from fasaco_edge.bus.session import BusSettings, open_bus
+from tests.daemon.outsider import Outsider, open_client
+from tests.daemon.processes import daemon_process, free_endpoint
+from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, room
+from tests.daemon.test_security import SILENCE_S
+
+# One name begins with the other, and one is a word of the contract.
+FLEET = ("r1", "r10", "map")
+
+
+@pytest.fixture(scope="module")
+def router():
+    """A router, on loopback."""
+    endpoint = free_endpoint()
+    with open_bus(BusSettings("router", (), (endpoint,))):
+        yield endpoint
+
+
+@pytest.fixture(scope="module")
+def fleet(router, tmp_path_factory):
+    """A daemon of each robot, in a process of its own, joined to the router."""
+    with contextlib.ExitStack() as stack:
+        for name in FLEET:
+            bus = {"mode": "client", "listen": [], "connect": [router]}
+            folder = tmp_path_factory.mktemp(name)
+            stack.enter_context(daemon_process(folder, bus=bus, robot={"name": name}))
+        yield
+
+
+@pytest.fixture
+def seats(router, fleet):
+    """An outsider at each robot's keys."""
+    with contextlib.ExitStack() as stack:
+        yield {name: stack.enter_context(Outsider(router, name)) for name in FLEET}
+
+
+def test_nobody_hears_another_robots_map(seats):
+    for rows, name in enumerate(FLEET, start=3):
+        seats[name].put("map", map_bytes(room(3.0, float(rows))))
+        seats[name].put("pose", pose_bytes(0.75, 0.75))
+        seats[name].wait_status(lambda status: status["map"] is not None)
+        time.sleep(SILENCE_S)
+        heard = {other: seats[other].ask_status()["map"] for other in FLEET}
+        assert [other for other in FLEET if heard[other]] == list(FLEET[: rows - 2])
+        assert heard[name]["rows"] == 20 * rows
+        assert heard[name]["revision"] == 1
+
+
+def test_nobody_hears_another_robots_path_or_obeys_its_commands(seats):
+    first, *others = (seats[name] for name in FLEET)
+    ears = [other.listen("path", late=False) for other in others]
+    first.put("map", map_bytes(pillared_room()))
+    first.put("pose", pose_bytes(0.75, 0.75))
+    first.wait_status(lambda status: status["state"] == "covering")
+    list(first.session.get(f"{first.prefix}/@rpc/mission", payload=b'{"command":"pause"}'))
+    first.wait_status(lambda status: status["state"] == "paused")
+    time.sleep(SILENCE_S)
+    assert all(ear.heard == [] for ear in ears)
+    assert [other.ask_status()["state"] != "paused" for other in others] == [True, True]
+
+
+@pytest.mark.parametrize("key", ["fasaco/@v1/*/map", "fasaco/@v1/r$*/map"])
+def test_a_map_for_all_reaches_whom_it_matches(router, seats, key):
+    """Zenoh lets a key expression be published on; only access control forbids it."""
+    before = {name: (seats[name].ask_status()["map"] or {"revision": 0}) for name in FLEET}
+    session = open_client(router)
+    session.put(key, map_bytes(pillared_room()))
+    matched = [name for name in FLEET if "$*" not in key or name.startswith("r")]
+    for name in matched:
+        seats[name].wait_status(
+            lambda status, old=before[name]: (status["map"] or {"revision": 0}) != old
+        )
+        assert seats[name].ask_status()["errors"]["total"] == 0
+    session.close()

@@ -1,0 +1,104 @@
+"""Two daemons behind the router of protocol/config/router.json5: to each its own."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+
+import pytest
+import zenoh
+
+from fasaco_edge.resources import folder
+from tests.daemon.certificates import authority, needs_openssl
+from tests.daemon.outsider import Outsider, open_client
+from tests.daemon.processes import daemon_process, free_endpoint
+from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes
+from tests.daemon.secured import transport
+from tests.daemon.test_security import PAUSE, SILENCE_S
+
+pytestmark = needs_openssl
+FLEET = ("r1", "r2")
+NAMES = ("router", *FLEET, "slam-r1", "tablet", "office")
+
+
+@pytest.fixture(scope="module")
+def ca(tmp_path_factory):
+    return authority(tmp_path_factory.mktemp("fleet") / "ca", *NAMES)
+
+
+@pytest.fixture(scope="module")
+def endpoint(ca, tmp_path_factory):
+    """Where the router listens, and two daemons connect to."""
+    listens = free_endpoint().replace("tcp/", "tls/")
+    text = (folder("protocol") / "config" / "router.json5").read_text()
+    text = text.replace("/etc/fasaco-edge", str(ca.folder)).replace("tls/0.0.0.0:7447", listens)
+    connects = listens.replace("127.0.0.1", "localhost")
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(zenoh.open(zenoh.Config.from_json5(text)))
+        for name in FLEET:
+            security = {"kind": "tls", "tls": ca.files(name), "roles": {"router": ["router"]}}
+            bus = {"mode": "client", "listen": [], "connect": [connects], "security": security}
+            place = tmp_path_factory.mktemp(name)
+            stack.enter_context(daemon_process(place, bus=bus, robot={"name": name}))
+        yield connects
+
+
+@pytest.fixture
+def voice(ca, endpoint):
+    """Open sessions by name."""
+    with contextlib.ExitStack() as stack:
+        yield lambda name: stack.enter_context(open_client(endpoint, transport(ca.files(name))))
+
+
+@pytest.fixture
+def office(ca, endpoint):
+    """The operator, at each robot's keys."""
+    with contextlib.ExitStack() as stack:
+        seats = [Outsider(endpoint, name, transport(ca.files("office"))) for name in FLEET]
+        yield [stack.enter_context(seat) for seat in seats]
+
+
+def status(seat):
+    time.sleep(0.05)  # the router passes a hundred queries a second
+    return seat.ask_status()
+
+
+def test_a_mapper_is_heard_by_its_own_robot_alone(office, voice):
+    first, second = office
+    slam = voice("slam-r1")
+    for robot in FLEET:
+        slam.put(f"fasaco/@v1/{robot}/map", map_bytes(pillared_room()))
+        slam.put(f"fasaco/@v1/{robot}/pose", pose_bytes(0.75, 0.75))
+    slam.put("fasaco/@v1/*/map", map_bytes(pillared_room()))
+    path = first.listen("path")
+    path.wait(lambda heard: heard.payload != b"")
+    time.sleep(SILENCE_S)
+    assert status(first)["map"]["revision"] == 1
+    assert status(second)["state"] == "waiting for map"
+
+
+def test_an_operator_commands_both(office):
+    for seat in office:
+        (reply,) = seat.session.get(f"{seat.prefix}/@rpc/mission", payload=PAUSE, timeout=10.0)
+        assert reply.ok is not None
+
+
+def test_a_robot_does_not_pass_for_another_nor_command_it(office, voice):
+    robot, second = voice("r1"), office[1]
+    before = status(second)
+    ear = second.listen("status", late=False)
+    robot.put("fasaco/@v1/r2/status", b"{}")
+    robot.put("fasaco/@v1/r2/map", map_bytes(pillared_room()))
+    assert list(robot.get("fasaco/@v1/r2/@rpc/mission", timeout=SILENCE_S, payload=PAUSE)) == []
+    time.sleep(1.2)
+    assert ear.heard
+    assert all(heard.json()["robot"] == "r2" for heard in ear.heard)
+    assert status(second)["map"] == before["map"]
+
+
+def test_a_viewer_views_both(ca, endpoint):
+    for name in FLEET:
+        with Outsider(endpoint, name, transport(ca.files("tablet"))) as tablet:
+            assert status(tablet)["robot"] == name
+            key = f"{tablet.prefix}/@rpc/mission"
+            assert list(tablet.session.get(key, timeout=SILENCE_S, payload=PAUSE)) == []
