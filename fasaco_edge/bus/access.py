@@ -64,6 +64,8 @@ ROLES: Mapping[str, Role] = {
         listens=(*HEARD_BY_ROBOT, "command"),
         includes="viewer",
     ),
+    # Topics that the configuration names: see ``ros_rights``.
+    "ros": Role("gives maps, updates and poses on ROS 2 topics, sees path and coverage there"),
     # Whom a daemon connects to: what others may do there, the router itself has to restrict.
     "router": Role("passes everything on, both ways", speaks=EVERYTHING, listens=EVERYTHING),
     # The daemon itself, as a router sees it.
@@ -78,14 +80,17 @@ class Grant:
     Attributes:
         role: one of ROLES.
         names: common names of certificates, or user names; who has several roles, may do all.
-        prefix: what the keys begin with: ``fasaco/@v1/robot``, ``fasaco/@v1/*`` for all robots.
+        prefix: what the keys begin with: ``fasaco/@v1/robot``, ``fasaco/@v1/*`` for all robots;
+            "" where topics are whole keys.
         of: tells grants of one role with several prefixes apart; "" where there is one.
+        rights: what the role may do; None for what ROLES says.
     """
 
     role: str
     names: Sequence[str]
     prefix: str
     of: str = ""
+    rights: Role | None = None
 
     @property
     def title(self) -> str:
@@ -178,6 +183,16 @@ def limits(prefix: str, most: Limits) -> dict[str, Any]:
     }
 
 
+def ros_rights(heard: Sequence[str], said: Sequence[str], graph: Sequence[str]) -> Role:
+    """Return what the other side may do in a ROS 2 graph.
+
+    Args:
+        heard, said: keys the daemon subscribes to, and publishes on.
+        graph: keys of the tokens by which nodes see each other.
+    """
+    return Role(ROLES["ros"].told, speaks=(*heard, *graph), listens=(*said, *graph))
+
+
 def mutual_tls(root_ca: str, certificate: str, private_key: str) -> dict[str, Any]:
     """Return Zenoh's ``transport`` where both sides show a certificate of the CA (PEM files)."""
     tls = {
@@ -215,7 +230,7 @@ def _parts(grant: Grant) -> Iterator[Grant]:
 
 
 def _rules(grant: Grant) -> Iterator[dict[str, Any]]:
-    role = ROLES[grant.role]
+    role = grant.rights or ROLES[grant.role]
     for what, flow, messages, topics in (
         ("speaks", "ingress", SPEAK, role.speaks),
         ("is heard", "egress", LISTEN, role.speaks),
@@ -234,6 +249,6 @@ def _rules(grant: Grant) -> Iterator[dict[str, Any]]:
 
 def _keys(prefix: str, topics: Sequence[str]) -> list[str]:
     """Return the keys of topics, and of what serves their late joiners."""
-    keys = [f"{prefix}/{topic}" for topic in topics]
-    published = [topic for topic in topics if topic != "alive" and not topic.startswith("@rpc/")]
-    return keys + [f"{prefix}/{topic}/@adv/**" for topic in published]
+    begin = f"{prefix}/" if prefix else ""
+    published = [topic for topic in topics if topic != "alive" and not topic.startswith("@")]
+    return [begin + topic for topic in topics] + [f"{begin}{one}/@adv/**" for one in published]

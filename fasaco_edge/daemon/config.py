@@ -63,13 +63,15 @@ class BusConfig(Section, frozen=True):
     open_to_everyone: bool = False
     security: SecurityConfig = SecurityConfig()
 
-    def settings(self, prefix: str) -> BusSettings:
+    def settings(self, prefix: str, ros: RosConfig | None = None) -> BusSettings:
         """Return these as settings of the session of a robot; its keys begin with ``prefix``.
+
+        ``ros`` has the keys it has besides.
 
         Raises:
             BadConfiguration: a file that shows who this is cannot be read.
         """
-        part = self.security.of_daemon(prefix)
+        part = self.security.of_daemon(prefix, ros.rights() if ros else None)
         if self.open_to_everyone:
             part |= self.security.thinned(prefix)
         return BusSettings(self.mode, self.connect, self.listen, part)
@@ -235,6 +237,8 @@ def _check_together(config: DaemonConfig) -> None:
         raise BadConfiguration("bus.listen and bus.connect must not both be empty")
     bus = config.bus
     check_security(bus.security, bus.listen, bus.connect, open_to_everyone=bus.open_to_everyone)
+    if bus.security.roles.ros and not config.ros2:
+        raise BadConfiguration("bus.security.roles.ros: without a block ros2 there is no such role")
     if "\0" in config.mission.state_dir:
         raise BadConfiguration("mission.state_dir must be a path, got one with a NUL")
     config.keys()

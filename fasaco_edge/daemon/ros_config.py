@@ -7,11 +7,12 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from fasaco_edge.bus.access import Role, ros_rights
 from fasaco_edge.daemon.section import Section
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
-from fasaco_edge.wire.ros_keys import RosTopic
+from fasaco_edge.wire.ros_keys import RosTopic, graph_key
 
 # ROS 2 design, "Topic and Service name mapping": letters, digits, _; no digit first.
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
@@ -97,6 +98,20 @@ class RosConfig(Section, frozen=True):
         """Out: what is covered."""
         name = self._name(self.topics.coverage_grid)
         return RosTopic(name, schemas.OCCUPANCY_GRID, latched=True)
+
+    def rights(self) -> Role:
+        """Return what those may do that have the role ``ros``."""
+        heard = [self.map, self.map_updates, *self.poses.values()]
+        said = [self.coverage_path, self.coverage_grid]
+        if self.kind == "bridge":
+            return ros_rights(
+                [topic.bridge_key for topic in heard], [topic.bridge_key for topic in said], []
+            )
+        return ros_rights(
+            [topic.rmw_key(self.domain, any_hash=True) for topic in heard],
+            [topic.rmw_key(self.domain) for topic in said],
+            [graph_key(self.domain)],
+        )
 
     def check(self) -> None:
         """Check what no single value's type shows.

@@ -50,6 +50,7 @@ class RolesConfig(Section, frozen=True):
     viewer: tuple[Name, ...] = ()
     operator: tuple[Name, ...] = ()
     recorder: tuple[Name, ...] = ()
+    ros: tuple[Name, ...] = ()
     router: tuple[Name, ...] = ()
 
 
@@ -100,11 +101,12 @@ class SecurityConfig(Section, frozen=True):
         # Gossip would tell everybody where everybody is, and let them make us connect there.
         return {"transport": transport, "scouting": {"gossip": {"enabled": False}}}
 
-    def of_daemon(self, prefix: str) -> dict[str, Any]:
+    def of_daemon(self, prefix: str, ros: access.Role | None = None) -> dict[str, Any]:
         """Return what a daemon's session needs besides, to keep others to their roles.
 
         Args:
             prefix: what all keys of the robot begin with.
+            ros: what the role of that name may do; None without a block ``ros2``.
 
         Raises:
             BadConfiguration: a file cannot be read.
@@ -115,7 +117,11 @@ class SecurityConfig(Section, frozen=True):
         if self.kind == "user" and self.user.dictionary_file:
             _read("user.dictionary_file", self.user.dictionary_file)
             part["transport"]["auth"]["usrpwd"]["dictionary_file"] = self.user.dictionary_file
-        grants = [access.Grant(role, who, prefix) for role, who in self.names().items()]
+        grants = [
+            access.Grant(role, who, prefix) for role, who in self.names().items() if role != "ros"
+        ]
+        if ros is not None:
+            grants.append(access.Grant("ros", self.roles.ros, "", rights=ros))
         part["access_control"] = access.access_control(grants, ATTRIBUTES[self.kind])
         return part | self.thinned(prefix)
 

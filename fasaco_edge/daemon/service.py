@@ -55,7 +55,7 @@ def run_daemon(
     robot = config.robot
     folder = state or config.mission.state_folder()
     ledger = open_ledger(folder, robot.name, robot.tool_width_m, fresh=fresh)
-    with open_bus(config.bus.settings(config.keys().prefix)) as bus:
+    with open_bus(config.bus.settings(config.keys().prefix, config.ros2 or None)) as bus:
         _serve(config, bus, ledger, record_to, stop, started)
     LOG.info("stopped")
 

@@ -113,6 +113,11 @@ class RosNode:
         return f"{_mangled('/')}/{_mangled(self.namespace)}/{self.name}"
 
 
+def graph_key(domain: int) -> str:
+    """Return the key expression of all tokens in a domain's graph."""
+    return f"@ros2_lv/{domain}/**"
+
+
 def gid_of(token: str) -> bytes:
     """Return ``GID_BYTES`` bytes that no other publisher's token has.
 

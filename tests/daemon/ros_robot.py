@@ -121,12 +121,18 @@ class RosRobot:
 
 
 @contextmanager
-def ros_robot(endpoint: str, naming: Naming) -> Iterator[RosRobot]:
-    """Run a robot's session, once there is somebody at ``endpoint``."""
+def ros_robot(
+    endpoint: str, naming: Naming, transport: dict[str, Any] | None = None
+) -> Iterator[RosRobot]:
+    """Run a robot's session, once there is somebody at ``endpoint``.
+
+    ``transport``: what shows who it is, as Zenoh's configuration has it.
+    """
     deadline = time.monotonic() + TIMEOUT_S
     while True:
         try:
-            session = _open(mode="client", connect={"endpoints": [endpoint], "timeout_ms": 0})
+            where = {"endpoints": [endpoint], "timeout_ms": 0}
+            session = _open(mode="client", connect=where, transport=transport or {})
             break
         except zenoh.ZError:
             assert time.monotonic() < deadline, f"nobody listens at {endpoint}"
@@ -155,5 +161,5 @@ def ros_router(endpoint: str) -> Iterator[None]:
 def _open(**document: Any) -> zenoh.Session:
     document["scouting"] = {"multicast": {"enabled": False}, "gossip": {"enabled": True}}
     document["timestamping"] = {"enabled": True}
-    document["transport"] = {"shared_memory": {"enabled": False}}
+    document["transport"] = {"shared_memory": {"enabled": False}} | document.get("transport", {})
     return zenoh.open(zenoh.Config.from_json5(json.dumps(document)))

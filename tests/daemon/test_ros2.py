@@ -235,3 +235,39 @@ def test_it_is_small_with_ros(tmp_path):
         resident = resident_mb(running.pid)
         print(f"idle with ros2: {resident:.1f} MB")
         assert resident < IDLE_MB
+
+
+@pytest.mark.parametrize("naming", [RMW, BRIDGE], ids=["rmw_zenoh", "bridge"])
+def test_where_names_are_shown_ros_has_a_role_of_its_own(naming, tmp_path):
+    for name, text in (("own.txt", "secret\n"), ("all.txt", "ros:one\neye:two\n")):
+        (tmp_path / name).write_text(text)
+    files = {
+        "password_file": str(tmp_path / "own.txt"),
+        "dictionary_file": str(tmp_path / "all.txt"),
+    }
+    roles = {"ros": ["ros"], "viewer": ["eye"]}
+    security = {"kind": "user", "user": {"name": "robot", **files}, "roles": roles}
+    bus = {"listen": [free_endpoint()], "security": security}
+
+    def shown(user, password):
+        return {"auth": {"usrpwd": {"user": user, "password": password}}}
+
+    with daemon_process(tmp_path, bus=bus, ros2=ros2(naming)) as running:
+        eye, ros = shown("eye", "two"), shown("ros", "one")
+        with (
+            Outsider(running.endpoint, transport=eye) as native,
+            ros_robot(running.endpoint, naming, eye) as viewer,
+        ):
+            unheard = viewer.listen("coverage_path", PATH)
+            put_map(viewer)
+            time.sleep(1.0)
+            assert native.ask_status()["state"] == "waiting for map"
+            assert naming.domain is None or viewer.tokens() == []
+            with ros_robot(running.endpoint, naming, ros) as robot:
+                path = robot.listen("coverage_path", PATH)
+                put_map(robot)
+                robot.put_tf("map", "base_link", Pose2D(1.0, 1.0))
+                check_path(path.wait(is_walk), near=(1.0, 1.0))
+                assert naming.domain is None or robot.tokens()
+            native.wait_status(lambda status: status["path"])
+            assert not unheard.heard

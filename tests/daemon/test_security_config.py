@@ -185,3 +185,12 @@ def test_loopback_alone_has_neither_rules_nor_limits(tmp_path):
         "low_pass_filter",
         "downsampling",
     }
+
+
+def test_a_role_for_ros_needs_topics(tmp_path):
+    with pytest.raises(BadConfiguration, match=r"roles\.ros: without a block ros2"):
+        load(
+            tmp_path,
+            listen=["tcp/127.0.0.1:7447"],
+            security={"kind": "user", "user": USER, "roles": {"ros": ["ros"]}},
+        )
