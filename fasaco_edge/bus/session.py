@@ -4,7 +4,8 @@ Choices that hold for every process, and why:
 
 * no multicast scouting and no shared memory: what is reachable is what was
   configured, and the idle session stays small;
-* puts drop on congestion: a frozen subscriber must never hold a planner;
+* each key has its quality of service, see ``bus.qos``: whatever a planner publishes
+  drops on congestion, so that a frozen subscriber never holds it;
 * latched keys are advanced publishers with a cache of one sample, so a late
   joiner has the newest path at once (ROS calls this transient local);
 * callbacks run on Zenoh's threads and only hand the sample on.
@@ -12,21 +13,23 @@ Choices that hold for every process, and why:
 
 from __future__ import annotations
 
-import contextlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib import metadata
 from typing import Any, Self
 
 import zenoh
 import zenoh.ext
 
+from fasaco_edge.bus.encodings import JSON, encoding_of, schema_of
+from fasaco_edge.bus.qos import VOLATILE, Qos
+from fasaco_edge.bus.queries import Question, Reply, Request, reply_of, request_of, send
 from fasaco_edge.errors import BusUnavailable
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 MAX_MESSAGE_BYTES = 64 * 1024 * 1024
-CDR = zenoh.Encoding.APPLICATION_CDR
-JSON = zenoh.Encoding.APPLICATION_JSON
+ZENOH_VERSION = metadata.version("eclipse-zenoh")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,61 +58,38 @@ class Sample:
     attachment: bytes = b""
 
 
-@dataclass(frozen=True, slots=True)
-class Reply:
-    """An answer to a query: a payload with its schema ("" for JSON), or an error."""
-
-    payload: bytes
-    schema: str = ""
-    attachment: bytes = b""
-    is_error: bool = False
-
-
-class Question:
-    """A query that somebody waits for an answer to; to be answered once, on any thread.
-
-    Attributes:
-        payload: what came with it, b"" for nothing.
-    """
-
-    def __init__(self, query: zenoh.Query, key: str) -> None:
-        payload = query.payload
-        self.payload = payload.to_bytes() if payload is not None else b""
-        self._query = query
-        self._key = key
-
-    def answer(self, reply: Reply) -> None:
-        """Answer; who asked may be gone by now."""
-        with contextlib.suppress(zenoh.ZError):
-            _send(self._query, self._key, reply)
-        query: Any = self._query  # drop() has no annotation
-        query.drop()
-
-
 class Publisher:
-    """Puts samples on one key; never blocks."""
+    """Puts samples on one key, with its quality of service."""
 
-    def __init__(self, session: zenoh.Session, key: str, schema: str, latched: bool) -> None:
-        encoding = _encoding(schema)
-        drop = zenoh.CongestionControl.DROP
+    def __init__(self, session: zenoh.Session, key: str, schema: str, qos: Qos) -> None:
+        said: dict[str, Any] = {
+            "congestion_control": getattr(zenoh.CongestionControl, qos.congestion.upper()),
+            "priority": getattr(zenoh.Priority, qos.priority.upper()),
+            "express": qos.express,
+        }
+        options = said | {
+            "encoding": encoding_of(schema),
+            "reliability": getattr(zenoh.Reliability, qos.reliability.upper()),
+        }
         # An advanced publisher cannot say who listens, a plain one beside it can.
-        self._plain = session.declare_publisher(key, encoding=encoding, congestion_control=drop)
+        self._plain = session.declare_publisher(key, **options)
         self._publisher: Any = self._plain
-        if latched:
+        if qos.latched:
             self._publisher = zenoh.ext.declare_advanced_publisher(
                 session,
                 key,
-                encoding=encoding,
-                congestion_control=drop,
-                cache=zenoh.ext.CacheConfig(max_samples=1),
+                **options,
+                cache=zenoh.ext.CacheConfig(
+                    max_samples=qos.cache, replies_config=zenoh.ext.RepliesConfig(**said)
+                ),
                 sample_miss_detection=zenoh.ext.MissDetectionConfig(
-                    heartbeat=None, sporadic_heartbeat=0.5
+                    heartbeat=None, sporadic_heartbeat=qos.heartbeat_s
                 ),
                 publisher_detection=True,
             )
 
     def put(self, payload: bytes, attachment: bytes = b"") -> None:
-        """Send ``payload``; a subscriber too slow to take it loses it."""
+        """Send ``payload``."""
         self._publisher.put(payload, attachment=attachment or None)
 
     def has_listeners(self) -> bool:
@@ -144,9 +124,9 @@ class Bus:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def publisher(self, key: str, schema: str = "", latched: bool = False) -> Publisher:
+    def publisher(self, key: str, schema: str = "", qos: Qos = VOLATILE) -> Publisher:
         """Declare a publisher; ``schema`` names a CDR type, "" means JSON."""
-        return Publisher(self._session, key, schema, latched)
+        return Publisher(self._session, key, schema, qos)
 
     def subscribe(
         self, key: str, callback: Callable[[Sample], None], latched: bool = False
@@ -176,13 +156,20 @@ class Bus:
         self._declared.append(subscription)
         return subscription
 
-    def serve(self, key: str, answer: Callable[[dict[str, str]], Reply]) -> None:
-        """Answer queries on ``key``; ``answer`` gets the parameters, on a Zenoh thread."""
+    def serve(
+        self, key: str, answer: Callable[[Request], Reply | None], complete: bool = True
+    ) -> None:
+        """Answer queries on ``key``, on a Zenoh thread; None leaves one to others.
+
+        ``complete``: nobody else has to be asked.
+        """
 
         def receive(query: zenoh.Query) -> None:
-            _send(query, key, answer(_parameters(query)))
+            reply = answer(request_of(query))
+            if reply is not None:
+                send(query, key, reply)
 
-        self._declared.append(self._session.declare_queryable(key, receive, complete=True))
+        self._declared.append(self._session.declare_queryable(key, receive, complete=complete))
 
     def take_questions(self, key: str, receive: Callable[[Question], None]) -> None:
         """Call ``receive`` with each query on ``key``, on a Zenoh thread; to be answered later."""
@@ -204,7 +191,7 @@ class Bus:
         replies = self._session.get(
             selector, timeout=timeout_s, payload=payload or None, encoding=encoding
         )
-        return [_reply(reply) for reply in replies]
+        return [reply_of(reply) for reply in replies]
 
     def token(self, key: str) -> None:
         """Declare a liveliness token; it vanishes with this session."""
@@ -265,41 +252,11 @@ def _config(mode: str, connect: Sequence[str], listen: Sequence[str]) -> zenoh.C
     )
 
 
-def _parameters(query: zenoh.Query) -> dict[str, str]:
-    parameters: Any = query.parameters  # no mapping by the stubs
-    return {str(key): str(value) for key, value in parameters}
-
-
-def _send(query: zenoh.Query, key: str, reply: Reply) -> None:
-    encoding = _encoding(reply.schema)
-    if reply.is_error:
-        query.reply_err(reply.payload, encoding=encoding)
-    else:
-        attachment = reply.attachment or None
-        query.reply(key, reply.payload, encoding=encoding, attachment=attachment)
-
-
-def _encoding(schema: str) -> zenoh.Encoding:
-    return CDR.with_schema(schema) if schema else JSON
-
-
-def _schema(encoding: zenoh.Encoding) -> str:
-    return str(encoding).partition(";")[2]
-
-
 def _sample(sample: zenoh.Sample) -> Sample:
     attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
     return Sample(
-        str(sample.key_expr), sample.payload.to_bytes(), _schema(sample.encoding), attachment
+        str(sample.key_expr), sample.payload.to_bytes(), schema_of(sample.encoding), attachment
     )
-
-
-def _reply(reply: zenoh.Reply) -> Reply:
-    if reply.ok is not None:
-        sample = _sample(reply.ok)
-        return Reply(sample.payload, sample.schema, sample.attachment)
-    assert reply.err is not None
-    return Reply(reply.err.payload.to_bytes(), _schema(reply.err.encoding), is_error=True)
 
 
 def _first_line(error: Exception) -> str:

@@ -38,17 +38,33 @@ class Route:
         self._site = site
         self._agenda = agenda
         self._disowned = False
+        # Why a plan is wanted that keeps nothing of the path; "" where none is.
+        self._anew = ""
         self._checked_on: Ground | None = None
 
     def ask(self, problem: CoverageProblem) -> PlanRequest:
         """Ask for the plan that is wanted."""
-        self.asked = PlanRequest(self.plans + 1, problem, self.wanted)
-        self.wanted = ""
+        self.asked = PlanRequest(self.plans + 1, problem, self._anew or self.wanted)
+        self.want_none()
         return self.asked
+
+    def want_none(self) -> None:
+        """Want no plan any more."""
+        self.wanted = self._anew = ""
+
+    def want_anew(self, reason: str) -> int:
+        """Want a plan that keeps nothing of the path; return the number it will have."""
+        self.wanted = self._anew = reason
+        return self.plans + (1 if self.asked is None else 2)
+
+    @property
+    def kept(self) -> NDArray[np.int32]:
+        """What of the path the next plan is to keep where it can, int32 (n, 2)."""
+        return self.path.ahead[:0] if self._anew else self.path.ahead
 
     def disown(self) -> None:
         """Want no plan any more; what comes back of the one under way is for another order."""
-        self.wanted = ""
+        self.want_none()
         self._disowned = self.asked is not None
 
     def take_plan(self, event: PlanReady) -> PathUpdate | None:
