@@ -20,6 +20,9 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.poses import decode_pose
 
+# Samples that wait for the loop, as ``protocol/limits.yaml`` has it.
+QUEUES = {"map": 4, "map_update": 256, "pose": 1024, "command": 16}
+
 
 @dataclass(frozen=True, slots=True)
 class Received:
@@ -35,7 +38,7 @@ def make_mailbox() -> Mailbox[object]:
     Poses are queued: each tells what the tool passed over. Some seconds of them
     are plenty. A map does not clear what was before it: it may be broken.
     """
-    return Mailbox({"map": 4, "map_update": 256, "pose": 1024, "snapshot": 8, "command": 16})
+    return Mailbox({**QUEUES, "snapshot": 8})
 
 
 class Inbox:
