@@ -62,14 +62,12 @@ class Publisher:
     """Puts samples on one key, with its quality of service."""
 
     def __init__(self, session: zenoh.Session, key: str, schema: str, qos: Qos) -> None:
-        said: dict[str, Any] = {
+        options: dict[str, Any] = {
+            "encoding": encoding_of(schema),
+            "reliability": getattr(zenoh.Reliability, qos.reliability.upper()),
             "congestion_control": getattr(zenoh.CongestionControl, qos.congestion.upper()),
             "priority": getattr(zenoh.Priority, qos.priority.upper()),
             "express": qos.express,
-        }
-        options = said | {
-            "encoding": encoding_of(schema),
-            "reliability": getattr(zenoh.Reliability, qos.reliability.upper()),
         }
         # An advanced publisher cannot say who listens, a plain one beside it can.
         self._plain = session.declare_publisher(key, **options)
@@ -79,9 +77,7 @@ class Publisher:
                 session,
                 key,
                 **options,
-                cache=zenoh.ext.CacheConfig(
-                    max_samples=qos.cache, replies_config=zenoh.ext.RepliesConfig(**said)
-                ),
+                cache=zenoh.ext.CacheConfig(max_samples=qos.cache),
                 sample_miss_detection=zenoh.ext.MissDetectionConfig(
                     heartbeat=None, sporadic_heartbeat=qos.heartbeat_s
                 ),

@@ -110,6 +110,19 @@ def test_who_comes_late_gets_the_newest_of_a_latched_key(bus, client):
     assert len(plain.heard) == 1
 
 
+@pytest.mark.parametrize("name", QOS)
+def test_a_sample_travels_as_its_key_says(bus, client, name):
+    came, qos = Queue(), QOS[name]
+    client.declare_subscriber(KEY, came.put)
+    publisher = bus.publisher(KEY, qos=qos)
+    until(publisher.has_listeners)
+    publisher.put(b"payload")
+    sample = came.get(timeout=TIMEOUT_S)
+    assert sample.priority == getattr(zenoh.Priority, qos.priority.upper())
+    assert sample.congestion_control == getattr(zenoh.CongestionControl, qos.congestion.upper())
+    assert sample.express == qos.express
+
+
 def test_a_latched_subscription_hears_what_was_said_before_it(bus, endpoint, samples):
     text = {"mode": "client", "connect": {"endpoints": [endpoint]}}
     # Without time stamps Zenoh refuses to keep samples.
