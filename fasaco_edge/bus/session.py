@@ -88,6 +88,10 @@ class Publisher:
         """Send ``payload``."""
         self._publisher.put(payload, attachment=attachment or None)
 
+    def release(self) -> None:
+        """Let go of what Zenoh has given."""
+        del self._plain, self._publisher
+
     def has_listeners(self) -> bool:
         """Tell whether any subscriber matches the key."""
         status: Any = self._plain.matching_status  # a bool by the stubs, an object in fact
@@ -106,6 +110,10 @@ class Subscription:
         self._subscriber.undeclare()
         self._subscriber = self._declare()
 
+    def release(self) -> None:
+        """Let go of what Zenoh has given."""
+        del self._subscriber, self._declare
+
 
 class Bus:
     """A session, with everything declared on it; close it on every way out."""
@@ -113,6 +121,9 @@ class Bus:
     def __init__(self, session: zenoh.Session) -> None:
         self._session = session
         self._declared: list[Any] = []
+        # What others hold, too: nothing of Zenoh's may be left to the last garbage collection,
+        # in which its threads and the interpreter may wait for each other for ever.
+        self._lent: list[Publisher | Subscription] = []
 
     def __enter__(self) -> Self:
         return self
@@ -122,7 +133,9 @@ class Bus:
 
     def publisher(self, key: str, schema: str = "", qos: Qos = VOLATILE) -> Publisher:
         """Declare a publisher; ``schema`` names a CDR type, "" means JSON."""
-        return Publisher(self._session, key, schema, qos)
+        publisher = Publisher(self._session, key, schema, qos)
+        self._lent.append(publisher)
+        return publisher
 
     def subscribe(
         self, key: str, callback: Callable[[Sample], None], latched: bool = False
@@ -149,7 +162,7 @@ class Bus:
             )
 
         subscription = Subscription(declare)
-        self._declared.append(subscription)
+        self._lent.append(subscription)
         return subscription
 
     def serve(
@@ -201,6 +214,9 @@ class Bus:
     def close(self) -> None:
         """End the session; a process that does not close it may hang at exit."""
         self._declared.clear()
+        for lent in self._lent:
+            lent.release()
+        self._lent.clear()
         session: Any = self._session  # close() has no annotation
         session.close()
 
