@@ -109,6 +109,20 @@ class NotYet(FasacoError):
     hint = "ask again once the daemon has a map and a pose"
 
 
+class BadQuery(FasacoError):
+    """A query has a parameter or a payload that it does not take."""
+
+    code = "bad_query"
+    hint = "leave out what the query does not take; see protocol/README.md, Queries"
+
+
+class UnknownQuery(FasacoError):
+    """Nothing of that name can be asked."""
+
+    code = "unknown_query"
+    hint = "ask for one of the names listed"
+
+
 class BadConfiguration(FasacoError):
     """A configuration key is unknown or its value impossible."""
 

@@ -18,6 +18,7 @@ from typing import Any, Self
 
 import yaml
 
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, BusSettings, Publisher, Sample, open_bus
 from fasaco_edge.errors import BusUnavailable, NotYet, ProcessEnded
 from fasaco_edge.grid.geometry import StampedPose
@@ -157,8 +158,8 @@ class MapSource:
     def __init__(self, daemon: DaemonProcess, bus: Bus) -> None:
         keys = daemon.keys
         self._daemon = daemon
-        self._maps = bus.publisher(keys.map, schemas.OCCUPANCY_GRID, latched=True)
-        self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED)
+        self._maps = bus.publisher(keys.map, schemas.OCCUPANCY_GRID, QOS["map"])
+        self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED, QOS["pose"])
         self._arrivals = queue.SimpleQueue[tuple[float, Sample]]()
         bus.subscribe(keys.path, lambda sample: self._arrivals.put((time.monotonic(), sample)))
         for publisher in (self._maps, self._poses):

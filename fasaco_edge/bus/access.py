@@ -23,16 +23,33 @@ LISTEN = ("declare_subscriber", "query", "declare_liveliness_subscriber", "livel
 
 MAPS = ("map", "map_update")
 VIEWS = ("path", "status", "coverage", "pheromone", "alive")
-VIEW_QUERIES = ("@rpc/path", "@rpc/status", "@rpc/coverage")
-# To ask this one is to command.
-MISSION = "@rpc/mission"
-SAID_BY_ROBOT = (*VIEWS, "command", *VIEW_QUERIES, MISSION)
-HEARD_BY_ROBOT = (*MAPS, "pose", "recorder")
+VIEW_QUERIES = (
+    "@rpc/path",
+    "@rpc/status",
+    "@rpc/coverage",
+    "@rpc/pheromone",
+    "@rpc/config",
+    "@rpc/version",
+)
+# To ask these is to command.
+COMMANDS = ("@rpc/mission", "@rpc/replan")
+TOKENS = ("alive", "recorder/alive")
+RECORDER = ("recorder", "recorder/alive")
+SAID_BY_ROBOT = (*VIEWS, "command", *VIEW_QUERIES, *COMMANDS)
+HEARD_BY_ROBOT = (*MAPS, "pose", *RECORDER)
 EVERYTHING = (*HEARD_BY_ROBOT, *SAID_BY_ROBOT)
-LARGE = (*MAPS, "path", "coverage", "pheromone", "@rpc/path", "@rpc/coverage")
-NOT_JSON = (*LARGE, "pose", "alive")
+LARGE = (
+    *MAPS,
+    "path",
+    "coverage",
+    "pheromone",
+    "@rpc/path",
+    "@rpc/coverage",
+    "@rpc/pheromone",
+)
+NOT_JSON = (*LARGE, "pose", *TOKENS)
 # Topics that answer queries with their last sample.
-ANSWERED = ("path", "status", "coverage")
+ANSWERED = ("path", "status", "coverage", "pheromone")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +73,11 @@ ROLES: Mapping[str, Role] = {
     "mapper": Role("gives maps, map updates and poses", speaks=(*MAPS, "pose")),
     "viewer": Role("sees path, status, coverage and pheromone", listens=(*VIEWS, *VIEW_QUERIES)),
     "operator": Role(
-        "commands the mission, and views", listens=("command", MISSION), includes="viewer"
+        "commands the mission, and views", listens=("command", *COMMANDS), includes="viewer"
     ),
     "recorder": Role(
         "hears everything, and says how it is itself",
-        speaks=("recorder",),
+        speaks=RECORDER,
         listens=(*HEARD_BY_ROBOT, "command"),
         includes="viewer",
     ),
@@ -156,7 +173,7 @@ def limits(prefix: str, most: Limits) -> dict[str, Any]:
     )
     rates = (
         ("maps and poses", "put", {"map": most.maps_hz, "pose": most.poses_hz}),
-        ("queries", "query", dict.fromkeys((*ANSWERED, *VIEW_QUERIES, MISSION), most.queries_hz)),
+        ("queries", "query", dict.fromkeys((*ANSWERED, *VIEW_QUERIES, *COMMANDS), most.queries_hz)),
     )
     return {
         "low_pass_filter": [
@@ -250,5 +267,5 @@ def _rules(grant: Grant) -> Iterator[dict[str, Any]]:
 def _keys(prefix: str, topics: Sequence[str]) -> list[str]:
     """Return the keys of topics, and of what serves their late joiners."""
     begin = f"{prefix}/" if prefix else ""
-    published = [topic for topic in topics if topic != "alive" and not topic.startswith("@")]
+    published = [topic for topic in topics if topic not in TOKENS and topic[0] != "@"]
     return [begin + topic for topic in topics] + [f"{begin}{one}/@adv/**" for one in published]

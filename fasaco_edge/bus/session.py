@@ -4,7 +4,8 @@ Choices that hold for every process, and why:
 
 * no multicast scouting and no shared memory: what is reachable is what was
   configured, and the idle session stays small;
-* puts drop on congestion: a frozen subscriber must never hold a planner;
+* each key has its quality of service, see ``bus.qos``: whatever a planner publishes
+  drops on congestion, so that a frozen subscriber never holds it;
 * latched keys are advanced publishers with a cache of one sample, so a late
   joiner has the newest path at once (ROS calls this transient local);
 * callbacks run on Zenoh's threads and only hand the sample on.
@@ -12,20 +13,22 @@ Choices that hold for every process, and why:
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from importlib import metadata
 from typing import Any, Self
 
 import zenoh
 import zenoh.ext
 
+from fasaco_edge.bus.encodings import JSON, encoding_of, schema_of
+from fasaco_edge.bus.qos import VOLATILE, Qos
+from fasaco_edge.bus.queries import Question, Reply, Request, reply_of, request_of, send
 from fasaco_edge.bus.session_config import session_config
 from fasaco_edge.errors import BusUnavailable
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-CDR = zenoh.Encoding.APPLICATION_CDR
-JSON = zenoh.Encoding.APPLICATION_JSON
+ZENOH_VERSION = metadata.version("eclipse-zenoh")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,62 +60,39 @@ class Sample:
     attachment: bytes = b""
 
 
-@dataclass(frozen=True, slots=True)
-class Reply:
-    """An answer to a query: a payload with its schema ("" for JSON), or an error."""
-
-    payload: bytes
-    schema: str = ""
-    attachment: bytes = b""
-    is_error: bool = False
-
-
-class Question:
-    """A query that somebody waits for an answer to; to be answered once, on any thread.
-
-    Attributes:
-        payload: what came with it, b"" for nothing.
-    """
-
-    def __init__(self, query: zenoh.Query, key: str) -> None:
-        payload = query.payload
-        self.payload = payload.to_bytes() if payload is not None else b""
-        self._query = query
-        self._key = key
-
-    def answer(self, reply: Reply) -> None:
-        """Answer; who asked may be gone by now."""
-        with contextlib.suppress(zenoh.ZError):
-            _send(self._query, self._key, reply)
-        query: Any = self._query  # drop() has no annotation
-        query.drop()
-
-
 class Publisher:
-    """Puts samples on one key; never blocks."""
+    """Puts samples on one key, with its quality of service."""
 
-    def __init__(self, session: zenoh.Session, key: str, schema: str, latched: bool) -> None:
-        encoding = _encoding(schema)
-        drop = zenoh.CongestionControl.DROP
+    def __init__(self, session: zenoh.Session, key: str, schema: str, qos: Qos) -> None:
+        options: dict[str, Any] = {
+            "encoding": encoding_of(schema),
+            "reliability": getattr(zenoh.Reliability, qos.reliability.upper()),
+            "congestion_control": getattr(zenoh.CongestionControl, qos.congestion.upper()),
+            "priority": getattr(zenoh.Priority, qos.priority.upper()),
+            "express": qos.express,
+        }
         # An advanced publisher cannot say who listens, a plain one beside it can.
-        self._plain = session.declare_publisher(key, encoding=encoding, congestion_control=drop)
+        self._plain = session.declare_publisher(key, **options)
         self._publisher: Any = self._plain
-        if latched:
+        if qos.latched:
             self._publisher = zenoh.ext.declare_advanced_publisher(
                 session,
                 key,
-                encoding=encoding,
-                congestion_control=drop,
-                cache=zenoh.ext.CacheConfig(max_samples=1),
+                **options,
+                cache=zenoh.ext.CacheConfig(max_samples=qos.cache),
                 sample_miss_detection=zenoh.ext.MissDetectionConfig(
-                    heartbeat=None, sporadic_heartbeat=0.5
+                    heartbeat=None, sporadic_heartbeat=qos.heartbeat_s
                 ),
                 publisher_detection=True,
             )
 
     def put(self, payload: bytes, attachment: bytes = b"") -> None:
-        """Send ``payload``; a subscriber too slow to take it loses it."""
+        """Send ``payload``."""
         self._publisher.put(payload, attachment=attachment or None)
+
+    def release(self) -> None:
+        """Let go of what Zenoh has given."""
+        del self._plain, self._publisher
 
     def has_listeners(self) -> bool:
         """Tell whether any subscriber matches the key."""
@@ -132,6 +112,10 @@ class Subscription:
         self._subscriber.undeclare()
         self._subscriber = self._declare()
 
+    def release(self) -> None:
+        """Let go of what Zenoh has given."""
+        del self._subscriber, self._declare
+
 
 class Bus:
     """A session, with everything declared on it; close it on every way out."""
@@ -139,6 +123,9 @@ class Bus:
     def __init__(self, session: zenoh.Session) -> None:
         self._session = session
         self._declared: list[Any] = []
+        # What others hold, too: nothing of Zenoh's may be left to the last garbage collection,
+        # in which its threads and the interpreter may wait for each other for ever.
+        self._lent: list[Publisher | Subscription] = []
 
     def __enter__(self) -> Self:
         return self
@@ -151,9 +138,11 @@ class Bus:
         """Id of the session, which no other has."""
         return str(self._session.zid())
 
-    def publisher(self, key: str, schema: str = "", latched: bool = False) -> Publisher:
+    def publisher(self, key: str, schema: str = "", qos: Qos = VOLATILE) -> Publisher:
         """Declare a publisher; ``schema`` names a CDR type, "" means JSON."""
-        return Publisher(self._session, key, schema, latched)
+        publisher = Publisher(self._session, key, schema, qos)
+        self._lent.append(publisher)
+        return publisher
 
     def subscribe(
         self,
@@ -184,16 +173,23 @@ class Bus:
             )
 
         subscription = Subscription(declare)
-        self._declared.append(subscription)
+        self._lent.append(subscription)
         return subscription
 
-    def serve(self, key: str, answer: Callable[[dict[str, str]], Reply]) -> None:
-        """Answer queries on ``key``; ``answer`` gets the parameters, on a Zenoh thread."""
+    def serve(
+        self, key: str, answer: Callable[[Request], Reply | None], complete: bool = True
+    ) -> None:
+        """Answer queries on ``key``, on a Zenoh thread; None leaves one to others.
+
+        ``complete``: nobody else has to be asked.
+        """
 
         def receive(query: zenoh.Query) -> None:
-            _send(query, key, answer(_parameters(query)))
+            reply = answer(request_of(query))
+            if reply is not None:
+                send(query, key, reply)
 
-        self._declared.append(self._session.declare_queryable(key, receive, complete=True))
+        self._declared.append(self._session.declare_queryable(key, receive, complete=complete))
 
     def take_questions(self, key: str, receive: Callable[[Question], None]) -> None:
         """Call ``receive`` with each query on ``key``, on a Zenoh thread; to be answered later."""
@@ -215,7 +211,7 @@ class Bus:
         replies = self._session.get(
             selector, timeout=timeout_s, payload=payload or None, encoding=encoding
         )
-        return [_reply(reply) for reply in replies]
+        return [reply_of(reply) for reply in replies]
 
     def token(self, key: str) -> None:
         """Declare a liveliness token; it vanishes with this session."""
@@ -229,6 +225,9 @@ class Bus:
     def close(self) -> None:
         """End the session; a process that does not close it may hang at exit."""
         self._declared.clear()
+        for lent in self._lent:
+            lent.release()
+        self._lent.clear()
         session: Any = self._session  # close() has no annotation
         session.close()
 
@@ -260,41 +259,11 @@ def _config(settings: BusSettings) -> zenoh.Config:
     return session_config(settings.mode, settings.connect, settings.listen, settings.secured)
 
 
-def _parameters(query: zenoh.Query) -> dict[str, str]:
-    parameters: Any = query.parameters  # no mapping by the stubs
-    return {str(key): str(value) for key, value in parameters}
-
-
-def _send(query: zenoh.Query, key: str, reply: Reply) -> None:
-    encoding = _encoding(reply.schema)
-    if reply.is_error:
-        query.reply_err(reply.payload, encoding=encoding)
-    else:
-        attachment = reply.attachment or None
-        query.reply(key, reply.payload, encoding=encoding, attachment=attachment)
-
-
-def _encoding(schema: str) -> zenoh.Encoding:
-    return CDR.with_schema(schema) if schema else JSON
-
-
-def _schema(encoding: zenoh.Encoding) -> str:
-    return str(encoding).partition(";")[2]
-
-
 def _sample(sample: zenoh.Sample) -> Sample:
     attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
     return Sample(
-        str(sample.key_expr), sample.payload.to_bytes(), _schema(sample.encoding), attachment
+        str(sample.key_expr), sample.payload.to_bytes(), schema_of(sample.encoding), attachment
     )
-
-
-def _reply(reply: zenoh.Reply) -> Reply:
-    if reply.ok is not None:
-        sample = _sample(reply.ok)
-        return Reply(sample.payload, sample.schema, sample.attachment)
-    assert reply.err is not None
-    return Reply(reply.err.payload.to_bytes(), _schema(reply.err.encoding), is_error=True)
 
 
 def _first_line(error: Exception) -> str:

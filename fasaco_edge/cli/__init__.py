@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from fasaco_edge import __version__
 from fasaco_edge.cli import (
+    ask,
     bench,
     demo,
     doctor,
@@ -27,7 +28,9 @@ from fasaco_edge.cli.arguments import with_negative_pairs
 from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
-COMMANDS = (demo, plan, run, mission, record, replay, simulate, bench, maps, warmup, doctor)
+COMMANDS = (
+    demo, plan, run, mission, ask, record, replay, simulate, bench, maps, warmup, doctor,
+)  # fmt: skip
 
 
 def main(argv: Sequence[str] | None = None) -> int:

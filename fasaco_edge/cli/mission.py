@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.cli import exits
-from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.cli.asking import add_question, ask
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
@@ -48,6 +47,7 @@ COMMANDS = {
     "pause": "let the robot stand; what it passes over still counts",
     "resume": "go on",
     "cancel": "stop, and forget the order; what is covered is remembered",
+    "replan": "make a full new plan now, which keeps nothing of the path there is",
     "reset": "stop, and forget the order and what is covered; the ledger is kept aside",
     "status": "tell state, progress, and what could not be reached",
 }
@@ -57,7 +57,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser(
         "mission",
-        help="command a running daemon: start, pause, resume, cancel, reset, status",
+        help="command a running daemon: start, pause, resume, cancel, replan, reset, status",
         description="Command the mission of a running daemon over Zenoh, and see how far it is.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -68,15 +68,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         command = names.add_parser(name, parents=[common], help=told, description=described)
         if name == "start":
             _add_order(command)
-        command.add_argument("--json", action="store_true", help="print the answer as JSON")
-        command.add_argument(
-            "--timeout",
-            type=_seconds,
-            default=5.0,
-            metavar="S",
-            help="how long to wait for the answer (default: %(default)s)",
-        )
-        add_robot_on_bus(command)
+        add_question(command)
         command.set_defaults(command=run, mission_command=name)
 
 
@@ -109,50 +101,18 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Ask, and show the answer."""
-    from fasaco_edge.bus.session import open_bus
     from fasaco_edge.cli.mission_view import show
-    from fasaco_edge.wire.keys import Keys
     from fasaco_edge.wire.status import decode_json, encode_json
 
     asked: dict[str, Any] = {"command": args.mission_command}
     if args.mission_command == "start":
         asked["order"] = _order(args)
-    keys = Keys(args.robot, args.base)
-    with open_bus(client_settings(args)) as bus:
-        replies = bus.get(keys.rpc("mission"), args.timeout, encode_json(asked))
-        if not replies:
-            raise _nobody(keys.prefix, bus.alive(f"{args.base}/@v1/*/alive"))
-    reply, answer = replies[0], decode_json(replies[0].payload)
+    reply = ask(args, "mission", payload=encode_json(asked))
     if args.json:
-        print(replies[0].payload.decode())
-    if reply.is_error:
-        raise CommandRefusedError(answer)
-    if not args.json:
-        show(answer)
+        print(reply.payload.decode())
+    else:
+        show(decode_json(reply.payload))
     return exits.OK
-
-
-class CommandRefusedError(FasacoError):
-    """The daemon's answer to a command is an error."""
-
-    def __init__(self, answer: dict[str, Any]) -> None:
-        super().__init__(str(answer.get("message")), hint=str(answer.get("hint", "")))
-        self.code = str(answer.get("code"))
-
-
-class NobodyAnswersError(FasacoError):
-    """No daemon of that robot is on the bus."""
-
-    code = "nobody_answers"
-
-
-def _nobody(prefix: str, alive: list[str]) -> NobodyAnswersError:
-    robots = sorted(key.split("/")[-2] for key in alive)
-    there = f"there are {', '.join(robots)}: give one as --robot" if robots else "there is none"
-    return NobodyAnswersError(
-        f"no daemon answers at {prefix}",
-        hint=f"of robots on this bus {there}; `fasaco-edge run` starts a daemon",
-    )
 
 
 def _order(args: argparse.Namespace) -> dict[str, Any]:
@@ -216,14 +176,3 @@ def _polygon(text: str) -> list[list[float]]:
     if len(corners) < 3 or any(len(corner) != 2 for corner in corners):
         raise argparse.ArgumentTypeError(f"must be x,y;x,y;x,y;... in metres, got {text!r}")
     return corners
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = 0.0
-    # A negated comparison, so that NaN is caught too.
-    if not 0 < seconds <= 3600:
-        raise argparse.ArgumentTypeError(f"must be in (0, 3600] s, got {text!r}")
-    return seconds

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import logging
+import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from fasaco_edge.cli import exits
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
@@ -59,4 +64,8 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.daemon.service import run_daemon
 
     run_daemon(load_config(args.config), args.record, args.state, fresh=args.fresh)
-    return 0
+    # All is closed. What is left is the interpreter's own end, in which it was seen to wait for
+    # ever, now and then, where Zenoh's threads had been at work: a service must not.
+    logging.shutdown()
+    sys.stdout.flush()
+    os._exit(exits.OK)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from fasaco_edge.daemon.keeping import Keeping
 from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
+from fasaco_edge.mission.assignment import CommandError
 from fasaco_edge.mission.events import Answer, CommandReceived, Event, MapReceived, PoseReceived
 
 if TYPE_CHECKING:
@@ -65,6 +66,8 @@ class Beginning:
         for asked in commands:
             try:
                 self.assignment = self.assignment.after(asked.command, asked.order)
+                if asked.command == "replan":
+                    raise CommandError("nothing to plan: the first plan is still to come")
             except FasacoError as error:
                 answers.append(Answer(asked.number, error))
                 continue

@@ -7,16 +7,23 @@ from functools import partial
 from typing import Any
 
 from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.bus.session import Bus, Question, Reply
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.bus.queries import Question, Reply
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.daemon.answers import check, error_reply
+from fasaco_edge.errors import BadQuery, FasacoError
+from fasaco_edge.mission.assignment import CommandError
 from fasaco_edge.mission.events import Answer, CommandReceived
-from fasaco_edge.mission.order_document import read_command
+from fasaco_edge.mission.order import EVERYTHING_ONCE, MissionOrder
+from fasaco_edge.mission.order_document import CommandName, read_command
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.status import decode_json, encode_error, encode_json
+from fasaco_edge.wire.status import decode_json, encode_json
+
+# A robot whose path changes all the time drives badly: it is planned anew no more often [s].
+REPLAN_PERIOD_S = 1.0
 
 
 class Commands:
-    """Serves ``@rpc/mission``; each question waits for its answer from the loop."""
+    """Serves ``@rpc/mission`` and ``@rpc/replan``; a question waits until the loop answers."""
 
     def __init__(self, bus: Bus, keys: Keys, mailbox: Mailbox[object]) -> None:
         self._count = 0
@@ -24,18 +31,21 @@ class Commands:
         self._open: dict[int, Question] = {}
         self._curious: list[Question] = []
         self._decided: list[Answer] = []
-        bus.take_questions(keys.rpc("mission"), partial(mailbox.post, "command"))
+        self._replan_key = keys.rpc("replan")
+        self._replanned_at = float("-inf")
+        for name in ("mission", "replan"):
+            bus.take_questions(keys.rpc(name), partial(mailbox.post, "command"))
 
-    def take(self, items: Sequence[tuple[str, object]]) -> list[CommandReceived]:
+    def take(self, items: Sequence[tuple[str, object]], now: float) -> list[CommandReceived]:
         """Return the commands in ``items``; what is none is answered at once."""
         commands = []
         for _, item in items:
             if not isinstance(item, Question):
                 continue
             try:
-                name, order = read_command(decode_json(item.payload or b'{"command":"status"}'))
+                name, order = self._read(item, now)
             except FasacoError as error:
-                item.answer(Reply(encode_error(error), is_error=True))
+                item.answer(error_reply(error))
                 continue
             if name == "status":
                 self._curious.append(item)
@@ -45,14 +55,36 @@ class Commands:
             commands.append(CommandReceived(self._count, name, order))
         return commands
 
+    def _read(self, question: Question, now: float) -> tuple[CommandName, MissionOrder]:
+        request = question.request
+        if question.key == self._replan_key:
+            check(request)
+            if request.key.endswith("*"):
+                # Who asks for all there is does not mean to change anything.
+                raise BadQuery("replan has to be asked for by its name")
+            command: tuple[CommandName, MissionOrder] = ("replan", EVERYTHING_ONCE)
+        else:
+            check(request, payload=True)
+            command = read_command(decode_json(request.payload or b'{"command":"status"}'))
+        if command[0] == "replan":
+            waits_s = self._replanned_at + REPLAN_PERIOD_S - now
+            if waits_s > 0:
+                raise CommandError(
+                    f"planned anew less than {REPLAN_PERIOD_S:g} s ago",
+                    hint=f"ask again in {waits_s:.1f} s",
+                )
+        return command
+
     @property
     def are_asked(self) -> bool:
         """Whether anybody waits for an answer."""
         return bool(self._open or self._curious)
 
-    def note(self, answers: Sequence[Answer]) -> None:
+    def note(self, answers: Sequence[Answer], now: float) -> None:
         """Note what the mission has decided."""
         self._decided.extend(answers)
+        if any(answer.plan is not None for answer in answers):
+            self._replanned_at = now
 
     def answer(self, report: dict[str, Any], *, is_kept: bool) -> None:
         """Answer who wants to know how it is; and who commanded, once that outlives the daemon."""
@@ -65,7 +97,10 @@ class Commands:
         for answer in self._decided:
             question = self._open.pop(answer.number)
             if answer.error is not None:
-                question.answer(Reply(encode_error(answer.error), is_error=True))
+                question.answer(error_reply(answer.error))
+            elif question.key == self._replan_key:
+                accepted = {"robot": report["robot"], "accepted": True, "plan": answer.plan}
+                question.answer(Reply(encode_json(accepted)))
             else:
                 question.answer(Reply(payload))
         self._decided.clear()

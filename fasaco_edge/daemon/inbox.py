@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 # must not take a core. No mapper is that fast.
 MAP_SPACING_S = 0.05
 
+# Samples that wait for the loop, as ``protocol/limits.yaml`` has it.
+QUEUES = {"map": 4, "map_update": 256, "tf_static": 256, "pose": 1024, "command": 16}
+
 
 @dataclass(frozen=True, slots=True)
 class Received:
@@ -46,10 +49,8 @@ def make_mailbox(map_spacing_s: float = MAP_SPACING_S) -> Mailbox[object]:
     are plenty. A map does not clear what was before it: it may be broken. An update
     patches the map before it, so it waits with that.
     """
-    lengths = {"map": 4, "map_update": 256, "tf_static": 256, "pose": 1024}
     return Mailbox(
-        {**lengths, "snapshot": 8, "command": 16},
-        Spacing("map", map_spacing_s, followers=("map_update",)),
+        {**QUEUES, "snapshot": 8}, Spacing("map", map_spacing_s, followers=("map_update",))
     )
 
 

@@ -7,7 +7,6 @@ both happen in a thread of their own, so that the loop keeps answering.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.mailbox import Mailbox
@@ -22,14 +21,11 @@ if TYPE_CHECKING:
 class Loader:
     """Imports what plans, warms the kernels up, and sets up mission and worker."""
 
-    def __init__(
-        self, config: DaemonConfig, mailbox: Mailbox[object], is_watched: Callable[[], bool]
-    ) -> None:
+    def __init__(self, config: DaemonConfig, mailbox: Mailbox[object]) -> None:
         self.stage = "importing"
         self.error: BaseException | None = None
         self._config = config
         self._mailbox = mailbox
-        self._is_watched = is_watched
         self._loaded: tuple[Mission, PlanningWorker] | None = None
         threading.Thread(target=self._run, name="loader", daemon=True).start()
 
@@ -63,7 +59,7 @@ class Loader:
             robot.tool_width_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least
         )
         chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
-        worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post, self._is_watched)
+        worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
         patience = self._config.mission
         mission = MissionConfig(
             footprint,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.daemon.beginning import Beginning
@@ -29,11 +29,10 @@ from fasaco_edge.mission.events import (
     PlanReady,
 )
 from fasaco_edge.mission.order_document import command_document
-from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.wire.coverage import coverage_grid
 
 if TYPE_CHECKING:
-    from fasaco_edge.daemon.worker import PlanningWorker
+    from fasaco_edge.daemon.worker import Observed, PlanningWorker
     from fasaco_edge.mission.mission import Mission
 
 TICK_S = 0.1
@@ -87,7 +86,7 @@ class Loop:
             events, faults = self._inbox.decode(items, self._mailbox.take_lost("map_update"))
             self._refuse(faults)
             self._note(items)
-            commands = self._commands.take(items)
+            commands = self._commands.take(items, started)
             mission = self._mission or self._begin(events)
             if mission is not None:
                 answers = self._turn(mission, [*events, *commands, *_plans(items)], started)
@@ -96,7 +95,7 @@ class Loop:
             self._publish_commands(commands, answers)
             self._keeping.keep(mission, self._assignment, started)
             self._publish_status(started)
-            self._commands.note(answers)
+            self._commands.note(answers, started)
             if self._commands.are_asked:
                 report = self._status.report(mission, self._assignment, self._loading)
                 self._commands.answer(report, is_kept=self._keeping.is_kept(time.monotonic()))
@@ -110,7 +109,7 @@ class Loop:
         return "" if self._mission else self._beginning.stage
 
     def _load(self) -> Loader:
-        return Loader(self._config, self._mailbox, self._outbox.is_watched)
+        return Loader(self._config, self._mailbox)
 
     def _begin(self, events: list[Event]) -> Mission | None:
         """Hold ``events`` until there is a mission; once it is there, they are all that was."""
@@ -154,8 +153,8 @@ class Loop:
         """Take what is not the mission's: snapshots, the recorder's word, failures."""
         self._map_arrived = None
         for kind, item in items:
-            if isinstance(item, ColonySnapshot):
-                self._publish_snapshot(item)
+            if kind == "snapshot":
+                self._publish_snapshot(cast("Observed", item))
             elif isinstance(item, BaseException):
                 raise item
             elif isinstance(item, PlanReady):
@@ -222,10 +221,10 @@ class Loop:
             )
         )
 
-    def _publish_snapshot(self, snapshot: ColonySnapshot) -> None:
+    def _publish_snapshot(self, seen: Observed) -> None:
         mission = self._mission
         frame = mission.grid.frame if mission and mission.grid else "map"
-        self._outbox.pheromone(snapshot, frame)
+        self._outbox.pheromone(seen, frame)
 
     def _publish_commands(
         self, commands: Sequence[CommandReceived], answers: Sequence[Answer]

@@ -235,7 +235,7 @@ def _loaded(
     config: DaemonConfig, mailbox: Mailbox[object]
 ) -> tuple[Mission, Loader, CoveragePlanner]:
     """Return the mission as the daemon sets it up, what has loaded it, and its planner."""
-    loader = Loader(config, mailbox, lambda: False)
+    loader = Loader(config, mailbox)
     while (loaded := loader.poll()) is None:
         mailbox.take(LOAD_S)
     mission, worker = loaded

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 
 from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, Publisher, Sample, Subscription
 from fasaco_edge.daemon.inbox import Received
 from fasaco_edge.daemon.ros_config import RosConfig
@@ -42,8 +43,8 @@ class RosBridge:
         self._subscribe("map_update", config.map_updates)
         for kind, topic in config.poses.items():
             self._subscribe(kind, topic)
-        self.path = self._publisher(config.coverage_path)
-        self.coverage = self._publisher(config.coverage_grid)
+        self.path = self._publisher(config.coverage_path, "path")
+        self.coverage = self._publisher(config.coverage_grid, "coverage")
 
     def _subscribe(self, kind: str, topic: RosTopic) -> Subscription:
         post = _poster(self._mailbox, kind, topic.schema)
@@ -55,12 +56,13 @@ class RosBridge:
         self._bus.token(self._node.endpoint_token(self._endpoints, "MS", topic))
         return subscription
 
-    def _publisher(self, topic: RosTopic) -> RosPublisher:
+    def _publisher(self, topic: RosTopic, like: str) -> RosPublisher:
+        """Publish ``topic`` with the quality of service of the native key ``like``."""
         if self._config.kind == "bridge":
-            publisher = self._bus.publisher(topic.bridge_key, topic.schema, topic.latched)
+            publisher = self._bus.publisher(topic.bridge_key, topic.schema, QOS[like])
             return RosPublisher(publisher)
         key = topic.rmw_key(self._config.domain)
-        publisher = self._bus.publisher(key, topic.schema, topic.latched)
+        publisher = self._bus.publisher(key, topic.schema, QOS[like])
         self._endpoints += 1
         token = self._node.endpoint_token(self._endpoints, "MP", topic)
         self._bus.token(token)

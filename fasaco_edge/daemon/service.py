@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.daemon.about import serve_about
 from fasaco_edge.daemon.commands import Commands
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.inbox import Inbox, make_mailbox
@@ -75,6 +76,7 @@ def _serve(
     inbox = Inbox(bus, keys, mailbox, config.pose.schema, ros)
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
     commands = Commands(bus, keys, mailbox)
+    serve_about(bus, keys, config)
     loop = Loop(config, mailbox, inbox, commands, outbox, ledger, recorder)
     try:
         loop.announce()

@@ -7,9 +7,8 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import msgspec
-
 from fasaco_edge import __version__
+from fasaco_edge.daemon.about import config_document
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.mission_report import mission_report
 from fasaco_edge.errors import FasacoError
@@ -74,6 +73,7 @@ class StatusBoard:
         self.ledger: dict[str, Any] = {}
         self.path: PathUpdate | None = None
         self._config = config
+        self._shown_config = config_document(config)
         self._started = time.monotonic()
         self._sent_at = float("-inf")
         self._sent_key: tuple[Any, ...] = ()
@@ -134,7 +134,7 @@ class StatusBoard:
             "ledger": self.ledger,
             "recorder": self.recorder,
             "rss_mb": resident_mb(),
-            "config": msgspec.to_builtins(self._config),
+            "config": self._shown_config,
         }
 
     def _path(self, mission: Mission | None) -> dict[str, Any] | None:

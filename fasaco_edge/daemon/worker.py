@@ -5,15 +5,25 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.mission.events import PlanReady, PlanRequest
 from fasaco_edge.planners.observation import ColonySnapshot
-from fasaco_edge.planners.planner import CoveragePlanner, ignore
+from fasaco_edge.planners.planner import CoveragePlanner
 from fasaco_edge.planners.stopping import AnyOf, Interrupt, TimeBudget
 
 # An attempt to make a path better takes so long [s].
 SPARE_S = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observed:
+    """What plan ``plan`` lets others see."""
+
+    plan: int
+    snapshot: ColonySnapshot
 
 
 class PlanningWorker:
@@ -24,12 +34,10 @@ class PlanningWorker:
         planner: CoveragePlanner,
         budget_s: float,
         post: Callable[[str, object], None],
-        is_watched: Callable[[], bool],
     ) -> None:
         self._planner = planner
         self._budget_s = budget_s
         self._post = post
-        self._is_watched = is_watched
         self._requests = LatestSlot[PlanRequest]()
         self._stopping = threading.Event()
         self._interrupt = threading.Event()
@@ -66,10 +74,9 @@ class PlanningWorker:
             return
         budget_s = min(self._budget_s, SPARE_S) if request.problem.only_better else self._budget_s
         stop = AnyOf(TimeBudget(budget_s), Interrupt(self._interrupt))
-        # To look at the trail costs time: only where somebody does.
-        observe = self._observe if self._is_watched() else ignore
-        path = self._planner.plan(request.problem, stop, observe)
+        # Costs some percent of a full plan, and a repair nothing.
+        path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))
         self._post("plan", PlanReady(request.number, path, time.monotonic() - started))
 
-    def _observe(self, snapshot: ColonySnapshot) -> None:
-        self._post("snapshot", snapshot)
+    def _observe(self, plan: int, snapshot: ColonySnapshot) -> None:
+        self._post("snapshot", Observed(plan, snapshot))

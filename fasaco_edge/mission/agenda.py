@@ -61,6 +61,11 @@ class Agenda:
         return self._memory.retry_at is not None
 
     @property
+    def can_plan(self) -> bool:
+        """Whether a plan would have anything to cover."""
+        return self.assignment.stage is not Stage.RETURNING and self._left() > 0
+
+    @property
     def ending(self) -> str:
         """How the order came to its end."""
         return self._memory.ending

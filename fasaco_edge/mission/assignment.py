@@ -120,7 +120,7 @@ class Assignment:
         another order; the same one goes on, unless it is over.
 
         Raises:
-            CommandError: there is nothing to pause or to resume.
+            CommandError: there is nothing to pause, to resume or to plan.
         """
         match command:
             case "start":
@@ -129,6 +129,10 @@ class Assignment:
                 if self.order is None or (self.stage is Stage.OVER and not self.standing):
                     raise CommandError(f"there is no mission to {command}")
                 return replace(self, paused=command == "pause")
+            case "replan":
+                if self.order is None or self.paused:
+                    why = "the mission is paused" if self.paused else "there is no mission"
+                    raise CommandError(f"nothing to plan: {why}")
             case "cancel" if self.order is not None:
                 return Assignment.none("cancelled")
             case "reset":

@@ -99,10 +99,14 @@ class PathUpdate:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The answer to command ``number``: done, or why not."""
+    """The answer to command ``number``: done, or why not.
+
+    ``plan`` is the number of the plan request that ``replan`` leads to.
+    """
 
     number: int
     error: FasacoError | None = None
+    plan: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.mission.assignment import CommandError
 from fasaco_edge.mission.events import (
     Answer,
     CommandReceived,
@@ -116,10 +117,11 @@ class Intake:
             if event.command == "start":
                 parts.site.check_zones(event.order)
             after = before.after(event.command, event.order)
+            plan = self._replan() if event.command == "replan" else None
         except FasacoError as error:
             self.answers.append(Answer(event.number, error))
             return
-        self.answers.append(Answer(event.number))
+        self.answers.append(Answer(event.number, plan=plan))
         if event.command == "reset":
             parts.log.begin_anew()
             self.forgotten = True
@@ -131,3 +133,16 @@ class Intake:
         elif before.paused and not after.paused:
             parts.route.wanted = "resumed"
         parts.agenda.assignment = after
+
+    def _replan(self) -> int:
+        """Want a full new plan, and return its number; CommandError where there is none to make."""
+        site = self._parts.site
+        if site.lattice is None:
+            raise CommandError("nothing to plan: there is no map yet")
+        if site.pose is None:
+            raise CommandError("nothing to plan: there is no pose yet")
+        if site.ground is None or site.cell() is None:
+            raise CommandError(f"nothing to plan: {site.misplaced()}")
+        if not self._parts.agenda.can_plan:
+            raise CommandError("nothing to plan: no reachable cell is left to cover")
+        return self._parts.route.want_anew("asked for")

@@ -23,7 +23,7 @@ from fasaco_edge.mission.order import (
     Zone,
 )
 
-CommandName = Literal["start", "pause", "resume", "cancel", "reset", "status"]
+CommandName = Literal["start", "pause", "resume", "cancel", "reset", "replan", "status"]
 
 _Passes = Annotated[int, Meta(ge=1, le=MOST_PASSES, description="how often to cover")]
 _Polygon = Annotated[

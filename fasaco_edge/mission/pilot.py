@@ -156,14 +156,14 @@ class Pilot:
         agenda.reopen()
         while agenda.assignment.stage is not Stage.RETURNING:
             try:
-                problem = agenda.problem(cell, route.path.ahead)
+                problem = agenda.problem(cell, route.kept)
             except NothingToCover:
                 if reason := agenda.seek(cell):
                     route.wanted = reason
                     continue
                 agenda.go_on(parts.now)
                 if agenda.waiting or agenda.assignment.stage is Stage.OVER:
-                    route.wanted = ""
+                    route.want_none()
                     return self._settle(update)
                 route.wanted = agenda.begin(cell, parts.now) or route.wanted
                 continue
@@ -177,7 +177,8 @@ class Pilot:
     def _go_home(self, cell: Cell, update: PathUpdate | None) -> Decision:
         parts, route, home = self._parts, self._parts.route, self._parts.agenda.assignment.home
         assert parts.site.ground is not None
-        route.wanted, parts.watch.doubt = "", ""
+        route.want_none()
+        parts.watch.doubt = ""
         if home is None or cell == home:
             parts.agenda.go_on(parts.now)
             return self._settle(update)

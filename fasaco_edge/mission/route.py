@@ -39,6 +39,8 @@ class Route:
         self._site = site
         self._agenda = agenda
         self._disowned = False
+        # Why a plan is wanted that keeps nothing of the path; "" where none is.
+        self._anew = ""
         self._checked_on: Ground | None = None
         self._attempt: Attempt | None = None
 
@@ -53,8 +55,8 @@ class Route:
 
     def ask(self, problem: CoverageProblem) -> PlanRequest:
         """Ask for the plan that is wanted."""
-        self.asked = PlanRequest(self._number, problem, self.wanted)
-        self.wanted = ""
+        self.asked = PlanRequest(self._number, problem, self._anew or self.wanted)
+        self.want_none()
         return self.asked
 
     def ask_for_better(self) -> PlanRequest | None:
@@ -65,9 +67,23 @@ class Route:
         self.asked = PlanRequest(self._number, self._attempt.problem, "spare time")
         return self.asked
 
+    def want_none(self) -> None:
+        """Want no plan any more."""
+        self.wanted = self._anew = ""
+
+    def want_anew(self, reason: str) -> int:
+        """Want a plan that keeps nothing of the path; return the number it will have."""
+        self.wanted = self._anew = reason
+        return self._number + (0 if self.asked is None else 1)
+
+    @property
+    def kept(self) -> NDArray[np.int32]:
+        """What of the path the next plan is to keep where it can, int32 (n, 2)."""
+        return self.path.ahead[:0] if self._anew else self.path.ahead
+
     def disown(self) -> None:
         """Want no plan any more; what comes back of the one under way is for another order."""
-        self.wanted = ""
+        self.want_none()
         self._disowned = self.asked is not None
 
     def take_plan(self, event: PlanReady) -> PathUpdate | None:

@@ -155,16 +155,22 @@ def snapshot_of(
 ) -> ColonySnapshot:
     lattice = problem.lattice
     rows, cols = lattice.steps.shape
-    into = np.zeros((rows, cols))
-    legal = (lattice.steps[..., None] >> np.arange(4, dtype=np.uint8)) & 1
-    trail = trail.reshape(rows, cols, 4) * legal
-    into[:, 1:] += trail[:, :-1, 0]
-    into[1:] += trail[:-1, :, 1]
-    into[:, :-1] += trail[:, 1:, 2]
-    into[:-1] += trail[1:, :, 3]
-    # A step is legal both ways or not at all, so moves in are as many as moves out.
-    moves = legal.sum(axis=2)
-    mean = np.divide(into, moves, out=np.zeros_like(into), where=moves > 0)
+    trail = trail.reshape(rows, cols, 4)
+    into, moves = np.zeros((rows, cols)), np.zeros((rows, cols), np.uint8)
+    # From where a move leads, and to where: one array at a time is several times as fast as all
+    # four directions at once.
+    ahead, behind = np.s_[1:], np.s_[:-1]
+    for direction, here, there in (
+        (0, np.s_[:, behind], np.s_[:, ahead]),
+        (1, np.s_[behind], np.s_[ahead]),
+        (2, np.s_[:, ahead], np.s_[:, behind]),
+        (3, np.s_[ahead], np.s_[behind]),
+    ):
+        legal = (lattice.steps >> np.uint8(direction)) & np.uint8(1)
+        into[there] += trail[..., direction][here] * legal[here]
+        # A step is legal both ways or not at all, so moves in are as many as moves out.
+        moves += legal
+    mean = np.divide(into, moves, out=into, where=moves > 0)
     return ColonySnapshot(
         lattice.window, lattice.cell_m, mean.astype(np.float32), cohort, velocity, ants, steps
     )

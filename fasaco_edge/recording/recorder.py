@@ -18,6 +18,7 @@ from pathlib import Path
 from types import FrameType
 
 from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, Publisher, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, FasacoError
 from fasaco_edge.process_memory import resident_mb
@@ -105,7 +106,7 @@ class Recorder:
         self._last_status_ns: int | None = None
         self._report: RecorderReport | None = None
         self._next_report_ns = 0
-        self._reporter: Publisher = bus.publisher(settings.keys.recorder, latched=True)
+        self._reporter: Publisher = bus.publisher(settings.keys.recorder, qos=QOS["recorder"])
 
     def listen(self) -> None:
         """Subscribe to everything there is to record, and say that the recorder is there."""
@@ -118,7 +119,7 @@ class Recorder:
         self._subscribe("coverage", keys.coverage, latched=True)
         self._subscribe("pheromone", keys.pheromone)
         self._subscribe("status", keys.status, latched=True)
-        self._bus.token(f"{keys.recorder}/alive")
+        self._bus.token(keys.recorder_alive)
 
     def step(self, timeout_s: float) -> None:
         """Write what came within ``timeout_s`` [s], find out whether it is written, report."""

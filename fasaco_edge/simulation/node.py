@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.mailbox import LatestSlot
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D
@@ -127,8 +128,8 @@ class _RobotOnBus:
     def __init__(self, world: World, keys: Keys, bus: Bus) -> None:
         self.world = world
         self.refused_paths = 0
-        self._map = bus.publisher(keys.map, OCCUPANCY_GRID, latched=True)
-        self._pose = bus.publisher(keys.pose, POSE_STAMPED)
+        self._map = bus.publisher(keys.map, OCCUPANCY_GRID, QOS["map"])
+        self._pose = bus.publisher(keys.pose, POSE_STAMPED, QOS["pose"])
         self._newest_path: LatestSlot[Sample] = LatestSlot()
         bus.subscribe(keys.path, self._newest_path.put, latched=True)
 

@@ -9,6 +9,9 @@ from fasaco_edge.errors import BadConfiguration
 
 VERSION = "@v1"
 
+RPC_NAMES = ("path", "status", "coverage", "pheromone", "config", "version", "mission", "replan")
+"""What can be asked, each as ``@rpc/<name>``."""
+
 _CHUNK = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -86,6 +89,11 @@ class Keys:
     def recorder(self) -> str:
         """Out, by the recorder: what it is doing."""
         return f"{self.prefix}/recorder"
+
+    @property
+    def recorder_alive(self) -> str:
+        """Liveliness token of the recorder."""
+        return f"{self.prefix}/recorder/alive"
 
     def rpc(self, name: str) -> str:
         """Return the key of the queryable ``name``.

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
+MAX_MESSAGE_BYTES: Final = 64 * 1024 * 1024
+"""Longest message of any kind; the session refuses longer ones (``bus.session``)."""
+
 MAX_STRING_BYTES: Final = 256
 """Longest string, in UTF-8, without its NUL."""
 

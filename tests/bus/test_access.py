@@ -13,7 +13,8 @@ from fasaco_edge.resources import folder
 
 README = (folder("protocol") / "README.md").read_text()
 PREFIX = "fasaco/@v1/robot"
-KEYS = yaml.safe_load((folder("protocol") / "keys.yaml").read_text())["keys"]
+TABLE = yaml.safe_load((folder("protocol") / "keys.yaml").read_text())
+KEYS, QUERIES = TABLE["keys"], TABLE["queries"]
 MOST = access.Limits(64_001_024, 4096, 1_049_600, 20.0, 200.0, 20.0)
 
 
@@ -36,9 +37,9 @@ def control(**names):
 
 
 def test_every_topic_of_the_contract_is_some_bodys():
-    topics = {entry["key"].removeprefix("{base}/@v1/{robot}/") for entry in KEYS}
-    ours = {"@rpc/{name}" if "@rpc" in topic else topic for topic in access.EVERYTHING}
-    assert topics == ours
+    entries = [*KEYS, *QUERIES]
+    topics = {entry["key"].removeprefix("{base}/@v1/{robot}/") for entry in entries}
+    assert topics == set(access.EVERYTHING)
 
 
 def test_the_readme_has_the_roles():
@@ -55,7 +56,7 @@ def test_what_a_robot_says_and_hears_is_what_the_contract_says():
     by_direction = {entry["name"]: entry["direction"] for entry in KEYS}
     incoming = {name for name, direction in by_direction.items() if direction == "in"}
     assert set(access.ROLES["mapper"].speaks) == incoming
-    assert set(access.ROLES["robot"].listens) == incoming | {"recorder"}
+    assert set(access.ROLES["robot"].listens) == incoming | {"recorder", "recorder/alive"}
 
 
 def test_a_map_comes_from_mappers_and_routers_alone():

@@ -13,7 +13,9 @@ import pytest
 import zenoh
 import zenoh.ext
 
-from fasaco_edge.bus.session import BusSettings, Reply, Sample, open_bus
+from fasaco_edge.bus.qos import QOS
+from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.session import BusSettings, Sample, open_bus
 from fasaco_edge.errors import BusUnavailable
 from tests.daemon.outsider import Ear, open_client
 from tests.daemon.processes import free_endpoint
@@ -94,7 +96,7 @@ def test_a_sample_comes_in_with_type_and_attachment(bus, client, samples, latche
 
 
 def test_who_comes_late_gets_the_newest_of_a_latched_key(bus, client):
-    publisher = bus.publisher(KEY, SCHEMA, latched=True)
+    publisher = bus.publisher(KEY, SCHEMA, QOS["path"])
     for number in range(5):
         publisher.put(b"%d" % number, b"attached")
     ear = Ear()
@@ -106,6 +108,19 @@ def test_who_comes_late_gets_the_newest_of_a_latched_key(bus, client):
     publisher.put(b"5")
     plain.wait(lambda h: h.payload == b"5")
     assert len(plain.heard) == 1
+
+
+@pytest.mark.parametrize("name", QOS)
+def test_a_sample_travels_as_its_key_says(bus, client, name):
+    came, qos = Queue(), QOS[name]
+    client.declare_subscriber(KEY, came.put)
+    publisher = bus.publisher(KEY, qos=qos)
+    until(publisher.has_listeners)
+    publisher.put(b"payload")
+    sample = came.get(timeout=TIMEOUT_S)
+    assert sample.priority == getattr(zenoh.Priority, qos.priority.upper())
+    assert sample.congestion_control == getattr(zenoh.CongestionControl, qos.congestion.upper())
+    assert sample.express == qos.express
 
 
 def test_a_latched_subscription_hears_what_was_said_before_it(bus, endpoint, samples):
@@ -124,7 +139,7 @@ def test_a_latched_subscription_hears_what_was_said_before_it(bus, endpoint, sam
 
 def test_it_knows_whether_anybody_listens(bus, client):
     for latched in (False, True):
-        publisher = bus.publisher(f"{KEY}/{latched}", latched=latched)
+        publisher = bus.publisher(f"{KEY}/{latched}", qos=QOS["path" if latched else "pose"])
         assert not publisher.has_listeners()
         subscriber = client.declare_subscriber(f"{KEY}/{latched}", Ear())
         until(publisher.has_listeners)
@@ -133,7 +148,7 @@ def test_it_knows_whether_anybody_listens(bus, client):
 
 
 def test_questions_are_answered_with_their_parameters(bus, client):
-    bus.serve(KEY, lambda asked: Reply(json.dumps(asked).encode(), SCHEMA, b"attached"))
+    bus.serve(KEY, lambda asked: Reply(json.dumps(asked.parameters).encode(), SCHEMA, b"attached"))
     (reply,) = client.get(f"{KEY}?a=1;b=two", timeout=TIMEOUT_S)
     assert json.loads(reply.ok.payload.to_bytes()) == {"a": "1", "b": "two"}
     assert str(reply.ok.encoding) == f"application/cdr;{SCHEMA}"
@@ -225,7 +240,7 @@ with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
     print("listening", flush=True)
     time.sleep(60)
 """
-    publisher = bus.publisher(KEY, latched=True)
+    publisher = bus.publisher(KEY, qos=QOS["coverage"])
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as listener:
         try:
             assert listener.stdout.readline() == b"listening\n"
@@ -243,10 +258,11 @@ with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
 def test_a_process_that_closes_its_session_ends(endpoint):
     """Without close() a process with a subscription may hang at its exit."""
     code = f"""
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import BusSettings, open_bus
 with open_bus(BusSettings("peer", (), ({endpoint!r},))) as bus:
     bus.subscribe({KEY!r}, lambda sample: None, latched=True)
     bus.serve({KEY!r}, lambda asked: None)
-    bus.publisher({KEY!r}, latched=True).put(b"")
+    bus.publisher({KEY!r}, qos=QOS["path"]).put(b"")
 """
     subprocess.run([sys.executable, "-c", code], check=True, timeout=20)

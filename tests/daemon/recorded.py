@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fasaco_edge.bus.mailbox import LatestSlot
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
@@ -35,7 +36,7 @@ START = Pose2D(0.75, 0.75)
 CRATE = (2.4, 1.2, 2.7, 1.5)
 CRATE_S = (8.0, 25.0)
 # What is commanded when [simulated s].
-COMMANDS = ((14.0, "pause"), (16.0, "resume"))
+COMMANDS = ((14.0, "pause"), (16.0, "resume"), (19.0, "replan"))
 # Simulated seconds per second.
 SPEED = 16.0
 TIMEOUT_S = 60.0
@@ -88,9 +89,9 @@ class MappingRobot:
         pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
         geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0))
         self._world = World(OccupancyGrid(geometry, pixels), START, SIMULATION)
-        self._maps = bus.publisher(keys.map, schemas.OCCUPANCY_GRID, latched=True)
+        self._maps = bus.publisher(keys.map, schemas.OCCUPANCY_GRID, QOS["map"])
         self._updates = bus.publisher(keys.map_update, schemas.OCCUPANCY_GRID_UPDATE)
-        self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED)
+        self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED, QOS["pose"])
         self._newest_path = LatestSlot[Sample]()
         self.status: dict = {}
         self._sent: OccupancyGrid | None = None
@@ -114,13 +115,19 @@ class MappingRobot:
             if (sample := self._newest_path.take(0.0)) is not None:
                 self._world.follow(decode_path(sample.payload).xy)
             self._publish()
-            if self._commands and 1e-9 * self._world.stamp_ns >= self._commands[0][0]:
+            if self._is_time():
                 self._command(self._commands.pop(0)[1])
                 due = time.monotonic()
             due += tick_s
             time.sleep(max(due - time.monotonic(), 0.0))
         # The last path, which tells the robot to stop, is to be recorded too.
         time.sleep(0.3)
+
+    def _is_time(self) -> bool:
+        """Tell whether the next command is due; a robot that has no path yet is not replanned."""
+        if not self._commands or 1e-9 * self._world.stamp_ns < self._commands[0][0]:
+            return False
+        return self._commands[0][1] != "replan" or self.status.get("state") == "covering"
 
     def _publish(self) -> None:
         emission = self._world.tick()

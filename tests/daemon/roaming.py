@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from fasaco_edge.bus.mailbox import LatestSlot
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
@@ -58,8 +59,8 @@ class Robot:
         self._world = world
         self._newest_path = LatestSlot[Sample]()
         keys = Keys()
-        self._maps = bus.publisher(keys.map, schemas.OCCUPANCY_GRID, latched=True)
-        self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED)
+        self._maps = bus.publisher(keys.map, schemas.OCCUPANCY_GRID, QOS["map"])
+        self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED, QOS["pose"])
         bus.subscribe(keys.path, self._newest_path.put, latched=True)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._drive, name="robot")

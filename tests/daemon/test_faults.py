@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.daemon.loop import ASK_FOR_MAP_S
 from fasaco_edge.errors import MalformedMessage
@@ -74,7 +75,7 @@ def test_an_update_that_lacks_its_map_asks_for_it(daemon, outsider):
     """Who publishes the map latched need not do anything; the newest one comes again."""
     with open_bus(BusSettings(connect=(daemon.endpoint,))) as mapper:
         prefix = outsider.prefix
-        latched = mapper.publisher(f"{prefix}/map", "nav_msgs/msg/OccupancyGrid", latched=True)
+        latched = mapper.publisher(f"{prefix}/map", "nav_msgs/msg/OccupancyGrid", QOS["map"])
         before = (outsider.ask_status()["map"] or {"revision": 0})["revision"]
         latched.put(map_bytes(room(3.0, 3.0)))
         outsider.wait_status(lambda status: (status["map"] or {}).get("revision") == before + 1)

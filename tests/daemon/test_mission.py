@@ -81,7 +81,6 @@ def test_before_there_is_a_path_the_answer_is_an_error(tmp_path):
             assert name.removeprefix("@rpc/") in error["message"]
             assert error["hint"]
             assert "json" in str(reply.err.encoding)
-        assert outsider.get("@rpc/nothing_of_that_name", timeout_s=1.0) == []
 
 
 def test_the_path_covers_every_cell_the_robot_fits_in(path, pixels):

@@ -76,7 +76,8 @@ def test_the_recording_holds_what_scenarios_need(samples, run, recording):
     assert topics.count("map_update") >= 10
     assert topics.count("pose") > 200
     commands = [sample.sample.payload for sample in samples if sample.topic == "command"]
-    assert [json.loads(command)["command"] for command in commands] == ["pause", "resume"]
+    told = [json.loads(command)["command"] for command in commands]
+    assert told == ["pause", "resume", "replan"]
     assert topics.count(PATH_DIGEST) == len(run.paths) == recording.status["path"]["revision"]
     assert run.ready_ns is not None
     assert run.starts == run.restored_cells == 0
@@ -89,6 +90,8 @@ def test_as_it_was_it_ends_as_it_did(as_it_was, recording, run):
     coverage = as_it_was.mission.coverage()
     assert coverage.covered == recording.status["coverage"]["covered"]
     assert as_it_was.faults == []
+    plans = [step.decision.plan for step in as_it_was.news if step.decision.plan is not None]
+    assert [plan.reason for plan in plans].count("asked for") == 1
     # The first plans follow from nothing but the map and the recorded work.
     # How many there are depends on what the daemon took together.
     verdicts = [step.as_recorded for step in as_it_was.news if step.decision.path is not None]

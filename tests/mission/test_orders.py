@@ -108,7 +108,10 @@ def test_commands():
         assert read_command(json.loads(json.dumps(command_document(*command)))) == command
     for document, said in (
         ({}, "the order: missing member command"),
-        ({"command": "go"}, "expected start, pause, resume, cancel, reset, status, got 'go'"),
+        (
+            {"command": "go"},
+            "expected start, pause, resume, cancel, reset, replan, status, got 'go'",
+        ),
         ({"command": "pause", "order": {}}, "order goes with start alone"),
         ({"command": "start", "order": {"zones": 3}}, "order.zones: expected array, got 3"),
     ):

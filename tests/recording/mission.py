@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -46,12 +47,12 @@ class Mission:
 
     def __post_init__(self) -> None:
         bus, keys = self.bus, self.keys
-        self._map = bus.publisher(keys.map, OCCUPANCY_GRID, latched=True)
-        self._pose = bus.publisher(keys.pose, POSE_STAMPED)
-        self._path = bus.publisher(keys.path, PATH, latched=True)
-        self._coverage = bus.publisher(keys.coverage, OCCUPANCY_GRID, latched=True)
+        self._map = bus.publisher(keys.map, OCCUPANCY_GRID, QOS["map"])
+        self._pose = bus.publisher(keys.pose, POSE_STAMPED, QOS["pose"])
+        self._path = bus.publisher(keys.path, PATH, QOS["path"])
+        self._coverage = bus.publisher(keys.coverage, OCCUPANCY_GRID, QOS["coverage"])
         self._pheromone = bus.publisher(keys.pheromone, PHEROMONE_GRID)
-        self._status = bus.publisher(keys.status, latched=True)
+        self._status = bus.publisher(keys.status, qos=QOS["status"])
         self.walk = _walk()
         self.rest = self.walk
         self.seen_cells = 0

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.errors import BadConfiguration, BusUnavailable
 from fasaco_edge.grid.geometry import Pose2D
@@ -55,7 +56,7 @@ class Planner:
         self.bus = open_bus(BusSettings(mode="router", connect=(), listen=(self.endpoint,)))
         self.bus.subscribe(self.keys.map, self.maps.append, latched=True)
         self.bus.subscribe(self.keys.pose, self.poses.append)
-        self._path = self.bus.publisher(self.keys.path, PATH, latched=True)
+        self._path = self.bus.publisher(self.keys.path, PATH, QOS["path"])
 
     @property
     def settings(self):

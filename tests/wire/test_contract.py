@@ -34,10 +34,10 @@ def constants(module: object) -> dict[str, object]:
 def test_keys_are_those_of_the_table() -> None:
     keys = Keys("mower-2", "site/hall_1")
     names = {name for name, _ in inspect.getmembers(Keys, lambda m: isinstance(m, property))}
-    assert names - {"prefix"} | {"rpc"} == ENTRIES.keys()
+    assert names - {"prefix"} == ENTRIES.keys()
     for name, entry in ENTRIES.items():
-        key = keys.rpc("plan") if name == "rpc" else getattr(keys, name)
-        assert key == entry["key"].format(base="site/hall_1", robot="mower-2", name="plan")
+        key = getattr(keys, name)
+        assert key == entry["key"].format(base="site/hall_1", robot="mower-2")
         assert key.startswith(f"{keys.prefix}/")
 
 
@@ -58,22 +58,9 @@ def test_payloads_are_those_of_the_table() -> None:
     assert len(columns) == 1
 
 
-def test_the_readme_has_the_keys_of_the_table() -> None:
-    shown = re.findall(r"^\| `\.\.\./([^`]+)` \|", README, re.MULTILINE)
-    assert shown == [
-        entry["key"].removeprefix("{base}/@v1/{robot}/").replace("{name}", "<name>")
-        for entry in TABLE["keys"]
-    ]
-
-
 def test_the_readme_has_the_values_of_coverage() -> None:
     shown = re.findall(r"^\| (-?\d+) \|", README, re.MULTILINE)
     assert [int(value) for value in shown] == sorted(constants(coverage).values())
-
-
-def test_limits_are_those_of_the_table() -> None:
-    table = yaml.safe_load((PROTOCOL / "limits.yaml").read_text())
-    assert table == {name.lower(): value for name, value in constants(limits).items()}
 
 
 @pytest.mark.parametrize(

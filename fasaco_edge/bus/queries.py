@@ -1,0 +1,93 @@
+"""Questions and answers: what is asked on the bus, and what is replied."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import zenoh
+
+from fasaco_edge.bus.encodings import encoding_of, schema_of
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """An answer to a query: a payload with its schema ("" for JSON), or an error."""
+
+    payload: bytes
+    schema: str = ""
+    attachment: bytes = b""
+    is_error: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is asked.
+
+    Attributes:
+        key: the key expression asked for; it may have wildcards.
+        parameters: what stood behind ``?``, without those that begin with ``_``: they are
+            Zenoh's own.
+        payload: what came with it, b"" for nothing.
+    """
+
+    key: str
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    payload: bytes = b""
+
+
+class Question:
+    """A query that somebody waits for an answer to; to be answered once, on any thread.
+
+    Attributes:
+        key: what is being served.
+        request: what is asked.
+    """
+
+    def __init__(self, query: zenoh.Query, key: str) -> None:
+        self.key = key
+        self.request = request_of(query)
+        self._query = query
+
+    def answer(self, reply: Reply) -> None:
+        """Answer; who asked may be gone by now."""
+        with contextlib.suppress(zenoh.ZError):
+            send(self._query, self.key, reply)
+        query: Any = self._query  # drop() has no annotation
+        query.drop()
+
+
+def matches(key: str, other: str) -> bool:
+    """Tell whether any key matches both of two key expressions."""
+    return bool(zenoh.KeyExpr(key).intersects(zenoh.KeyExpr(other)))
+
+
+def request_of(query: zenoh.Query) -> Request:
+    """Return what a query asks."""
+    listed: Any = query.parameters  # no mapping by the stubs
+    parameters = {str(name): str(value) for name, value in listed}
+    own = {name: value for name, value in parameters.items() if not name.startswith("_")}
+    payload = query.payload.to_bytes() if query.payload is not None else b""
+    return Request(str(query.key_expr), own, payload)
+
+
+def send(query: zenoh.Query, key: str, reply: Reply) -> None:
+    """Answer a query on ``key``; by Zenoh's rule with the quality of service it came with."""
+    encoding = encoding_of(reply.schema)
+    if reply.is_error:
+        query.reply_err(reply.payload, encoding=encoding)
+        return
+    attachment = reply.attachment or None
+    query.reply(key, reply.payload, encoding=encoding, attachment=attachment)
+
+
+def reply_of(reply: zenoh.Reply) -> Reply:
+    """Return an answer that came in."""
+    if reply.ok is not None:
+        sample = reply.ok
+        attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
+        return Reply(sample.payload.to_bytes(), schema_of(sample.encoding), attachment)
+    assert reply.err is not None
+    return Reply(reply.err.payload.to_bytes(), schema_of(reply.err.encoding), is_error=True)

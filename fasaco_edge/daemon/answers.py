@@ -1,0 +1,107 @@
+"""Answers to who asks what was said last: on Zenoh's thread, without waiting for the loop."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable
+from functools import partial
+
+from fasaco_edge.bus.queries import Reply, Request
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.errors import BadQuery, FasacoError, NotYet
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.status import encode_error
+
+NEWEST = "newest"
+
+
+def error_reply(error: FasacoError) -> Reply:
+    """Return the answer that tells an error."""
+    return Reply(encode_error(error), is_error=True)
+
+
+def answering(answer: Callable[[Request], Reply]) -> Callable[[Request], Reply]:
+    """Return ``answer`` such that an error it raises is the answer."""
+
+    def answered(request: Request) -> Reply:
+        try:
+            return answer(request)
+        except FasacoError as error:
+            return error_reply(error)
+
+    return answered
+
+
+def check(request: Request, *parameters: str, payload: bool = False) -> None:
+    """Check that a query has no other parameters, and a payload only where it takes one.
+
+    Raises:
+        BadQuery: it has, by name.
+    """
+    name = request.key.rpartition("/")[2]
+    takes = ", ".join(parameters) or "none"
+    for parameter in request.parameters:
+        if parameter not in parameters:
+            raise BadQuery(f"{name}: unknown parameter {parameter!r}, it takes {takes}")
+    if request.payload and not payload:
+        raise BadQuery(f"{name} takes no payload, got one of {len(request.payload)} bytes")
+
+
+class LastSamples:
+    """Keeps what was said last on some topics, and answers with it.
+
+    The answer is the same on the topic itself, as a storage would give it.
+    """
+
+    def __init__(self, bus: Bus, keys: Keys) -> None:
+        self._lock = threading.Lock()
+        self._last: dict[str, Reply] = {}
+        # Of the newest full plan: by cohort, and the newest; and the number of its request.
+        self._trails: dict[str, Reply] = {}
+        self._plan = 0
+        for name in ("path", "status", "coverage"):
+            answer = answering(partial(self._answer, name))
+            for key in (keys.rpc(name), getattr(keys, name)):
+                bus.serve(key, answer)
+        for key in (keys.rpc("pheromone"), keys.pheromone):
+            bus.serve(key, answering(self._trail))
+
+    def keep(self, topic: str, reply: Reply) -> None:
+        """Keep what was said on ``topic``."""
+        with self._lock:
+            self._last[topic] = reply
+
+    def keep_trail(self, plan: int, cohort: int, reply: Reply) -> None:
+        """Keep the trail that ``cohort`` of plan ``plan`` has left."""
+        with self._lock:
+            if plan != self._plan:
+                self._plan, self._trails = plan, {}
+            self._trails[str(cohort)] = self._trails[NEWEST] = reply
+
+    def _answer(self, topic: str, request: Request) -> Reply:
+        check(request)
+        with self._lock:
+            reply = self._last.get(topic)
+        if reply is None:
+            raise NotYet(f"there is no {topic} yet")
+        return reply
+
+    def _trail(self, request: Request) -> Reply:
+        check(request, "cohort")
+        cohort = request.parameters.get("cohort", NEWEST)
+        if cohort != NEWEST:
+            if not re.fullmatch("[0-9]{1,9}", cohort):
+                raise BadQuery(f"cohort must be a whole number from 0, got {cohort!r}")
+            cohort = str(int(cohort))
+        with self._lock:
+            reply = self._trails.get(cohort)
+            kept = [name for name in self._trails if name != NEWEST]
+        if reply is not None:
+            return reply
+        if not kept:
+            raise NotYet("there is no pheromone yet: no full plan was made")
+        raise NotYet(
+            f"the newest full plan has no trail of cohort {cohort}",
+            hint=f"leave cohort out, or ask for {', '.join(kept)}",
+        )

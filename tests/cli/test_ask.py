@@ -1,0 +1,66 @@
+"""Questions to a running daemon from the command line."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from fasaco_edge.wire.keys import RPC_NAMES
+from tests.cli.commands import fasaco_edge
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import daemon_process
+from tests.daemon.rooms import map_bytes, pose_bytes, room
+
+SAID = {
+    "path": "first plan",
+    "status": "covering",
+    "coverage": "to_cover",
+    "pheromone": "best_steps",
+    "config": "tool_width_m: 0.3",
+    "version": "protocol: v1",
+    "mission": "begun by itself",
+    "replan": "accepted: true",
+}
+
+
+@pytest.fixture(scope="module")
+def endpoint(tmp_path_factory):
+    with daemon_process(tmp_path_factory.mktemp("ask")) as running:
+        with Outsider(running.endpoint) as outsider:
+            outsider.put("map", map_bytes(room(3.0, 3.0)))
+            outsider.put("pose", pose_bytes(0.75, 0.75))
+            outsider.wait_status(lambda status: status["state"] == "covering")
+            outsider.wait_status(lambda status: status["plan"]["plans"] == 1)
+        yield running.endpoint
+
+
+@pytest.mark.parametrize("name", RPC_NAMES)
+def test_every_question_has_an_answer_people_can_read(endpoint, name):
+    ended = fasaco_edge("ask", name, "--connect", endpoint)
+    assert ended.code == 0, ended.err
+    assert SAID[name] in ended.out
+
+
+def test_a_program_gets_json(endpoint):
+    path, trail, version = (
+        json.loads(fasaco_edge("ask", *words, "--json", "--connect", endpoint).out)
+        for words in (("path",), ("pheromone", "--param", "cohort=0"), ("version",))
+    )
+    assert path["poses"] == path["steps"] + 1
+    assert path["length_m"] == pytest.approx(0.3 * path["steps"])
+    assert (trail["cohort"], trail["rows"] * trail["cols"]) == (0, 100)
+    assert version["package"] == "fasaco-edge"
+
+
+def test_what_is_wrong_is_told(endpoint):
+    ended = fasaco_edge("ask", "pheromone", "--param", "cohort=77", "--json", "--connect", endpoint)
+    assert ended.code == 1
+    assert json.loads(ended.out)["code"] == "not_yet"
+    assert "no trail of cohort 77" in ended.err
+    assert "\n  hint: leave cohort out" in ended.err
+    ended = fasaco_edge("ask", "status", "--robot", "other", "--connect", endpoint)
+    assert ended.code == 1
+    assert "there are robot: give one as --robot" in ended.err
+    for words in (("ask", "colour"), ("ask", "path", "--param", "colour"), ("ask",)):
+        assert fasaco_edge(*words).code == 2

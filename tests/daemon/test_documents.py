@@ -1,0 +1,93 @@
+"""What a running daemon really says, against the JSON Schemas; and a client that shares no code."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import daemon_process
+from tests.daemon.rooms import cells_of, coverable_cells, map_bytes, pose_bytes, room
+from tests.wire.readme_tables import PROTOCOL, load
+from tests.wire.schemas import check
+
+ORDER = {"zones": [{"name": "west", "polygon": [[0, 0], [1.5, 0], [1.5, 3], [0, 3]], "passes": 2}]}
+CLIENT = PROTOCOL / "examples" / "client.py"
+
+
+def say(outsider, name, payload=None):
+    """Ask, and return the document that comes back, checked."""
+    (reply,) = outsider.session.get(f"{outsider.prefix}/@rpc/{name}", payload=payload, timeout=10)
+    answer = reply.ok or reply.err
+    document = json.loads(answer.payload.to_bytes())
+    schemas = {query["name"]: query["json"] for query in load("keys.yaml")["queries"]}
+    check(schemas[name] if reply.ok else "error.json", document)
+    return document
+
+
+def test_from_the_first_status_to_the_last_each_is_one(tmp_path):
+    """Through a life with all there is: orders, zones, faults, replans, the end."""
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        path, commands = outsider.listen("path"), outsider.listen("command", late=False)
+        for name in ("config", "version", "mission", "status", "replan", "path", "pheromone"):
+            say(outsider, name)
+        outsider.put("pose", b"nonsense")
+        outsider.put("map", map_bytes(room(3.0, 3.0)))
+        outsider.put("pose", pose_bytes(0.75, 0.75))
+        path.wait(lambda heard: True)
+        order = json.dumps({"command": "start", "order": ORDER}).encode()
+        assert say(outsider, "mission", order)["mission"]["zones"][0]["name"] == "west"
+        path.wait(lambda heard: b"west" in heard.attachment)
+        assert say(outsider, "replan")["accepted"]
+        outsider.wait_status(lambda status: status["ledger"]["age_s"] is not None)
+        for command in ("pause", "resume", "cancel"):
+            say(outsider, "mission", json.dumps({"command": command}).encode())
+        outsider.wait_status(lambda status: status["state"] == "idle")
+        assert len(outsider.status.heard) > 5
+        for heard in outsider.status.heard:
+            check("status.json", heard.json())
+        for heard in path.heard:
+            check("path_attachment.json", json.loads(heard.attachment))
+        for heard in commands.heard:
+            check("mission.json", heard.json())
+        told = [heard.json()["command"] for heard in commands.heard]
+        assert told == ["start", "replan", "pause", "resume", "cancel"]
+
+
+def test_the_recorder_says_what_its_schema_has(tmp_path):
+    pytest.importorskip("rerun")
+    with (
+        daemon_process(tmp_path, "--record", str(tmp_path)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        recorder = outsider.listen("recorder")
+        check("recorder.json", recorder.wait(lambda heard: True).json())
+        outsider.wait_status(lambda status: (status["recorder"] or {}).get("state") == "recording")
+        for heard in outsider.status.heard:
+            check("status.json", heard.json())
+
+
+def test_the_example_gets_a_path_over_every_cell(tmp_path):
+    lines = [line for line in CLIENT.read_text().splitlines() if line.strip()]
+    assert len(lines) <= 30
+    with daemon_process(tmp_path) as running:
+        with Outsider(running.endpoint):
+            pass  # it is there
+        command = [sys.executable, str(CLIENT), running.endpoint]
+        with subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        ) as client:
+            heard = [client.stdout.readline()]
+            while not (heard[-1].startswith("path") or not heard[-1]):
+                heard.append(client.stdout.readline())
+            rest, _ = client.communicate(input="", timeout=10)
+        assert client.returncode == 0
+        said, *points = heard[-1].split("; ")[0], *heard[-1].split("; ")[3:]
+        assert said == "path"
+        visited = cells_of([[float(x) for x in point.strip("()\n").split(",")] for point in points])
+        assert set(visited) == coverable_cells(room(4.0, 3.0))
+        assert "status waiting for map\n" in heard
+        assert "Traceback" not in rest

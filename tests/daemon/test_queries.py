@@ -1,0 +1,184 @@
+"""What can be asked of a running daemon, by a program that shares no code with it."""
+
+from __future__ import annotations
+
+import json
+import time
+from importlib import metadata
+from typing import Any
+
+import pytest
+import zenoh
+
+from fasaco_edge import __version__
+from fasaco_edge.daemon.about import LEFT_OUT, config_document
+from fasaco_edge.daemon.config import BusConfig, DaemonConfig
+from fasaco_edge.wire.keys import RPC_NAMES
+from fasaco_edge.wire.pheromone import decode_pheromone
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import daemon_process
+from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes
+from tests.daemon.test_mission import about, covers, planned
+
+ANTS = {"local_search": False, "ants": 24, "velocities": "8,4,1", "budget_s": 2.0}
+
+
+def get(outsider: Outsider, name: str, payload: bytes | None = None) -> list[zenoh.Reply]:
+    return list(outsider.session.get(f"{outsider.prefix}/{name}", payload=payload, timeout=5.0))
+
+
+def error(outsider: Outsider, name: str, payload: bytes | None = None) -> dict[str, Any]:
+    """Return the one answer, which has to be an error with its three members."""
+    (reply,) = get(outsider, name, payload)
+    assert reply.ok is None, reply.ok.payload.to_bytes()
+    assert str(reply.err.encoding) == "application/json"
+    document: dict[str, Any] = json.loads(reply.err.payload.to_bytes())
+    assert document.keys() == {"code", "message", "hint"}
+    assert all(document.values())
+    return document
+
+
+@pytest.fixture(scope="module")
+def covering(tmp_path_factory):
+    """A daemon that has planned for a room, without local search."""
+    folder = tmp_path_factory.mktemp("covering")
+    with (
+        daemon_process(folder, planner=ANTS) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        for name in ("path", "coverage", "pheromone"):
+            assert error(outsider, f"@rpc/{name}")["code"] == "not_yet"
+        assert error(outsider, "@rpc/replan")["code"] == "not_now"
+        path = outsider.listen("path")
+        outsider.put("map", map_bytes(pillared_room()))
+        outsider.put("pose", pose_bytes(0.75, 0.75))
+        path.wait(lambda heard: covers(heard, pillared_room()))
+        outsider.wait_status(lambda status: status["plan"]["plans"] == 1)
+        yield outsider
+
+
+def test_versions(covering):
+    answer = covering.ask("@rpc/version").json()
+    assert answer == {
+        "package": "fasaco-edge",
+        "version": __version__,
+        "protocol": "v1",
+        "zenoh": metadata.version("eclipse-zenoh"),
+    }
+
+
+def test_the_configuration_is_the_one_in_force(covering):
+    answer = covering.ask("@rpc/config").json()
+    assert answer["planner"] | ANTS == answer["planner"]
+    assert answer == covering.ask("@rpc/status").json()["config"]
+
+
+def test_secrets_are_left_out():
+    secret = "tls/10.0.0.1:7447#connect_private_key_base64=c2VjcmV0;verify_name_on_connect=true"
+    plain = "tcp/127.0.0.1:7447?prio=1-7"
+    config = DaemonConfig(bus=BusConfig(listen=(plain,), connect=(secret,)))
+    document = config_document(config)
+    assert document["bus"]["listen"] == [plain]
+    assert document["bus"]["connect"] == [f"tls/10.0.0.1:7447#{LEFT_OUT}"]
+    assert "c2VjcmV0" not in json.dumps(document)
+
+
+@pytest.mark.parametrize("name", ["xyz", "paths", "Path", "pa$*x"])
+def test_who_asks_for_what_is_not_there_hears_what_is(covering, name):
+    answer = error(covering, f"@rpc/{name}")
+    assert answer["code"] == "unknown_query"
+    assert all(known in answer["message"] for known in RPC_NAMES)
+
+
+@pytest.mark.parametrize("name", ["path", "status", "coverage", "pheromone", "config", "version"])
+def test_what_is_there_is_answered_once(covering, name):
+    (reply,) = get(covering, f"@rpc/{name}")
+    assert str(reply.ok.key_expr) == f"{covering.prefix}/@rpc/{name}"
+
+
+def test_who_asks_for_everything_gets_it_and_changes_nothing(covering):
+    before = covering.ask_status()["plan"]["plans"]
+    replies = get(covering, "@rpc/*")
+    answered = {str(reply.ok.key_expr).rpartition("/")[2] for reply in replies if reply.ok}
+    assert answered == set(RPC_NAMES) - {"replan"}
+    (refused,) = [json.loads(reply.err.payload.to_bytes()) for reply in replies if reply.err]
+    assert (refused["code"], refused["message"][:6]) == ("bad_query", "replan")
+    time.sleep(0.3)
+    assert covering.ask_status()["plan"]["plans"] == before
+
+
+@pytest.mark.parametrize("name", [*(f"@rpc/{name}" for name in RPC_NAMES), "path", "status"])
+def test_a_parameter_that_is_not_known_is_an_error(covering, name):
+    answer = error(covering, f"{name}?colour=red")
+    assert answer["code"] == "bad_query"
+    assert "unknown parameter 'colour'" in answer["message"]
+
+
+@pytest.mark.parametrize("name", [name for name in RPC_NAMES if name != "mission"])
+def test_a_payload_that_is_not_taken_is_an_error(covering, name):
+    answer = error(covering, f"@rpc/{name}", b"{}")
+    assert answer["code"] == "bad_query"
+    assert answer["message"] == f"{name} takes no payload, got one of 2 bytes"
+
+
+def test_parameters_of_zenoh_are_stepped_over(covering):
+    assert get(covering, "@rpc/version?_time=[now(-1h)..]")[0].ok is not None
+
+
+def test_the_trail_of_each_cohort(covering):
+    newest, *cohorts = (
+        decode_pheromone(covering.ask(f"@rpc/pheromone{parameters}").payload)
+        for parameters in ("", "?cohort=0", "?cohort=1", "?cohort=02")
+    )
+    assert [(trail.cohort, trail.velocity, trail.ants) for trail in cohorts] == [
+        (0, 8, 8),
+        (1, 4, 16),
+        (2, 1, 24),
+    ]
+    assert newest.levels.tobytes() == cohorts[2].levels.tobytes()
+    assert newest.trail_max > newest.trail_min > 0
+    assert covering.ask("pheromone").payload == covering.ask("@rpc/pheromone").payload
+    assert error(covering, "@rpc/pheromone?cohort=3") == {
+        "code": "not_yet",
+        "message": "the newest full plan has no trail of cohort 3",
+        "hint": "leave cohort out, or ask for 0, 1, 2",
+    }
+    for wrong in ("-1", "x", "", "1e1", "9" * 5000, "٣"):
+        assert error(covering, f"@rpc/pheromone?cohort={wrong}")["code"] == "bad_query"
+
+
+def test_a_full_plan_is_made_when_asked_for_but_not_all_the_time(covering):
+    path, commands = covering.listen("path"), covering.listen("command", late=False)
+    before = covering.ask_status()["plan"]["plans"]
+    answer = covering.ask("@rpc/replan").json()
+    assert answer == {"robot": "robot", "accepted": True, "plan": before + 1}
+    again = error(covering, "@rpc/replan")
+    assert again["code"] == "not_now"
+    assert again["hint"].startswith("ask again in 0.") or again["hint"].startswith(
+        "ask again in 1."
+    )
+    assert commands.wait(lambda heard: True).json() == {"command": "replan"}
+    covering.wait_status(lambda status: status["plan"]["plans"] == before + 1)
+    # The same problem and the same seed lead to the same path: nobody need hear of it again.
+    assert len(path.heard) == len(commands.heard) == 1
+
+
+def test_a_path_that_was_asked_for_says_so(tmp_path):
+    with (
+        daemon_process(tmp_path, planner={"budget_s": 0.05}) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        path = outsider.listen("path")
+        outsider.put("map", map_bytes(pillared_room()))
+        outsider.put("pose", pose_bytes(0.75, 0.75))
+        path.wait(lambda heard: True)
+        # Elsewhere the walk has another beginning.
+        outsider.put("pose", pose_bytes(1.05, 0.75))
+        outsider.wait_status(lambda status: (status["pose"] or {}).get("x") == 1.05)
+        answer = outsider.ask("@rpc/replan").json()
+        heard = path.wait(lambda heard: about(heard)["reason"] == "asked for")
+        assert planned(heard)[0][0].tolist() == pytest.approx([1.05, 0.75])
+        outsider.wait_status(lambda status: status["plan"]["plans"] >= answer["plan"])
+        # With local search the colony leaves one trail, of the cohort that walked last.
+        trail = decode_pheromone(outsider.ask("@rpc/pheromone").payload)
+        assert trail.best_steps > 0

@@ -1,0 +1,126 @@
+"""Who joins late, and what becomes of everybody when the router between them is started again."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import pytest
+import zenoh
+import zenoh.ext
+
+from tests.daemon.outsider import Ear, Outsider
+from tests.daemon.processes import daemon_process, free_endpoint
+from tests.daemon.rooms import WALL, fill, map_bytes, pose_bytes, room
+from tests.daemon.router import router_process
+
+LATE_S = 1.0
+BACK_S = 2.0
+PREFIX = "fasaco/@v1/robot"
+PATIENT = {"retry": {"period_init_ms": 200, "period_max_ms": 1000}}
+
+
+def member(endpoint, connect):
+    """Open a client's session as Zenoh's defaults have it, but for what ``connect`` says."""
+    config = {"mode": "client", "connect": {"endpoints": [endpoint], **connect}}
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
+
+
+def until(holds, timeout_s=30.0):
+    """Wait; return the seconds it took."""
+    started = time.monotonic()
+    while not holds():
+        assert time.monotonic() - started < timeout_s, "never came"
+        time.sleep(0.02)
+    return time.monotonic() - started
+
+
+def test_who_joins_late_has_path_and_status_within_a_second(daemon, outsider):
+    path = outsider.listen("path")
+    outsider.put("map", map_bytes(room(3.0, 3.0)))
+    outsider.put("pose", pose_bytes(0.75, 0.75))
+    path.wait(lambda heard: True)
+    took = []
+    for _ in range(5):
+        with Outsider(daemon.endpoint) as late:
+            started = time.monotonic()
+            ears = late.listen("path"), late.listen("status")
+            for ear in ears:
+                ear.wait(lambda heard: True)
+            took.append(time.monotonic() - started)
+            assert ears[0].heard[0].payload == path.heard[-1].payload
+    print(f"late joiner: path and status after {1e3 * max(took):.0f} ms at most")
+    assert max(took) < LATE_S
+
+
+@pytest.mark.parametrize(("away_s", "connect"), [(0.2, {}), (3.0, PATIENT)])
+def test_when_the_router_is_back_everything_is(tmp_path, away_s, connect):
+    """The subscriber does nothing but keep its session."""
+    endpoint = free_endpoint()
+    bus = {"mode": "peer", "listen": [], "connect": [endpoint]}
+    with router_process(endpoint) as router, daemon_process(tmp_path, bus=bus):
+        session = member(endpoint, connect)
+        try:
+            heard = _Heard(session)
+            heard.wait_all(0)
+            router.kill()
+            router.wait()
+            until(lambda: not heard.tokens[-1])
+            time.sleep(away_s)
+            with router_process(endpoint):
+                back = heard.wait_all(1)
+        finally:
+            session.close()  # type: ignore[no-untyped-call]
+    print(f"back after {away_s:g} s:", {name: f"{1e3 * s:.0f} ms" for name, s in back.items()})
+    assert max(back.values()) < BACK_S
+
+
+class _Heard:
+    """What a subscriber hears, with nothing declared again."""
+
+    def __init__(self, session):
+        self.tokens = []
+        self._session = session
+        self._maps = 0
+        history = zenoh.ext.HistoryConfig(max_samples=1, detect_late_publishers=True)
+        self._ears = {"path": Ear(), "status": Ear()}
+        for name, ear in self._ears.items():
+            zenoh.ext.declare_advanced_subscriber(session, f"{PREFIX}/{name}", ear, history=history)
+        session.liveliness().declare_subscriber(f"{PREFIX}/alive", self._note, history=True)
+
+    def wait_all(self, losses):
+        """Wait until all comes anew; return for each the seconds it took."""
+        since = {name: len(ear.heard) for name, ear in self._ears.items()}
+        missing = {
+            "path": lambda: self._is_new("path", since),
+            "status": lambda: self._is_new("status", since),
+            "liveliness": lambda: self.tokens.count(True) > losses,
+            "queries": self._is_answered,
+        }
+        took, started = {}, time.monotonic()
+        while missing:
+            assert time.monotonic() - started < 30.0, f"never came: {missing.keys()}"
+            self._publish()
+            for name in [name for name, holds in missing.items() if holds()]:
+                took[name] = time.monotonic() - started
+                del missing[name]
+            time.sleep(0.02)
+        return took
+
+    def _note(self, token):
+        """Note whether the daemon is there now."""
+        self.tokens.append(token.kind == zenoh.SampleKind.PUT)
+
+    def _is_new(self, name, since):
+        return len(self._ears[name].heard) > since[name]
+
+    def _is_answered(self):
+        replies = self._session.get(f"{PREFIX}/@rpc/version", timeout=0.2)
+        return any(reply.ok is not None for reply in replies)
+
+    def _publish(self):
+        """Publish a map that changes: each leads to another path."""
+        self._maps += 1
+        pixels = fill(room(3.0, 3.0), 1.5, 0.0, 1.6, 0.5 + 0.3 * (self._maps % 4), WALL)
+        for name, payload in (("map", map_bytes(pixels)), ("pose", pose_bytes(0.75, 0.75))):
+            self._session.put(f"{PREFIX}/{name}", payload)

@@ -1,0 +1,85 @@
+"""A full new plan, asked for."""
+
+from __future__ import annotations
+
+import pytest
+
+from fasaco_edge.mission.assignment import Assignment, CommandError
+from fasaco_edge.mission.events import MapReceived
+from tests.mission.world import Drive, building, pose_at, started
+
+ROOM = ("........",) * 6
+
+
+def test_it_plans_anew_and_keeps_nothing_of_the_path():
+    drive = started(*ROOM)
+    drive.go()
+    decision = drive.command("replan")
+    assert drive.refused is None
+    assert decision.plan.reason == "asked for"
+    assert decision.answers[0].plan == decision.plan.number == 2
+    assert len(decision.plan.problem.before) == 0
+    assert drive.mission.state == "covering", "it drives on meanwhile"
+    drive.plan()
+    drive.finish()
+    assert len(drive.visited) == 48
+
+
+def test_only_the_plan_that_was_asked_for_is_a_full_one():
+    drive = started(*ROOM)
+    drive.command("replan")
+    drive.plan()
+    drive.tell(MapReceived(building(*ROOM, "...#....")))
+    assert drive.request.reason != "asked for"
+    assert len(drive.request.problem.before) > 0
+
+
+def test_one_under_way_comes_first():
+    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
+    assert drive.request.number == 1
+    for _ in range(2):
+        (answer,) = drive.command("replan").answers
+        assert (answer.error, answer.plan) == (None, 2)
+    decision = drive.plan()
+    assert decision.path.reason != "asked for"
+    assert (decision.plan.number, decision.plan.reason) == (2, "asked for")
+    assert decision.path is not None
+    assert drive.plan().plan is None
+
+
+def test_what_the_map_shows_meanwhile_does_not_hide_that_it_was_asked_for():
+    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
+    drive.command("replan")
+    drive.tell(MapReceived(building(*ROOM, "...#....")))
+    assert drive.plan().plan.reason == "asked for"
+
+
+@pytest.mark.parametrize(
+    ("drive", "said"),
+    [
+        (lambda: Drive((0, 0)), "there is no map yet"),
+        (lambda: Drive((0, 0), MapReceived(building(*ROOM))), "there is no pose yet"),
+        (lambda: Drive((0, 0), assignment=Assignment.none("")), "there is no mission"),
+        (lambda: Drive((9, 9), MapReceived(building(*ROOM)), pose_at(9, 9)), "outside of the map"),
+    ],
+)
+def test_where_there_is_nothing_to_plan_it_says_why(drive, said):
+    robot = drive()
+    decision = robot.command("replan")
+    assert isinstance(robot.refused, CommandError)
+    assert "nothing to plan" in str(robot.refused)
+    assert said in str(robot.refused)
+    assert decision.plan is None
+
+
+def test_a_mission_that_rests_is_not_planned():
+    drive = started(*ROOM)
+    drive.command("pause")
+    drive.command("replan")
+    assert "paused" in str(drive.refused)
+    drive.command("resume")
+    drive.plan()
+    drive.finish()
+    assert drive.command("replan").plan is None
+    assert "no reachable cell is left" in str(drive.refused)
+    assert drive.mission.state == "done"

@@ -1,0 +1,86 @@
+"""The JSON Schemas are schemas, and the README's tables of members are theirs."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+from jsonschema import Draft202012Validator, ValidationError
+
+from fasaco_edge.errors import NotYet
+from fasaco_edge.wire.status import encode_error
+from tests.wire.readme_tables import PROTOCOL, load
+from tests.wire.schemas import NAMES, check, schema
+
+README = (PROTOCOL / "README.md").read_text()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_a_schema(name):
+    Draft202012Validator.check_schema(schema(name))
+
+
+def test_every_schema_has_a_use():
+    table = load("keys.yaml")
+    used = {entry["json"] for entry in (*table["keys"], *table["queries"])}
+    used |= {entry["attachment"] for entry in table["keys"]}
+    used |= {query["payload"] for query in table["queries"]}
+    assert used - {None} | {"error.json"} == set(NAMES)
+
+
+def members(heading: str) -> list[str]:
+    """Return the names in the first column of the README's table with this heading."""
+    table = README.partition(f"\n| {heading} |")[2].partition("\n\n")[0]
+    cells = [line.split(" | ")[0] for line in table.splitlines()[2:]]
+    return [name for cell in cells for name in re.findall(r"`(\w+)`", cell)]
+
+
+@pytest.mark.parametrize(
+    ("heading", "documented"),
+    [
+        ("member of `coverage`", schema("status.json")["$defs"]["coverage"]),
+        ("member of `mission`", schema("status.json")["$defs"]["mission"]),
+        ("member of `ledger`", schema("status.json")["properties"]["ledger"]),
+        ("member of `status`", schema("status.json")),
+        ("member", schema("path_attachment.json")),
+        ("member of `order`", schema("mission.json")["$defs"]["OrderDocument"]),
+    ],
+)  # fmt: skip
+def test_the_readme_has_the_members_of_a_schema(heading, documented):
+    names = members(heading)
+    # Beside its own the table of zones names what a zone has.
+    assert set(documented["properties"]) <= set(names)
+    assert set(documented["required"]) <= set(names)
+
+
+def test_the_readme_has_the_states():
+    table = README.partition("\n| state |")[2].partition("\n\n")[0]
+    cells = "".join(line.split(" | ")[0] for line in table.splitlines()[2:])
+    assert re.findall(r"`([^`]+)`", cells) == schema("status.json")["$defs"]["state"]["enum"]
+
+
+def test_the_readme_has_the_commands():
+    table = README.partition("\n| command |")[2].partition("\n\n")[0]
+    cells = "".join(line.split(" | ")[0] for line in table.splitlines()[2:])
+    enum = schema("mission.json")["$defs"]["CommandDocument"]["properties"]["command"]["enum"]
+    assert sorted(re.findall(r"`(\w+)`", cells)) == enum
+
+
+def test_an_error_is_one():
+    check("error.json", json.loads(encode_error(NotYet("there is no path yet"))))
+
+
+@pytest.mark.parametrize(
+    ("name", "document"),
+    [
+        ("error.json", {"code": "not_yet", "message": "no path"}),
+        ("error.json", {"code": "not_yet", "message": "", "hint": ""}),
+        ("version.json", {"package": "fasaco-edge", "version": "1", "protocol": "@v1"}),
+        ("replan.json", {"robot": "robot", "accepted": False, "plan": 1}),
+        ("mission.json", {"command": "dance"}),
+    ],
+)
+def test_what_is_wrong_is_refused(name, document):
+    with pytest.raises(ValidationError):
+        check(name, document)
