@@ -159,6 +159,7 @@ class _PasserBy:
 
     def __init__(self) -> None:
         self._walked_px, self._since_s = 0.0, COMES_S
+        self._is_there = False
         self._empty: NDArray[np.int8] | None = None
 
     def __call__(self, mission: OnlineMission) -> bool:
@@ -171,12 +172,13 @@ class _PasserBy:
         if COMES_S <= now < LEAVES_S:
             ahead_px = self._walked_px + (now - self._since_s) * PERSON_M_S / pixel_m
             if math.dist(_on_walk(ahead_px), mission.robot.at) * pixel_m >= DISTANCE_M:
-                self._walked_px = ahead_px
+                self._walked_px, self._is_there = ahead_px, True
             self._since_s = now
+        if self._is_there and now < LEAVES_S:
             x, y = _on_walk(self._walked_px)
             rows, cols = np.indices(truth.shape)
             truth[np.hypot(rows + 0.5 - y, cols + 0.5 - x) * pixel_m < PERSON_M] = OCCUPIED
-        return now >= COMES_S
+        return self._is_there
 
 
 def _on_walk(walked_px: float) -> Point:

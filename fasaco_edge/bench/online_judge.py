@@ -77,7 +77,9 @@ def _judged_case(mission: OnlineMission) -> Verdict:
     lattice = sight.true_lattice()
     corner = (lattice.window.row0, lattice.window.col0)
     walk = cells_of(robot.trail, sight, lattice.cell_m) - corner
-    last: tuple[int, int] = tuple(walk[-1].tolist())
+    # Somebody may stand where it is: then from where it last stood free.
+    free = np.flatnonzero(lattice.coverable[tuple(walk.T)])
+    last: tuple[int, int] = tuple(walk[free[-1]].tolist())
     wanted = np.argwhere(reachable(lattice.steps, last) & lattice.coverable)
     places = lattice.centres((wanted + corner).astype(np.int32))
     way = np.array([sight.geometry.to_map(*point) for point in robot.trail])
