@@ -72,7 +72,7 @@ class PlanningWorker:
         self._interrupt.clear()
         if self._stopping.is_set():
             return
-        budget_s = min(self._budget_s, SPARE_S) if request.problem.only_better else self._budget_s
+        budget_s = SPARE_S if request.problem.only_better else self._budget_s
         stop = AnyOf(TimeBudget(budget_s), Interrupt(self._interrupt))
         # Costs some percent of a full plan, and a repair nothing.
         path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))

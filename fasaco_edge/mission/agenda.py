@@ -109,7 +109,7 @@ class Agenda:
         before: NDArray[np.int32],
         *,
         driven: NDArray[np.int32] | None = None,
-        only_better: bool = False,
+        attempt: int = 0,
     ) -> CoverageProblem:
         """Return the problem of what is still to be covered now.
 
@@ -117,7 +117,7 @@ class Agenda:
             cell: where the robot is, or will be.
             before: int32 (n, 2), the path from there on.
             driven: int32 (m, 2), cells it will have driven by then; None for none.
-            only_better: see ``CoverageProblem``.
+            attempt: see ``CoverageProblem``.
 
         Raises:
             NothingToCover: nothing is.
@@ -142,7 +142,7 @@ class Agenda:
             end=home if ends_home else None,
             cost=self._config.cost,
             before=before,
-            only_better=only_better,
+            attempt=attempt,
         )
 
     def seek(self, cell: Cell) -> str:

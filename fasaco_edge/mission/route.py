@@ -61,7 +61,7 @@ class Route:
 
     def ask_for_better(self) -> PlanRequest | None:
         """Ask for a better path; None where too little is left of it."""
-        self._attempt = Attempt.at(self.path, self.revision, self._agenda)
+        self._attempt = Attempt.at(self.path, self.revision, self._agenda, self.attempts + 1)
         if self._attempt is None:
             return None
         self.asked = PlanRequest(self._number, self._attempt.problem, "spare time")
@@ -72,9 +72,9 @@ class Route:
         self.wanted = self._anew = ""
 
     def want_anew(self, reason: str) -> int:
-        """Want a plan that keeps nothing of the path; return the number it will have."""
+        """Want a plan that keeps nothing of the path; return which of the plans it will be."""
         self.wanted = self._anew = reason
-        return self._number + (0 if self.asked is None else 1)
+        return self.plans + (1 if self.asked is None or self.is_improving else 2)
 
     @property
     def kept(self) -> NDArray[np.int32]:

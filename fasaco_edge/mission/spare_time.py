@@ -60,15 +60,15 @@ class Attempt:
     problem: CoverageProblem
 
     @classmethod
-    def at(cls, path: DrivenPath, revision: int, agenda: Agenda) -> Attempt | None:
-        """Return an attempt on a path; None where too little of it is left."""
+    def at(cls, path: DrivenPath, revision: int, agenda: Agenda, number: int) -> Attempt | None:
+        """Return attempt ``number``, on a path; None where too little of it is left."""
         joint = path.index + HELD_CELLS
         if joint + HELD_CELLS > len(path.cells):
             return None
         row, col = path.cells[joint].tolist()
         driven, rest = path.cells[path.index : joint], path.cells[joint:]
         try:
-            problem = agenda.problem((row, col), rest, driven=driven, only_better=True)
+            problem = agenda.problem((row, col), rest, driven=driven, attempt=number)
         except FasacoError:
             return None  # the map has changed: a repair is due
         return cls(revision, joint, problem)

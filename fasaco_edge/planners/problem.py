@@ -37,7 +37,8 @@ class CoverageProblem:
         cost: what a walk is to have little of.
         before: int32 (n, 2), the walk that was still to be driven when the problem changed
             to this one; a planner that can keeps of it what holds. None for none.
-        only_better: whether all of ``before`` holds, and is only to be made better.
+        attempt: where all of ``before`` holds, and is only to be made better, which attempt at
+            that it is, from 1 on: each looks elsewhere. 0 for a plan that is needed.
     """
 
     lattice: CoverageLattice
@@ -47,7 +48,7 @@ class CoverageProblem:
     end: Cell | None = None
     cost: CoverageCost = STEPS_ALONE
     before: NDArray[np.int32] | None = None
-    only_better: bool = False
+    attempt: int = 0
 
     @classmethod
     def of(
@@ -59,7 +60,7 @@ class CoverageProblem:
         end: Cell | None = None,
         cost: CoverageCost = STEPS_ALONE,
         before: NDArray[np.int32] | None = None,
-        only_better: bool = False,
+        attempt: int = 0,
     ) -> CoverageProblem:
         """Pose the problem of covering what is reachable and not yet ``covered``.
 
@@ -70,7 +71,7 @@ class CoverageProblem:
             end: cell (row, col) to end in; the start for home, None for anywhere.
             cost: of steps and turns; by default of steps alone.
             before: int32 (n, 2), the walk that was still to be driven; None for none.
-            only_better: whether that holds, and is only to be made better.
+            attempt: see above.
 
         Raises:
             StartOutsideMap, EndOutsideMap: the lattice does not span the start, or the end.
@@ -89,7 +90,12 @@ class CoverageProblem:
         if not to_cover.any():
             raise NothingToCover("every reachable cell is covered")
         to_cover.flags.writeable = unreachable.flags.writeable = False
-        return cls(lattice, start, to_cover, unreachable, end, cost, before, only_better)
+        return cls(lattice, start, to_cover, unreachable, end, cost, before, attempt)
+
+    @property
+    def only_better(self) -> bool:
+        """Whether there is a walk that does, and a better one is looked for."""
+        return self.attempt > 0
 
     @property
     def cells(self) -> int:

@@ -102,9 +102,8 @@ class _Repair:
         if not self._problem.only_better:
             yield from neighbourhoods(self._framed, self._walk[:HELD], self._changed)
             return
-        # Another walk begins elsewhere, so that many short attempts come everywhere.
-        first, gainless = STRIDE * len(self._walk), 0
-        for number in itertools.count(first):
+        gainless = 0
+        for number in itertools.count(STRIDE * self._problem.attempt):
             if self._is_proven():
                 return
             before_us = self._cost_us

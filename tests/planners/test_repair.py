@@ -190,3 +190,22 @@ def test_a_walk_far_above_its_bound_is_planned_anew():
     path = NearOptimal().plan(problem, SHORT)
     judge(problem, path.cells)
     assert path.steps < 180
+
+
+def test_attempts_at_a_better_walk_never_lose_and_each_looks_elsewhere():
+    rng = np.random.default_rng(8)
+    lattice = CoverageLattice.from_free(rng.random((60, 60)) >= 0.1)
+    start = tuple(np.argwhere(lattice.coverable)[0].tolist())
+    problem = CoverageProblem.of(lattice, start)
+    walk = NearOptimal().plan(problem, WorkLimit(SearchWork(proposals=1))).cells
+    costs, found = [problem.cost.of_walk(walk)], set()
+    for attempt in range(1, 9):
+        # The walk is the same each time: where one looks follows from the attempt alone.
+        again = CoverageProblem.of(lattice, start, before=walk, attempt=attempt)
+        path = NearOptimal().plan(again, WorkLimit(SearchWork(kicks=60)))
+        judge(again, path.cells)
+        costs.append(path.cost_s)
+        found.add(path.cells.tobytes())
+    assert max(costs[1:]) <= costs[0]
+    assert min(costs[1:]) < costs[0]
+    assert len(found) == 8
