@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
@@ -14,11 +12,12 @@ import yaml
 from msgspec import Meta
 
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
+from fasaco_edge.daemon.mission_settings import MissionSettings
+from fasaco_edge.daemon.planner_config import PlannerConfig
 from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.daemon.section import Section
 from fasaco_edge.daemon.security_config import SecurityConfig, check_security
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import Keys
@@ -95,83 +94,6 @@ class PoseConfig(Section, frozen=True):
     ] = schemas.POSE_STAMPED
 
 
-class PlannerConfig(Section, frozen=True):
-    """The colony, see ``planners.colony.ColonyConfig``; and the time one plan may take [s].
-
-    While the robot drives, ``spare_share`` of a processor core goes into making the rest of its
-    path better; fasaco with local search alone can do that.
-
-    ``local_search`` is for fasaco alone; without it a plan may end before its budget.
-
-    ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
-    The paper's ants see no further than their neighbours; a robot's see what will soon
-    be cut off, which saves it revisits (``fasaco_edge/bench/RESULTS.md``).
-    """
-
-    name: Literal["fasaco", "aco", "stc", "spiral-stc", "zigzag"] = "fasaco"
-    local_search: bool = True
-    ants: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
-    velocities: str = "8:1"
-    q0: Annotated[float, Meta(ge=0, le=1)] = 0.98
-    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.1
-    tau0: Annotated[float, Meta(ge=1e-12, le=1e6)] = 0.1
-    visibility: Literal["neighbour", "distance", "fewest-open"] = "fewest-open"
-    beta: Annotated[float, Meta(ge=0, le=10)] = 2.0
-    threads: Annotated[int, Meta(ge=1, le=64)] = 1
-    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
-    budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.1
-    spare_share: Annotated[float, Meta(ge=0, le=1)] = 0.05
-
-    def colony(self) -> ColonyConfig:
-        """Return these as a colony.
-
-        Raises:
-            BadConfiguration: the velocities cannot be read, or there are fewer ants
-                than cohorts.
-        """
-        return ColonyConfig(
-            ants=self.ants,
-            velocities=parse_velocities(self.velocities),
-            q0=self.q0,
-            alpha=self.alpha,
-            tau0=self.tau0,
-            seed=self.seed,
-            visibility=self.visibility,
-            beta=self.beta,
-        )
-
-
-class MissionSettings(Section, frozen=True):
-    """Whether to begin without being told to, how patient to be, and where progress is kept.
-
-    What is blocked or left over in the end is tried again ``retries`` times, each after
-    ``retry_s`` [s]. Without a pose for ``lost_pose_s`` [s], or a map or an update for
-    ``stale_map_s`` [s], the state is degraded; 0 for never. ``state_dir`` "" is the folder a
-    service manager or the user has for that.
-    """
-
-    autostart: bool = True
-    retries: Annotated[int, Meta(ge=0, le=100)] = 2
-    retry_s: Annotated[float, Meta(ge=0, le=86_400)] = 30.0
-    lost_pose_s: Annotated[float, Meta(ge=0, le=86_400)] = 3.0
-    stale_map_s: Annotated[float, Meta(ge=0, le=86_400)] = 0.0
-    state_dir: str = ""
-
-    def state_folder(self, environ: Mapping[str, str] = os.environ) -> Path:
-        """Return the folder of the coverage ledger.
-
-        By default systemd's $STATE_DIRECTORY, else fasaco-edge in an absolute $XDG_STATE_HOME,
-        else in ~/.local/state; BadConfiguration where there is no such home.
-        """
-        if self.state_dir:
-            return _home(Path(self.state_dir))
-        if service := environ.get("STATE_DIRECTORY", "").partition(":")[0]:
-            return Path(service)
-        if (user := environ.get("XDG_STATE_HOME", "")).startswith("/"):
-            return Path(user, "fasaco-edge")
-        return _home(Path("~/.local/state/fasaco-edge"))
-
-
 class DaemonConfig(Section, frozen=True):
     """The whole configuration; without ``ros2`` the daemon has nothing to do with ROS."""
 
@@ -217,13 +139,6 @@ def load_config(path: Path | None) -> DaemonConfig:
     except BadConfiguration as error:
         raise type(error)(f"{path}: {error}", hint=error.hint) from error
     return config
-
-
-def _home(path: Path) -> Path:
-    try:
-        return path.expanduser()
-    except RuntimeError as error:
-        raise BadConfiguration(f"mission.state_dir: {path}: there is no home folder") from error
 
 
 def _check_together(config: DaemonConfig) -> None:

@@ -13,7 +13,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.daemon.config import DaemonConfig, MissionSettings, load_config
+from fasaco_edge.daemon.config import DaemonConfig, load_config
+from fasaco_edge.daemon.mission_settings import MissionSettings
 from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.errors import BadConfiguration
 from tests.daemon.processes import PROGRAM
