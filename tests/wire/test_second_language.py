@@ -35,11 +35,7 @@ VECTORS = folder("protocol") / "vectors"
 COMPILER = shutil.which("cc")
 STRICT = ("-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-# What the client reads; a type that it does not know yet is no failure of the others.
-TYPES = [
-    schemas.OCCUPANCY_GRID, schemas.OCCUPANCY_GRID_UPDATE, schemas.PATH, schemas.PHEROMONE_GRID,
-    schemas.POSE_STAMPED, schemas.POSE_WITH_COVARIANCE_STAMPED, schemas.ODOMETRY,
-]  # fmt: skip
+TYPES = sorted(DECODERS)
 MUTANTS = 2000
 
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="there is no C compiler")
@@ -75,7 +71,7 @@ def read(client: Path, messages: Sequence[tuple[str, bytes]]) -> list[dict[str, 
 def check_facts(said: dict[str, Any], facts: dict[str, Any]) -> None:
     assert said.keys() == facts.keys(), said
     for name, value in facts.items():
-        if isinstance(value, list):
+        if isinstance(value, list) and not any(isinstance(leaf, str) for leaf in flat(value)):
             # One ulp of an arctangent is not a matter of the contract.
             np.testing.assert_allclose(flat(said[name]), flat(value), rtol=1e-15, atol=1e-15)
         else:
@@ -84,7 +80,8 @@ def check_facts(said: dict[str, Any], facts: dict[str, Any]) -> None:
 
 def index(kind: str) -> list[dict[str, Any]]:
     entries = yaml.safe_load((VECTORS / kind / "index.yaml").read_text(encoding="utf-8"))
-    return [entry for entry in entries if entry["schema"] in TYPES]
+    assert isinstance(entries, list)
+    return entries
 
 
 def messages_of(kind: str) -> list[tuple[str, bytes]]:

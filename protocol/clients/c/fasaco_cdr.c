@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { HEADER_BYTES = 4, MAX_PADDING = 3, LEAST_POSE_BYTES = 72, NAME_BYTES = 64 };
+enum { HEADER_BYTES = 4, MAX_PADDING = 3, LEAST_POSE_BYTES = 72, LEAST_TRANSFORM_BYTES = 80,
+       NAME_BYTES = 64 };
 
 static const uint32_t SECOND_NS = 1000000000u;
 
@@ -164,17 +165,19 @@ static fasaco_header read_header(reader *r, const char *field)
     return header;
 }
 
-static void check_position(reader *r, const double place[3], const char *field)
+static void check_place(reader *r, const double place[3], const char *name)
 {
     for (int axis = 0; axis < 3; axis++)
         /* Negated, so that NaN is caught too. */
         if (!(fabs(place[axis]) <= FASACO_MAX_COORDINATE_M))
-            refuse(r, "%s.position.%c must be within %g m of 0, got %g", field, "xyz"[axis],
+            refuse(r, "%s.%c must be within %g m of 0, got %g", name, "xyz"[axis],
                    FASACO_MAX_COORDINATE_M, place[axis]);
 }
 
-/* Reads a geometry_msgs/Pose; *tilt is the larger magnitude of its quaternion's x and y. */
-static fasaco_pose read_pose(reader *r, const char *field, double *tilt)
+/* Reads a place and a quaternion, called so; *tilt is the larger magnitude of the latter's x
+ * and y. */
+static fasaco_pose read_placement(reader *r, const char *field, const char *place,
+                                  const char *turn, double *tilt)
 {
     const uint8_t *at = take(r, 8, 56, field);
     if (!at)
@@ -182,16 +185,25 @@ static fasaco_pose read_pose(reader *r, const char *field, double *tilt)
     double values[7];
     for (int i = 0; i < 7; i++)
         values[i] = number(at + 8 * i);
-    check_position(r, values, field);
+    check_place(r, values, place);
     double x = values[3], y = values[4], z = values[5], w = values[6];
     double norm = sqrt(x * x + y * y + z * z + w * w);
     if (!(fabs(norm - 1.0) <= FASACO_QUATERNION_TOLERANCE))
-        refuse(r, "norm of %s.orientation must be 1 within %g, got %g", field,
-               FASACO_QUATERNION_TOLERANCE, norm);
+        refuse(r, "norm of %s must be 1 within %g, got %g", turn, FASACO_QUATERNION_TOLERANCE,
+               norm);
     if (tilt)
         *tilt = fmax(fabs(x), fabs(y));
     double yaw = atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z);
     return (fasaco_pose){values[0], values[1], yaw};
+}
+
+/* Reads a geometry_msgs/Pose; tilt as above. */
+static fasaco_pose read_pose(reader *r, const char *field, double *tilt)
+{
+    char place[NAME_BYTES + 16], turn[NAME_BYTES + 16];
+    (void)snprintf(place, sizeof place, "%s.position", field);
+    (void)snprintf(turn, sizeof turn, "%s.orientation", field);
+    return read_placement(r, field, place, turn, tilt);
 }
 
 /* Returns the shortest decimal that is this float32, as a double. */
@@ -398,6 +410,59 @@ bool fasaco_path_next(fasaco_path *path, fasaco_pose *pose)
     *pose = read_path_pose(&r, path->header.frame, path->next);
     path->next++;
     path->position = r.position;
+    return r.ok;
+}
+
+static fasaco_transform read_transform(reader *r, uint32_t index)
+{
+    fasaco_transform transform;
+    char field[NAME_BYTES], place[2 * NAME_BYTES], turn[2 * NAME_BYTES];
+    double tilt = 0.0;
+    (void)snprintf(field, sizeof field, "transforms[%u].header", index);
+    transform.header = read_header(r, field);
+    (void)snprintf(field, sizeof field, "transforms[%u].child_frame_id", index);
+    transform.child = read_string(r, field);
+    (void)snprintf(field, sizeof field, "transforms[%u].transform", index);
+    (void)snprintf(place, sizeof place, "%s.translation", field);
+    (void)snprintf(turn, sizeof turn, "rotation of %s", field);
+    transform.pose = read_placement(r, field, place, turn, &tilt);
+    if (tilt > FASACO_MAX_TRANSFORM_TILT)
+        refuse(r, "%s must be a turn about z (x and y within %g), got %g", turn,
+               FASACO_MAX_TRANSFORM_TILT, tilt);
+    return transform;
+}
+
+bool fasaco_read_transforms(const uint8_t *payload, size_t size, fasaco_transforms *transforms,
+                            fasaco_error *error)
+{
+    reader r = begin(payload, size, error);
+    transforms->count = read_uint32(&r, "length of transforms");
+    transforms->next = 0;
+    if (r.ok && (uint64_t)transforms->count * LEAST_TRANSFORM_BYTES > r.size - r.position)
+        refuse(&r, "length of transforms must be at most %zu in %zu bytes, got %u",
+               (r.size - r.position) / LEAST_TRANSFORM_BYTES, r.size - r.position,
+               transforms->count);
+    if (r.ok && transforms->count > FASACO_MAX_TRANSFORMS)
+        refuse(&r, "length of transforms must be at most %u, got %u", FASACO_MAX_TRANSFORMS,
+               transforms->count);
+    transforms->body = r.body;
+    transforms->size = r.size;
+    transforms->position = r.position;
+    for (uint32_t index = 0; r.ok && index < transforms->count; index++)
+        (void)read_transform(&r, index);
+    return end(&r);
+}
+
+bool fasaco_transforms_next(fasaco_transforms *transforms, fasaco_transform *transform)
+{
+    if (transforms->next >= transforms->count)
+        return false;
+    fasaco_error error;
+    reader r = {.body = transforms->body, .size = transforms->size,
+                .position = transforms->position, .ok = true, .error = &error};
+    *transform = read_transform(&r, transforms->next);
+    transforms->next++;
+    transforms->position = r.position;
     return r.ok;
 }
 

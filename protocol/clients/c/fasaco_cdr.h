@@ -20,6 +20,8 @@
 #define FASACO_MAX_RESOLUTION_M 100.0
 #define FASACO_QUATERNION_TOLERANCE 0.01
 #define FASACO_MAX_GRID_TILT 0.01
+#define FASACO_MAX_TRANSFORM_TILT 0.2
+#define FASACO_MAX_TRANSFORMS 4096u
 #define FASACO_MAX_GRID_CELLS 64000000u
 #define FASACO_MAX_PATH_POSES 1000000u
 
@@ -90,6 +92,21 @@ typedef struct {
     size_t size, position;
 } fasaco_path;
 
+/* tf2_msgs/TFMessage: read and checked as a whole, its transforms one after the other. */
+typedef struct {
+    uint32_t count;
+    uint32_t next;         /* the transform fasaco_transforms_next gives next */
+    const uint8_t *body;   /* all below is for fasaco_transforms_next alone */
+    size_t size, position;
+} fasaco_transforms;
+
+/* Where frame child lies in the plane of header.frame. */
+typedef struct {
+    fasaco_header header;
+    fasaco_string child;
+    fasaco_pose pose;
+} fasaco_transform;
+
 /* Each reads one payload; false, and a text in *error, if it is refused. */
 bool fasaco_read_pose_stamped(const uint8_t *payload, size_t size, fasaco_pose_stamped *pose,
                               fasaco_error *error);
@@ -105,6 +122,12 @@ bool fasaco_read_pheromone_grid(const uint8_t *payload, size_t size, fasaco_pher
                                 fasaco_error *error);
 bool fasaco_read_path(const uint8_t *payload, size_t size, fasaco_path *path,
                       fasaco_error *error);
+
+bool fasaco_read_transforms(const uint8_t *payload, size_t size, fasaco_transforms *transforms,
+                            fasaco_error *error);
+
+/* Gives the next transform of a message that was read; false behind the last. */
+bool fasaco_transforms_next(fasaco_transforms *transforms, fasaco_transform *transform);
 
 /* Gives the next pose of a path that was read; false behind the last. */
 bool fasaco_path_next(fasaco_path *path, fasaco_pose *pose);

@@ -19,9 +19,9 @@
 
 enum { NAME_BYTES = 128, MAX_PAYLOAD = 128 << 20 };
 
-static void print_string(const char *name, const char *text, size_t size)
+static void print_text(const char *text, size_t size)
 {
-    printf("\"%s\": \"", name);
+    putchar('"');
     for (size_t i = 0; i < size; i++) {
         unsigned char letter = (unsigned char)text[i];
         if (letter < 0x20 || letter == 0x7f)
@@ -34,11 +34,21 @@ static void print_string(const char *name, const char *text, size_t size)
     putchar('"');
 }
 
+static void print_string(const char *name, const char *text, size_t size)
+{
+    printf("\"%s\": ", name);
+    print_text(text, size);
+}
+
+static int64_t stamp_ns(const fasaco_header *header)
+{
+    return (int64_t)header->sec * 1000000000 + (int64_t)header->nanosec;
+}
+
 static void print_header(const fasaco_header *header)
 {
     print_string("frame", header->frame.text, header->frame.size);
-    printf(", \"stamp_ns\": %" PRId64,
-           (int64_t)header->sec * 1000000000 + (int64_t)header->nanosec);
+    printf(", \"stamp_ns\": %" PRId64, stamp_ns(header));
 }
 
 static void print_geometry(const fasaco_geometry *geometry)
@@ -147,6 +157,33 @@ static bool show_path(const uint8_t *payload, size_t size, fasaco_error *error)
     return true;
 }
 
+/* One list for each member, as the index of the vectors has them. */
+static bool show_transforms(const uint8_t *payload, size_t size, fasaco_error *error)
+{
+    static const char *const MEMBERS[] = {"frames", "children", "stamps_ns", "poses"};
+    fasaco_transforms message;
+    if (!fasaco_read_transforms(payload, size, &message, error))
+        return false;
+    for (int member = 0; member < 4; member++) {
+        fasaco_transforms all = message;
+        fasaco_transform one;
+        printf("%s\"%s\": [", member ? ", " : "", MEMBERS[member]);
+        while (fasaco_transforms_next(&all, &one)) {
+            fputs(all.next > 1 ? ", " : "", stdout);
+            if (member == 0)
+                print_text(one.header.frame.text, one.header.frame.size);
+            else if (member == 1)
+                print_text(one.child.text, one.child.size);
+            else if (member == 2)
+                printf("%" PRId64, stamp_ns(&one.header));
+            else
+                printf("[%.17g, %.17g, %.17g]", one.pose.x, one.pose.y, one.pose.yaw);
+        }
+        putchar(']');
+    }
+    return true;
+}
+
 static const struct {
     const char *type;
     bool (*show)(const uint8_t *payload, size_t size, fasaco_error *error);
@@ -158,6 +195,7 @@ static const struct {
     {"map_msgs/msg/OccupancyGridUpdate", show_grid_update},
     {"nav_msgs/msg/Path", show_path},
     {"fasaco_msgs/msg/PheromoneGrid", show_pheromone_grid},
+    {"tf2_msgs/msg/TFMessage", show_transforms},
 };
 
 static void show(const char *type, const uint8_t *payload, size_t size)
