@@ -18,6 +18,7 @@ from fasaco_edge.cli import (
     plan,
     record,
     replay,
+    review,
     run,
     simulate,
     warmup,
@@ -26,7 +27,7 @@ from fasaco_edge.cli.arguments import with_negative_pairs
 from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
-COMMANDS = (demo, plan, run, mission, record, replay, simulate, bench, maps, warmup)
+COMMANDS = (demo, plan, run, mission, record, replay, review, simulate, bench, maps, warmup)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

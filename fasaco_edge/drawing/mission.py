@@ -10,7 +10,7 @@ from PIL import Image
 
 from fasaco_edge.drawing.plot import Plot
 from fasaco_edge.drawing.sheet import Sheet
-from fasaco_edge.drawing.view import View, bounds_of
+from fasaco_edge.drawing.view import MAX_HEIGHT, MAX_WIDTH, View, bounds_of
 from fasaco_edge.drawing.visits import draw_visits
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -27,6 +27,7 @@ def draw_mission(
     *,
     title: str,
     lines: Sequence[str],
+    room: tuple[int, int] = (MAX_WIDTH, MAX_HEIGHT),
 ) -> Image.Image:
     """Return a picture, RGB, of a mission's result.
 
@@ -37,8 +38,9 @@ def draw_mission(
         visits: uint16, shape of the lattice: how often each cell was covered.
         title: heading.
         lines: caption below it.
+        room: the most the map may take (width, height) [px].
     """
-    plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m))
+    plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m, *room))
     plot.ground(grid)
     start = lattice.cell_at(*driven_xy[0].tolist())
     key = draw_visits(plot, lattice, visits, start)
