@@ -42,6 +42,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print a JSON document, see below")
     parser.add_argument("--png", type=Path, metavar="FILE", help="write a picture")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page that needs no net")
     parser.add_argument(
         "--export",
         type=Path,
@@ -58,7 +59,8 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.cli.review_report import print_comparison, print_review
     from fasaco_edge.review.document import document, side_by_side
 
-    check_output(args.png)
+    for file in (args.png, args.html):
+        check_output(file)
     review = _read(args.recordings, "reading")
     other = _read(args.against, "reading the other") if args.against else None
     told = document(review)
@@ -73,6 +75,11 @@ def run(args: argparse.Namespace) -> int:
 
         with writing(args.png):
             draw_review(review).save(args.png, "PNG")
+    if args.html:
+        from fasaco_edge.review.page import page_of
+
+        with writing(args.html):
+            args.html.write_text(page_of(review, other), encoding="utf-8")
     if args.export:
         from fasaco_edge.review.export import export
 

@@ -88,9 +88,11 @@ def replan_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
     """Return how long replans took, a dot each."""
     time = TimeAxis.over(max(review.duration_s for review in reviews))
     found = [replan_times(review) for review in reviews]
+    # Two have the colours of their curves, one has another than the curve above it.
+    colours = COLOURS if len(reviews) > 1 else COLOURS[1:]
     lines = [
         Line(label if len(reviews) > 1 else "", colour, _dots(time, at_s, took_ms), joined=False)
-        for (at_s, took_ms), label, colour in zip(found, labels, COLOURS[1:], strict=False)
+        for (at_s, took_ms), label, colour in zip(found, labels, colours, strict=False)
     ]
     y = Axis.linear("ms", [value for _, took_ms in found for value in took_ms.tolist()] or [1.0])
     return Panel("Time of each replan", "", time.axis, y, tuple(lines))

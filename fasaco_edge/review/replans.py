@@ -10,8 +10,11 @@ from dataclasses import dataclass
 from fasaco_edge.bench.spread import percentile
 from fasaco_edge.review.story import TakenPath
 
-# "map: 3 cells more" and "path blocked at cell (2, 3)" are of the kinds "map" and "path blocked".
+# "path blocked at cell (2, 3)" is of the kind "path blocked".
 _DETAIL = re.compile(r":| at cell|,| \d")
+# As ``mission.ground.GroundChange`` says them.
+_MAP = "map: "
+_CHANGES = ("more", "fewer", "passages changed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,5 +52,9 @@ class Replans:
 
 
 def kind_of(reason: str) -> str:
-    """Return ``reason`` without its details."""
+    """Return ``reason`` without its details; of a map, whether cells came or went."""
+    if reason.startswith(_MAP):
+        changes = [change for change in _CHANGES if change in reason]
+        cells = "" if "passages changed" in changes else "cells "
+        return _MAP + cells + " and ".join(changes) if changes else "map"
     return _DETAIL.split(reason, maxsplit=1)[0].strip() or "no reason told"

@@ -102,7 +102,7 @@ def _figures(told: Mapping[str, Any]) -> Iterator[_Figure]:
 def _compared(mine: _Figure, theirs: _Figure) -> Row:
     if mine.value is None or theirs.value is None:
         return mine.name, mine.text, theirs.text, ""
-    less = mine.value - theirs.value
+    less = round(mine.value - theirs.value, 1)
     text = f"{less:+,d}" if isinstance(less, int) else f"{less:+,.1f}"
     return mine.name, mine.text, theirs.text, text if less else "0"
 
@@ -116,7 +116,10 @@ def clock(seconds: float) -> str:
 
 def amount(value: float | None, unit: str) -> str:
     """Return a value with its unit."""
-    return NOT_KNOWN if value is None else f"{value:,.4g} {unit}".rstrip()
+    if value is None:
+        return NOT_KNOWN
+    digits = 0 if abs(value) >= 100 or value == round(value) else 1 if abs(value) >= 10 else 2
+    return f"{value:,.{digits}f} {unit}".rstrip()
 
 
 def _count(value: float | None, unit: str = "") -> str:

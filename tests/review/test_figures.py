@@ -69,7 +69,11 @@ def test_states_said_again_go_on():
 @pytest.mark.parametrize(
     ("reason", "kind"),
     [
-        ("map: 3 cells more, 1 fewer", "map"),
+        ("map: 3 cells more", "map: cells more"),
+        ("map: 1 cell fewer", "map: cells fewer"),
+        ("map: 3 cells more, 1 cell fewer", "map: cells more and fewer"),
+        ("map: passages changed at 4 cells", "map: passages changed"),
+        ("map and pose moved: 3 cells to be covered again", "map and pose moved"),
         ("path blocked at cell (3, 4)", "path blocked"),
         ("first plan, 30 cells were covered before", "first plan"),
         ("the pose jumped 1.20 m", "the pose jumped"),

@@ -1,0 +1,156 @@
+"""What a review writes: picture, page, files; and what it says where it cannot."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from PIL import Image
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.cli import main
+from fasaco_edge.drawing import palette
+from fasaco_edge.review.document import document
+from fasaco_edge.review.export import export
+from fasaco_edge.review.page import page_of
+from fasaco_edge.review.picture import SIZE, draw_review
+from fasaco_edge.review.reading import read_review
+from tests.cli.commands import fasaco_edge
+from tests.review.test_parts import run_told
+
+VOID = ("meta", "img", "line", "circle", "polyline")
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory):
+    return run_told(tmp_path_factory.mktemp("one") / "runs", faults={"<odd>": 2})
+
+
+@pytest.fixture(scope="module")
+def review(parts):
+    return read_review(parts)
+
+
+class Page(HTMLParser):
+    """Text and elements of a page; each that is opened has to be closed."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.open, self.text, self.names, self.links = [], "", [], []
+        self.feed(page)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.names.append(tag)
+        self.links += [value for name, value in attrs if name in ("src", "href")]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.names.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def test_the_page_needs_nothing_else(review):
+    text = page_of(review)
+    page = Page(text)
+    assert "script" not in page.names
+    assert "link" not in page.names
+    (picture,) = page.links
+    assert picture.startswith("data:image/png;base64,")
+    assert "http" not in re.sub(r"data:image/png[^\"]*", "", text)
+    assert "prefers-color-scheme: dark" in text
+    assert page.names.count("svg") == 3
+
+
+def test_the_page_tells_the_figures(review):
+    page, told = Page(page_of(review)), document(review)
+    for text in (told["recording"], "4 of 24 cells", "not complete", "no pose for 3 s", "<odd>"):
+        assert text in page.text
+
+
+def test_the_page_sets_two_side_by_side(review):
+    page = Page(page_of(review, review))
+    assert page.names.count("svg") == 4
+    assert page.names.count("img") == 2
+    assert "first less second" in page.text
+
+
+def test_the_picture_shows_map_and_trail(review):
+    picture = draw_review(review)
+    assert picture.size == SIZE
+    colours = {colour for _, colour in picture.getcolors(maxcolors=1 << 20)}
+    assert {palette.OCCUPIED, palette.COVERED, palette.RECOVERED[0], palette.START} <= colours
+
+
+def test_without_map_and_poses_there_are_still_charts(review):
+    bare = replace(review, lattice=None, drive=None, walk=None, counts=None)
+    assert draw_review(bare).size == SIZE
+    assert "no map was recorded" in page_of(bare)
+    told = document(bare)
+    assert told["steps"] is told["covered_cells"] is None
+    assert len(told["not_recorded"]) >= 2
+
+
+def test_the_command_writes_them(parts, tmp_path):
+    picture, page, folder = tmp_path / "a.png", tmp_path / "a.html", tmp_path / "files"
+    ended = fasaco_edge(
+        "review", *parts, "--png", picture, "--html", page, "--export", folder, "--json"
+    )
+    assert ended.code == 0, ended.err
+    with Image.open(picture) as image:
+        assert image.size == SIZE
+    assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
+    names = {file.name for file in folder.iterdir()}
+    assert names == {
+        *(f"{name}.csv" for name in ("trail", "paths", "states", "coverage", "plots")),
+        "end.npz",
+    }
+
+
+def test_exported_files_hold_what_was_driven(parts, tmp_path):
+    export(read_review(parts), tmp_path)
+    with (tmp_path / "trail.csv").open(encoding="utf-8") as file:
+        trail = list(csv.DictReader(file))
+    assert [float(row["x_m"]) for row in trail] == [0.45, 0.75, 1.05, 1.35, 1.05, 0.75]
+    with (tmp_path / "paths.csv").open(encoding="utf-8") as file:
+        paths = list(csv.DictReader(file))
+    assert [row["reason"] for row in paths][2] == "path blocked at cell (1, 2)"
+    assert paths[-1]["plan_ms"] == ""
+    with np.load(tmp_path / "end.npz") as arrays:
+        assert arrays["map"].shape == (36, 48)
+        row0, col0 = arrays["lattice_corner"]
+        visits = arrays["visits"]
+        assert visits[1 - row0, 1 - col0 : 5 - col0].tolist() == [1, 2, 2, 1]
+        assert visits.sum() == 6
+        assert arrays["reachable"].sum() == 24
+
+
+@pytest.mark.parametrize("option", ["--png", "--html"])
+def test_a_full_disk_is_named(parts, option, capsys):
+    assert main(["review", *map(str, parts), option, "/dev/full"]) == 78
+    assert "cannot write /dev/full: No space left on device" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("option", "name"), [("--png", "none/a.png"), ("--html", "none/a.html")])
+def test_a_missing_folder_is_named_first(parts, tmp_path, option, name, capsys):
+    assert main(["review", *map(str, parts), option, str(tmp_path / name)]) == 78
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert "there is no folder" in told.err
+
+
+def test_a_file_is_no_folder_to_export_to(parts, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert main(["review", *map(str, parts), "--export", str(tmp_path / "file")]) == 78
+    assert "cannot write" in capsys.readouterr().err
