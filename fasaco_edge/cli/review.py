@@ -41,8 +41,12 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         help="the parts of another run, to be set beside it",
     )
     parser.add_argument("--json", action="store_true", help="print a JSON document, see below")
-    parser.add_argument("--png", type=Path, metavar="FILE", help="write a picture")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page that needs no net")
+    parser.add_argument(
+        "--png", type=Path, metavar="FILE", help="write a picture of the (first) run"
+    )
+    parser.add_argument(
+        "--html", type=Path, metavar="FILE", help="write a page, one file that needs no net"
+    )
     parser.add_argument(
         "--export",
         type=Path,

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 from fasaco_edge.cli import terminal
 from fasaco_edge.review.curve import curve
 from fasaco_edge.review.document import troubles
-from fasaco_edge.review.rows import amount, card_rows, clock, compared_rows, figure_rows
+from fasaco_edge.review.rows import (
+    amount,
+    card_rows,
+    clock,
+    compared_rows,
+    ending,
+    figure_rows,
+)
 from fasaco_edge.review.series import covered_share
 
 if TYPE_CHECKING:
@@ -24,8 +31,8 @@ MOST_TROUBLES = 12
 def print_review(review: Review, told: dict[str, Any]) -> None:
     """Print all of a review; ``told`` is its document."""
     console = terminal.out()
-    endings = {True: "complete", False: "NOT COMPLETE", None: "not known whether complete"}
-    console.print(f"[bold]{told['recording']}: {endings[told['complete']]}[/bold]")
+    colour = {True: "green", False: "red", None: "yellow"}[told["complete"]]
+    console.print(f"[bold]{told['recording']}: [{colour}]{ending(told)}[/{colour}][/bold]")
     console.print(terminal.figures(card_rows(told)))
     _print_curve(console, review)
     console.print(terminal.figures(figure_rows(told)))

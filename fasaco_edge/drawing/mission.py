@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -28,6 +29,7 @@ def draw_mission(
     title: str,
     lines: Sequence[str],
     room: tuple[int, int] = (MAX_WIDTH, MAX_HEIGHT),
+    jump_m: float = math.inf,
 ) -> Image.Image:
     """Return a picture, RGB, of a mission's result.
 
@@ -39,14 +41,16 @@ def draw_mission(
         title: heading.
         lines: caption below it.
         room: the most the map may take (width, height) [px].
+        jump_m: two places further apart than this [m] are no drive, and not joined.
     """
     plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m, *room))
     plot.ground(grid)
     start = lattice.cell_at(*driven_xy[0].tolist())
     key = draw_visits(plot, lattice, visits, start)
-    plot.trail(driven_xy[:-1], driven_xy[1:], LINE_WIDTH * lattice.cell_m)
+    lengths_m = np.hypot(*np.diff(driven_xy, axis=0).T)
+    driven = lengths_m <= jump_m
+    plot.trail(driven_xy[:-1][driven], driven_xy[1:][driven], LINE_WIDTH * lattice.cell_m)
     plot.end_mark(driven_xy[-1])
     plot.start_mark(driven_xy[0])
-    driven_m = float(np.hypot(*np.diff(driven_xy, axis=0).T).sum())
-    bar = ("0", f"{driven_m:,.0f} m driven")
+    bar = ("0", f"{lengths_m[driven].sum():,.0f} m driven")
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())

@@ -12,6 +12,9 @@ from pathlib import Path
 from fasaco_edge.errors import MissingExtra, ProcessEnded
 from fasaco_edge.recording.whole import whole_part
 
+# Its server would be open to the whole network else, and refuse to start beside another viewer.
+VIEWER = (sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", "auto")
+
 
 def view(paths: Sequence[Path]) -> None:
     """Show recordings until the viewer is closed; of torn ones what is whole.
@@ -24,7 +27,7 @@ def view(paths: Sequence[Path]) -> None:
         raise MissingExtra("the viewer comes with rerun, which is not installed")
     with ExitStack() as copies:
         whole = [str(copies.enter_context(whole_part(path))[0]) for path in paths]
-        ended = subprocess.run([sys.executable, "-m", "rerun", *whole], check=False)
+        ended = subprocess.run([*VIEWER, *whole], check=False)
     if ended.returncode:
         raise ProcessEnded(
             f"Rerun's viewer ended with {ended.returncode}",

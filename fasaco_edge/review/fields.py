@@ -25,7 +25,7 @@ FIELDS: Final = {
     "turns_90, turns_180": "quarter-turns and about-turns between steps",
     "driven_m": "length of the trail, without jumps [m]",
     "paths": "paths that were published",
-    "replans": "those that came of a plan, without the first",
+    "replans": "those that came of a plan, without the first of each start of the daemon",
     "replans_by_reason": "how many for each kind of reason",
     "first_plan_ms": "how long the first plan took [ms]",
     "replan_ms_p50, replan_ms_p99, replan_ms_max": "how long replans took [ms], nearest rank",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 # Less than this is no drive, and no turn on the spot.
 STILL_M = 0.05
 STILL_RAD = 0.1
-# A robot in one of these is on its way, and meant to be.
-UNDER_WAY = ("planning", "covering", "returning", "degraded", "blocked")
+# In these the robot has nothing to do, or not yet.
+AT_REST = ("idle", "waiting for map", "waiting for pose", "loading", "done", "silent")
 TROUBLES = ("degraded", "blocked", "silent")
 
 
@@ -64,10 +64,10 @@ def spans_of(entered: Sequence[tuple[float, str, str]], end_s: float) -> tuple[S
     return tuple(spans)
 
 
-def under_way(states: Sequence[Span]) -> Span | None:
-    """Return the time from the mission's first plan to its end; None where it never began."""
-    begun = [span for span in states if span.name in UNDER_WAY]
-    return Span("under way", begun[0].begin_s, begun[-1].end_s) if begun else None
+def under_way(states: Sequence[Span]) -> tuple[Span, ...]:
+    """Return the times from a mission's first plan to its end; pauses and troubles count."""
+    runs = [list(run) for rests, run in groupby(states, lambda s: s.name in AT_REST) if not rests]
+    return tuple(Span("under way", run[0].begin_s, run[-1].end_s) for run in runs)
 
 
 def longest_stand(

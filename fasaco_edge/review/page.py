@@ -13,16 +13,12 @@ from fasaco_edge.review.charts import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.document import document, troubles
 from fasaco_edge.review.picture import draw_map
 from fasaco_edge.review.review import Review
-from fasaco_edge.review.rows import amount, card_rows, clock, compared_rows, figure_rows
+from fasaco_edge.review.rows import amount, card_rows, clock, compared_rows, ending, figure_rows
 from fasaco_edge.review.style import STYLE
 from fasaco_edge.review.svg import svg_of
 
 MAP_ROOM = (1000, 700)
-VERDICTS = {
-    True: ("good", "complete: every reachable cell was covered"),
-    False: ("bad", "not complete"),
-    None: ("open", "the recording does not tell whether it was completed"),
-}
+KINDS = {True: "good", False: "bad", None: "open"}
 INTRODUCTION = (
     "A robot was to pass over every place it can reach, on a map that grows while it drives. "
     "The ground is divided into square cells as wide as its tool; a cell is covered when the "
@@ -77,7 +73,7 @@ def page_of(review: Review, other: Review | None = None) -> str:
 
 
 def _verdict(told: Mapping[str, Any], index: int, of: int) -> str:
-    kind, text = VERDICTS[told["complete"]]
+    kind, text = KINDS[told["complete"]], ending(told)
     who = f"{_mark(index)}{escape(told['recording'])}: " if of > 1 else ""
     return f"<p class='verdict {kind}'>{who}{text}</p>"
 

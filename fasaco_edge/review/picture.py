@@ -8,6 +8,7 @@ from PIL import Image
 
 from fasaco_edge.bench.chart import draw_panels
 from fasaco_edge.drawing import draw_mission, palette
+from fasaco_edge.mission.ledger import JUMP_CELLS
 from fasaco_edge.review.charts import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.rows import clock
@@ -59,6 +60,7 @@ def draw_map(review: Review, room: tuple[int, int]) -> Image.Image | None:
         title=f"{review.record.recording_id}: {DONE[review.complete]}",
         lines=_caption(review),
         room=room,
+        jump_m=JUMP_CELLS * lattice.cell_m,
     )
 
 

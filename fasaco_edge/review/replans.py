@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from fasaco_edge.bench.spread import percentile
 from fasaco_edge.review.story import TakenPath
@@ -23,7 +24,7 @@ class Replans:
 
     Attributes:
         first: the first planned path.
-        later: all others, in order.
+        later: all others, in order, without the first ones of a daemon that was started again.
     """
 
     first: TakenPath | None
@@ -33,7 +34,8 @@ class Replans:
     def of(cls, paths: Sequence[TakenPath]) -> Replans:
         """Sort out ``paths``; those that no plan was needed for are none."""
         planned = [path for path in paths if path.planner]
-        return cls(planned[0] if planned else None, tuple(planned[1:]))
+        later = [after for before, after in pairwise(planned) if after.revision > before.revision]
+        return cls(planned[0] if planned else None, tuple(later))
 
     @property
     def by_reason(self) -> dict[str, int]:

@@ -15,17 +15,10 @@ from fasaco_edge.recording.fields import integer, number, section
 from fasaco_edge.recording.run_reading import RunRecord, Told
 from fasaco_edge.review.drive import Drive, WalkFigures, drive_over, first_covered, walk_figures
 from fasaco_edge.review.faults import Faults, faults_of
-from fasaco_edge.review.moments import (
-    Moment,
-    Span,
-    largest_drop,
-    longest_gap,
-    longest_stand,
-    spans_of,
-    under_way,
-)
+from fasaco_edge.review.moments import Moment, Span, spans_of
 from fasaco_edge.review.replans import Replans
 from fasaco_edge.review.story import HeardStatus, Story
+from fasaco_edge.review.worst import worst_moments
 
 # A coverage that comes so soon after a status [s] is still of the same step.
 SAME_STEP_S = 1.5
@@ -136,7 +129,7 @@ def review_of(record: RunRecord, story: Story, missing: int) -> Review:
         recorder_states=spans_of(
             _entered(record, entities.RECORDER_STATE, entities.RECORDER_LOG), end_s
         ),
-        moments=tuple(_moments(story, states, replans, fractions)),
+        moments=worst_moments(story, states, replans, fractions),
         faults=faults_of(story, record),
         missing=missing,
     )
@@ -218,27 +211,6 @@ def _is_still_true(status: HeardStatus, fractions: NDArray[np.float64]) -> bool:
     later = fractions[fractions[:, 0] > status.at_s + SAME_STEP_S]
     then = fractions[fractions[:, 0] <= status.at_s + SAME_STEP_S]
     return not len(later) or (len(then) > 0 and bool((later[:, 1] == then[-1, 1]).all()))
-
-
-def _moments(
-    story: Story,
-    states: tuple[Span, ...],
-    replans: Replans,
-    fractions: NDArray[np.float64],
-) -> list[Moment]:
-    during = under_way(states)
-    found: list[Moment | None] = []
-    if during is not None:
-        found += [
-            longest_stand(story.times, story.trail, during, states),
-            longest_gap("longest time without a pose", story.pose_s, during),
-            longest_gap("longest time without a map", story.map_s, during),
-        ]
-    slowest = replans.slowest
-    if slowest is not None and slowest.plan_ms is not None:
-        found.append(Moment("slowest replan", slowest.plan_ms, "ms", slowest.at_s, slowest.reason))
-    found.append(largest_drop(fractions, story.map_s))
-    return [moment for moment in found if moment is not None]
 
 
 def seconds_by_state(states: tuple[Span, ...]) -> dict[str, float]:

@@ -36,6 +36,17 @@ NUMBERS = (
 SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
 
 
+def ending(told: Mapping[str, Any]) -> str:
+    """Return in words whether the mission was completed, and where it was left."""
+    if told["complete"]:
+        return "complete: all it was to cover, and could reach, is covered"
+    if told["complete"] is None:
+        return "the recording does not tell whether it was completed"
+    ended = all(part["ended"] for part in told["files"])
+    how = "ended" if ended else "broke off"
+    return f"not complete: the recording {how} when the mission was {told['state']}"
+
+
 def card_rows(told: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return what was run: robot, map, when, how."""
     config, grid = told["config"], told["map"]

@@ -133,7 +133,8 @@ class _Listener:
         }
 
     def hear(self, arrival: Arrival) -> None:
-        self._now = 1e-9 * (arrival.wall_ns - self._began_ns)
+        # A part begins with what was in force before it.
+        self._now = max(1e-9 * (arrival.wall_ns - self._began_ns), 0.0)
         self.story.last_s = max(self.story.last_s, self._now)
         hear = self._hear.get(arrival.topic)
         if hear is None:

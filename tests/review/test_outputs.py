@@ -150,6 +150,15 @@ def test_a_missing_folder_is_named_first(parts, tmp_path, option, name, capsys):
     assert "there is no folder" in told.err
 
 
+def test_a_viewer_without_a_screen_is_named(parts, monkeypatch, capfd):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    assert main(["review", *map(str, parts), "--view"]) == 1
+    told = capfd.readouterr().err
+    assert "gRPC connections on 127.0.0.1" in told
+    assert "it needs a screen" in told
+
+
 def test_a_file_is_no_folder_to_export_to(parts, tmp_path, capsys):
     (tmp_path / "file").touch()
     assert main(["review", *map(str, parts), "--export", str(tmp_path / "file")]) == 78

@@ -34,7 +34,7 @@ PATHS = (
 )
 
 
-def run_told(folder, *, faults, silent=0):
+def run_told(folder, *, faults, silent=0, killed=False):
     """Record a run of known figures, in parts as small as can be; return its files."""
     folder.mkdir()
     keys = Keys()
@@ -70,7 +70,12 @@ def run_told(folder, *, faults, silent=0):
             for _ in range(silent):
                 put("status", _status("covering", "path 1", faults | {"late": 1}))
             recorder.written(sent)
-            recorder.process.terminate()
+            if killed:
+                # What came is written once a second.
+                time.sleep(1.5)
+                recorder.process.kill()
+            else:
+                recorder.process.terminate()
             recorder.process.wait(20)
     return sorted(folder.glob("*.rrd"))
 
@@ -129,6 +134,26 @@ def test_troubles_and_faults_are_told(parts):
     # The last status tells no other state: its counts by code were not recorded.
     assert told["faults_by_code"] == {"wrong_frame": 2, NOT_TOLD: 1}
     assert told["faults"] == 3
+
+
+def test_a_part_alone_begins_with_what_was_in_force(parts):
+    review = read_review(parts[-1:])
+    assert all(span.begin_s >= 0 for span in review.states)
+    assert review.lattice is not None
+    told = document(review)
+    assert told["robot"] == "robot"
+    assert told["samples_missing"] == 0
+
+
+def test_of_a_killed_recorder_all_is_told(tmp_path, parts):
+    files = run_told(tmp_path / "runs", faults={"wrong_frame": 2}, silent=1, killed=True)
+    content = [file.read_bytes() for file in files]
+    told, whole = document(read_review(files)), document(read_review(parts))
+    assert [file.read_bytes() for file in files] == content
+    assert told["files"][-1]["ended"] is False
+    for name in ("steps", "revisits", "covered_cells", "replans_by_reason", "paths", "state"):
+        assert told[name] == whole[name]
+    assert told["faults_by_code"]["wrong_frame"] == 2
 
 
 def test_parts_of_different_runs_are_refused(parts, other, capsys):

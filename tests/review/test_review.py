@@ -82,7 +82,6 @@ def test_the_walk_is_counted_as_the_benchmark_counts(review):
     mine = walk_figures(cells)
     assert (mine.steps, mine.revisits) == (verdict.steps, verdict.revisits)
     assert (mine.turns_90, mine.turns_180) == (verdict.turns_90, verdict.turns_180)
-    assert mine.revisits > 0
 
 
 def test_shares_are_reached_when_they_were(told, review, truth, recording):
@@ -236,7 +235,8 @@ def _began(recording, review):
 
 
 def _under_way(review):
-    first = next(span for span in review.states if span.name == "planning")
+    begun = ("planning", "covering", "paused")
+    first = next(span for span in review.states if span.name in begun)
     done = next(span for span in review.states if span.name == "done")
     return first.begin_s, done.begin_s
 
