@@ -65,8 +65,8 @@ def run(args: argparse.Namespace) -> int:
 
     for file in (args.png, args.html):
         check_output(file)
-    review = _read(args.recordings, "reading")
-    other = _read(args.against, "reading the other") if args.against else None
+    review = _read(args.recordings, "recording")
+    other = _read(args.against, "the other one") if args.against else None
     told = document(review)
     if args.json:
         print(json.dumps(side_by_side(told, document(other)) if other else told))
@@ -96,14 +96,17 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _read(paths: Sequence[Path], task: str) -> Review:
+def _read(paths: Sequence[Path], name: str) -> Review:
     from fasaco_edge.cli import terminal
-    from fasaco_edge.recording.run_reading import count_frames
     from fasaco_edge.review.reading import read_review
 
     with terminal.progress() as bar:
-        reading = bar.add_task(task, total=count_frames(paths))
-        return read_review(paths, lambda frames: bar.advance(reading, frames))
+        task = bar.add_task(name, total=None)
+
+        def tell(what: str, done: int, total: int) -> None:
+            bar.update(task, description=f"{name}: {what}", completed=done, total=total)
+
+        return read_review(paths, tell)
 
 
 def _epilog() -> str:

@@ -73,12 +73,12 @@ def count_frames(paths: Sequence[Path]) -> int:
     return sum(_scan(path).frames for path in paths)
 
 
-def read_run_record(paths: Sequence[Path], advance: Callable[[int], None]) -> RunRecord:
+def read_run_record(paths: Sequence[Path], advance: Callable[[], None]) -> RunRecord:
     """Read the parts of one run, in any order.
 
     Args:
         paths: the files; a torn one is read as far as it is whole, and left as it is.
-        advance: called now and then with the number of frames read since.
+        advance: called with each frame.
 
     Raises:
         UnreadableRecording: a file is missing or no recording, or there are no samples.
@@ -94,7 +94,7 @@ def read_run_record(paths: Sequence[Path], advance: Callable[[int], None]) -> Ru
 class _Gathering:
     """What was read so far."""
 
-    advance: Callable[[int], None]
+    advance: Callable[[], None]
     ids: dict[str, Path] = field(default_factory=dict)
     parts: list[PartFile] = field(default_factory=list)
     span: list[int] = field(default_factory=list)
@@ -109,7 +109,7 @@ class _Gathering:
                 reader = RrdReader(str(whole))
                 self._note_part(path, scan, [entry.recording_id for entry in reader.recordings()])
                 for chunk in reader.stream() if scan.frames else ():
-                    self.advance(1)
+                    self.advance()
                     self._take(chunk, path)
         except OSError as error:
             raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error

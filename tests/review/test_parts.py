@@ -117,6 +117,20 @@ def test_parts_are_one_run(parts):
     assert told["complete"] is False
 
 
+def test_progress_is_told(parts):
+    told = []
+    read_review(parts, lambda *what: told.append(what))
+    assert list(dict.fromkeys(what for what, _, _ in told)) == [
+        "reading",
+        "decoding",
+        "following the robot",
+    ]
+    reading = [(done, total) for what, done, total in told if what == "reading"]
+    assert [done for done, _ in reading] == list(range(1, len(reading) + 1))
+    # Frames that only tell how to show it, many in so small a file, are stepped over.
+    assert len(reading) <= reading[0][1]
+
+
 def test_paths_without_a_plan_are_no_replans(parts):
     told = document(read_review(parts))
     assert told["paths"] == 4
