@@ -32,10 +32,12 @@ def print_review(review: Review, told: dict[str, Any]) -> None:
     """Print all of a review; ``told`` is its document."""
     console = terminal.out()
     colour = {True: "green", False: "red", None: "yellow"}[told["complete"]]
-    console.print(f"[bold]{told['recording']}: [{colour}]{ending(told)}[/{colour}][/bold]")
-    console.print(terminal.figures(card_rows(told)))
+    console.print(
+        f"[bold]{_shown(told['recording'])}: [{colour}]{_shown(ending(told))}[/{colour}][/bold]"
+    )
+    console.print(terminal.figures(_all_shown(card_rows(told))))
     _print_curve(console, review)
-    console.print(terminal.figures(figure_rows(told)))
+    console.print(terminal.figures(_all_shown(figure_rows(told))))
     _print_table(
         console,
         "Why replans came",
@@ -112,23 +114,21 @@ def _print_remarks(console: Console, told: dict[str, Any]) -> None:
     for part in told["files"]:
         if part["torn_bytes"]:
             console.print(
-                f"{part['path']}: torn, its last {part['torn_bytes']} bytes cannot be read",
+                _shown(f"{part['path']}: torn, its last {part['torn_bytes']} bytes are lost"),
                 soft_wrap=True,
-                markup=False,
             )
     for remark in told["remarks"]:
-        console.print(f"recorder: {remark}", soft_wrap=True, markup=False)
+        console.print(_shown(f"recorder: {remark}"), soft_wrap=True)
     for topic, count in told["unreadable"].items():
-        console.print(f"{count} samples of {topic} cannot be read")
+        console.print(_shown(f"{count} samples of {topic} cannot be read"))
     for names, why in told["not_recorded"].items():
-        console.print(f"not known: {names}: {why}", soft_wrap=True, markup=False)
+        console.print(_shown(f"not known: {names}: {why}"), soft_wrap=True)
 
 
 def _print_table(
     console: Console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]
 ) -> None:
     from rich.table import Table
-    from rich.text import Text
 
     rows = list(rows)
     if not rows:
@@ -136,7 +136,20 @@ def _print_table(
     table: Table = Table(title=title, title_justify="left", title_style="bold")
     for index, column in enumerate(columns):
         last = index == len(columns) - 1 and index > 1
-        table.add_column(column, overflow="fold", justify="left" if last or not index else "right")
+        table.add_column(
+            _shown(column), overflow="fold", justify="left" if last or not index else "right"
+        )
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
+        table.add_row(*(_shown(cell) for cell in row))
     console.print(table)
+
+
+def _shown(text: str) -> str:
+    """Return a text out of a recording so that the terminal shows it, and does nothing else."""
+    from rich.markup import escape
+
+    return escape("".join(letter if letter.isprintable() else "?" for letter in text))
+
+
+def _all_shown(rows: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    return [(name, _shown(value)) for name, value in rows]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
 from fasaco_edge.recording.runcard import flat_settings
 from fasaco_edge.review.drive import milestones
-from fasaco_edge.review.moments import TROUBLES, Span
+from fasaco_edge.review.moments import RECORDER_IN_ORDER, TROUBLES, Span
 from fasaco_edge.review.review import Review, seconds_by_state
 
 
@@ -83,8 +84,14 @@ def document(review: Review) -> dict[str, Any]:
 
 
 def troubles(review: Review) -> list[Span]:
-    """Return each time the mission was not as it should be, in order."""
-    return [span for span in review.states if span.name in TROUBLES]
+    """Return each time the mission was not as it should be, or the recorder, in order."""
+    mission = [span for span in review.states if span.name in TROUBLES]
+    recorder = [
+        replace(span, name=f"recorder: {span.name}")
+        for span in review.recorder_states
+        if span.name not in RECORDER_IN_ORDER
+    ]
+    return sorted(mission + recorder, key=lambda span: span.begin_s)
 
 
 def side_by_side(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:

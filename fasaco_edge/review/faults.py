@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fields import integer
 from fasaco_edge.recording.run_reading import RunRecord
+from fasaco_edge.review.moments import RECORDER_IN_ORDER
 from fasaco_edge.review.story import Story
 
 _ERROR = re.compile(r"error (\d+): ")
 # What the recorder says of itself where nothing is wrong.
-IN_ORDER = ("recording: ", "stopping: ")
+IN_ORDER = tuple(f"{state}: " for state in RECORDER_IN_ORDER)
 NOT_TOLD = "code not recorded"
 
 

@@ -30,8 +30,8 @@ FIELDS: Final = {
     "first_plan_ms": "how long the first plan took [ms]",
     "replan_ms_p50, replan_ms_p99, replan_ms_max": "how long replans took [ms], nearest rank",
     "states": "seconds in each state",
-    "troubles": "each time the mission was degraded, blocked or silent: state, reason, at_s, "
-    "seconds",
+    "troubles": "each time the mission was degraded, blocked or silent, or the recorder could not "
+    "write (`recorder: disk full`, `recorder: stalled`): state, reason, at_s, seconds",
     "worst": "moments that stand out: what, value, unit, at_s, note",
     "faults": "messages that the daemon refused",
     "faults_by_code": "the same by code",

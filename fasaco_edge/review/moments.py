@@ -16,6 +16,7 @@ STILL_RAD = 0.1
 # In these the robot has nothing to do, or not yet.
 AT_REST = ("idle", "waiting for map", "waiting for pose", "loading", "done", "silent")
 TROUBLES = ("degraded", "blocked", "silent")
+RECORDER_IN_ORDER = ("recording", "stopping")
 
 
 @dataclass(frozen=True, slots=True)

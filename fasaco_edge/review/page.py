@@ -179,7 +179,7 @@ def _stories(review: Review, told: Mapping[str, Any], of: int) -> str:
         *(f"not known: {names}: {why}" for names, why in told["not_recorded"].items()),
     ]
     parts = [_table(("worst moments", "how much", "at", "what else is known"), moments, "told")]
-    none = "<p>It was never degraded, blocked or silent.</p>"
+    none = "<p>It was never degraded, blocked or silent, and the recorder could always write.</p>"
     parts.append(_table(("trouble", "at", "for", "why"), found, "told") if found else none)
     none = "<p>No message was refused.</p>"
     parts.append(_table(("refused messages", "how many"), faults) if faults else none)

@@ -14,12 +14,15 @@ from PIL import Image
 pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
+from fasaco_edge.cli.review_report import print_review
 from fasaco_edge.drawing import palette
 from fasaco_edge.review.document import document
 from fasaco_edge.review.export import export
+from fasaco_edge.review.moments import Span
 from fasaco_edge.review.page import page_of
 from fasaco_edge.review.picture import SIZE, draw_review
 from fasaco_edge.review.reading import read_review
+from fasaco_edge.review.review import CoverageCounts, review_of
 from tests.cli.commands import fasaco_edge
 from tests.review.test_parts import run_told
 
@@ -100,6 +103,59 @@ def test_without_map_and_poses_there_are_still_charts(review):
     told = document(bare)
     assert told["steps"] is told["covered_cells"] is None
     assert len(told["not_recorded"]) >= 2
+
+
+@pytest.mark.parametrize(
+    ("state", "covered", "zones", "complete"),
+    [
+        ("done", 24, (), True),
+        ("done", 23, (), False),
+        ("covering", 24, (), False),
+        ("done", 10, ({"cells": 4, "covered": 4}, {"cells": 2, "covered": 2}), True),
+        ("done", 10, ({"cells": 4, "covered": 4}, {"cells": 2, "covered": 1}), False),
+        ("", 24, (), None),
+    ],
+)
+def test_complete_is_done_and_nothing_left_over(review, state, covered, zones, complete):
+    last = replace(review.story.statuses[-1], zones=zones)
+    told = replace(
+        review,
+        story=replace(review.story, statuses=[last]),
+        # A daemon that is ended after the mission says nothing any more.
+        states=(Span(state, 0, 1), Span("silent", 1, 2)) if state else (),
+        counts=CoverageCounts(covered, 24, 0, 0, "status"),
+    )
+    assert told.complete is complete
+
+
+def test_what_was_covered_before_is_not_guessed_at(review):
+    story = replace(
+        review.story, statuses=[replace(s, restored_cells=7) for s in review.story.statuses]
+    )
+    told = document(review_of(review.record, story, 0))
+    assert told["covered_cells"] is told["reached_s"] is None
+    assert told["steps"] == 5
+    assert "7 cells were covered before" in told["not_recorded"]["reached_s"]
+
+
+def test_a_recorder_in_trouble_is_told(review):
+    states = (Span("recording", 0, 2), Span("disk full", 2, 5, "less than 50 MB are free"))
+    told = document(replace(review, recorder_states=states))
+    assert {
+        "state": "recorder: disk full",
+        "reason": "less than 50 MB are free",
+        "at_s": 2,
+        "seconds": 3,
+    } in told["troubles"]
+
+
+def test_texts_of_a_recording_do_nothing_to_a_terminal(review, capsys):
+    told = document(review) | {"robot": "[/red] \x1b]0;title\x07", "remarks": ["[/]\x1b[2J"]}
+    print_review(review, told)
+    out = capsys.readouterr().out
+    assert "\x1b" not in out
+    assert "[/red]" in out
+    assert "[/]?[2J" in out
 
 
 def test_the_command_writes_them(parts, tmp_path):
