@@ -165,3 +165,10 @@ class UnreadableRecording(FasacoError):
 
     code = "unreadable_recording"
     hint = "a recorder started in its folder cuts a torn recording at the last whole frame"
+
+
+class DifferentRuns(FasacoError):
+    """Files are taken for the parts of one recording, and are of several."""
+
+    code = "different_runs"
+    hint = "review the parts of one run at a time, or compare two runs with --against"

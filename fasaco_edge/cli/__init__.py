@@ -20,6 +20,7 @@ from fasaco_edge.cli import (
     plan,
     record,
     replay,
+    review,
     run,
     simulate,
     warmup,
@@ -29,7 +30,7 @@ from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
 COMMANDS = (
-    demo, plan, run, mission, ask, record, replay, simulate, bench, maps, warmup, doctor,
+    demo, plan, run, mission, ask, record, review, replay, simulate, bench, maps, warmup, doctor,
 )  # fmt: skip
 
 

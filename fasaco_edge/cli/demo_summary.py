@@ -77,7 +77,9 @@ def print_summary(summary: dict[str, Any], *, as_json: bool) -> None:
     for file in (*summary["recording"], summary["picture"]):
         console.print(file, soft_wrap=True)
     if summary["recording"]:
-        console.print(f"review it:  rerun {' '.join(summary['recording'])}", soft_wrap=True)
+        files = " ".join(summary["recording"])
+        console.print(f"review it:   fasaco-edge review {files}", soft_wrap=True)
+        console.print(f"look at it:  rerun {files}", soft_wrap=True)
 
 
 def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:

@@ -43,7 +43,9 @@ class RunDescription:
     def properties(self) -> dict[str, str]:
         """Return the run's properties, flat, all as text: another version's types may differ."""
         known = {"robot": self.robot, "began": self.began, "version": self.version}
-        settings = {name.replace(".", "_"): str(value) for name, value in _flat(self.config)}
+        settings = {
+            name.replace(".", "_"): str(value) for name, value in flat_settings(self.config)
+        }
         return {name: value for name, value in (settings | known).items() if value}
 
     def markdown(self) -> str:
@@ -53,15 +55,16 @@ class RunDescription:
             ("began", self.began),
             ("version", self.version or "unknown until the first status"),
         ]
-        rows += sorted(_flat(self.config), key=_rank)
+        rows += sorted(flat_settings(self.config), key=_rank)
         table = "\n".join(f"| {name} | {_cell(value)} |" for name, value in rows)
         return f"{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"
 
 
-def _flat(config: Json, prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flat_settings(config: Json, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the settings of a configuration by their dotted names, lists as text."""
     for name, value in config.items():
         if isinstance(value, dict):
-            yield from _flat(value, f"{prefix}{name}.")
+            yield from flat_settings(value, f"{prefix}{name}.")
         elif isinstance(value, str | int | float):
             yield f"{prefix}{name}", value
         elif isinstance(value, list):

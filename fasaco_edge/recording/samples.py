@@ -6,14 +6,11 @@ that is still being written, the whole frames are read.
 
 from __future__ import annotations
 
-import shutil
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -21,15 +18,17 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.sample_codec import Place, SampleDecoder, place_of
 from fasaco_edge.errors import MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.repair import scan_recording
 from fasaco_edge.recording.sdk import RrdReader
+from fasaco_edge.recording.whole import whole_part
 
 HINT = "name the .rrd files that a recorder has written"
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
 
 
 @dataclass(frozen=True, slots=True)
-class _Batch:
+class Batch:
+    """A batch of samples, where it belongs, and the file it is from."""
+
     place: Place
     body: bytes
     path: Path
@@ -47,7 +46,16 @@ class RecordedSamples:
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        batches = [batch for path in paths for batch in _batches(path)]
+        self._take([batch for path in paths for batch in _batches(path)])
+
+    @classmethod
+    def of(cls, batches: Sequence[Batch]) -> Self:
+        """Return the samples in batches that were read already, in any order."""
+        samples = cls(())
+        samples._take(batches)
+        return samples
+
+    def _take(self, batches: Sequence[Batch]) -> None:
         # Runs are numbered by their beginning, so later ones follow.
         self._batches = sorted(batches, key=lambda batch: (batch.place.run, batch.place.first))
         self.missing = 0
@@ -78,14 +86,14 @@ class RecordedSamples:
                 yield numbered.arrival
 
 
-def _batches(path: Path) -> list[_Batch]:
+def _batches(path: Path) -> list[Batch]:
     try:
-        with _whole(path) as whole, warnings.catch_warnings():
+        with whole_part(path) as (whole, _), warnings.catch_warnings():
             # Of a file without its footer: slower to open, and all there.
             warnings.filterwarnings("ignore", message="RRD file has no footer")
             chunks = RrdReader(str(whole)).stream().filter(content=f"/{entities.INPUTS}")
-            bodies = [body for chunk in chunks for body in _blobs(chunk.to_record_batch())]
-        batches = [_Batch(place_of(body), body, path) for body in bodies]
+            bodies = [body for chunk in chunks for body in blobs(chunk.to_record_batch())]
+        batches = [Batch(place_of(body), body, path) for body in bodies]
     except OSError as error:
         raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
     except (RuntimeError, ValueError, MalformedMessage) as error:
@@ -97,26 +105,8 @@ def _batches(path: Path) -> list[_Batch]:
     return batches
 
 
-def _blobs(batch: Any) -> Iterator[bytes]:  # noqa: ANN401 - pyarrow has no types
+def blobs(batch: Any) -> Iterator[bytes]:  # noqa: ANN401 - pyarrow has no types
+    """Yield the batches of samples in a record batch of the entity ``inputs``."""
     if COMPONENT in batch.schema.names:
         for blob in batch.column(COMPONENT):
             yield np.asarray(blob.values, np.uint8).tobytes()
-
-
-@contextmanager
-def _whole(path: Path) -> Iterator[Path]:
-    """Yield ``path``, or where its end is torn a copy of what is whole."""
-    with path.open("rb") as recording:
-        scan = scan_recording(recording)
-        if scan is None:
-            raise ValueError("this is no recording")
-        if scan.has_footer or not scan.torn_bytes:
-            yield path
-            return
-        with TemporaryDirectory() as folder:
-            copy = Path(folder, path.name)
-            recording.seek(0)
-            with copy.open("wb") as target:
-                shutil.copyfileobj(recording, target)
-                target.truncate(scan.whole_bytes)
-            yield copy

@@ -47,14 +47,20 @@ SIMULATION = SimulationConfig(
 
 @dataclass(frozen=True)
 class Recording:
-    """The parts, and what the daemon said last."""
+    """The parts, what the daemon said, and where the robot was in truth.
+
+    ``statuses`` and ``notes``, those of all paths, come with the seconds they came at.
+    """
 
     paths: list[Path]
     status: dict
+    statuses: list[tuple[float, dict]]
+    notes: list[tuple[float, dict]]
+    trail: np.ndarray
 
 
-def record_mission(folder: Path) -> Recording:
-    """Record a mission from its first map to its end."""
+def record_mission(folder: Path, *, broken_poses: int = 0) -> Recording:
+    """Record a mission from its first map to its end; some poses may be none."""
     runs = folder / "runs"
     warm_up()  # so that the daemon need not compile while the robot waits
     with daemon_process(folder, "--record", str(runs), planner={"budget_s": 0.05}) as daemon:
@@ -63,13 +69,15 @@ def record_mission(folder: Path) -> Recording:
             assert time.monotonic() < deadline, daemon.log_text()
             time.sleep(0.05)
         with bus:
-            robot = MappingRobot(bus)
+            robot = MappingRobot(bus, broken_poses)
             robot.wait(lambda status: (status["recorder"] or {}).get("state") == "recording")
             robot.drive()
         # With the recorder's last words it may take a while on a busy machine.
         daemon.process.terminate()
         daemon.process.wait(TIMEOUT_S)
-    return Recording(sorted(runs.glob("*.rrd")), robot.status)
+    return Recording(
+        sorted(runs.glob("*.rrd")), robot.status, robot.statuses, robot.notes, robot.trail
+    )
 
 
 def _joined(endpoint: str) -> Bus | None:
@@ -82,8 +90,9 @@ def _joined(endpoint: str) -> Bus | None:
 class MappingRobot:
     """A robot on the bus, and the newest status of the daemon."""
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, bus: Bus, broken_poses: int = 0) -> None:
         self._bus, self._keys = bus, Keys()
+        self._broken_poses = broken_poses
         keys = self._keys
         self._commands = list(COMMANDS)
         pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
@@ -94,8 +103,10 @@ class MappingRobot:
         self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED, QOS["pose"])
         self._newest_path = LatestSlot[Sample]()
         self.status: dict = {}
+        self.statuses: list[tuple[float, dict]] = []
+        self.notes: list[tuple[float, dict]] = []
         self._sent: OccupancyGrid | None = None
-        bus.subscribe(keys.path, self._newest_path.put, latched=True)
+        bus.subscribe(keys.path, self._take_path, latched=True)
         bus.subscribe(keys.status, self._hear, latched=True)
 
     def wait(self, holds) -> None:
@@ -134,7 +145,11 @@ class MappingRobot:
         if emission.map is not None:
             self._publish_map(self._believed(emission.map))
         if emission.pose is not None:
-            self._poses.put(encode_pose_stamped(emission.pose))
+            pose = encode_pose_stamped(emission.pose)
+            self._poses.put(pose)
+            if self._broken_poses:
+                self._broken_poses -= 1
+                self._poses.put(pose[:-5])
 
     def _command(self, name: str) -> None:
         payload = encode_json({"command": name})
@@ -166,5 +181,15 @@ class MappingRobot:
         patch = MapPatch(window, cells, grid.frame, grid.stamp_ns)
         self._updates.put(encode_map_update(patch))
 
+    @property
+    def trail(self) -> np.ndarray:
+        """Where the robot was in truth: points (x, y) [m], float64 (n, 2)."""
+        return self._world.trail
+
+    def _take_path(self, sample: Sample) -> None:
+        self.notes.append((time.monotonic(), decode_json(sample.attachment)))
+        self._newest_path.put(sample)
+
     def _hear(self, sample: Sample) -> None:
         self.status = decode_json(sample.payload)
+        self.statuses.append((time.monotonic(), self.status))

@@ -1,0 +1,136 @@
+"""What of a review is shown over time, as panels: the same for picture and page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bench.chart import COLOURS, Axis, Line, Panel
+from fasaco_edge.drawing.palette import Colour
+from fasaco_edge.review.review import Review
+from fasaco_edge.review.series import covered_share, replan_times
+
+MOST_POINTS = 700
+FAINT: Colour = (150, 156, 166)
+GREEN, BLUE, SKY = (0, 158, 115), (0, 114, 178), (86, 180, 233)
+AMBER, RED, VIOLET = (230, 159, 0), (213, 94, 0), (204, 121, 167)
+# From the bottom up; what is not in it is drawn as the last one.
+STATES: dict[str, Colour] = {
+    "done": BLUE,
+    "returning": SKY,
+    "covering": GREEN,
+    "planning": SKY,
+    "paused": VIOLET,
+    "degraded": AMBER,
+    "blocked": RED,
+    "silent": RED,
+}
+SHORT = {"waiting for map": "no map", "waiting for pose": "no pose"}
+BAND_PX = 12
+# A state is to be seen however short it was: share of the whole time.
+LEAST_SHARE = 0.006
+
+
+@dataclass(frozen=True, slots=True)
+class TimeAxis:
+    """The axis of time, and seconds per unit of it."""
+
+    axis: Axis
+    unit_s: float
+
+    @classmethod
+    def over(cls, seconds: float) -> TimeAxis:
+        """Return an axis from 0 to ``seconds``."""
+        unit_s, name = next(
+            (unit_s, name)
+            for unit_s, name, least_s in ((3600.0, "h", 14400.0), (60.0, "min", 240.0), (1, "s", 0))
+            if seconds >= least_s
+        )
+        axis = Axis.linear(f"time since the recording began [{name}]", [seconds / unit_s])
+        return cls(axis, unit_s)
+
+    def points(
+        self, at_s: NDArray[np.float64], values: NDArray[np.float64]
+    ) -> tuple[tuple[float, float], ...]:
+        """Return points of a line, not more than can be told apart."""
+        places = np.unique(np.linspace(0, len(at_s) - 1, MOST_POINTS).round().astype(int))
+        chosen = places if len(at_s) > MOST_POINTS else np.arange(len(at_s))
+        pairs = np.column_stack((at_s[chosen] / self.unit_s, values[chosen]))
+        return tuple((float(x), float(y)) for x, y in pairs)
+
+
+def coverage_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
+    """Return how the covered share grew; of one review also the share of what was known then.
+
+    Of two, ``labels`` tell them apart.
+    """
+    time = TimeAxis.over(max(review.duration_s for review in reviews))
+    lines = [
+        Line(
+            label if len(reviews) > 1 else "", colour, _curve(time, review), dotted=False, width=2.2
+        )
+        for review, label, colour in zip(reviews, labels, COLOURS, strict=False)
+    ]
+    if len(reviews) == 1:
+        known = reviews[0].known_fractions
+        points = time.points(known[:, 0], 100 * known[:, 1])
+        lines.append(Line("", FAINT, points, dotted=False, width=1.4))
+    one = "blue: of all cells known in the end; grey: of those known then"
+    caption = one if len(reviews) == 1 else "of all cells that each run knew in the end"
+    y = Axis.linear("%", [100.0])
+    return Panel("Covered share of all cells", caption, time.axis, y, tuple(lines))
+
+
+def replan_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
+    """Return how long replans took, a dot each."""
+    time = TimeAxis.over(max(review.duration_s for review in reviews))
+    found = [replan_times(review) for review in reviews]
+    # Two have the colours of their curves, one has another than the curve above it.
+    colours = COLOURS if len(reviews) > 1 else COLOURS[1:]
+    lines = [
+        Line(label if len(reviews) > 1 else "", colour, _dots(time, at_s, took_ms), joined=False)
+        for (at_s, took_ms), label, colour in zip(found, labels, colours, strict=False)
+    ]
+    y = Axis.linear("ms", [value for _, took_ms in found for value in took_ms.tolist()] or [1.0])
+    return Panel("Time of each replan", "", time.axis, y, tuple(lines))
+
+
+def state_panel(review: Review) -> Panel:
+    """Return what the mission was doing, a bar for each time it was in a state."""
+    time = TimeAxis.over(review.duration_s)
+    known = [name for name in STATES if any(span.name == name for span in review.states)]
+    others = [span.name for span in review.states if span.name not in STATES]
+    names = [*known, *reversed(dict.fromkeys(others))]
+    least_s = LEAST_SHARE * review.duration_s
+    lines = []
+    for span in review.states:
+        level = float(names.index(span.name))
+        begin, end = span.begin_s, max(span.end_s, span.begin_s + least_s)
+        points = ((begin / time.unit_s, level), (end / time.unit_s, level))
+        colour = STATES.get(span.name, FAINT)
+        lines.append(Line("", colour, points, dotted=False, width=BAND_PX))
+    ticks = tuple((float(level), SHORT.get(name, name)) for level, name in enumerate(names))
+    y = Axis("", -0.7, max(len(names) - 0.3, 0.7), ticks)
+    return Panel("What the mission was doing", "", time.axis, y, tuple(lines))
+
+
+def _curve(time: TimeAxis, review: Review) -> tuple[tuple[float, float], ...]:
+    at_s, shares = covered_share(review)
+    if not len(at_s):
+        return ()
+    at_s = np.concatenate(([at_s[0]], at_s, [review.duration_s]))
+    return time.points(at_s, 100 * np.concatenate(([0.0], shares, shares[-1:])))
+
+
+def _dots(
+    time: TimeAxis, at_s: NDArray[np.float64], took_ms: NDArray[np.float64]
+) -> tuple[tuple[float, float], ...]:
+    """Return a dot for each replan; of very many the slowest of each stretch of time."""
+    if len(at_s) > MOST_POINTS:
+        stretches = np.array_split(np.arange(len(at_s)), MOST_POINTS)
+        chosen = np.array([part[np.argmax(took_ms[part])] for part in stretches])
+        at_s, took_ms = at_s[chosen], took_ms[chosen]
+    return time.points(at_s, took_ms)

@@ -1,0 +1,153 @@
+"""A review as a JSON document, and two of them side by side; ``fields.FIELDS`` explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import Any
+
+from fasaco_edge.recording.runcard import flat_settings
+from fasaco_edge.review.drive import milestones
+from fasaco_edge.review.moments import RECORDER_IN_ORDER, TROUBLES, Span
+from fasaco_edge.review.review import Review, seconds_by_state
+
+
+def document(review: Review) -> dict[str, Any]:
+    """Return all figures of a review; null where a recording does not hold them."""
+    record, story = review.record, review.story
+    grid, counts, walk, drive = story.grid, review.counts, review.walk, review.drive
+    replans, faults = review.replans, review.faults
+    geometry = grid.geometry if grid else None
+    began = datetime.fromtimestamp(1e-9 * record.began_ns, UTC)
+    told: dict[str, Any] = {
+        "recording": record.recording_id,
+        "files": [
+            {
+                "path": str(part.path),
+                "bytes": part.bytes,
+                "torn_bytes": part.torn_bytes,
+                "ended": part.has_footer,
+            }
+            for part in record.parts
+        ],
+        "robot": story.robot or None,
+        "version": story.version or None,
+        "config": dict(flat_settings(story.config)),
+        "map": geometry
+        and {
+            "rows": geometry.rows,
+            "cols": geometry.cols,
+            "resolution_m": geometry.resolution,
+        },
+        "began": f"{began:%Y-%m-%dT%H:%M:%SZ}",
+        "duration_s": round(review.duration_s, 3),
+        "state": review.state or None,
+        "complete": review.complete,
+        "covered_cells": counts and counts.covered,
+        "coverable_cells": counts and counts.coverable,
+        "recovered_cells": counts and counts.recovered,
+        "unreachable_cells": counts and counts.unreachable,
+        "coverage_from": counts and counts.source,
+        "reached_s": _reached(review),
+        "steps": walk and walk.steps,
+        "revisits": walk and walk.revisits,
+        "turns_90": walk and walk.turns_90,
+        "turns_180": walk and walk.turns_180,
+        "driven_m": drive and round(drive.driven_m, 2),
+        "paths": len(story.paths),
+        "replans": len(replans.later),
+        "replans_by_reason": replans.by_reason,
+        "first_plan_ms": replans.first and _rounded(replans.first.plan_ms),
+        "replan_ms_p50": _rounded(replans.milliseconds(50)),
+        "replan_ms_p99": _rounded(replans.milliseconds(99)),
+        "replan_ms_max": _rounded(replans.milliseconds(100)),
+        "states": {name: round(s, 3) for name, s in seconds_by_state(review.states).items()},
+        "troubles": [
+            {"state": s.name, "reason": s.reason, "at_s": _rounded(s.begin_s)}
+            | {"seconds": _rounded(s.seconds)}
+            for s in troubles(review)
+        ],
+        "worst": [
+            {"what": m.what, "value": _rounded(m.value), "unit": m.unit, "at_s": _rounded(m.at_s)}
+            | {"note": m.note}
+            for m in review.moments
+        ],
+        "faults": faults.total,
+        "faults_by_code": faults.by_code,
+        "recorder_lost": faults.lost,
+        "samples_missing": review.missing,
+        "unreadable": dict(story.undecodable),
+        "remarks": list(faults.complaints),
+    }
+    return told | {"not_recorded": _not_recorded(review)}
+
+
+def troubles(review: Review) -> list[Span]:
+    """Return each time the mission was not as it should be, or the recorder, in order."""
+    mission = [span for span in review.states if span.name in TROUBLES]
+    recorder = [
+        replace(span, name=f"recorder: {span.name}")
+        for span in review.recorder_states
+        if span.name not in RECORDER_IN_ORDER
+    ]
+    return sorted(mission + recorder, key=lambda span: span.begin_s)
+
+
+def side_by_side(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+    """Return two documents and, of each number that both have the first less the second."""
+    return {"recording": dict(one), "against": dict(other), "difference": differences(one, other)}
+
+
+def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+    """Return of each number that both documents have the first less the second."""
+    found: dict[str, Any] = {}
+    for name, value in one.items():
+        mate = other.get(name)
+        if isinstance(value, dict) and isinstance(mate, dict):
+            if inner := differences(value, mate):
+                found[name] = inner
+        elif _is_number(value) and _is_number(mate):
+            found[name] = round(value - mate, 6)
+    return found
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _reached(review: Review) -> dict[str, float | None] | None:
+    if review.drive is None or _restored(review):
+        return None
+    moments = milestones(review.first_s, review.drive.coverage.coverable)
+    return {str(percent): _rounded(at_s) for percent, at_s in moments.items()}
+
+
+def _restored(review: Review) -> int:
+    return max((status.restored_cells for status in review.story.statuses), default=0)
+
+
+def _not_recorded(review: Review) -> dict[str, str]:
+    story, why = review.story, {}
+    if not story.statuses:
+        why["robot, version, config, state"] = "there is no status of a daemon"
+    if review.drive is None:
+        lacks = "no map" if story.grid is None else "no configuration"
+        why["steps, revisits, turns_90, turns_180, driven_m, reached_s"] = f"there is {lacks}"
+    elif _restored(review):
+        why["reached_s"] = (
+            f"{_restored(review)} cells were covered before, and a recording does not tell which"
+        )
+    if review.counts is None:
+        why["covered_cells, coverable_cells, recovered_cells"] = (
+            "the daemon's last recorded count is outdated, and the trail does not tell all"
+        )
+    if not review.replans.later:
+        why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "no plan was made anew"
+    if review.faults.lost is None:
+        why["recorder_lost"] = "no recorded status tells of the recorder"
+    return why
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 3)

@@ -1,0 +1,158 @@
+"""What the robot drove: its walk over the cells, when each was first covered, how it stood.
+
+Cells count as the mission's own ledger counts them: one is covered when the tool passes over
+its centre. So a walk is the cells in the order they were passed over.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.mission.ground import Ground, anchor_cell
+from fasaco_edge.mission.ledger import JUMP_CELLS, CoverageLedger
+from fasaco_edge.mission.progress import Coverage
+
+MILESTONES = (50, 90, 99, 100)
+"""Shares of the cells that can be covered at the end [percent]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drive:
+    """The robot's way over the lattice.
+
+    Attributes:
+        cells: int32 (n, 2), the cells (row, col) it passed over, in order.
+        at_s: float64 (n,), when [s].
+        visits: uint16, shape of the lattice: how often each was passed over.
+        reachable: bool, shape of the lattice: what could be covered at the end.
+        coverage: counts over both.
+        driven_m: length of the way, without jumps [m].
+    """
+
+    cells: NDArray[np.int32]
+    at_s: NDArray[np.float64]
+    visits: NDArray[np.uint16]
+    reachable: NDArray[np.bool_]
+    coverage: Coverage
+    driven_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class WalkFigures:
+    """Counts of a walk: steps from cell to cell, revisits, quarter-turns, about-turns."""
+
+    steps: int
+    revisits: int
+    turns_90: int
+    turns_180: int
+
+
+def drive_over(
+    lattice: CoverageLattice,
+    at_s: NDArray[np.float64],
+    trail: NDArray[np.float64],
+    lost_pose_s: float = 0.0,
+) -> Drive:
+    """Return the way of a robot over the lattice that the map has at the end.
+
+    Args:
+        lattice: without the cells to keep out of.
+        at_s: float64 (n,), when each pose came [s].
+        trail: float64 (n, 3), the poses: x [m], y [m], yaw [rad].
+        lost_pose_s: after so long without a pose [s] nobody knows how the robot came to the
+            next; 0 for never.
+    """
+    ledger = CoverageLedger(lattice.cell_m)
+    walk: list[Cell] = []
+    times: list[float] = []
+    before = at_s[0] if len(at_s) else 0.0
+    last = trail[0] if len(trail) else np.zeros(3)
+    for now, pose in zip(at_s.tolist(), trail, strict=True):
+        x, y = float(pose[0]), float(pose[1])
+        # As the mission has it: a pose kilometres astray is no drive.
+        if not lattice.contains(lattice.cell_at(x, y)):
+            continue
+        if 0 < lost_pose_s < now - before:
+            ledger.lift()
+        entered = sorted(ledger.record(Pose2D(x, y)), key=_distance_from(last, lattice.cell_m))
+        walk += entered
+        times += [now] * len(entered)
+        before, last = now, pose
+    visits = ledger.visits(lattice.window)
+    reachable = _reachable(lattice, trail)
+    return Drive(
+        cells=np.array(walk, np.int32).reshape(-1, 2),
+        at_s=np.array(times, np.float64),
+        visits=visits,
+        reachable=reachable,
+        coverage=Coverage.of(lattice, reachable, visits),
+        driven_m=_driven_m(trail, JUMP_CELLS * lattice.cell_m),
+    )
+
+
+def walk_figures(cells: NDArray[np.int32]) -> WalkFigures:
+    """Count over a walk, int32 (n, 2); turns count between steps to a neighbouring cell."""
+    if not len(cells):
+        return WalkFigures(0, 0, 0, 0)
+    whole = cells.astype(np.int64)
+    moves = whole[1:] - whole[:-1]
+    before, after = moves[:-1], moves[1:]
+    single = np.abs(moves).sum(axis=1) == 1
+    both = single[:-1] & single[1:]
+    along = (before * after).sum(axis=1)
+    return WalkFigures(
+        steps=len(moves),
+        revisits=len(cells) - len(np.unique(cells, axis=0)),
+        turns_90=int(np.count_nonzero(both & (along == 0))),
+        turns_180=int(np.count_nonzero(both & (along == -1))),
+    )
+
+
+def first_covered(drive: Drive, lattice: CoverageLattice) -> NDArray[np.float64]:
+    """Return when cells that could be covered at the end were first covered [s], ascending."""
+    corner = np.array((lattice.window.row0, lattice.window.col0))
+    places = drive.cells - corner
+    inside = np.all((places >= 0) & (places < drive.reachable.shape), axis=1)
+    inside[inside] = drive.reachable[tuple(places[inside].T)]
+    _, first = np.unique(places[inside], axis=0, return_index=True)
+    return np.sort(drive.at_s[inside][first])
+
+
+def milestones(first_s: NDArray[np.float64], coverable: int) -> dict[int, float | None]:
+    """Return when each of MILESTONES was reached [s]; None where it was not.
+
+    Args:
+        first_s: float64 (n,), when each cell was first covered [s], ascending.
+        coverable: how many cells could be covered at the end.
+    """
+    needed = {percent: -(-coverable * percent // 100) for percent in MILESTONES}
+    return {
+        percent: float(first_s[count - 1]) if 0 < count <= len(first_s) else None
+        for percent, count in needed.items()
+    }
+
+
+def _reachable(lattice: CoverageLattice, trail: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return what can be reached from where the robot was last on coverable ground."""
+    for x, y, _ in trail[::-1].tolist():
+        cell = anchor_cell(lattice, Pose2D(x, y))
+        if cell is not None:
+            return Ground.around(lattice, cell).reachable
+    return np.zeros(lattice.states.shape, np.bool_)
+
+
+def _driven_m(trail: NDArray[np.float64], jump_m: float) -> float:
+    lengths = np.hypot(*np.diff(trail[:, :2], axis=0).T) if len(trail) > 1 else np.zeros(0)
+    return float(lengths[lengths <= jump_m].sum())
+
+
+def _distance_from(pose: NDArray[np.float64], cell_m: float) -> Callable[[Cell], float]:
+    x, y = float(pose[0]), float(pose[1])
+    return lambda cell: math.hypot((cell[1] + 0.5) * cell_m - x, (cell[0] + 0.5) * cell_m - y)

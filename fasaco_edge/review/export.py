@@ -1,0 +1,96 @@
+"""A review as files for other programs: CSV with one header line, and NumPy arrays."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.review.review import Review
+from fasaco_edge.review.series import covered_share
+
+
+def export(review: Review, folder: Path) -> None:
+    """Write all series of a review into ``folder``, which is made if missing.
+
+    ==============  ==========================================================================
+    trail.csv       at_s, x_m, y_m, yaw_rad: each pose
+    paths.csv       at_s, revision, steps, planner, plan_ms, reason: each published path
+    states.csv      begin_s, end_s, state, reason: what the mission was doing
+    coverage.csv    at_s, share: covered share of the cells coverable at the end
+    plots.csv       at_s, name, value: all that was plotted: latencies, memory, fractions
+    end.npz         map int8 and its origin (x, y, yaw) and resolution_m; visits uint16 and
+                    reachable bool of the lattice with its first row, column and cell_m
+    ==============  ==========================================================================
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    story = review.story
+    trail = zip(story.pose_s, story.poses, strict=True)
+    _write(
+        folder / "trail.csv",
+        ("at_s", "x_m", "y_m", "yaw_rad"),
+        ((f"{at:.6f}", f"{x:.4f}", f"{y:.4f}", f"{yaw:.5f}") for at, (x, y, yaw) in trail),
+    )
+    _write(
+        folder / "paths.csv",
+        ("at_s", "revision", "steps", "planner", "plan_ms", "reason"),
+        (
+            (f"{p.at_s:.6f}", p.revision, p.steps, p.planner, p.plan_ms, p.reason)
+            for p in story.paths
+        ),
+    )
+    _write(
+        folder / "states.csv",
+        ("begin_s", "end_s", "state", "reason"),
+        ((f"{s.begin_s:.6f}", f"{s.end_s:.6f}", s.name, s.reason) for s in review.states),
+    )
+    _write(
+        folder / "coverage.csv",
+        ("at_s", "share"),
+        ((f"{at:.6f}", f"{share:.6f}") for at, share in zip(*covered_share(review), strict=True)),
+    )
+    _write(
+        folder / "plots.csv",
+        ("at_s", "name", "value"),
+        (
+            (f"{at:.6f}", name, f"{value:.9g}")
+            for name, points in sorted(review.record.plots.items())
+            for at, value in points.tolist()
+        ),
+    )
+    _write_arrays(review, folder / "end.npz")
+
+
+def _write(file: Path, names: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    with file.open("w", encoding="utf-8", newline="") as target:
+        writer = csv.writer(target)
+        writer.writerow(names)
+        writer.writerows(rows)
+
+
+def _write_arrays(review: Review, file: Path) -> None:
+    grid, lattice, drive = review.story.grid, review.lattice, review.drive
+    arrays: dict[str, NDArray[Any]] = {}
+    if grid is not None:
+        origin = grid.geometry.origin
+        arrays |= {
+            "map": grid.cells,
+            "map_origin": np.array((origin.x, origin.y, origin.yaw)),
+            "map_resolution_m": np.array(grid.geometry.resolution),
+        }
+    if lattice is not None and drive is not None:
+        arrays |= {
+            "visits": drive.visits,
+            "reachable": drive.reachable,
+            "lattice_corner": np.array((lattice.window.row0, lattice.window.col0)),
+            "cell_m": np.array(lattice.cell_m),
+        }
+    # As NumPy's own readers take it; its stub takes the first array for an option.
+    np.savez_compressed(file, **arrays)  # type: ignore[arg-type]

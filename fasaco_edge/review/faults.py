@@ -1,0 +1,87 @@
+"""What was refused, and what the recorder lost."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.fields import integer
+from fasaco_edge.recording.run_reading import RunRecord
+from fasaco_edge.review.moments import RECORDER_IN_ORDER
+from fasaco_edge.review.story import Story
+
+_ERROR = re.compile(r"error (\d+): ")
+# What the recorder says of itself where nothing is wrong.
+IN_ORDER = tuple(f"{state}: " for state in RECORDER_IN_ORDER)
+NOT_TOLD = "code not recorded"
+
+
+@dataclass(frozen=True, slots=True)
+class Faults:
+    """Refused messages and losses.
+
+    Attributes:
+        by_code: what the daemon refused; under ``NOT_TOLD`` what it counted after the last
+            status whose counts by code were recorded.
+        lost: samples that the recorder could not write; None where it never said.
+        torn_bytes: what a crash tore off the files [bytes].
+        complaints: what the recorder wrote into its log.
+    """
+
+    by_code: dict[str, int]
+    lost: int | None
+    torn_bytes: int
+    complaints: tuple[str, ...]
+
+    @property
+    def total(self) -> int:
+        """All that the daemon refused."""
+        return sum(self.by_code.values())
+
+
+def faults_of(story: Story, record: RunRecord) -> Faults:
+    """Return what a recording tells of faults."""
+    by_code = _over_restarts(status.faults for status in story.statuses)
+    total = _counted(line for _, line in record.log.get(entities.MISSION_LOG, ()))
+    if total > by_code.total():
+        by_code[NOT_TOLD] = total - by_code.total()
+    lost = [integer(status.recorder, "lost") for status in story.statuses]
+    told = [count for count in lost if count is not None]
+    return Faults(
+        by_code=dict(sorted(by_code.items())),
+        lost=max(told) if told else None,
+        torn_bytes=sum(part.torn_bytes for part in record.parts),
+        complaints=tuple(
+            line
+            for log in (entities.BUS_LOG, entities.RECORDER_LOG)
+            for _, line in record.log.get(log, ())
+            if not line.startswith(IN_ORDER)
+        ),
+    )
+
+
+def _over_restarts(counts: Iterable[Mapping[str, int]]) -> Counter[str]:
+    """Return the sum of counts that begin anew whenever a daemon does."""
+    ended: Counter[str] = Counter()
+    newest: Counter[str] = Counter()
+    for count in counts:
+        now = Counter(dict(count))
+        if now.total() < newest.total():
+            ended += newest
+        newest = now
+    return ended + newest
+
+
+def _counted(lines: Iterable[str]) -> int:
+    """Return how many errors the log counts, over restarts."""
+    ended = newest = 0
+    for line in lines:
+        match = _ERROR.match(line)
+        if match:
+            now = int(match[1])
+            ended += newest if now <= newest else 0
+            newest = now
+    return ended + newest

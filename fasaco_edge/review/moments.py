@@ -1,0 +1,132 @@
+"""What of a mission is worth a second look: states and how long they lasted, stands, gaps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby, pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Less than this is no drive, and no turn on the spot.
+STILL_M = 0.05
+STILL_RAD = 0.1
+# In these the robot has nothing to do, or not yet.
+AT_REST = ("idle", "waiting for map", "waiting for pose", "loading", "done", "silent")
+TROUBLES = ("degraded", "blocked", "silent")
+RECORDER_IN_ORDER = ("recording", "stopping")
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A time [s] in which something held, and why."""
+
+    name: str
+    begin_s: float
+    end_s: float
+    reason: str = ""
+
+    @property
+    def seconds(self) -> float:
+        """How long it held [s]."""
+        return self.end_s - self.begin_s
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """Something that stands out.
+
+    Attributes:
+        what: which figure it is the extreme of.
+        value, unit: how much it was.
+        at_s: when it began [s].
+        note: what else is known of it.
+    """
+
+    what: str
+    value: float
+    unit: str
+    at_s: float
+    note: str = ""
+
+
+def spans_of(entered: Sequence[tuple[float, str, str]], end_s: float) -> tuple[Span, ...]:
+    """Return how long states lasted that were entered at some times, for some reasons."""
+    spans: list[Span] = []
+    for at_s, state, reason in entered:
+        # Parts begin with the state in force.
+        if spans and spans[-1].name == state:
+            continue
+        if spans:
+            spans[-1] = Span(spans[-1].name, spans[-1].begin_s, at_s, spans[-1].reason)
+        spans.append(Span(state, at_s, end_s, reason))
+    return tuple(spans)
+
+
+def under_way(states: Sequence[Span]) -> tuple[Span, ...]:
+    """Return the times from a mission's first plan to its end; pauses and troubles count."""
+    runs = [list(run) for rests, run in groupby(states, lambda s: s.name in AT_REST) if not rests]
+    return tuple(Span("under way", run[0].begin_s, run[-1].end_s) for run in runs)
+
+
+def longest_stand(
+    at_s: NDArray[np.float64],
+    trail: NDArray[np.float64],
+    during: Span,
+    states: Sequence[Span] = (),
+) -> Moment | None:
+    """Return the longest time the robot neither drove nor turned.
+
+    Args:
+        at_s: float64 (n,), when each pose came [s].
+        trail: float64 (n, 3), x [m], y [m], yaw [rad].
+        during: the time to look at.
+        states: what the mission did meanwhile.
+    """
+    chosen = (at_s >= during.begin_s) & (at_s <= during.end_s)
+    times, poses = at_s[chosen].tolist(), trail[chosen].tolist()
+    if not times:
+        return None
+    best, anchor = (0.0, times[0], poses[0]), 0
+    for index, (x, y, yaw) in enumerate(poses):
+        x0, y0, yaw0 = poses[anchor]
+        turned = abs(math.remainder(yaw - yaw0, math.tau))
+        if math.hypot(x - x0, y - y0) > STILL_M or turned > STILL_RAD:
+            anchor = index
+        best = max(best, (times[index] - times[anchor], times[anchor], poses[anchor]))
+    seconds, since, (x, y, _) = best
+    until = since + seconds
+    meanwhile = [s.name for s in states if since < s.end_s and s.begin_s < until]
+    note = f"at ({x:.2f}, {y:.2f}) m: {', '.join(dict.fromkeys(meanwhile))}".rstrip(": ")
+    return Moment("longest stand", seconds, "s", since, note)
+
+
+def longest_gap(what: str, at_s: Sequence[float], during: Span) -> Moment | None:
+    """Return the longest time between two of some samples, the span's ends included."""
+    inside = [at for at in at_s if during.begin_s <= at <= during.end_s]
+    ends = [during.begin_s, *inside, during.end_s]
+    gaps = [(after - before, before) for before, after in pairwise(ends)]
+    seconds, since = max(gaps)
+    return Moment(what, seconds, "s", since)
+
+
+def largest_drop(fractions: NDArray[np.float64], map_s: Sequence[float]) -> Moment | None:
+    """Return by how much a new map made the covered share of what was known smaller, at most.
+
+    Args:
+        fractions: float64 (n, 2), when [s], and the covered share as the daemon told it.
+        map_s: when maps and updates came [s].
+    """
+    drops = list(_drops(fractions, np.array(sorted(map_s))))
+    return max(drops, key=lambda drop: drop.value, default=None)
+
+
+def _drops(fractions: NDArray[np.float64], map_s: NDArray[np.float64]) -> Iterator[Moment]:
+    for (since, before), (until, after) in pairwise(fractions.tolist()):
+        maps = np.searchsorted(map_s, (since, until), side="right")
+        if after < before and maps[1] > maps[0]:
+            points = 100 * (before - after)
+            note = f"from {100 * before:.1f} % to {100 * after:.1f} % of what was known"
+            yield Moment("largest drop of coverage after a map", points, "%", until, note)

@@ -1,0 +1,206 @@
+"""A review as a page: one file, no script, nothing from the net; light and dark."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+from fasaco_edge.bench.chart import COLOURS, Panel
+from fasaco_edge.review.charts import coverage_panel, replan_panel, state_panel
+from fasaco_edge.review.document import document, troubles
+from fasaco_edge.review.picture import draw_map
+from fasaco_edge.review.review import Review
+from fasaco_edge.review.rows import amount, card_rows, clock, compared_rows, ending, figure_rows
+from fasaco_edge.review.style import STYLE
+from fasaco_edge.review.svg import svg_of
+
+MAP_ROOM = (1000, 700)
+KINDS = {True: "good", False: "bad", None: "open"}
+INTRODUCTION = (
+    "A robot was to pass over every place it can reach, on a map that grows while it drives. "
+    "The ground is divided into square cells as wide as its tool; a cell is covered when the "
+    "tool has passed over its centre. Whenever the map shows something new, the way is planned "
+    "anew: a replan."
+)
+GLOSSARY = {
+    "covered again": "cells that were passed over more than once",
+    "out of reach": "cells where the robot would fit, but that it cannot come to",
+    "steps": "moves from one cell to the next",
+    "revisits": "visits of cells beyond the first of each",
+    "replan": "a plan made anew; its time is that of planning alone",
+    "map: cells more, fewer": "a new map showed more or less ground to cover than the one before",
+    "better further on": "spare time was used to find a better rest of the way",
+    "p99": "of a hundred replans, 99 were not slower",
+    "degraded": "poses or maps had stopped, or a pose jumped; the robot went on",
+    "blocked": "the robot could not go on",
+    "refused": "messages that were broken or made no sense; each is ignored",
+}
+
+
+def page_of(review: Review, other: Review | None = None) -> str:
+    """Return an HTML document about a review, or about two side by side."""
+    reviews = [review] if other is None else [review, other]
+    told = [document(each) for each in reviews]
+    title = " against ".join(document["recording"] for document in told)
+    kind = "Review of a recorded mission" if other is None else "Two recorded missions compared"
+    body = [
+        f"<header><p class=kind>{kind}</p><h1>{escape(title)}</h1>",
+        *(_verdict(document, index, len(told)) for index, document in enumerate(told)),
+        f"<p class=lead>{INTRODUCTION}</p></header>",
+        *(_tiles(told[0]) if other is None else ()),
+        _maps(reviews, told),
+        _section("Over time", *_charts(reviews, told)),
+        _section("Figures", *_figures(told)),
+        _section("Replans", _reasons(told)),
+        *(
+            _stories(each, document, len(told))
+            for each, document in zip(reviews, told, strict=True)
+        ),
+        _section("What the words mean", _table(("", ""), GLOSSARY.items(), "plain")),
+        "<footer>Written by <code>fasaco-edge review</code>. "
+        "All times count from the beginning of the recording.</footer>",
+    ]
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n'
+        f"<title>{escape(title)}</title>\n<style>{STYLE}</style></head>\n"
+        f"<body><main>{''.join(body)}</main></body></html>\n"
+    )
+
+
+def _verdict(told: Mapping[str, Any], index: int, of: int) -> str:
+    kind, text = KINDS[told["complete"]], ending(told)
+    who = f"{_mark(index)}{escape(told['recording'])}: " if of > 1 else ""
+    return f"<p class='verdict {kind}'>{who}{text}</p>"
+
+
+def _mark(index: int) -> str:
+    """Return a dot in the colour of a run's curves."""
+    red, green, blue = COLOURS[index]
+    return f"<i class=dot style='background:rgb({red},{green},{blue})'></i>"
+
+
+def _tiles(told: Mapping[str, Any]) -> list[str]:
+    covered, coverable = told["covered_cells"], told["coverable_cells"]
+    share = f"{100 * covered / coverable:.1f} %" if covered is not None and coverable else "-"
+    tiles = [
+        (share, "of the reachable cells covered"),
+        (clock(told["duration_s"]), "recorded"),
+        (amount(told["driven_m"], "m"), "driven"),
+        (amount(told["revisits"], ""), "revisits"),
+        (amount(told["replan_ms_p50"], "ms"), "a replan, median"),
+        (amount(told["replan_ms_max"], "ms"), "the slowest replan"),
+        (amount(told["faults"], ""), "messages refused"),
+    ]
+    cells = "".join(f"<div><b>{escape(v)}</b><span>{escape(n)}</span></div>" for v, n in tiles)
+    return [f"<div class=tiles>{cells}</div>"]
+
+
+def _maps(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> str:
+    figures = []
+    for review, its_figures in zip(reviews, told, strict=True):
+        picture = draw_map(review, MAP_ROOM)
+        card = _table(("", ""), card_rows(its_figures), "plain")
+        if picture is None:
+            figures.append(f"<figure><p>no map was recorded</p>{card}</figure>")
+            continue
+        buffer = io.BytesIO()
+        picture.save(buffer, "PNG", optimize=True)
+        content = base64.b64encode(buffer.getvalue()).decode()
+        text = "map, covered cells and the way of the robot"
+        image = f'<img alt="{text}" src="data:image/png;base64,{content}">'
+        figures.append(f"<figure>{image}{card}</figure>")
+    kind = "maps two" if len(figures) > 1 else "maps"
+    return _section("The map in the end", f"<div class='{kind}'>{''.join(figures)}</div>")
+
+
+def _charts(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> list[str]:
+    labels = [document["recording"] for document in told]
+    key = ""
+    if len(reviews) > 1:
+        marks = (f"{_mark(index)}{escape(label)}" for index, label in enumerate(labels))
+        key = f"<p class=key>{' &nbsp; '.join(marks)}</p>"
+    charts = [
+        _chart(coverage_panel(reviews, labels), 300),
+        _chart(replan_panel(reviews, labels), 260),
+    ]
+    for review, label in zip(reviews, labels, strict=True):
+        panel = state_panel(review)
+        name = f" ({label})" if len(reviews) > 1 else ""
+        charts.append(_chart(panel, 66 + 30 * len(panel.y.ticks), name))
+    return [key, f"<div class=charts>{''.join(charts)}</div>"]
+
+
+def _chart(panel: Panel, height: int, name: str = "") -> str:
+    caption = f"<p>{escape(panel.caption)}</p>" if panel.caption else ""
+    return (
+        f"<figure class=chart><h3>{escape(panel.title + name)}</h3>{caption}"
+        f"{svg_of(panel, height)}</figure>"
+    )
+
+
+def _figures(told: Sequence[Mapping[str, Any]]) -> list[str]:
+    if len(told) == 1:
+        return [_table(("", ""), figure_rows(told[0]))]
+    names = tuple(document["recording"] for document in told)
+    return [_table(("", *names, "first less second"), compared_rows(told[0], told[1]))]
+
+
+def _reasons(told: Sequence[Mapping[str, Any]]) -> str:
+    counts = [document["replans_by_reason"] for document in told]
+    kinds = dict.fromkeys(kind for count in counts for kind in count)
+    if not kinds:
+        return "<p>There were none.</p>"
+    names = ("replans",) if len(told) == 1 else tuple(d["recording"] for d in told)
+    rows = [(kind, *(str(count.get(kind, 0)) for count in counts)) for kind in kinds]
+    return _table(("why it came", *names), rows)
+
+
+def _stories(review: Review, told: Mapping[str, Any], of: int) -> str:
+    """Return what stands out in one run."""
+    moments = [(m.what, amount(m.value, m.unit), clock(m.at_s), m.note) for m in review.moments]
+    found = [(s.name, clock(s.begin_s), f"{s.seconds:.1f} s", s.reason) for s in troubles(review)]
+    faults = [(code, str(count)) for code, count in told["faults_by_code"].items()]
+    remarks = [
+        *(
+            f"{p['path']}: torn, {p['torn_bytes']} bytes lost"
+            for p in told["files"]
+            if p["torn_bytes"]
+        ),
+        *told["remarks"],
+        *(
+            f"{count} samples of {topic} cannot be read"
+            for topic, count in told["unreadable"].items()
+        ),
+        *(f"not known: {names}: {why}" for names, why in told["not_recorded"].items()),
+    ]
+    parts = [_table(("worst moments", "how much", "at", "what else is known"), moments, "told")]
+    none = "<p>It was never degraded, blocked or silent, and the recorder could always write.</p>"
+    parts.append(_table(("trouble", "at", "for", "why"), found, "told") if found else none)
+    none = "<p>No message was refused.</p>"
+    parts.append(_table(("refused messages", "how many"), faults) if faults else none)
+    if remarks:
+        parts.append(f"<ul>{''.join(f'<li>{escape(remark)}</li>' for remark in remarks)}</ul>")
+    name = f" in {told['recording']}" if of > 1 else ""
+    return _section(f"What stands out{name}", *parts)
+
+
+def _section(title: str, *parts: str) -> str:
+    return f"<section><h2>{escape(title)}</h2>{''.join(parts)}</section>"
+
+
+def _table(names: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "numbers") -> str:
+    """Return a table: of "numbers", "plain" of text, "told" where the last column is text."""
+    head = "".join(f"<th>{escape(name)}</th>" for name in names)
+    lines = "".join(
+        "<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return (
+        f"<div class=wide><table class={kind}>"
+        + (f"<thead><tr>{head}</tr></thead>" if any(names) else "")
+        + f"<tbody>{lines}</tbody></table></div>"
+    )

@@ -1,0 +1,211 @@
+"""What the samples of a recording tell: where the robot was, its map, its paths, its statuses."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival
+from fasaco_edge.errors import FasacoError, MalformedMessage
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.order_document import read_command
+from fasaco_edge.mission.polygons import Polygon
+from fasaco_edge.recording.fields import Json, integer, number, section, text
+from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.schemas import POSE_STAMPED
+from fasaco_edge.wire.status import decode_json
+
+
+@dataclass(frozen=True, slots=True)
+class TakenPath:
+    """A path that was published.
+
+    Attributes:
+        at_s: when, since the recording began [s].
+        revision: counts the paths of a daemon.
+        reason: why it came.
+        steps: from its first cell to its last.
+        planner: what found it; "" where no plan was needed.
+        plan_ms: how long planning took [ms]; None where no plan was needed.
+    """
+
+    at_s: float
+    revision: int
+    reason: str
+    steps: int
+    planner: str
+    plan_ms: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class HeardStatus:
+    """What a review needs of a status.
+
+    Attributes:
+        at_s: when, since the recording began [s].
+        state, reason: of the mission.
+        coverage: its counts; empty where there were none.
+        zones: what of each zone is covered.
+        restored_cells: covered cells taken over from before a restart.
+        faults: what was refused so far, by code.
+        recorder: the recorder's own report, as far as it goes.
+    """
+
+    at_s: float
+    state: str
+    reason: str
+    coverage: Mapping[str, Any]
+    zones: tuple[Mapping[str, Any], ...]
+    restored_cells: int
+    faults: Mapping[str, int]
+    recorder: Mapping[str, Any]
+
+
+@dataclass(slots=True)
+class Story:
+    """All that the samples tell; times are [s] since the recording began.
+
+    Attributes:
+        pose_s, poses: when each pose came, and x [m], y [m], yaw [rad] of it.
+        map_s: when each map and each update came.
+        paths, statuses, commands: in order.
+        grid: the map at the end, with all updates.
+        keep_out: polygons of the last order.
+        config, version, robot: of the daemon, as its last status has them.
+        undecodable: samples that could not be read, by topic.
+        last_s: when the last sample came.
+    """
+
+    pose_s: list[float] = field(default_factory=list)
+    poses: list[tuple[float, float, float]] = field(default_factory=list)
+    map_s: list[float] = field(default_factory=list)
+    paths: list[TakenPath] = field(default_factory=list)
+    statuses: list[HeardStatus] = field(default_factory=list)
+    commands: list[tuple[float, str]] = field(default_factory=list)
+    grid: OccupancyGrid | None = None
+    keep_out: tuple[Polygon, ...] = ()
+    config: Mapping[str, Any] = field(default_factory=dict)
+    version: str = ""
+    robot: str = ""
+    undecodable: Counter[str] = field(default_factory=Counter)
+    last_s: float = 0.0
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """When each pose came [s], float64 (n,)."""
+        return np.array(self.pose_s, np.float64)
+
+    @property
+    def trail(self) -> NDArray[np.float64]:
+        """Where the robot was: x [m], y [m], yaw [rad], float64 (n, 3)."""
+        return np.array(self.poses, np.float64).reshape(-1, 3)
+
+
+def gather(samples: Iterable[Arrival], began_ns: int) -> Story:
+    """Return what ``samples``, in order, tell; one that cannot be read costs itself alone."""
+    listener = _Listener(Story(), began_ns)
+    for arrival in samples:
+        listener.hear(arrival)
+    return listener.story
+
+
+class _Listener:
+    """Writes a story, sample by sample; holds one map at a time."""
+
+    def __init__(self, story: Story, began_ns: int) -> None:
+        self.story = story
+        self._began_ns = began_ns
+        self._now = 0.0
+        self._schema = POSE_STAMPED
+        self._hear: dict[str, Callable[[Arrival], None]] = {
+            "map": self._map,
+            "map_update": self._map_update,
+            "pose": self._pose,
+            "command": self._command,
+            "status": self._status,
+            PATH_DIGEST: self._path,
+        }
+
+    def hear(self, arrival: Arrival) -> None:
+        # A part begins with what was in force before it.
+        self._now = max(1e-9 * (arrival.wall_ns - self._began_ns), 0.0)
+        self.story.last_s = max(self.story.last_s, self._now)
+        hear = self._hear.get(arrival.topic)
+        if hear is None:
+            return
+        try:
+            hear(arrival)
+        except FasacoError:
+            self.story.undecodable[arrival.topic] += 1
+
+    def _map(self, arrival: Arrival) -> None:
+        self.story.grid = decode_occupancy_grid(arrival.sample.payload)
+        self.story.map_s.append(self._now)
+
+    def _map_update(self, arrival: Arrival) -> None:
+        patch = decode_map_update(arrival.sample.payload)
+        if self.story.grid is None:
+            raise MalformedMessage("an update before any map")
+        self.story.grid = self.story.grid.patched(patch)
+        self.story.map_s.append(self._now)
+
+    def _pose(self, arrival: Arrival) -> None:
+        pose = decode_pose(arrival.sample.payload, arrival.sample.schema or self._schema).pose
+        self.story.pose_s.append(self._now)
+        self.story.poses.append((pose.x, pose.y, pose.yaw))
+
+    def _command(self, arrival: Arrival) -> None:
+        name, order = read_command(decode_json(arrival.sample.payload))
+        self.story.commands.append((self._now, name))
+        if name == "start":
+            self.story.keep_out = order.keep_out
+
+    def _status(self, arrival: Arrival) -> None:
+        status, story = decode_json(arrival.sample.payload), self.story
+        story.config = section(status, "config") or story.config
+        story.version = text(status, "version") or story.version
+        story.robot = text(status, "robot") or story.robot
+        self._schema = text(section(story.config, "pose"), "schema") or self._schema
+        zones = section(status, "mission").get("zones")
+        by_code = section(section(status, "errors"), "by_code")
+        story.statuses.append(
+            HeardStatus(
+                at_s=self._now,
+                state=text(status, "state"),
+                reason=text(status, "reason"),
+                coverage=section(status, "coverage"),
+                zones=tuple(zone for zone in zones or () if isinstance(zone, dict)),
+                restored_cells=integer(section(status, "ledger"), "restored_cells") or 0,
+                faults={code: integer(by_code, code) or 0 for code in by_code},
+                recorder=section(status, "recorder"),
+            )
+        )
+
+    def _path(self, arrival: Arrival) -> None:
+        note = _note(arrival)
+        revision = integer(note, "revision") or 0
+        paths = self.story.paths
+        # One that is published again is still the same.
+        if paths and paths[-1].revision == revision:
+            return
+        planner = text(note, "planner")
+        paths.append(
+            TakenPath(
+                at_s=self._now,
+                revision=revision,
+                reason=text(note, "reason"),
+                steps=integer(note, "steps") or 0,
+                planner=planner,
+                plan_ms=number(note, "plan_ms") if planner else None,
+            )
+        )
+
+
+def _note(arrival: Arrival) -> Json:
+    return decode_json(arrival.sample.attachment) if arrival.sample.attachment else {}

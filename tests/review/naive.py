@@ -1,0 +1,48 @@
+"""What a trail comes to, told slowly: sample by sample along it, a millimetre apart."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+STRIDE_M = 0.001
+
+
+def passed_cells(trail, cell_m):
+    """Return the cells (row, col) whose centre came to lie under the tool, and after how far [m].
+
+    The tool is a disc as wide as a cell; a cell is passed anew once the tool has left its centre.
+    """
+    passed, under, way = [], None, 0.0
+    points = [trail[0]]
+    for begin, end in pairwise(trail):
+        count = max(math.ceil(math.dist(begin, end) / STRIDE_M), 1)
+        points += [begin + (end - begin) * (k + 1) / count for k in range(count)]
+    last = points[0]
+    for point in points:
+        way += math.dist(last, point)
+        last = point
+        cell = (math.floor(point[1] / cell_m), math.floor(point[0] / cell_m))
+        centre = ((cell[1] + 0.5) * cell_m, (cell[0] + 0.5) * cell_m)
+        now = cell if math.dist(point, centre) < 0.5 * cell_m - 1e-9 else None
+        if now is not None and now != under:
+            passed.append((now, way))
+        under = now
+    return passed
+
+
+def quarter_turns(cells):
+    """Return how often a walk turns left or right between two steps to a neighbouring cell."""
+    turns = 0
+    for (r0, c0), (r1, c1), (r2, c2) in zip(cells, cells[1:], cells[2:], strict=False):
+        before, after = (r1 - r0, c1 - c0), (r2 - r1, c2 - c1)
+        if abs(before[0]) + abs(before[1]) == abs(after[0]) + abs(after[1]) == 1:
+            turns += abs(before[0] * after[1] - before[1] * after[0])
+    return turns
+
+
+def nearest_rank(values, percent):
+    """Return a percentile that is one of the values."""
+    return float(np.percentile(values, percent, method="inverted_cdf"))

@@ -1,0 +1,104 @@
+"""Figures of small made-up missions, worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fasaco_edge.review.curve import curve
+from fasaco_edge.review.drive import milestones, walk_figures
+from fasaco_edge.review.moments import Span, largest_drop, longest_gap, longest_stand, spans_of
+from fasaco_edge.review.replans import kind_of
+from fasaco_edge.review.rows import clock
+
+ALL = Span("under way", 0.0, 100.0)
+
+
+def test_a_walk_is_counted():
+    cells = np.array([(0, 0), (0, 1), (0, 2), (1, 2), (1, 1), (1, 2), (3, 5), (3, 6)], np.int32)
+    figures = walk_figures(cells)
+    assert (figures.steps, figures.revisits) == (7, 1)
+    # Up, and left; what comes before and after the jump is no turn.
+    assert (figures.turns_90, figures.turns_180) == (2, 1)
+    nothing = walk_figures(cells[:0])
+    assert (nothing.steps, nothing.revisits, nothing.turns_90) == (0, 0, 0)
+    assert walk_figures(cells[:1]).steps == 0
+
+
+def test_milestones_need_whole_cells():
+    first_s = np.array([1.0, 2.0, 3.0, 4.0])
+    assert milestones(first_s, 5) == {50: 3.0, 90: None, 99: None, 100: None}
+    assert milestones(first_s, 4) == {50: 2.0, 90: 4.0, 99: 4.0, 100: 4.0}
+    assert milestones(np.zeros(0), 0) == dict.fromkeys((50, 90, 99, 100))
+
+
+def test_the_longest_stand_neither_drives_nor_turns():
+    at_s = np.arange(12.0)
+    x = np.array([0, 1, 2, 2.01, 2.02, 2.02, 2.02, 3, 4, 4, 4, 4.0])
+    yaw = np.array([0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3.0])
+    trail = np.column_stack((x, np.zeros(12), yaw))
+    stand = longest_stand(at_s, trail, ALL, [Span("paused", 4.0, 5.0)])
+    assert (stand.at_s, stand.value) == (2.0, 4.0)
+    assert stand.note == "at (2.00, 0.00) m: paused"
+    assert longest_stand(at_s, trail, Span("", 50.0, 60.0)) is None
+
+
+def test_gaps_reach_from_end_to_end():
+    assert longest_gap("", [10.0, 30.0, 95.0], ALL).value == 65.0
+    assert longest_gap("", [60.0, 70.0], ALL).at_s == 0.0
+    assert longest_gap("", [], ALL).value == 100.0
+
+
+def test_only_a_map_makes_coverage_drop():
+    fractions = np.array([(0, 0.1), (1, 0.5), (2, 0.3), (3, 0.4), (4, 0.1), (5, 0.1)])
+    drop = largest_drop(fractions, [1.5, 2.5])
+    assert (drop.at_s, drop.value) == (2.0, pytest.approx(20.0))
+    assert largest_drop(fractions, []) is None
+    assert largest_drop(np.zeros((0, 2)), [1.0]) is None
+
+
+def test_states_said_again_go_on():
+    spans = spans_of([(0, "a", "why"), (2, "a", ""), (3, "b", ""), (5, "a", "")], 9.0)
+    assert [(s.name, s.begin_s, s.end_s, s.reason) for s in spans] == [
+        ("a", 0, 3, "why"),
+        ("b", 3, 5, ""),
+        ("a", 5, 9.0, ""),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("reason", "kind"),
+    [
+        ("map: 3 cells more", "map: cells more"),
+        ("map: 1 cell fewer", "map: cells fewer"),
+        ("map: 3 cells more, 1 cell fewer", "map: cells more and fewer"),
+        ("map: passages changed at 4 cells", "map: passages changed"),
+        ("map and pose moved: 3 cells to be covered again", "map and pose moved"),
+        ("path blocked at cell (3, 4)", "path blocked"),
+        ("first plan, 30 cells were covered before", "first plan"),
+        ("the pose jumped 1.20 m", "the pose jumped"),
+        ("better further on", "better further on"),
+        ("", "no reason told"),
+    ],
+)
+def test_reasons_have_kinds(reason, kind):
+    assert kind_of(reason) == kind
+
+
+def test_a_curve_fills_its_picture():
+    lines = curve(np.array([5.0]), np.array([1.0]), 10.0, 4, 2)
+    assert lines == [" ███", " ███"]
+    little = curve(np.array([0.0]), np.array([0.001]), 10.0, 4, 2)
+    assert little == ["    ", "▁▁▁▁"]
+    nearly = curve(np.array([0.0]), np.array([0.999]), 10.0, 4, 2)
+    assert nearly == ["▇▇▇▇", "████"]
+
+
+def test_times_are_told_as_on_a_clock():
+    assert [clock(s) for s in (0, 59.96, 61.5, 3600, 7325.25)] == [
+        "0:00.0",
+        "1:00.0",
+        "1:01.5",
+        "1:00:00.0",
+        "2:02:05.2",
+    ]

@@ -1,0 +1,221 @@
+"""What a review writes: picture, page, files; and what it says where it cannot."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from PIL import Image
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.cli import main
+from fasaco_edge.cli.review_report import print_review
+from fasaco_edge.drawing import palette
+from fasaco_edge.review.document import document
+from fasaco_edge.review.export import export
+from fasaco_edge.review.moments import Span
+from fasaco_edge.review.page import page_of
+from fasaco_edge.review.picture import SIZE, draw_review
+from fasaco_edge.review.reading import read_review
+from fasaco_edge.review.review import CoverageCounts, review_of
+from tests.cli.commands import fasaco_edge
+from tests.review.test_parts import run_told
+
+VOID = ("meta", "img", "line", "circle", "polyline")
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory):
+    return run_told(tmp_path_factory.mktemp("one") / "runs", faults={"<odd>": 2})
+
+
+@pytest.fixture(scope="module")
+def review(parts):
+    return read_review(parts)
+
+
+class Page(HTMLParser):
+    """Text and elements of a page; each that is opened has to be closed."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.open, self.text, self.names, self.links = [], "", [], []
+        self.feed(page)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.names.append(tag)
+        self.links += [value for name, value in attrs if name in ("src", "href")]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.names.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def test_the_page_needs_nothing_else(review):
+    text = page_of(review)
+    page = Page(text)
+    assert "script" not in page.names
+    assert "link" not in page.names
+    (picture,) = page.links
+    assert picture.startswith("data:image/png;base64,")
+    assert "http" not in re.sub(r"data:image/png[^\"]*", "", text)
+    assert "prefers-color-scheme: dark" in text
+    assert page.names.count("svg") == 3
+
+
+def test_the_page_tells_the_figures(review):
+    page, told = Page(page_of(review)), document(review)
+    for text in (told["recording"], "4 of 24 cells", "not complete", "no pose for 3 s", "<odd>"):
+        assert text in page.text
+
+
+def test_the_page_sets_two_side_by_side(review):
+    page = Page(page_of(review, review))
+    assert page.names.count("svg") == 4
+    assert page.names.count("img") == 2
+    assert "first less second" in page.text
+
+
+def test_the_picture_shows_map_and_trail(review):
+    picture = draw_review(review)
+    assert picture.size == SIZE
+    colours = {colour for _, colour in picture.getcolors(maxcolors=1 << 20)}
+    assert {palette.OCCUPIED, palette.COVERED, palette.RECOVERED[0], palette.START} <= colours
+
+
+def test_without_map_and_poses_there_are_still_charts(review):
+    bare = replace(review, lattice=None, drive=None, walk=None, counts=None)
+    assert draw_review(bare).size == SIZE
+    assert "no map was recorded" in page_of(bare)
+    told = document(bare)
+    assert told["steps"] is told["covered_cells"] is None
+    assert len(told["not_recorded"]) >= 2
+
+
+@pytest.mark.parametrize(
+    ("state", "covered", "zones", "complete"),
+    [
+        ("done", 24, (), True),
+        ("done", 23, (), False),
+        ("covering", 24, (), False),
+        ("done", 10, ({"cells": 4, "covered": 4}, {"cells": 2, "covered": 2}), True),
+        ("done", 10, ({"cells": 4, "covered": 4}, {"cells": 2, "covered": 1}), False),
+        ("", 24, (), None),
+    ],
+)
+def test_complete_is_done_and_nothing_left_over(review, state, covered, zones, complete):
+    last = replace(review.story.statuses[-1], zones=zones)
+    told = replace(
+        review,
+        story=replace(review.story, statuses=[last]),
+        # A daemon that is ended after the mission says nothing any more.
+        states=(Span(state, 0, 1), Span("silent", 1, 2)) if state else (),
+        counts=CoverageCounts(covered, 24, 0, 0, "status"),
+    )
+    assert told.complete is complete
+
+
+def test_what_was_covered_before_is_not_guessed_at(review):
+    story = replace(
+        review.story, statuses=[replace(s, restored_cells=7) for s in review.story.statuses]
+    )
+    told = document(review_of(review.record, story, 0))
+    assert told["covered_cells"] is told["reached_s"] is None
+    assert told["steps"] == 5
+    assert "7 cells were covered before" in told["not_recorded"]["reached_s"]
+
+
+def test_a_recorder_in_trouble_is_told(review):
+    states = (Span("recording", 0, 2), Span("disk full", 2, 5, "less than 50 MB are free"))
+    told = document(replace(review, recorder_states=states))
+    assert {
+        "state": "recorder: disk full",
+        "reason": "less than 50 MB are free",
+        "at_s": 2,
+        "seconds": 3,
+    } in told["troubles"]
+
+
+def test_texts_of_a_recording_do_nothing_to_a_terminal(review, capsys):
+    told = document(review) | {"robot": "[/red] \x1b]0;title\x07", "remarks": ["[/]\x1b[2J"]}
+    print_review(review, told)
+    out = capsys.readouterr().out
+    assert "\x1b" not in out
+    assert "[/red]" in out
+    assert "[/]?[2J" in out
+
+
+def test_the_command_writes_them(parts, tmp_path):
+    picture, page, folder = tmp_path / "a.png", tmp_path / "a.html", tmp_path / "files"
+    ended = fasaco_edge(
+        "review", *parts, "--png", picture, "--html", page, "--export", folder, "--json"
+    )
+    assert ended.code == 0, ended.err
+    with Image.open(picture) as image:
+        assert image.size == SIZE
+    assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
+    names = {file.name for file in folder.iterdir()}
+    assert names == {
+        *(f"{name}.csv" for name in ("trail", "paths", "states", "coverage", "plots")),
+        "end.npz",
+    }
+
+
+def test_exported_files_hold_what_was_driven(parts, tmp_path):
+    export(read_review(parts), tmp_path)
+    with (tmp_path / "trail.csv").open(encoding="utf-8") as file:
+        trail = list(csv.DictReader(file))
+    assert [float(row["x_m"]) for row in trail] == [0.45, 0.75, 1.05, 1.35, 1.05, 0.75]
+    with (tmp_path / "paths.csv").open(encoding="utf-8") as file:
+        paths = list(csv.DictReader(file))
+    assert [row["reason"] for row in paths][2] == "path blocked at cell (1, 2)"
+    assert paths[-1]["plan_ms"] == ""
+    with np.load(tmp_path / "end.npz") as arrays:
+        assert arrays["map"].shape == (36, 48)
+        row0, col0 = arrays["lattice_corner"]
+        visits = arrays["visits"]
+        assert visits[1 - row0, 1 - col0 : 5 - col0].tolist() == [1, 2, 2, 1]
+        assert visits.sum() == 6
+        assert arrays["reachable"].sum() == 24
+
+
+@pytest.mark.parametrize("option", ["--png", "--html"])
+def test_a_full_disk_is_named(parts, option, capsys):
+    assert main(["review", *map(str, parts), option, "/dev/full"]) == 78
+    assert "cannot write /dev/full: No space left on device" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("option", "name"), [("--png", "none/a.png"), ("--html", "none/a.html")])
+def test_a_missing_folder_is_named_first(parts, tmp_path, option, name, capsys):
+    assert main(["review", *map(str, parts), option, str(tmp_path / name)]) == 78
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert "there is no folder" in told.err
+
+
+def test_a_viewer_without_a_screen_is_named(parts, monkeypatch, capfd):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    assert main(["review", *map(str, parts), "--view"]) == 1
+    told = capfd.readouterr().err
+    assert "gRPC connections on 127.0.0.1" in told
+    assert "it needs a screen" in told
+
+
+def test_a_file_is_no_folder_to_export_to(parts, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert main(["review", *map(str, parts), "--export", str(tmp_path / "file")]) == 78
+    assert "cannot write" in capsys.readouterr().err

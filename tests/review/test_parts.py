@@ -1,0 +1,218 @@
+"""Recordings in several parts, of several runs, or without what a review needs."""
+
+from __future__ import annotations
+
+import shutil
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.cli import main
+from fasaco_edge.errors import DifferentRuns, UnreadableRecording
+from fasaco_edge.review.document import document, side_by_side
+from fasaco_edge.review.faults import NOT_TOLD
+from fasaco_edge.review.reading import read_review
+from fasaco_edge.wire import schemas
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.paths import encode_path
+from fasaco_edge.wire.status import encode_json
+from tests.daemon.rooms import map_bytes, pose_bytes, room
+from tests.recording.recorders import bus_on_free_port, recorder_process
+
+CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "mission": {"lost_pose_s": 3.0}}
+# Three cells to the right and back, in the lowest row of the room.
+WAY = [0.45, 0.75, 1.05, 1.35, 1.05, 0.75]
+Y = 0.45
+PATHS = (
+    ("fasaco", 50.0, "first plan"),
+    ("fasaco", 4.0, "map: 1 cell more"),
+    ("fasaco", 8.0, "path blocked at cell (1, 2)"),
+    (None, 0.0, "stopped"),
+)
+
+
+def run_told(folder, *, faults, silent=0, killed=False):
+    """Record a run of known figures, in parts as small as can be; return its files."""
+    folder.mkdir()
+    keys = Keys()
+    with bus_on_free_port() as (bus, endpoint):
+        topics = {
+            "map": bus.publisher(keys.map, schemas.OCCUPANCY_GRID, latched=True),
+            "pose": bus.publisher(keys.pose, schemas.POSE_STAMPED),
+            "path": bus.publisher(keys.path, schemas.PATH, latched=True),
+            "status": bus.publisher(keys.status, latched=True),
+        }
+        with recorder_process(bus, endpoint, folder, part_bytes=1) as recorder:
+            sent = 0
+
+            def put(topic, payload, note=None):
+                nonlocal sent
+                sent += 1
+                topics[topic].put(payload, encode_json(note) if note else b"")
+                # Each is to come at a time of its own, and in this order.
+                time.sleep(0.03)
+
+            put("map", map_bytes(room(2.4, 1.8)))
+            put("status", _status("planning", "first plan", {}))
+            for revision, (planner, ms, why) in enumerate(PATHS):
+                note = {"revision": revision + 1, "reason": why, "planner": planner, "plan_ms": ms}
+                put("path", _path(), note)
+            put("status", _status("covering", "path 1", {}))
+            for x in WAY:
+                put("pose", pose_bytes(x, Y))
+            # A part ends with a flush, and these are seconds apart.
+            recorder.wait_until(lambda report: "-part1." not in report["file"])
+            put("status", _status("degraded", "no pose for 3 s", {}))
+            put("status", _status("covering", "path 1", faults))
+            for _ in range(silent):
+                put("status", _status("covering", "path 1", faults | {"late": 1}))
+            recorder.written(sent)
+            if killed:
+                # What came is written once a second.
+                time.sleep(1.5)
+                recorder.process.kill()
+            else:
+                recorder.process.terminate()
+            recorder.process.wait(20)
+    return sorted(folder.glob("*.rrd"))
+
+
+def _status(state, reason, faults):
+    errors = {"total": sum(faults.values()), "last": "one", "by_code": faults}
+    return encode_json(
+        {"robot": "robot", "version": "9", "state": state, "reason": reason, "config": CONFIG}
+        | {"errors": errors, "recorder": {"lost": 2}, "map": {"rows": 1}}
+    )
+
+
+def _path():
+    xy = np.array([(0.45, Y), (0.75, Y)])
+    return encode_path(xy, np.zeros(2), "map", 1)
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory):
+    return run_told(tmp_path_factory.mktemp("one") / "runs", faults={"wrong_frame": 2}, silent=1)
+
+
+@pytest.fixture(scope="module")
+def other(tmp_path_factory):
+    return run_told(tmp_path_factory.mktemp("other") / "runs", faults={})
+
+
+def test_parts_are_one_run(parts):
+    assert len(parts) >= 2
+    told = document(read_review(list(reversed(parts))))
+    assert len(told["files"]) == len(parts)
+    assert (told["steps"], told["revisits"], told["turns_180"]) == (5, 2, 1)
+    assert told["driven_m"] == pytest.approx(1.5)
+    assert (told["covered_cells"], told["recovered_cells"]) == (4, 2)
+    assert told["coverage_from"] == "trail"
+    # The disc of 0.18 m fits where a cell's centre is that far from the walls of 0.05 m.
+    assert told["coverable_cells"] == 6 * 4
+    assert told["reached_s"]["50"] is None
+    assert told["complete"] is False
+
+
+def test_progress_is_told(parts):
+    told = []
+    read_review(parts, lambda *what: told.append(what))
+    assert list(dict.fromkeys(what for what, _, _ in told)) == [
+        "reading",
+        "decoding",
+        "following the robot",
+    ]
+    reading = [(done, total) for what, done, total in told if what == "reading"]
+    assert [done for done, _ in reading] == list(range(1, len(reading) + 1))
+    # Frames that only tell how to show it, many in so small a file, are stepped over.
+    assert len(reading) <= reading[0][1]
+
+
+def test_paths_without_a_plan_are_no_replans(parts):
+    told = document(read_review(parts))
+    assert told["paths"] == 4
+    assert told["first_plan_ms"] == 50.0
+    assert told["replans_by_reason"] == {"map: cells more": 1, "path blocked": 1}
+    assert (told["replan_ms_p50"], told["replan_ms_p99"], told["replan_ms_max"]) == (4.0, 8.0, 8.0)
+
+
+def test_troubles_and_faults_are_told(parts):
+    review = read_review(parts)
+    told = document(review)
+    (trouble,) = told["troubles"]
+    assert (trouble["state"], trouble["reason"]) == ("degraded", "no pose for 3 s")
+    assert told["recorder_lost"] == 2
+    # The last status tells no other state: its counts by code were not recorded.
+    assert told["faults_by_code"] == {"wrong_frame": 2, NOT_TOLD: 1}
+    assert told["faults"] == 3
+
+
+def test_a_part_alone_begins_with_what_was_in_force(parts):
+    review = read_review(parts[-1:])
+    assert all(span.begin_s >= 0 for span in review.states)
+    assert review.lattice is not None
+    told = document(review)
+    assert told["robot"] == "robot"
+    assert told["samples_missing"] == 0
+
+
+def test_of_a_killed_recorder_all_is_told(tmp_path, parts):
+    files = run_told(tmp_path / "runs", faults={"wrong_frame": 2}, silent=1, killed=True)
+    content = [file.read_bytes() for file in files]
+    told, whole = document(read_review(files)), document(read_review(parts))
+    assert [file.read_bytes() for file in files] == content
+    assert told["files"][-1]["ended"] is False
+    for name in ("steps", "revisits", "covered_cells", "replans_by_reason", "paths", "state"):
+        assert told[name] == whole[name]
+    assert told["faults_by_code"]["wrong_frame"] == 2
+
+
+def test_parts_of_different_runs_are_refused(parts, other, capsys):
+    with pytest.raises(DifferentRuns, match="parts of different runs"):
+        read_review([parts[0], other[0]])
+    assert main(["review", str(parts[0]), str(other[0])]) == 1
+    assert "--against" in capsys.readouterr().err
+
+
+def test_two_runs_side_by_side(parts, other, capsys):
+    one, two = (document(read_review(files)) for files in (parts, other))
+    both = side_by_side(one, two)
+    assert both["difference"]["faults"] == 3
+    assert both["difference"]["steps"] == 0
+    assert "complete" not in both["difference"]
+    words = ["review", *map(str, parts), "--against", *map(str, other)]
+    assert main(words) == 0
+    table = capsys.readouterr().out
+    assert "messages refused" in table
+    assert "+3" in table
+
+
+def test_what_is_no_recording_is_named(tmp_path, capsys):
+    assert main(["review", str(tmp_path / "none.rrd")]) == 1
+    assert "No such file or directory" in capsys.readouterr().err
+    (tmp_path / "text.rrd").write_text("hello")
+    assert main(["review", str(tmp_path / "text.rrd")]) == 1
+    assert "this is no recording" in capsys.readouterr().err
+
+
+def test_a_recording_without_samples_is_named(tmp_path):
+    import rerun as rr
+
+    stream = rr.RecordingStream("other", recording_id="other")
+    stream.set_sinks(rr.FileSink(str(tmp_path / "other.rrd")))
+    stream.log("a", rr.TextDocument("b"), static=True)
+    stream.disconnect()
+    with pytest.raises(UnreadableRecording, match="holds no samples"):
+        read_review([tmp_path / "other.rrd"])
+
+
+def test_nothing_but_a_header_holds_no_samples(parts, tmp_path):
+    header = tmp_path / "header.rrd"
+    shutil.copy(parts[0], header)
+    with header.open("r+b") as file:
+        file.truncate(40)
+    with pytest.raises(UnreadableRecording, match=r"header\.rrd"):
+        read_review([header])

@@ -1,0 +1,254 @@
+"""Figures of a real mission, against what was heard on the bus and where the robot was in truth."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.bench.checking import check_walk
+from fasaco_edge.review.document import document
+from fasaco_edge.review.drive import walk_figures
+from fasaco_edge.review.reading import read_review
+from fasaco_edge.review.series import covered_share
+from tests.cli.commands import fasaco_edge
+from tests.daemon.recorded import record_mission
+from tests.daemon.rooms import TOOL_M
+from tests.review.naive import nearest_rank, passed_cells, quarter_turns
+
+# Where the kernels have to be compiled first.
+pytestmark = pytest.mark.timeout(300)
+
+BROKEN_POSES = 3
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    return record_mission(tmp_path_factory.mktemp("recording"), broken_poses=BROKEN_POSES)
+
+
+@pytest.fixture(scope="module")
+def review(recording):
+    return read_review(recording.paths)
+
+
+@pytest.fixture(scope="module")
+def told(review):
+    return document(review)
+
+
+@pytest.fixture(scope="module")
+def truth(recording):
+    """The cells that the robot passed over in truth."""
+    return passed_cells(recording.trail, TOOL_M)
+
+
+def test_cells_are_those_of_the_status(told, recording):
+    coverage = recording.status["coverage"]
+    assert told["coverage_from"] == "status"
+    assert told["covered_cells"] == coverage["covered"] > 50
+    assert told["coverable_cells"] == coverage["coverable"]
+    assert told["recovered_cells"] == coverage["recovered"]
+    assert told["unreachable_cells"] == coverage["unreachable"]
+    assert told["complete"] is True
+    assert told["state"] == "done"
+
+
+def test_the_trail_comes_to_the_same_cells(review, recording):
+    coverage, mine = recording.status["coverage"], review.drive.coverage
+    assert (mine.covered, mine.coverable) == (coverage["covered"], coverage["coverable"])
+    assert (mine.recovered, mine.unreachable) == (coverage["recovered"], coverage["unreachable"])
+
+
+def test_the_walk_is_that_of_the_simulated_robot(told, review, truth, recording):
+    cells = [cell for cell, _ in truth]
+    assert [tuple(cell) for cell in review.drive.cells.tolist()] == cells
+    assert told["steps"] == len(cells) - 1
+    assert told["revisits"] == len(cells) - len(set(cells))
+    assert told["turns_90"] == quarter_turns(cells)
+    driven = sum(np.hypot(*(b - a)) for a, b in pairwise(recording.trail))
+    # Poses come four times in a simulated second: corners are cut a little.
+    assert told["driven_m"] == pytest.approx(driven, rel=0.03)
+
+
+def test_the_walk_is_counted_as_the_benchmark_counts(review):
+    lattice, cells = review.lattice, review.drive.cells
+    local = cells - (lattice.window.row0, lattice.window.col0)
+    verdict = check_walk(lattice.steps, lattice.coverable, local, tuple(local[0].tolist()))
+    mine = walk_figures(cells)
+    assert (mine.steps, mine.revisits) == (verdict.steps, verdict.revisits)
+    assert (mine.turns_90, mine.turns_180) == (verdict.turns_90, verdict.turns_180)
+
+
+def test_shares_are_reached_when_they_were(told, review, truth, recording):
+    """By the statuses: one with fewer cells comes before, one with as many not long after."""
+    cells = list(dict.fromkeys(cell for cell, _ in truth))
+    assert len(review.first_s) == len(cells)
+    began = _began(recording, review)
+    for percent in (50, 90, 99, 100):
+        needed = -(-len(cells) * percent // 100)
+        at_s = told["reached_s"][str(percent)]
+        counts = [
+            (at - began, status["coverage"]["covered"])
+            for at, status in recording.statuses
+            if status["coverage"]
+        ]
+        assert all(count < needed for at, count in counts if at < at_s - 0.3)
+        assert all(count >= needed for at, count in counts if at > at_s + 0.3)
+
+
+def test_the_curve_ends_with_all(review):
+    at_s, shares = covered_share(review)
+    assert np.all(np.diff(at_s) >= 0)
+    assert np.all(np.diff(shares) > 0)
+    assert shares[-1] == 1.0
+
+
+def test_replans_are_those_heard(told, recording):
+    notes = {note["revision"]: note for _, note in recording.notes}
+    assert told["paths"] == len(notes) == recording.status["path"]["revision"]
+    planned = [note for _, note in sorted(notes.items()) if note["planner"]]
+    assert told["first_plan_ms"] == pytest.approx(planned[0]["plan_ms"], abs=0.001)
+    took_ms = [note["plan_ms"] for note in planned[1:]]
+    assert told["replans"] == len(took_ms) > 5
+    assert told["replan_ms_p50"] == pytest.approx(nearest_rank(took_ms, 50), abs=0.001)
+    assert told["replan_ms_p99"] == pytest.approx(nearest_rank(took_ms, 99), abs=0.001)
+    assert told["replan_ms_max"] == pytest.approx(max(took_ms), abs=0.001)
+    mine = told["replans_by_reason"]
+    by_map = sum(note["reason"].startswith("map: ") for note in planned[1:])
+    assert sum(count for kind, count in mine.items() if kind.startswith("map: ")) == by_map > 0
+    assert sum(told["replans_by_reason"].values()) == len(took_ms)
+
+
+def test_states_are_those_heard(told, review, recording):
+    names = [name for name, _ in _groups(status["state"] for _, status in recording.statuses)]
+    mine = [span.name for span in review.states]
+    # The recorder may have joined a little later than the robot.
+    assert mine == names[-len(mine) :]
+    assert {"paused", "covering", "done"} <= set(mine)
+    entered = {}
+    for at, status in recording.statuses:
+        entered.setdefault(status["state"], at)
+    began = _began(recording, review)
+    paused = next(span for span in review.states if span.name == "paused")
+    assert paused.begin_s == pytest.approx(entered["paused"] - began, abs=0.3)
+    assert sum(told["states"].values()) <= told["duration_s"] + 0.01
+
+
+def test_faults_are_those_of_the_status(told, recording):
+    assert recording.status["errors"]["by_code"] == {"malformed_message": BROKEN_POSES}
+    assert told["faults_by_code"] == {"malformed_message": BROKEN_POSES}
+    assert told["faults"] == BROKEN_POSES
+    assert told["unreadable"] == {"pose": BROKEN_POSES}
+    assert told["recorder_lost"] == 0
+    assert told["samples_missing"] == 0
+
+
+def test_the_card_says_what_was_run(told, recording):
+    config = recording.status["config"]
+    assert told["robot"] == recording.status["robot"]
+    assert told["version"] == recording.status["version"]
+    assert told["config"]["planner.budget_s"] == config["planner"]["budget_s"] == 0.05
+    assert told["map"]["rows"] == recording.status["map"]["rows"]
+    assert told["not_recorded"] == {}
+
+
+def test_moments_lie_within_the_mission(review):
+    found = {moment.what: moment for moment in review.moments}
+    assert len(found) >= 4
+    for moment in found.values():
+        assert 0 <= moment.at_s <= review.duration_s
+    slowest = max(p.plan_ms for p in review.story.paths[1:] if p.plan_ms is not None)
+    assert found["slowest replan"].value == slowest
+    # Brute force: each moment between two poses at which the robot had something to do.
+    ends = sorted({0.0, *review.story.pose_s, *(at for s in review.states for at in _ends(s))})
+    gaps, last = [], None
+    for before, after in pairwise(ends):
+        busy = any(
+            s.begin_s <= before < s.end_s and s.name in ("planning", "covering", "paused")
+            for s in review.states
+        )
+        last = (before if last is None or before in review.story.pose_s else last) if busy else None
+        gaps.append(after - last if last is not None else 0.0)
+    assert found["longest time without a pose"].value == pytest.approx(max(gaps))
+
+
+def test_the_longest_stand_is_one(review):
+    (stand,) = (moment for moment in review.moments if moment.what == "longest stand")
+    poses = [
+        pose
+        for at, pose in zip(review.story.pose_s, review.story.poses, strict=True)
+        if stand.at_s <= at <= stand.at_s + stand.value
+    ]
+    xy = np.array(poses)[:, :2]
+    assert len(xy) > 1
+    assert np.hypot(*(xy - xy[0]).T).max() <= 0.05
+
+
+@pytest.mark.parametrize("share", [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.99])
+def test_a_torn_file_is_read_as_far_as_it_is_whole(recording, review, tmp_path, share):
+    (whole,) = recording.paths
+    content = whole.read_bytes()
+    torn = tmp_path / "torn.rrd"
+    torn.write_bytes(content[: int(share * len(content))])
+    before = torn.read_bytes()
+    cut = read_review([torn])
+    assert torn.read_bytes() == before
+    told = document(cut)
+    assert told["files"][0]["torn_bytes"] > 0
+    assert told["files"][0]["ended"] is False
+    if cut.drive is None:
+        assert told["steps"] is told["covered_cells"] is None
+        assert told["not_recorded"]
+        return
+    # What is there is the beginning of the same walk.
+    cells = [tuple(cell) for cell in cut.drive.cells.tolist()]
+    assert cells == [tuple(cell) for cell in review.drive.cells[: len(cells)].tolist()]
+    assert told["complete"] is (len(cells) == len(review.drive.cells) and told["state"] == "done")
+    if told["coverage_from"] == "trail":
+        assert told["covered_cells"] == len(set(cells))
+    assert cut.duration_s <= review.duration_s
+
+
+def test_the_command_prints_the_document(recording, told):
+    ended = fasaco_edge("review", *recording.paths, "--json")
+    assert ended.code == 0
+    assert json.loads(ended.out) == told
+
+
+def test_the_command_prints_a_report(recording, told):
+    ended = fasaco_edge("review", *recording.paths)
+    assert ended.code == 0
+    for text in (
+        f"{told['covered_cells']} of {told['coverable_cells']} cells",
+        "Coverage over time",
+        "Why replans came",
+        "slowest replan",
+        "malformed_message",
+        ": complete",
+    ):
+        assert text in ended.out
+
+
+def _began(recording, review):
+    """When the recording began by the clock of the statuses, told by the state it ended with."""
+    done = next(at for at, status in recording.statuses if status["state"] == "done")
+    span = next(span for span in review.states if span.name == "done")
+    return done - span.begin_s
+
+
+def _ends(span):
+    return span.begin_s, span.end_s
+
+
+def _groups(names):
+    groups = []
+    for name in names:
+        if not groups or groups[-1][0] != name:
+            groups.append([name, 0])
+        groups[-1][1] += 1
+    return groups
