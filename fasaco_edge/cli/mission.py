@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.cli import exits
-from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings
+from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings, seconds
+from fasaco_edge.cli.nobody import NobodyAnswersError
 from fasaco_edge.errors import FasacoError
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         command.add_argument("--json", action="store_true", help="print the answer as JSON")
         command.add_argument(
             "--timeout",
-            type=_seconds,
+            type=seconds,
             default=5.0,
             metavar="S",
             help="how long to wait for the answer (default: %(default)s)",
@@ -121,7 +122,8 @@ def run(args: argparse.Namespace) -> int:
     with open_bus(client_settings(args)) as bus:
         replies = bus.get(keys.rpc("mission"), args.timeout, encode_json(asked))
         if not replies:
-            raise _nobody(keys.prefix, bus.alive(f"{args.base}/@v1/*/alive"))
+            alive = bus.alive(f"{args.base}/@v1/*/alive")
+            raise NobodyAnswersError(keys.prefix, {key.split("/")[-2] for key in alive})
     reply, answer = replies[0], decode_json(replies[0].payload)
     if args.json:
         print(replies[0].payload.decode())
@@ -138,21 +140,6 @@ class CommandRefusedError(FasacoError):
     def __init__(self, answer: dict[str, Any]) -> None:
         super().__init__(str(answer.get("message")), hint=str(answer.get("hint", "")))
         self.code = str(answer.get("code"))
-
-
-class NobodyAnswersError(FasacoError):
-    """No daemon of that robot is on the bus."""
-
-    code = "nobody_answers"
-
-
-def _nobody(prefix: str, alive: list[str]) -> NobodyAnswersError:
-    robots = sorted(key.split("/")[-2] for key in alive)
-    there = f"there are {', '.join(robots)}: give one as --robot" if robots else "there is none"
-    return NobodyAnswersError(
-        f"no daemon answers at {prefix}",
-        hint=f"of robots on this bus {there}; `fasaco-edge run` starts a daemon",
-    )
 
 
 def _order(args: argparse.Namespace) -> dict[str, Any]:
@@ -216,14 +203,3 @@ def _polygon(text: str) -> list[list[float]]:
     if len(corners) < 3 or any(len(corner) != 2 for corner in corners):
         raise argparse.ArgumentTypeError(f"must be x,y;x,y;x,y;... in metres, got {text!r}")
     return corners
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = 0.0
-    # A negated comparison, so that NaN is caught too.
-    if not 0 < seconds <= 3600:
-        raise argparse.ArgumentTypeError(f"must be in (0, 3600] s, got {text!r}")
-    return seconds
