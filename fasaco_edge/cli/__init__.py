@@ -21,12 +21,13 @@ from fasaco_edge.cli import (
     run,
     simulate,
     warmup,
+    watch,
 )
 from fasaco_edge.cli.arguments import with_negative_pairs
 from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
-COMMANDS = (demo, plan, run, mission, record, replay, simulate, bench, maps, warmup)
+COMMANDS = (demo, plan, run, mission, watch, record, replay, simulate, bench, maps, warmup)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
