@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import sys
 from typing import TYPE_CHECKING, NoReturn
@@ -68,15 +67,16 @@ def run(args: argparse.Namespace) -> int:
 
     keys, console, known = Keys(args.robot, args.base), out(), Known(args.robot)
     with Feed(client_settings(args), keys) as feed:
-        if args.once:
-            return _once(args, feed, known, console)
         try:
-            if args.json:
+            if args.once:
+                _once(args, feed, known, console)
+            elif args.json:
                 live.watch_as_json(feed, known)
             elif sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in ("dumb", "unknown"):
                 live.watch_on_screen(feed, known, console)
             else:
                 live.watch_in_lines(feed, known)
+            sys.stdout.flush()
             code = exits.OK
         except OSError:
             # The terminal is gone, or the reader of a pipe has seen enough.
@@ -91,12 +91,10 @@ def _leave(code: int) -> NoReturn:
     it was closed (Zenoh 1.10). Where the interpreter ends meanwhile, the C library aborts the
     process with "FATAL: exception not rethrown".
     """
-    with contextlib.suppress(OSError):
-        sys.stdout.flush()
     os._exit(code)
 
 
-def _once(args: argparse.Namespace, feed: Feed, known: Known, console: Console) -> int:
+def _once(args: argparse.Namespace, feed: Feed, known: Known, console: Console) -> None:
     import time
 
     from fasaco_edge.cli.nobody import NobodyAnswersError
@@ -110,9 +108,8 @@ def _once(args: argparse.Namespace, feed: Feed, known: Known, console: Console) 
         raise NobodyAnswersError(f"{args.base}/@v1/{args.robot}", known.robots)
     if args.json:
         print_json(known.document)
-        return exits.OK
+        return
     # The prompt takes a line.
     width, height = console.width, console.height - 1
     for line in Page(console).lines(known, time.time(), width, height):
         print(line.rstrip())
-    return exits.OK

@@ -16,6 +16,8 @@ from fasaco_edge.wire.keys import VERSION, Keys
 QUEUED = {"token": 256, "status": 64, "path": 64, "map_update": 256, "command": 16}
 LATCHED = ("map", "path", "coverage", "status")
 RETRY_S = 0.5
+# So long the end may wait for a host that does not answer.
+END_S = 0.5
 
 
 class Feed:
@@ -34,13 +36,16 @@ class Feed:
         self._bus: Bus | None = None
         self._lock = threading.Lock()
         # A host that does not answer would keep whoever waits for it from everything else.
-        threading.Thread(target=self._join, name="join-bus", daemon=True).start()
+        self._joining = threading.Thread(target=self._join, name="join-bus", daemon=True)
+        self._joining.start()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._ended.set()
+        # An interpreter must not end while a thread comes back from Zenoh: that is an abort.
+        self._joining.join(END_S)
         with self._lock:
             if self._bus is not None:
                 self._bus.close()
@@ -54,7 +59,7 @@ class Feed:
             try:
                 bus = open_bus(self._settings)
             except BusUnavailable as error:
-                self.trouble = str(error)
+                self.trouble = f"{', '.join(self._settings.connect)}: {error}"
                 self._ended.wait(RETRY_S)
                 continue
             with self._lock:

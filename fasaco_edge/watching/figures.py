@@ -71,10 +71,8 @@ def _coverage(coverage: Coverage, bar: Text) -> list[Row]:
 
 
 def _path(path: PathReport, width: int) -> list[Row]:
-    rows: list[Row] = [
-        (f"path {path.revision}", _text(f"{path.remaining_steps} of {path.steps} steps to go")),
-        ("", _text(path.reason)),
-    ]
+    left = f"{path.remaining_steps} of {path.steps} steps to go" if path.steps else "stop"
+    rows: list[Row] = [(f"path {path.revision}", _text(left)), ("", _text(path.reason))]
     if path.planned_steps is not None:
         plan = f"{path.planned_steps} steps"
         if path.lower_bound_steps is not None:
@@ -90,10 +88,11 @@ def _mission(mission: Mission) -> list[Row]:
     rows: list[Row] = [("mission", _text(phrases.stage(*stage)))]
     for zone in mission.zones:
         at, covered = phrases.zone_progress(zone.turn, zone.passes, zone.covered, zone.cells)
-        rows.append(("", _text(f"{zone.name}, pass {at}, {covered}")))
+        told = f"pass {at}, {covered}" if zone.turn else at
+        rows.append((phrases.printable(zone.name), _text(told)))
     more = []
     if mission.keep_out:
-        more.append(f"{mission.keep_out} keep-out zones")
+        more.append(f"keep-out zones: {mission.keep_out}")
     if mission.return_home:
         more.append("returns home")
     if more:
@@ -107,7 +106,7 @@ def _mission(mission: Mission) -> list[Row]:
 def _running(report: Report) -> list[Row]:
     latency, errors = report.latency_ms, report.errors
     told = [
-        f"{name} {milliseconds:.0f} ms"
+        f"{name} {milliseconds:.0f}"
         for name, milliseconds in (
             ("plan", latency.plan),
             ("map to path", latency.map_to_path),
@@ -117,7 +116,7 @@ def _running(report: Report) -> list[Row]:
     ]
     counted = ", ".join(f"{count} {code}" for code, count in errors.by_code.items())
     rows: list[Row] = [
-        ("latency", _text(", ".join(told) or "-")),
+        ("latency", _text(f"{', '.join(told)} ms" if told else "-")),
         ("errors", _text(counted, "red") if errors.total else _text("none")),
         ("ledger", _ledger(report)),
         ("recorder", _recorder(report.recorder)),

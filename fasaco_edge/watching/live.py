@@ -109,7 +109,7 @@ def status_line(known: Known, now: float) -> str:
     """Return how it stands, in a line."""
     report = known.report
     if known.trouble:
-        return f"waiting for the bus: {phrases.printable(known.trouble)}"
+        return f"waiting for the bus at {phrases.printable(known.trouble)}"
     if known.gone_since is not None:
         return "waiting for the daemon to come back"
     if not known.is_here:

@@ -141,7 +141,7 @@ def headline(known: Known, now: float) -> Text:
     line = Text().append(f" {known.robot} ", "bold reverse").append("  ")
     report, silent = known.report, known.silent_s(now)
     if known.trouble:
-        line.append(f"waiting for the bus: {printable(known.trouble)}", "red")
+        line.append(f"waiting for the bus at {printable(known.trouble)}", "red")
     elif known.gone_since is not None:
         gone = age(now - known.gone_since)
         line.append(f"the daemon is gone for {gone}; waiting for it to come back", "bold red")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import fcntl
 import os
 import pty
@@ -28,6 +29,8 @@ class Terminal:
 
     def __init__(self, *words: str, columns: int = 80, lines: int = 24, **env: str) -> None:
         self.written = ""
+        # What is read may end within a character.
+        self._decoder = codecs.getincrementaldecoder("utf-8")()
         self._master, self._slave = pty.openpty()
         self.resize(columns, lines)
         self.mode = self._mode()
@@ -68,7 +71,7 @@ class Terminal:
     def read(self, timeout_s: float = 0.05) -> None:
         """Take in what was written."""
         while select.select([self._master], [], [], timeout_s)[0]:
-            self.written += os.read(self._master, 65536).decode(errors="replace")
+            self.written += self._decoder.decode(os.read(self._master, 65536))
 
     def wait(self, holds: Callable[[str], bool]) -> str:
         """Wait until the screen is such; return it, as it is seen."""

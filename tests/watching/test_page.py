@@ -94,6 +94,35 @@ def test_it_says_how_it_stands():
         assert said in page, page
 
 
+def test_it_says_how_far_an_order_is():
+    known = mid_mission()
+    zones = [
+        {"name": "kitchen", "passes": 2, "pass": 1, "cells": 60, "covered": 15},
+        {"name": "hall", "passes": 1, "pass": 0},
+    ]
+    order = {"ordered": "command", "stage": "covering", "zone": "kitchen", "pass": 1, "passes": 2}
+    more = {"zones": zones, "keep_out": 3, "return_home": True, "unreached": {"cells": 5}}
+    tell(known, "status", status(mission=order | more))
+    page = page_of(known, 120, 40)
+    for said in (
+        "zone kitchen, pass 1 of 2",
+        "kitchen   pass 1 of 2, 25.0 %: 15 of 60 cells",
+        "hall      to come",
+        "keep-out zones: 3, returns home",
+        "5 cells, 0.0 m2",
+    ):
+        assert said in page, page
+
+
+def test_a_path_without_points_is_a_stop():
+    known = mid_mission()
+    path = {"revision": 8, "reason": "paused by command"}
+    tell(known, "status", status(state="paused", reason="paused by command", path=path))
+    page = page_of(known, 120, 40)
+    assert "path 8    stop" in page
+    assert "paused: paused by command" in page
+
+
 def test_a_narrow_terminal_keeps_picture_and_state():
     page = page_of(mid_mission(), 40, 20)
     assert "COVERING" in page
@@ -119,7 +148,7 @@ def test_before_anything_came_it_says_what_it_waits_for():
     assert "waiting for a daemon of that name; on this bus: other" in page
     assert "no map" in page
     known.trouble = "refused"
-    assert "waiting for the bus: refused" in page_of(known)
+    assert "waiting for the bus at refused" in page_of(known)
 
 
 def test_texts_off_the_bus_do_not_control_the_terminal():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import time
 from collections.abc import Iterator
@@ -129,7 +130,7 @@ def test_a_terminal_that_is_closed_ends_it(covering):
 def test_it_outlives_the_daemon(tmp_path):
     endpoint = free_endpoint()
     with Terminal("--connect", endpoint) as terminal:
-        terminal.wait_text("waiting for the bus")
+        terminal.wait_text(f"waiting for the bus at {endpoint}")
         bus = {"listen": [endpoint]}
         with daemon_process(tmp_path, bus=bus) as first, Outsider(endpoint) as outsider:
             begin(outsider)
@@ -145,6 +146,17 @@ def test_it_outlives_the_daemon(tmp_path):
                 outsider.put("map", map_bytes(HALL))
                 outsider.put("pose", pose_bytes(*lanes(1)[0]))
                 terminal.wait_text("COVERING")
+            terminal.type("q")
+            assert terminal.end() == 0
+            assert terminal.is_clean()
+
+
+def test_it_ends_in_order_while_the_daemon_is_away(tmp_path):
+    """What Zenoh's threads still do then must not abort it."""
+    with daemon_process(tmp_path) as daemon, Terminal("--connect", daemon.endpoint) as terminal:
+        terminal.wait_text("WAITING FOR MAP")
+        daemon.stop()
+        terminal.wait_text("the daemon is gone")
         terminal.type("q")
         assert terminal.end() == 0
         assert terminal.is_clean()
@@ -205,6 +217,20 @@ def test_once_is_one_picture(covering):
     assert "\x1b" not in ended.out
     ended = fasaco_edge("watch", "--once", "--json", "--connect", covering.endpoint)
     assert json.loads(ended.out)["state"] == "covering"
+
+
+def test_a_host_that_takes_calls_and_says_nothing_holds_nobody_up():
+    with socket.create_server(("127.0.0.1", 0)) as mute:
+        endpoint = f"tcp/127.0.0.1:{mute.getsockname()[1]}"
+        began = time.monotonic()
+        ended = fasaco_edge("watch", "--once", "--timeout", "1", "--connect", endpoint)
+        assert ended.code == 1
+        assert time.monotonic() - began < 8.0
+        with Terminal("--connect", endpoint) as terminal:
+            terminal.wait_text("waiting for a daemon")
+            terminal.type("q")
+            assert terminal.end() == 0
+            assert terminal.is_clean()
 
 
 def test_once_without_a_daemon_is_an_error(covering):
