@@ -66,7 +66,7 @@ def _coverage(coverage: Coverage, bar: Text) -> list[Row]:
     areas = f"{coverage.covered_m2:.1f} m2, {coverage.to_cover_m2:.1f} m2 to go"
     rows: list[Row] = [("covered", share), ("", bar), ("", _text(areas))]
     if coverage.recovered:
-        rows.append(("twice", _text(f"{coverage.recovered} cells")))
+        rows.append(("twice", _text(_cells(coverage.recovered))))
     return rows
 
 
@@ -98,7 +98,7 @@ def _mission(mission: Mission) -> list[Row]:
     if more:
         rows.append(("", _text(", ".join(more))))
     if mission.unreached.cells:
-        left = f"{mission.unreached.cells} cells, {mission.unreached.m2:.1f} m2"
+        left = f"{_cells(mission.unreached.cells)}, {mission.unreached.m2:.1f} m2"
         rows.append(("unreached", _text(left)))
     return rows
 
@@ -141,6 +141,10 @@ def _recorder(recorder: Recorder | None) -> Text:
     return _text(
         recorder.state if good else f"{recorder.state}: {recorder.reason}", "" if good else "red"
     )
+
+
+def _cells(count: int) -> str:
+    return "1 cell" if count == 1 else f"{count} cells"
 
 
 def _text(told: str, style: str = "") -> Text:
