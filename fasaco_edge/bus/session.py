@@ -222,6 +222,17 @@ class Bus:
         replies = self._session.liveliness().get(key, timeout=timeout_s)
         return [str(reply.ok.key_expr) for reply in replies if reply.ok]
 
+    def watch_tokens(self, key: str, callback: Callable[[str, bool], None]) -> None:
+        """Call ``callback`` with the key of each liveliness token that matches ``key``, on a
+        Zenoh thread: True when it appears or is there already, False when it is gone."""
+
+        def receive(sample: zenoh.Sample) -> None:
+            callback(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+        self._declared.append(
+            self._session.liveliness().declare_subscriber(key, receive, history=True)
+        )
+
     def close(self) -> None:
         """End the session; a process that does not close it may hang at exit."""
         self._declared.clear()

@@ -24,13 +24,15 @@ from fasaco_edge.cli import (
     run,
     simulate,
     warmup,
+    watch,
 )
 from fasaco_edge.cli.arguments import with_negative_pairs
 from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
 COMMANDS = (
-    demo, plan, run, mission, ask, record, review, replay, simulate, bench, maps, warmup, doctor,
+    demo, plan, run, mission, ask, watch, record, review, replay, simulate, bench, maps, warmup,
+    doctor,
 )  # fmt: skip
 
 

@@ -38,6 +38,18 @@ def pair_of_floats(text: str) -> tuple[float, float]:
     return x, y
 
 
+def seconds(text: str) -> float:
+    """Read a time to wait [s]."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    # A negated comparison, so that NaN is caught too.
+    if not 0 < value <= 3600:
+        raise argparse.ArgumentTypeError(f"must be in (0, 3600] s, got {text!r}")
+    return value
+
+
 def with_negative_pairs(words: Sequence[str]) -> list[str]:
     """Return the words of a command line with ``--start -1,2`` as ``--start=-1,2``.
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings
+from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings, seconds
+from fasaco_edge.cli.nobody import NobodyAnswersError
 from fasaco_edge.errors import FasacoError
 
 if TYPE_CHECKING:
@@ -22,18 +23,12 @@ class RefusedError(FasacoError):
         self.code = str(answer.get("code"))
 
 
-class NobodyAnswersError(FasacoError):
-    """No daemon of that robot is on the bus."""
-
-    code = "nobody_answers"
-
-
 def add_question(parser: argparse.ArgumentParser) -> None:
     """Add whom to ask, how long to wait, and how to show the answer."""
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.add_argument(
         "--timeout",
-        type=_seconds,
+        type=seconds,
         default=TIMEOUT_S,
         metavar="S",
         help="how long to wait for the answer (default: %(default)s)",
@@ -58,30 +53,11 @@ def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: byte
     with open_bus(client_settings(args)) as bus:
         replies = bus.get(selector, args.timeout, payload)
         if not replies:
-            raise _nobody(keys.prefix, bus.alive(f"{args.base}/@v1/*/alive"))
+            alive = bus.alive(f"{args.base}/@v1/*/alive")
+            raise NobodyAnswersError(keys.prefix, {key.split("/")[-2] for key in alive})
     reply = replies[0]
     if reply.is_error:
         if args.json:
             print(reply.payload.decode())
         raise RefusedError(decode_json(reply.payload))
     return reply
-
-
-def _nobody(prefix: str, alive: list[str]) -> NobodyAnswersError:
-    robots = sorted(key.split("/")[-2] for key in alive)
-    there = f"there are {', '.join(robots)}: give one as --robot" if robots else "there is none"
-    return NobodyAnswersError(
-        f"no daemon answers at {prefix}",
-        hint=f"of robots on this bus {there}; `fasaco-edge run` starts a daemon",
-    )
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = 0.0
-    # A negated comparison, so that NaN is caught too.
-    if not 0 < seconds <= 3600:
-        raise argparse.ArgumentTypeError(f"must be in (0, 3600] s, got {text!r}")
-    return seconds

@@ -9,6 +9,7 @@ from typing import Any, Self
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from fasaco_edge.cli.terminal import err
+from fasaco_edge.watching import phrases
 
 PLAIN_LINE_EVERY_S = 5.0
 
@@ -56,10 +57,13 @@ class DemoView:
 
 
 def _figures(status: dict[str, Any], coverage: dict[str, Any]) -> str:
-    path, latency = status.get("path") or {}, status["latency_ms"]
-    plan_ms = latency["plan"] or 0.0
-    return (
-        f"{status['state']}: {coverage.get('covered', 0)}/{coverage.get('coverable', 0)} cells, "
-        f"path {path.get('revision', 0)} ({path.get('remaining_steps', 0)} steps to go), "
-        f"{status['plan']['plans']} plans, last {plan_ms:.0f} ms"
+    path = status.get("path") or {}
+    return phrases.figures(
+        status["state"],
+        coverage.get("covered", 0),
+        coverage.get("coverable", 0),
+        path.get("revision", 0),
+        path.get("remaining_steps", 0),
+        status["plan"]["plans"],
+        status["latency_ms"]["plan"] or 0.0,
     )

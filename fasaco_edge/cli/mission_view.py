@@ -8,6 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from fasaco_edge.cli.terminal import figures, out
+from fasaco_edge.watching import phrases
 
 
 def show(report: dict[str, Any]) -> None:
@@ -26,15 +27,12 @@ def _rows(report: dict[str, Any], mission: dict[str, Any]) -> list[tuple[str, st
     rows = [(name, escape(report[name])) for name in ("robot", "state", "reason")]
     if mission["ordered"] is not None:
         began = "begun by itself" if mission["ordered"] == "itself" else "as ordered"
-        rows.append(("mission", f"{_stage(mission)}, {began}"))
+        stage = phrases.stage(*(mission[name] for name in ("stage", "zone", "pass", "passes")))
+        rows.append(("mission", f"{escape(stage)}, {began}"))
     if coverage := report["coverage"]:
-        rows.append(
-            (
-                "covered",
-                f"{100 * coverage['fraction']:.1f} %: {coverage['covered']} of "
-                f"{coverage['coverable']} cells, {coverage['covered_m2']:.1f} m2",
-            )
-        )
+        cells = coverage["covered"], coverage["coverable"]
+        told = phrases.covered(coverage["fraction"], *cells, coverage["covered_m2"])
+        rows.append(("covered", told))
     if mission["keep_out"]:
         rows.append(("keep-out zones", str(mission["keep_out"])))
     if mission["return_home"]:
@@ -43,22 +41,11 @@ def _rows(report: dict[str, Any], mission: dict[str, Any]) -> list[tuple[str, st
     return rows
 
 
-def _stage(mission: dict[str, Any]) -> str:
-    if mission["stage"] != "covering":
-        return str(mission["stage"])
-    zone = f"zone {escape(mission['zone'])}" if mission["zone"] else "everything reachable"
-    return f"{zone}, pass {mission['pass']} of {mission['passes']}"
-
-
 def _zones(zones: list[dict[str, Any]]) -> Table:
     table = Table("zone", "pass", "covered", title="Zones", title_justify="left")
     for zone in zones:
-        share = 100 * zone["covered"] / zone["cells"] if zone["cells"] else 0.0
-        table.add_row(
-            escape(zone["name"]),
-            f"{zone['pass']} of {zone['passes']}" if zone["pass"] else "to come",
-            f"{share:.1f} %: {zone['covered']} of {zone['cells']} cells",
-        )
+        counts = (zone[name] for name in ("pass", "passes", "covered", "cells"))
+        table.add_row(escape(zone["name"]), *phrases.zone_progress(*counts))
     return table
 
 

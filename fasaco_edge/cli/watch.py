@@ -1,0 +1,115 @@
+"""``fasaco-edge watch``: a robot's mission in a terminal, as it goes."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from typing import TYPE_CHECKING, NoReturn
+
+from fasaco_edge.cli import exits
+from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings, seconds
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.watching.feed import Feed
+    from fasaco_edge.watching.known import Known
+
+EPILOG = """\
+examples:
+  fasaco-edge watch                                    a daemon on this machine
+  fasaco-edge watch --connect tcp/192.168.1.20:7447 --robot hall2
+  fasaco-edge watch --once                             one picture of how it stands
+  fasaco-edge watch | tee mission.log                  lines, where there is no terminal
+  fasaco-edge watch --json | jq .coverage.fraction
+
+q or Ctrl-C ends it. Row by row the picture is the map, north up: y grows upwards. Where no map is
+published on the native key `map` (under ROS 2, say) the coverage is drawn alone. NO_COLOR=1 and
+TERM=dumb are kept to.
+
+exit codes: 0 ended as asked; 1 --once and nobody answered, or the terminal is gone
+"""
+
+
+def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "watch",
+        parents=[common],
+        help="watch a robot's mission live in this terminal",
+        description="Show map, coverage, the path ahead and the robot, with state, figures and "
+        "what happened lately, as they come over Zenoh; on the robot or on any other machine.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--once", action="store_true", help="print one picture and end")
+    parser.add_argument("--json", action="store_true", help="print each status as a line of JSON")
+    parser.add_argument(
+        "--timeout",
+        type=seconds,
+        default=5.0,
+        metavar="S",
+        help="with --once, how long to wait for the daemon (default: %(default)s)",
+    )
+    add_robot_on_bus(parser)
+    parser.set_defaults(command=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Watch until told to stop."""
+    from fasaco_edge.cli.terminal import out
+    from fasaco_edge.watching import live
+    from fasaco_edge.watching.feed import Feed
+    from fasaco_edge.watching.known import Known
+    from fasaco_edge.wire.keys import Keys
+
+    keys, console, known = Keys(args.robot, args.base), out(), Known(args.robot)
+    with Feed(client_settings(args), keys) as feed:
+        try:
+            if args.once:
+                _once(args, feed, known, console)
+            elif args.json:
+                live.watch_as_json(feed, known)
+            elif sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in ("dumb", "unknown"):
+                live.watch_on_screen(feed, known, console)
+            else:
+                live.watch_in_lines(feed, known)
+            sys.stdout.flush()
+            code = exits.OK
+        except OSError:
+            # The terminal is gone, or the reader of a pipe has seen enough.
+            code = exits.ERROR
+    return _leave(code)
+
+
+def _leave(code: int) -> NoReturn:
+    """End the process here.
+
+    A session that has lost its router leaves threads behind that still let go of callbacks after
+    it was closed (Zenoh 1.10). Where the interpreter ends meanwhile, the C library aborts the
+    process with "FATAL: exception not rethrown".
+    """
+    os._exit(code)
+
+
+def _once(args: argparse.Namespace, feed: Feed, known: Known, console: Console) -> None:
+    import time
+
+    from fasaco_edge.cli.nobody import NobodyAnswersError
+    from fasaco_edge.errors import BusUnavailable
+    from fasaco_edge.watching.live import look_once, print_json
+    from fasaco_edge.watching.page import Page
+
+    if not look_once(feed, known, args.timeout):
+        if known.trouble:
+            raise BusUnavailable(known.trouble)
+        raise NobodyAnswersError(f"{args.base}/@v1/{args.robot}", known.robots)
+    if args.json:
+        print_json(known.document)
+        return
+    # The prompt takes a line.
+    width, height = console.width, console.height - 1
+    for line in Page(console).lines(known, time.time(), width, height):
+        print(line.rstrip())

@@ -1,0 +1,85 @@
+"""From the bus to whoever takes: joins as soon as it can, and stays."""
+
+from __future__ import annotations
+
+import threading
+from functools import partial
+from typing import Self
+
+from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.errors import BusUnavailable
+from fasaco_edge.watching.known import Token
+from fasaco_edge.wire.keys import VERSION, Keys
+
+# Each counts: states and revisions are noted, updates lie on each other.
+QUEUED = {"token": 256, "status": 64, "path": 64, "map_update": 256, "command": 16}
+LATCHED = ("map", "path", "coverage", "status")
+RETRY_S = 0.5
+# So long the end may wait for a host that does not answer.
+END_S = 0.5
+
+
+class Feed:
+    """What is said of one robot, and which robots there are; end it on every way out.
+
+    Attributes:
+        trouble: why the bus cannot be joined yet; "" once it is.
+    """
+
+    def __init__(self, settings: BusSettings, keys: Keys) -> None:
+        self.trouble = ""
+        self._settings = settings
+        self._keys = keys
+        self._mailbox: Mailbox[object] = Mailbox(QUEUED)
+        self._ended = threading.Event()
+        self._bus: Bus | None = None
+        self._lock = threading.Lock()
+        # A host that does not answer would keep whoever waits for it from everything else.
+        self._joining = threading.Thread(target=self._join, name="join-bus", daemon=True)
+        self._joining.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        # An interpreter must not end while a thread comes back from Zenoh: that is an abort.
+        self._joining.join(END_S)
+        with self._lock:
+            if self._bus is not None:
+                self._bus.close()
+
+    def take(self, timeout_s: float) -> list[tuple[str, object]]:
+        """Return what came, as (topic, Sample or Token); wait up to ``timeout_s`` [s] for it."""
+        return self._mailbox.take(timeout_s)
+
+    def _join(self) -> None:
+        while not self._ended.is_set():
+            try:
+                bus = open_bus(self._settings)
+            except BusUnavailable as error:
+                self.trouble = f"{', '.join(self._settings.connect)}: {error}"
+                self._ended.wait(RETRY_S)
+                continue
+            with self._lock:
+                if self._ended.is_set():
+                    bus.close()
+                    return
+                self._bus = bus
+                self._listen(bus)
+                self.trouble = ""
+            return
+
+    def _listen(self, bus: Bus) -> None:
+        prefix = f"{self._keys.base}/{VERSION}"
+        bus.watch_tokens(f"{prefix}/*/alive", self._note_token)
+        for topic in ("map", "map_update", "pose", "path", "coverage", "status", "command"):
+            key = f"{self._keys.prefix}/{topic}"
+            bus.subscribe(key, partial(self._post, topic), latched=topic in LATCHED)
+
+    def _note_token(self, key: str, here: bool) -> None:
+        self._mailbox.post("token", Token(key.split("/")[-2], here))
+
+    def _post(self, topic: str, sample: Sample) -> None:
+        self._mailbox.post(topic, sample)

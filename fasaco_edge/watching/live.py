@@ -1,0 +1,159 @@
+"""The loop of a live view: take, draw, wait; and the same in plain lines."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from rich.console import Console
+
+from fasaco_edge.bus.session import Sample
+from fasaco_edge.watching import phrases
+from fasaco_edge.watching.feed import Feed
+from fasaco_edge.watching.known import Known
+from fasaco_edge.watching.page import Page
+from fasaco_edge.watching.screen import Screen
+from fasaco_edge.wire.status import decode_json, encode_json
+
+# At most ten pages a second, and only where something changed or the clock did [s].
+FRAME_S = 0.1
+LINE_EVERY_S = 1.0
+# Of what comes with the status, so much is waited for where there is none of it [s].
+REST_S = 1.0
+
+
+class Told:
+    """Whether SIGINT, SIGTERM or SIGHUP asked for the end."""
+
+    def __init__(self) -> None:
+        self.to_end = False
+
+    def __call__(self, _number: int, _frame: FrameType | None) -> None:
+        self.to_end = True
+
+
+def take(feed: Feed, known: Known, timeout_s: float) -> list[tuple[str, object]]:
+    """Take in what came; wait up to ``timeout_s`` [s] for it. Return it as well."""
+    items = feed.take(timeout_s)
+    now = time.time()
+    for topic, item in items:
+        known.take(topic, item, now)
+    known.trouble = feed.trouble
+    return items
+
+
+def watch_on_screen(feed: Feed, known: Known, console: Console) -> None:
+    """Show the mission until somebody types q, or a signal asks for the end.
+
+    Raises:
+        OSError: the terminal is gone.
+    """
+    page, shown_at = Page(console), (0, (0, 0), "")
+    with told_to_end() as told, Screen(sys.stdout) as screen:
+        while not told.to_end:
+            came = take(feed, known, 0.0)
+            key = (int(time.time()), screen.size(), known.trouble)
+            if came or key != shown_at:
+                shown_at, size = key, key[1]
+                screen.show(page.lines(known, time.time(), *size), size)
+            if "q" in screen.keys(FRAME_S).lower():
+                return
+
+
+def watch_in_lines(feed: Feed, known: Known) -> None:
+    """Print what happens, and once a second how it stands, until a signal asks for the end."""
+    # What is there already comes within the first second.
+    told_entries, said, next_line_at = 0, "", time.time() + LINE_EVERY_S
+    with told_to_end() as told:
+        while not told.to_end:
+            take(feed, known, FRAME_S)
+            now = time.time()
+            for entry in known.journal.since(told_entries):
+                _print_line(entry.at_s, entry.text)
+            told_entries = known.journal.count
+            if now >= next_line_at:
+                next_line_at, line = now + LINE_EVERY_S, status_line(known, now)
+                if line != said:
+                    said = line
+                    _print_line(now, line)
+
+
+def watch_as_json(feed: Feed, known: Known) -> None:
+    """Print each status as a line of JSON, until a signal asks for the end."""
+    with told_to_end() as told:
+        while not told.to_end:
+            for topic, item in take(feed, known, FRAME_S):
+                if topic == "status" and isinstance(item, Sample):
+                    print_json(item.payload)
+
+
+def look_once(feed: Feed, known: Known, timeout_s: float) -> bool:
+    """Wait up to ``timeout_s`` [s] until enough is known for a picture; return whether it is."""
+    deadline = time.monotonic() + timeout_s
+    with told_to_end() as told:
+        while known.report is None or not known.is_here:
+            if told.to_end or time.monotonic() > deadline:
+                return False
+            take(feed, known, FRAME_S)
+        deadline = time.monotonic() + REST_S
+        while not (told.to_end or _is_whole(known)) and time.monotonic() < deadline:
+            take(feed, known, FRAME_S)
+    return True
+
+
+def status_line(known: Known, now: float) -> str:
+    """Return how it stands, in a line."""
+    report = known.report
+    if known.trouble:
+        return f"waiting for the bus at {phrases.printable(known.trouble)}"
+    if known.gone_since is not None:
+        return "waiting for the daemon to come back"
+    if not known.is_here:
+        return f"waiting for a daemon of robot {known.robot}"
+    if report is None:
+        return "the daemon has said nothing yet"
+    if known.silent_s(now):
+        return "the daemon is silent"
+    coverage, path = report.coverage, report.path
+    line = phrases.figures(
+        report.state,
+        coverage.covered if coverage else 0,
+        coverage.coverable if coverage else 0,
+        path.revision if path else 0,
+        path.remaining_steps if path else 0,
+        report.plan.plans,
+        report.latency_ms.plan or 0.0,
+    )
+    return f"{phrases.percent(coverage.fraction if coverage else 0.0)}  {line}"
+
+
+def print_json(payload: bytes) -> None:
+    """Print a JSON object as one line, however it came."""
+    print(encode_json(decode_json(payload)).decode(), flush=True)
+
+
+@contextmanager
+def told_to_end() -> Iterator[Told]:
+    """Let SIGINT, SIGTERM and SIGHUP ask for the end instead of being it."""
+    told = Told()
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, told) for number in numbers]
+    try:
+        yield told
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+def _is_whole(known: Known) -> bool:
+    return known.map is not None and known.coverage is not None and known.walk.revision > 0
+
+
+def _print_line(at_s: float, text: str) -> None:
+    clock = time.strftime("%H:%M:%S", time.localtime(at_s))
+    sys.stdout.write(f"{clock}  {text}\n")
+    sys.stdout.flush()

@@ -1,0 +1,55 @@
+"""How things are said, wherever in a terminal they are said."""
+
+from __future__ import annotations
+
+
+def printable(text: str) -> str:
+    """Return a text off the bus without what would control a terminal."""
+    return "".join(mark if mark.isprintable() else "\N{REPLACEMENT CHARACTER}" for mark in text)
+
+
+def covered(fraction: float, covered: int, coverable: int, covered_m2: float) -> str:
+    """Return how much is covered."""
+    return f"{percent(fraction)}: {covered} of {coverable} cells, {covered_m2:.1f} m2"
+
+
+def percent(fraction: float) -> str:
+    """Return a share; never 100.0 % before all is done."""
+    shown = min(100 * fraction, 99.9) if fraction < 1.0 else 100.0
+    return f"{shown:.1f} %"
+
+
+def stage(stage: str | None, zone: str | None, turn: int | None, passes: int | None) -> str:
+    """Return what a mission is at."""
+    if stage is None:
+        return "no order"
+    if stage != "covering":
+        return printable(stage)
+    what = f"zone {printable(zone)}" if zone else "everything reachable"
+    return f"{what}, pass {turn} of {passes}"
+
+
+def zone_progress(turn: int, passes: int, covered: int, cells: int) -> tuple[str, str]:
+    """Return which pass a zone is in, and how far that is."""
+    at = f"{turn} of {passes}" if turn else "to come"
+    return at, f"{percent(covered / cells if cells else 0.0)}: {covered} of {cells} cells"
+
+
+def figures(
+    state: str, covered: int, coverable: int, revision: int, steps: int, plans: int, plan_ms: float
+) -> str:
+    """Return state and progress in a line."""
+    return (
+        f"{printable(state)}: {covered}/{coverable} cells, path {revision} ({steps} steps to go), "
+        f"{plans} plans, last {plan_ms:.0f} ms"
+    )
+
+
+def age(seconds: float) -> str:
+    """Return a time that has gone by."""
+    if seconds < 10.0:
+        return f"{seconds:.1f} s"
+    if seconds < 120.0:
+        return f"{seconds:.0f} s"
+    minutes, hours = seconds / 60, seconds / 3600
+    return f"{minutes:.0f} min" if hours < 2 else f"{hours:.1f} h"
