@@ -41,11 +41,12 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 PERIOD_S = 0.5
-# A recorder needs some seconds to start; nobody is waited for any longer than so many turns,
-# and so many deflated bytes of samples.
-WAITING_TURNS, WAITING_BYTES = 2048, 700_000
-# To deflate more than this would hold the loop up.
-LARGEST_BYTES = 4_000_000
+# A recorder needs some seconds to start; nobody is waited for any longer than so many turns.
+WAITING_TURNS = 2048
+# Samples from before are told as long as there is room, deflated; more would hold the loop up.
+TOLD_BYTES, DEFLATED_BYTES = 8_000_000, 500_000
+# A longer pose is none, and named only; of so many bytes of poses no turn more is waited for.
+POSE_BYTES, POSES_BYTES = 1024, 500_000
 # From when somebody listens, until everything surely comes to them, too.
 MARGIN_S = 0.2
 MAPS = ("map", "map_update")
@@ -83,7 +84,7 @@ class TurnLog:
         self._published_at = float("-inf")
         self._first, self._times = 1, list[float]()
         self._turns: list[Turn] = []
-        self._waiting_bytes = 0
+        self._told_room, self._deflated_room = TOLD_BYTES, DEFLATED_BYTES
         self._poses = SampleEncoder(run=0)
         self._news = DecidedNews()
         self._has_begun = self._kernels_told = False
@@ -119,7 +120,8 @@ class TurnLog:
             )
         self._has_begun = mission is not None
         self._forget_poses([i.sample for _, i in turn.items if isinstance(i, Received)])
-        if turn.now - self._published_at >= PERIOD_S:
+        is_full = self._poses.waiting_bytes > POSES_BYTES
+        if is_full or turn.now - self._published_at >= PERIOD_S:
             self._published_at = turn.now
             self.publish()
 
@@ -128,8 +130,7 @@ class TurnLog:
         if not self._is_open or not self._times:
             return
         if self._heard_at == float("inf"):
-            waiting_bytes = self._waiting_bytes + self._poses.waiting_bytes
-            if len(self._times) > WAITING_TURNS or waiting_bytes > WAITING_BYTES:
+            if len(self._times) > WAITING_TURNS or self._poses.waiting_bytes > POSES_BYTES:
                 self._close()
             return
         if not self._publisher.has_listeners():
@@ -159,17 +160,22 @@ class TurnLog:
 
     def _taken(self, kind: str, item: Received) -> Taken:
         sample = item.sample
-        told = None
-        if kind == POSE:
+        if kind == POSE and len(sample.payload) <= POSE_BYTES:
             self._poses.add(Arrival(kind, sample, 0, 0))
-        elif item.at < self._told_until:
-            if len(sample.payload) > LARGEST_BYTES:
-                self._waiting_bytes = WAITING_BYTES + 1
-            else:
-                told = Told(sample.key, sample.schema, zlib.compress(sample.payload, 1))
-                self._waiting_bytes += len(told.deflated)
-        at = item.at if kind in MAPS else 0.0
-        return Taken(kind, zlib.crc32(sample.payload), at, told)
+            return Taken(kind, 0)
+        told = self._told(sample) if item.at < self._told_until else None
+        return Taken(kind, zlib.crc32(sample.payload), item.at if kind in MAPS else 0.0, told)
+
+    def _told(self, sample: Sample) -> Told | None:
+        """Return the sample itself; None where there is no room for it."""
+        if len(sample.payload) > self._told_room:
+            return None
+        self._told_room -= len(sample.payload)
+        deflated = zlib.compress(sample.payload, 1)
+        if len(deflated) > self._deflated_room:
+            return None
+        self._deflated_room -= len(deflated)
+        return Told(sample.key, sample.schema, deflated)
 
     def _forget_poses(self, newest: Sequence[Sample]) -> None:
         """As long as there is nothing but poses, the newest is all that will count."""

@@ -21,7 +21,7 @@ from fasaco_edge.daemon.keeping import Keeping
 from fasaco_edge.daemon.ledger_codec import decode_ledger
 from fasaco_edge.daemon.replay import ReplayStep
 from fasaco_edge.daemon.replay_parts import NoDisk, SilentBus, load_mission
-from fasaco_edge.daemon.turn_log import POSE
+from fasaco_edge.daemon.turn_log import POSE, POSE_BYTES
 from fasaco_edge.daemon.turn_record import TURNS, TurnRecord, Waiting, told_sample
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.events import (
@@ -99,7 +99,7 @@ class TurnReplay:
         # A batch is played when the next has come: its samples are all there by then.
         batch: TurnBatch | None = None
         for arrival in samples:
-            if arrival.topic == POSE:
+            if arrival.topic == POSE and len(arrival.sample.payload) <= POSE_BYTES:
                 continue  # they are in the log
             if arrival.topic != TURNS:
                 self._waiting.add(arrival)
@@ -178,7 +178,7 @@ class TurnReplay:
     def _find(self, turn: Turn, taken: Taken) -> Sample | None:
         if taken.told is not None:
             return told_sample(taken.told)
-        if taken.topic == POSE and self._poses:
+        if taken.topic == POSE and not taken.checksum and self._poses:
             return self._poses.popleft()
         sample, is_it = self._waiting.find(taken)
         if not is_it:

@@ -41,7 +41,7 @@ class Taken(msgspec.Struct, frozen=True, array_like=True):
 
     Attributes:
         topic: what it is.
-        checksum: CRC-32 of its payload.
+        checksum: CRC-32 of its payload; 0 of poses that are in the batch.
         at: when it came, of maps and their updates [s]; 0 of others, where it decides nothing.
         told: the sample itself; None of poses, and where the recorder heard it, too.
     """
@@ -104,7 +104,7 @@ class Turn(msgspec.Struct, frozen=True, omit_defaults=True):
     """
 
     number: int
-    is_begun: bool
+    is_begun: bool = True
     samples: list[Taken] = []
     patches_lost: int = 0
     commands: list[tuple[int, dict[str, Any]]] = []
