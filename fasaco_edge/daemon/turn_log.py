@@ -47,6 +47,10 @@ WAITING_TURNS = 2048
 TOLD_BYTES, DEFLATED_BYTES = 8_000_000, 500_000
 # A longer pose is none, and named only; of so many bytes of poses no turn more is waited for.
 POSE_BYTES, POSES_BYTES = 1024, 500_000
+# A busy link drops maps, too; larger ones are named only, for to tell them costs the loop time.
+MAP_BYTES = 100_000
+# So many bytes of samples do not wait for the next batch's time.
+FULL_BYTES = 4_000_000
 # From when somebody listens, until everything surely comes to them, too.
 MARGIN_S = 0.2
 MAPS = ("map", "map_update")
@@ -85,7 +89,7 @@ class TurnLog:
         self._first, self._times = 1, list[float]()
         self._turns: list[Turn] = []
         self._told_room, self._deflated_room = TOLD_BYTES, DEFLATED_BYTES
-        self._poses = SampleEncoder(run=0)
+        self._samples = SampleEncoder(run=0)
         self._news = DecidedNews()
         self._has_begun = self._kernels_told = False
 
@@ -120,7 +124,7 @@ class TurnLog:
             )
         self._has_begun = mission is not None
         self._forget_poses([i.sample for _, i in turn.items if isinstance(i, Received)])
-        is_full = self._poses.waiting_bytes > POSES_BYTES
+        is_full = self._samples.waiting_bytes > FULL_BYTES
         if is_full or turn.now - self._published_at >= PERIOD_S:
             self._published_at = turn.now
             self.publish()
@@ -130,7 +134,7 @@ class TurnLog:
         if not self._is_open or not self._times:
             return
         if self._heard_at == float("inf"):
-            if len(self._times) > WAITING_TURNS or self._poses.waiting_bytes > POSES_BYTES:
+            if len(self._times) > WAITING_TURNS or self._samples.waiting_bytes > POSES_BYTES:
                 self._close()
             return
         if not self._publisher.has_listeners():
@@ -141,7 +145,7 @@ class TurnLog:
             times=self._times,
             turns=self._turns,
             beginning=self._beginning() if self._first == 1 else None,
-            poses=self._poses.take(),
+            told=self._samples.take(),
             kernels=self._kernels(),
         )
         self._publisher.put(encode_turns(batch))
@@ -156,13 +160,16 @@ class TurnLog:
         LOG.info("nobody listens to the turn log: it ends")
         self._is_open = False
         self._times, self._turns, self._restored = [], [], None
-        self._poses = SampleEncoder(run=0)
+        self._samples = SampleEncoder(run=0)
 
     def _taken(self, kind: str, item: Received) -> Taken:
         sample = item.sample
         if kind == POSE and len(sample.payload) <= POSE_BYTES:
-            self._poses.add(Arrival(kind, sample, 0, 0))
+            self._samples.add(Arrival(kind, sample, 0, 0))
             return Taken(kind, 0)
+        if kind == "map" and len(sample.payload) <= MAP_BYTES and item.at >= self._told_until:
+            self._samples.add(Arrival(kind, sample, 0, 0))
+            return Taken(kind, 0, item.at)
         told = self._told(sample) if item.at < self._told_until else None
         return Taken(kind, zlib.crc32(sample.payload), item.at if kind in MAPS else 0.0, told)
 
@@ -182,9 +189,9 @@ class TurnLog:
         is_waiting = self._heard_at == float("inf") and not self._has_begun
         if is_waiting and len(self._turns) > 1 and all(map(_is_pose, self._turns)):
             self._times, self._turns = self._times[-1:], [_numbered(self._turns[-1], self._first)]
-            self._poses = SampleEncoder(run=0)
+            self._samples = SampleEncoder(run=0)
             for sample in newest:
-                self._poses.add(Arrival(POSE, sample, 0, 0))
+                self._samples.add(Arrival(POSE, sample, 0, 0))
 
     def _beginning(self) -> Beginning:
         ledger = encode_ledger(self._restored) if self._restored else b""

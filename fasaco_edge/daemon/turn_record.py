@@ -17,6 +17,8 @@ TURNS = "turns"
 KEPT_NS = 60_000_000_000
 # The log is told twice a second: so long after it nothing else should come [ns].
 SILENT_NS = 5_000_000_000
+# Of samples that nobody took so many are kept, of each topic.
+STRANGE = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +83,7 @@ class Waiting:
         self._taken = taken
         self._samples: dict[tuple[str, int], Arrival] = {}
         # Those that no turn took as they are.
-        self._strange: dict[str, deque[Sample]] = defaultdict(deque)
+        self._strange: dict[str, deque[Sample]] = defaultdict(lambda: deque(maxlen=STRANGE))
 
     def add(self, arrival: Arrival) -> None:
         """Keep a sample."""

@@ -6,7 +6,7 @@ where they were stopped then. The first turn that ends otherwise is the end of t
 
 from __future__ import annotations
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -83,7 +83,7 @@ class TurnReplay:
         self._is_begun = False
         self._waiting = Waiting(record.taken)
         self._decoder = SampleDecoder()
-        self._poses = deque[Sample]()
+        self._told: dict[str, deque[Sample]] = defaultdict(deque)
         self._news = DecidedNews()
         self._request: PlanRequest | None = None
         self._began: float | None = None
@@ -114,8 +114,8 @@ class TurnReplay:
 
     def _play(self, batch: TurnBatch) -> Iterator[ReplayStep]:
         told = {turn.number: turn for turn in batch.turns}
-        poses = self._decoder.samples(batch.poses) if batch.poses else []
-        self._poses.extend(numbered.arrival.sample for numbered in poses)
+        for numbered in self._decoder.samples(batch.told) if batch.told else []:
+            self._told[numbered.arrival.topic].append(numbered.arrival.sample)
         for number, now in enumerate(batch.times, batch.first):
             if self.difference is not None or number > self._record.turns:
                 return
@@ -178,8 +178,8 @@ class TurnReplay:
     def _find(self, turn: Turn, taken: Taken) -> Sample | None:
         if taken.told is not None:
             return told_sample(taken.told)
-        if taken.topic == POSE and not taken.checksum and self._poses:
-            return self._poses.popleft()
+        if not taken.checksum and self._told[taken.topic]:
+            return self._told[taken.topic].popleft()
         sample, is_it = self._waiting.find(taken)
         if not is_it:
             recorded = "another one" if sample is not None else "missing in the recording"

@@ -41,9 +41,9 @@ class Taken(msgspec.Struct, frozen=True, array_like=True):
 
     Attributes:
         topic: what it is.
-        checksum: CRC-32 of its payload; 0 of poses that are in the batch.
+        checksum: CRC-32 of its payload; 0 of one that is told in the batch.
         at: when it came, of maps and their updates [s]; 0 of others, where it decides nothing.
-        told: the sample itself; None of poses, and where the recorder heard it, too.
+        told: a sample from before anybody listened; None of others.
     """
 
     topic: str
@@ -120,8 +120,8 @@ class TurnBatch(msgspec.Struct, frozen=True, omit_defaults=True):
         times: when each was, by the daemon's steady clock [s].
         turns: those of them in which something came in or was decided.
         beginning: in the first batch alone.
-        poses: the poses taken in these turns, in order, as ``bus.sample_codec`` has them: a link
-            that is busy may lose a recorder some, and they are small.
+        told: poses and small maps taken in these turns, in order, as ``bus.sample_codec`` has
+            them: a link that is busy may lose a recorder some.
         kernels: names the compiled kernels; in the first batch with a mission alone.
     """
 
@@ -129,7 +129,7 @@ class TurnBatch(msgspec.Struct, frozen=True, omit_defaults=True):
     times: list[float]
     turns: list[Turn]
     beginning: Beginning | None = None
-    poses: bytes = b""
+    told: bytes = b""
     kernels: str = ""
 
 

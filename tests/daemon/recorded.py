@@ -125,8 +125,8 @@ class MappingRobot:
                 due = time.monotonic()
             due += tick_s
             time.sleep(max(due - time.monotonic(), 0.0))
-        # The last path, which tells the robot to stop, is to be recorded too.
-        time.sleep(0.3)
+        # The last path, which tells the robot to stop, is to be recorded too, and its turn.
+        time.sleep(0.8)
 
     def _is_time(self) -> bool:
         """Tell whether the next command is due; a robot that has no path yet is not replanned."""
