@@ -35,7 +35,7 @@ VIEW_QUERIES = (
 COMMANDS = ("@rpc/mission", "@rpc/replan")
 TOKENS = ("alive", "recorder/alive")
 RECORDER = ("recorder", "recorder/alive")
-SAID_BY_ROBOT = (*VIEWS, "command", *VIEW_QUERIES, *COMMANDS)
+SAID_BY_ROBOT = (*VIEWS, "command", "turns", *VIEW_QUERIES, *COMMANDS)
 HEARD_BY_ROBOT = (*MAPS, "pose", *RECORDER)
 EVERYTHING = (*HEARD_BY_ROBOT, *SAID_BY_ROBOT)
 LARGE = (
@@ -78,7 +78,7 @@ ROLES: Mapping[str, Role] = {
     "recorder": Role(
         "hears everything, and says how it is itself",
         speaks=RECORDER,
-        listens=(*HEARD_BY_ROBOT, "command"),
+        listens=(*HEARD_BY_ROBOT, "command", "turns"),
         includes="viewer",
     ),
     # Topics that the configuration names: see ``ros_rights``.

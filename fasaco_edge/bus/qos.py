@@ -59,5 +59,6 @@ QOS: dict[str, Qos] = {
     "command": Qos("interactive_low"),
     "coverage": Qos("data_low", cache=1, heartbeat_s=0.5),
     "recorder": Qos("data", cache=1, heartbeat_s=0.5),
+    "turns": Qos("data_low"),
     "pheromone": Qos("background", "best_effort"),
 }

@@ -14,18 +14,22 @@ if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
     from fasaco_edge.daemon.replay import Replay, ReplayStep
     from fasaco_edge.daemon.replay_run import RecordedRun
+    from fasaco_edge.daemon.turn_replay import TurnReplay
     from fasaco_edge.mission.events import PathUpdate
     from fasaco_edge.recording.samples import RecordedSamples
 
 DESCRIPTION = """\
 Play the samples of a recording to the mission again, through the same code that the
-daemon runs, and tell what it decides. Time is that of the samples and planning is counted
-in work: the same files give the same decisions on any machine, byte for byte.
+daemon runs, and tell what it decides. A recording with a turn log is played turn by turn, and
+each decision compared with the recorded one, bit for bit: the first that is another ends it,
+and the command, with code 1. One without is played approximately: time is that of the samples
+and planning is counted in work. The same files give the same decisions on any machine.
 """
 EPILOG = """\
-The column `then` tells whether the path is cell by cell the one that was recorded. A
-recording does not tell in full which samples the daemon took together, nor the work of
-plans that came to nothing: a path that differs is no error by itself.
+The column `then` tells whether the path is cell by cell the one that was recorded. Without
+turn log a recording does not tell in full which samples the daemon took together, nor the work
+of plans that came to nothing: a path that differs is no error then. With --config or --work the
+replay is of another mission, and approximate, too.
 """
 
 
@@ -65,15 +69,24 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Replay."""
     from fasaco_edge.cli import terminal
+    from fasaco_edge.cli.turn_summary import turn_rows, turn_summary
     from fasaco_edge.daemon.config import load_config
     from fasaco_edge.daemon.replay import Replay
     from fasaco_edge.daemon.replay_run import read_run
+    from fasaco_edge.daemon.turn_record import read_turns
+    from fasaco_edge.daemon.turn_replay import TurnReplay
     from fasaco_edge.recording.samples import RecordedSamples
 
     samples = RecordedSamples(args.recordings)
     recorded = read_run(samples)
     config = load_config(args.config) if args.config else recorded.daemon_config()
-    replay = Replay(config, recorded, args.work)
+    is_as_it_was = args.config is None and args.work is None
+    record = read_turns(samples) if is_as_it_was else None
+    replay: Replay | TurnReplay
+    if record is not None:
+        replay = TurnReplay(config, record)
+    else:
+        replay = Replay(config, recorded, args.work)
     began = time.monotonic()
     steps: list[ReplayStep] = []
     last_s = 0.0
@@ -82,14 +95,17 @@ def run(args: argparse.Namespace) -> int:
         if step.is_news:
             steps.append(step)
     summary = _summary(replay, recorded, samples, steps, last_s)
+    summary |= turn_summary(replay, record)
+    code = 0 if summary["equal"] in (True, None) else 1
     if args.json:
         print(json.dumps({"decisions": [_document(step) for step in steps], "summary": summary}))
-        return 0
+        return code
+    rows = [*_rows(summary), *turn_rows(summary)]
     console = terminal.out()
     console.print(_table(steps))
-    console.print(terminal.figures((name, str(value)) for name, value in _rows(summary)))
+    console.print(terminal.figures((name, str(value)) for name, value in rows))
     terminal.err().print(f"{last_s:.1f} s in {time.monotonic() - began:.1f} s")
-    return 0
+    return code
 
 
 def _count(text: str) -> int:
@@ -125,7 +141,7 @@ def _path(update: PathUpdate) -> dict[str, Any]:
 
 
 def _summary(
-    replay: Replay,
+    replay: Replay | TurnReplay,
     recorded: RecordedRun,
     samples: RecordedSamples,
     steps: Iterable[ReplayStep],
@@ -138,6 +154,7 @@ def _summary(
         fault.code for step in steps for fault in (*step.refused, *step.decision.faults)
     )
     coverage = mission.coverage()
+    is_approximate = not hasattr(replay, "difference")
     return {
         "duration_s": round(last_s, 3),
         "state": str(mission.state),
@@ -150,8 +167,8 @@ def _summary(
         "paths_as_recorded": verdicts[True],
         "faults": dict(sorted(faults.items())),
         "samples_missing": samples.missing,
-        "restored_cells_missing": recorded.restored_cells,
-        "restarts_ignored": recorded.starts,
+        "restored_cells_missing": recorded.restored_cells if is_approximate else 0,
+        "restarts_ignored": recorded.starts if is_approximate else 0,
     }
 
 

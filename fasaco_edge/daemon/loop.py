@@ -18,17 +18,15 @@ from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.daemon.outbox import Outbox
 from fasaco_edge.daemon.status import StatusBoard, plan_figures
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
+from fasaco_edge.daemon.turn_log import TurnLog, TurnNote
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
 from fasaco_edge.mission.assignment import Assignment
 from fasaco_edge.mission.events import (
-    Answer,
-    CommandReceived,
     Decision,
     Event,
     PathUpdate,
     PlanReady,
 )
-from fasaco_edge.mission.order_document import command_document
 from fasaco_edge.wire.coverage import coverage_grid
 
 if TYPE_CHECKING:
@@ -53,6 +51,7 @@ class Loop:
         outbox: Outbox,
         ledger: LedgerWriter,
         recorder: RecorderSupervisor | None,
+        turns: TurnLog,
     ) -> None:
         self._config = config
         self._mailbox = mailbox
@@ -65,6 +64,7 @@ class Loop:
         )
         self._beginning = Beginning(self._keeping, self._load)
         self._recorder = recorder
+        self._turns = turns
         self._status = StatusBoard(config)
         self._mission: Mission | None = None
         self._worker: PlanningWorker | None = None
@@ -83,16 +83,19 @@ class Loop:
         while not stop.is_set():
             items = self._mailbox.take(TICK_S)
             started = time.monotonic()
-            events, faults = self._inbox.decode(items, self._mailbox.take_lost("map_update"))
+            lost = self._mailbox.take_lost("map_update")
+            events, faults = self._inbox.decode(items, lost)
             self._refuse(faults)
             self._note(items)
             commands = self._commands.take(items, started)
             mission = self._mission or self._begin(events)
             if mission is not None:
-                answers = self._turn(mission, [*events, *commands, *_plans(items)], started)
+                decision = self._turn(mission, [*events, *commands, *_plans(items)], started)
             else:
-                answers = self._beginning.obey(commands)
-            self._publish_commands(commands, answers)
+                decision = Decision(answers=tuple(self._beginning.obey(commands)))
+            answers = decision.answers
+            self._turns.note(TurnNote(started, items, lost, commands, decision), mission)
+            self._outbox.commands(commands, answers)
             self._keeping.keep(mission, self._assignment, started)
             self._publish_status(started)
             self._commands.note(answers, started)
@@ -121,8 +124,8 @@ class Loop:
         events[:] = self._beginning.held
         return self._mission
 
-    def _turn(self, mission: Mission, events: list[Event], started: float) -> Sequence[Answer]:
-        """Step the mission and do what it decides; return its answers to commands."""
+    def _turn(self, mission: Mission, events: list[Event], started: float) -> Decision:
+        """Step the mission, do what it decides, and return that."""
         maps = mission.map_revision
         decision = mission.step(events, started)
         if mission.map_revision > maps:
@@ -137,14 +140,15 @@ class Loop:
         except FasacoError as error:
             # What cannot be said in the protocol's limits costs this message alone.
             self._status.faults.count([error])
-        return decision.answers
+        return decision
 
     def announce(self) -> None:
         """Publish a first status, so that who asks gets one from the beginning."""
         self._publish_status(time.monotonic())
 
     def close(self, timeout_s: float) -> None:
-        """Hand over what the ledger holds, and end the planning thread."""
+        """Hand over what turn log and ledger hold, and end the planning thread."""
+        self._turns.publish()
         self._keeping.keep(self._mission, self._assignment, float("inf"))
         if self._worker is not None:
             self._worker.close(timeout_s)
@@ -225,15 +229,6 @@ class Loop:
         mission = self._mission
         frame = mission.grid.frame if mission and mission.grid else "map"
         self._outbox.pheromone(seen, frame)
-
-    def _publish_commands(
-        self, commands: Sequence[CommandReceived], answers: Sequence[Answer]
-    ) -> None:
-        """Tell everybody what was taken: a question is heard by who is asked alone."""
-        refused = {answer.number for answer in answers if answer.error is not None}
-        for asked in commands:
-            if asked.number not in refused:
-                self._outbox.command(command_document(asked.command, asked.order))
 
     def _publish_status(self, now: float) -> None:
         if self._recorder is not None:

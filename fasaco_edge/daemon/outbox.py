@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.answers import LastSamples
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.events import Answer, CommandReceived
+from fasaco_edge.mission.order_document import command_document
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import encode_occupancy_grid
@@ -58,9 +61,12 @@ class Outbox:
         self._last.keep("status", Reply(payload))
         self._status.put(payload)
 
-    def command(self, document: dict[str, Any]) -> None:
-        """Publish a command that the mission has taken."""
-        self._command.put(encode_json(document))
+    def commands(self, commands: Sequence[CommandReceived], answers: Sequence[Answer]) -> None:
+        """Tell everybody what was taken: a question is heard by who is asked alone."""
+        refused = {answer.number for answer in answers if answer.error is not None}
+        for asked in commands:
+            if asked.number not in refused:
+                self._command.put(encode_json(command_document(asked.command, asked.order)))
 
     def coverage(self, grid: OccupancyGrid) -> None:
         """Publish the coverage, a grid on the lattice."""

@@ -14,24 +14,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from fasaco_edge.bus.arrival import Arrival, digest
-from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.bus.session import Bus, Subscription
 from fasaco_edge.daemon.beginning import Beginning
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.inbox import Inbox, Received, make_mailbox
 from fasaco_edge.daemon.keeping import Keeping
-from fasaco_edge.daemon.ledger_writer import LedgerWriter
-from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.daemon.loop import TICK_S
+from fasaco_edge.daemon.replay_parts import NoDisk, SilentBus, load_mission
 from fasaco_edge.daemon.replay_plans import ReplayPlanner
 from fasaco_edge.daemon.replay_run import RecordedRun
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.events import CommandReceived, Decision, Event, PathUpdate
-from fasaco_edge.mission.ledger import LedgerSnapshot
-from fasaco_edge.mission.mission import Mission
 from fasaco_edge.mission.order_document import read_command
-from fasaco_edge.planners.planner import CoveragePlanner
-from fasaco_edge.planners.table import planner_of
 from fasaco_edge.wire.status import decode_json
 
 # How long the mission goes on after the last sample [s]: plans come, patience ends.
@@ -39,7 +32,6 @@ TAIL_S = 3.0
 # Samples this close together are taken in one step: the daemon's loop needs about as long to
 # wake up.
 TOGETHER_NS = 1_000_000
-LOAD_S = 1.0
 COMMAND = "command"
 
 
@@ -91,12 +83,12 @@ class Replay:
     ) -> None:
         self._run = run or RecordedRun()
         self._mailbox = make_mailbox(map_spacing_s=0.0)
-        bus = _SilentBus()
+        bus = SilentBus()
         self._inbox = Inbox(bus, config.keys(), self._mailbox, config.pose.schema)
         self._heard = {*bus.heard, COMMAND}
-        self.mission, loader, planner = _loaded(config, self._mailbox)
+        self.mission, loader, planner = load_mission(config, self._mailbox)
         self.plans = ReplayPlanner(planner, self._run, config.planner.budget_s, work)
-        keeping = Keeping(_NoDisk(), config.robot.tool_width_m, autostart=config.mission.autostart)
+        keeping = Keeping(NoDisk(), config.robot.tool_width_m, autostart=config.mission.autostart)
         self._beginning = Beginning(keeping, lambda: loader)
         self._is_begun = False
         self._commands = 0
@@ -202,44 +194,3 @@ class Replay:
         if recorded is None or mission.lattice is None:
             return None
         return digest(mission.lattice.centres(update.cells).tobytes()) == recorded.digest
-
-
-class _SilentBus(Bus):
-    """A bus on which nothing is said; knows the topics that are listened to."""
-
-    def __init__(self) -> None:
-        self.heard: set[str] = set()
-
-    def subscribe(
-        self, key: str, callback: object, latched: bool = False, history: int = 1
-    ) -> Subscription:
-        """Note the key's topic."""
-        self.heard.add(key.rpartition("/")[2])
-        return Subscription(lambda: None)
-
-
-class _NoDisk(LedgerWriter):
-    """Keeps nothing: a replay leaves no trace, and begins with nothing covered."""
-
-    def __init__(self) -> None:
-        self.restored = None
-
-    def put(self, ledger: LedgerSnapshot) -> None:
-        """Do nothing."""
-
-    def begin_anew(self, fault: FasacoError | None, why: str) -> None:
-        """Do nothing."""
-
-
-def _loaded(
-    config: DaemonConfig, mailbox: Mailbox[object]
-) -> tuple[Mission, Loader, CoveragePlanner]:
-    """Return the mission as the daemon sets it up, what has loaded it, and its planner."""
-    loader = Loader(config, mailbox)
-    while (loaded := loader.poll()) is None:
-        mailbox.take(LOAD_S)
-    mission, worker = loaded
-    worker.close(LOAD_S)
-    planner = config.planner
-    chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
-    return mission, loader, chosen

@@ -8,6 +8,7 @@ import threading
 import time
 from pathlib import Path
 
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.daemon.about import serve_about
 from fasaco_edge.daemon.commands import Commands
@@ -18,6 +19,7 @@ from fasaco_edge.daemon.loop import Loop
 from fasaco_edge.daemon.outbox import Outbox
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
+from fasaco_edge.daemon.turn_log import TurnLog
 
 LOG = logging.getLogger(__name__)
 
@@ -77,7 +79,8 @@ def _serve(
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
     commands = Commands(bus, keys, mailbox)
     serve_about(bus, keys, config)
-    loop = Loop(config, mailbox, inbox, commands, outbox, ledger, recorder)
+    turns = TurnLog(bus.publisher(keys.turns, qos=QOS["turns"]), config, ledger.restored)
+    loop = Loop(config, mailbox, inbox, commands, outbox, ledger, recorder, turns)
     try:
         loop.announce()
         bus.token(keys.alive)

@@ -12,7 +12,7 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.mission.events import PlanReady, PlanRequest
 from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.planners.planner import CoveragePlanner
-from fasaco_edge.planners.stopping import AnyOf, Interrupt, TimeBudget
+from fasaco_edge.planners.stopping import AnyOf, Interrupt, Noted, TimeBudget
 
 # An attempt to make a path better takes so long [s].
 SPARE_S = 0.05
@@ -73,10 +73,11 @@ class PlanningWorker:
         if self._stopping.is_set():
             return
         budget_s = SPARE_S if request.problem.only_better else self._budget_s
-        stop = AnyOf(TimeBudget(budget_s), Interrupt(self._interrupt))
+        stop = Noted(AnyOf(TimeBudget(budget_s), Interrupt(self._interrupt)))
         # Costs some percent of a full plan, and a repair nothing.
         path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))
-        self._post("plan", PlanReady(request.number, path, time.monotonic() - started))
+        seconds = time.monotonic() - started
+        self._post("plan", PlanReady(request.number, path, seconds, tuple(stop.stops)))
 
     def _observe(self, plan: int, snapshot: ColonySnapshot) -> None:
         self._post("snapshot", Observed(plan, snapshot))

@@ -50,11 +50,15 @@ class PoseReceived:
 
 @dataclass(frozen=True, slots=True)
 class PlanReady:
-    """The plan asked for by request ``number`` is there, made in ``seconds``."""
+    """The plan asked for by request ``number`` is there, made in ``seconds``.
+
+    ``stops`` tells where it was stopped, see ``planners.stopping.Noted``.
+    """
 
     number: int
     path: CoveragePath
     seconds: float
+    stops: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from fasaco_edge.planners.planner import StoppingCriterion
@@ -57,6 +58,44 @@ class Interrupt:
     def __call__(self, progress: SearchProgress) -> bool:
         """Tell whether somebody asked."""
         return self.asked.is_set()
+
+
+@dataclass(slots=True)
+class Noted:
+    """Stops when another criterion does, and notes when: ``StopAt`` repeats it exactly.
+
+    The work of the path alone would not: a repair that was stopped and came to little is
+    followed by a search, of which this tells, too.
+
+    Attributes:
+        criterion: the other one.
+        stops: which of the questions were answered by yes, from 1.
+    """
+
+    criterion: StoppingCriterion
+    stops: list[int] = field(default_factory=list)
+    _asked: int = 0
+
+    def __call__(self, progress: SearchProgress) -> bool:
+        """Tell whether the other says so."""
+        self._asked += 1
+        says_so = self.criterion(progress)
+        if says_so:
+            self.stops.append(self._asked)
+        return says_so
+
+
+@dataclass(slots=True)
+class StopAt:
+    """Stop where a search that was ``Noted`` stopped: this repeats its path."""
+
+    stops: Sequence[int]
+    _asked: int = 0
+
+    def __call__(self, progress: SearchProgress) -> bool:
+        """Tell whether this is one of those questions."""
+        self._asked += 1
+        return self._asked in self.stops
 
 
 class AnyOf:

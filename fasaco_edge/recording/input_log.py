@@ -19,8 +19,10 @@ from fasaco_edge.recording.journal import Journal
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.status import decode_json
 
-INPUTS: Final = ("map", "map_update", "pose", "command")
-"""Topics that are logged as they come: all that a mission hears."""
+INPUTS: Final = ("map", "map_update", "pose", "command", "turns")
+"""Topics that are logged as they come: all that a mission hears, and when it took it."""
+# What is in force for no longer than it takes to hear it.
+PASSING: Final = ("pose", "command", "turns")
 PERIOD_NS = 1_000_000_000
 WAITING_BYTES = 4_000_000
 # Updates since the last full map; with more of them a part begins without the map.
@@ -124,7 +126,5 @@ class _InForce:
             self._updates, self._updates_bytes = [], 0
 
     def samples(self) -> list[Numbered]:
-        newest = [
-            numbered for topic, numbered in self._newest.items() if topic not in ("pose", "command")
-        ]
+        newest = [numbered for topic, numbered in self._newest.items() if topic not in PASSING]
         return sorted((*newest, *self._updates), key=lambda numbered: numbered.number)

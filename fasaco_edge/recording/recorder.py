@@ -96,6 +96,7 @@ class Recorder:
             "map_update": self._read_map_update,
             "pose": self._read_pose,
             "command": self._read_command,
+            "turns": lambda _: None,  # for a replay, which reads the inputs
             "path": self._read_path,
             "coverage": self._read_coverage,
             "pheromone": self._read_pheromone,
@@ -119,6 +120,8 @@ class Recorder:
         self._subscribe("coverage", keys.coverage, latched=True)
         self._subscribe("pheromone", keys.pheromone)
         self._subscribe("status", keys.status, latched=True)
+        # Last: once the daemon sees that this is listened to, everything else is, too.
+        self._subscribe("turns", keys.turns)
         self._bus.token(keys.recorder_alive)
 
     def step(self, timeout_s: float) -> None:

@@ -81,6 +81,11 @@ class Keys:
         return f"{self.prefix}/command"
 
     @property
+    def turns(self) -> str:
+        """Out: what each turn of the loop took in and decided."""
+        return f"{self.prefix}/turns"
+
+    @property
     def alive(self) -> str:
         """Liveliness token of the planner."""
         return f"{self.prefix}/alive"

@@ -59,9 +59,16 @@ class Recording:
     trail: np.ndarray
 
 
-def record_mission(folder: Path, *, broken_poses: int = 0) -> Recording:
-    """Record a mission from its first map to its end; some poses may be none."""
-    runs = folder / "runs"
+def is_done(status: dict) -> bool:
+    """Tell whether all is covered."""
+    return status.get("state") == "done"
+
+
+def record_mission(
+    folder: Path, name: str = "runs", ends=is_done, *, broken_poses: int = 0
+) -> Recording:
+    """Record a mission from its first map until a status ends it; some poses may be none."""
+    runs = folder / name
     warm_up()  # so that the daemon need not compile while the robot waits
     with daemon_process(folder, "--record", str(runs), planner={"budget_s": 0.05}) as daemon:
         deadline = time.monotonic() + TIMEOUT_S
@@ -71,7 +78,7 @@ def record_mission(folder: Path, *, broken_poses: int = 0) -> Recording:
         with bus:
             robot = MappingRobot(bus, broken_poses)
             robot.wait(lambda status: (status["recorder"] or {}).get("state") == "recording")
-            robot.drive()
+            robot.drive(ends)
         # With the recorder's last words it may take a while on a busy machine.
         daemon.process.terminate()
         daemon.process.wait(TIMEOUT_S)
@@ -116,12 +123,12 @@ class MappingRobot:
             assert time.monotonic() < deadline, f"never came; the last was {self.status}"
             time.sleep(0.02)
 
-    def drive(self) -> None:
-        """Drive until the daemon says that all is covered."""
+    def drive(self, ends=is_done) -> None:
+        """Drive until the daemon says that all is covered, or what else ends it."""
         deadline = time.monotonic() + TIMEOUT_S
         tick_s = SIMULATION.tick_s / SPEED
         due = time.monotonic()
-        while self.status.get("state") != "done":
+        while not ends(self.status):
             assert time.monotonic() < deadline, f"never done; the last was {self.status}"
             if (sample := self._newest_path.take(0.0)) is not None:
                 self._world.follow(decode_path(sample.payload).xy)
@@ -131,8 +138,8 @@ class MappingRobot:
                 due = time.monotonic()
             due += tick_s
             time.sleep(max(due - time.monotonic(), 0.0))
-        # The last path, which tells the robot to stop, is to be recorded too.
-        time.sleep(0.3)
+        # The last path, which tells the robot to stop, is to be recorded too, and its turn.
+        time.sleep(0.8)
 
     def _is_time(self) -> bool:
         """Tell whether the next command is due; a robot that has no path yet is not replanned."""

@@ -1,0 +1,154 @@
+"""The turn log: what each turn of the daemon's loop took in and decided, as JSON on the bus.
+
+With the samples it names it repeats a mission bit for bit. Numbers are the JSON numbers of
+float64, which come back as they were; bytes are base64.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.wire.status import encode_json
+
+
+class Beginning(msgspec.Struct, frozen=True):
+    """What a daemon began with.
+
+    Attributes:
+        version: its release.
+        config: the configuration in force, without secrets.
+        ledger: the ledger that was restored, as its file holds it; empty for none.
+    """
+
+    version: str
+    config: dict[str, Any]
+    ledger: bytes = b""
+
+
+class Told(msgspec.Struct, frozen=True):
+    """A sample that came before anybody listened: its key, type and deflated payload."""
+
+    key: str
+    schema: str
+    deflated: bytes
+
+
+class Taken(msgspec.Struct, frozen=True, array_like=True):
+    """A sample that was taken.
+
+    Attributes:
+        topic: what it is.
+        checksum: CRC-32 of its payload; 0 of one that is told in the batch.
+        at: when it came, of maps and their updates [s]; 0 of others, where it decides nothing.
+        told: a sample from before anybody listened; None of others.
+    """
+
+    topic: str
+    checksum: int
+    at: float = 0.0
+    told: Told | None = None
+
+
+class PlanTaken(msgspec.Struct, frozen=True, array_like=True):
+    """A plan that came back.
+
+    Attributes:
+        number: of the request.
+        seconds: how long it took.
+        stops: which of the planner's questions whether to stop were answered by yes, from 1.
+            These repeat it: a repair and the search after it may each have been stopped.
+        work: its ants, kicks and proposals.
+        checksum: CRC-32 of its cells, int32 (row, col), little endian.
+    """
+
+    number: int
+    seconds: float
+    stops: list[int]
+    work: tuple[int, int, int]
+    checksum: int
+
+
+class Decided(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What was decided, where anything was or the state has changed.
+
+    Attributes:
+        state, reason: of the mission.
+        asked: number of the plan asked for, and why; None for none.
+        path: revision of the path published, why, and the CRC-32 of its cells; None for none.
+        faults: codes of what was refused.
+        answers: to commands: their number, and "" or the code of what was wrong.
+    """
+
+    state: str
+    reason: str
+    asked: tuple[int, str] | None = None
+    path: tuple[int, str, int] | None = None
+    faults: list[str] = []
+    answers: list[tuple[int, str]] = []
+
+
+class Turn(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A turn in which something came in or was decided.
+
+    Attributes:
+        number: of the turn.
+        is_begun: whether there is a mission; what comes before is held for it.
+        samples: in the order they were taken in.
+        patches_lost: map updates that were lost before them.
+        commands: number and document of each.
+        plan: that came back.
+        decided: what of it all came.
+    """
+
+    number: int
+    is_begun: bool = True
+    samples: list[Taken] = []
+    patches_lost: int = 0
+    commands: list[tuple[int, dict[str, Any]]] = []
+    plan: PlanTaken | None = None
+    decided: Decided | None = None
+
+
+class TurnBatch(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Some turns, one after the other.
+
+    Attributes:
+        first: number of the first one, from 1.
+        times: when each was, by the daemon's steady clock [s].
+        turns: those of them in which something came in or was decided.
+        beginning: in the first batch alone.
+        told: poses and small maps taken in these turns, in order, as ``bus.sample_codec`` has
+            them: a link that is busy may lose a recorder some.
+        kernels: names the compiled kernels; in the first batch with a mission alone.
+    """
+
+    first: int
+    times: list[float]
+    turns: list[Turn]
+    beginning: Beginning | None = None
+    told: bytes = b""
+    kernels: str = ""
+
+
+def encode_turns(batch: TurnBatch) -> bytes:
+    """Return a batch as JSON.
+
+    Raises:
+        MalformedMessage: a number in it is not finite.
+    """
+    return encode_json(batch)
+
+
+def decode_turns(payload: bytes) -> TurnBatch:
+    """Return the batch in JSON.
+
+    Raises:
+        MalformedMessage: it is none.
+    """
+    try:
+        return msgspec.json.decode(payload, type=TurnBatch)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise MalformedMessage(f"turn log: {error}") from error

@@ -1,0 +1,71 @@
+"""A plan that was stopped at any time is repeated by where that was, cell by cell."""
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.near_optimal import NearOptimal, is_poor
+from fasaco_edge.planners.planner import never
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.repair import repaired
+from fasaco_edge.planners.stopping import Noted, StopAt, WorkLimit
+
+
+def poor_problem(seed=0, visits=1000):
+    """Return a problem with a walk that wanders about, many times longer than need be."""
+    draw = np.random.default_rng(seed)
+    free = draw.random((18, 18)) > 0.15
+    free[0, 0] = free[0, 1] = True
+    lattice = CoverageLattice.from_free(free)
+    walk = [(0, 0)]
+    while len(walk) < visits:
+        row, col = walk[-1]
+        around = [(row + 1, col), (row - 1, col), (row, col + 1), (row, col - 1)]
+        row, col = around[draw.integers(4)]
+        if 0 <= row < 18 and 0 <= col < 18 and free[row, col]:
+            walk.append((row, col))
+    return CoverageProblem.of(lattice, (0, 0), before=np.array(walk, np.int32))
+
+
+def stopping_at(*questions):
+    asked = iter(range(1, 1_000_000))
+    return Noted(lambda progress: next(asked) in questions)
+
+
+def test_a_repair_that_was_stopped_and_the_search_after_it_are_repeated():
+    """The work of the path says nothing of the repair: by that alone another path comes."""
+    problem = poor_problem()
+    assert is_poor(repaired(problem, "fasaco", 0, lambda progress: True))
+    stop = stopping_at(1, 3)
+    path = NearOptimal().plan(problem, stop)
+    assert stop.stops == [1, 3]
+    assert path.work.ants > 0
+    again = Noted(StopAt(stop.stops))
+    repeated = NearOptimal().plan(problem, again)
+    assert again.stops == stop.stops
+    assert np.array_equal(repeated.cells, path.cells)
+    assert repeated.work == path.work
+    by_work = NearOptimal().plan(problem, WorkLimit(path.work))
+    assert not np.array_equal(by_work.cells, path.cells)
+
+
+@pytest.mark.parametrize("planner", [NearOptimal(), Fasaco()])
+@pytest.mark.parametrize("question", [1, 2, 5, 17])
+def test_a_search_is_repeated(planner, question):
+    lattice = CoverageLattice.from_free(np.random.default_rng(3).random((20, 20)) > 0.2)
+    start = tuple(np.argwhere(lattice.coverable)[0].tolist())
+    problem = CoverageProblem.of(lattice, start)
+    stop = stopping_at(question)
+    path = planner.plan(problem, stop)
+    repeated = planner.plan(problem, StopAt(stop.stops))
+    assert np.array_equal(repeated.cells, path.cells)
+    assert repeated.work == path.work
+
+
+def test_one_that_was_never_stopped_is_not_stopped():
+    problem = poor_problem()
+    stop = Noted(never)
+    path = NearOptimal().plan(problem, stop)
+    assert stop.stops == []
+    assert np.array_equal(NearOptimal().plan(problem, StopAt(())).cells, path.cells)
