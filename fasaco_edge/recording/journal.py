@@ -17,9 +17,9 @@ from fasaco_edge.recording.part import Flush, Part
 from fasaco_edge.recording.sdk import rr, rrb
 from fasaco_edge.recording.standing import Standing
 
-# What a kill -9 costs of what is drawn. Each entity begins a chunk with each flush, and a
-# chunk takes a kilobyte.
-FLUSH_PERIOD_NS = 4_000_000_000
+# What a kill -9 costs, with what a flush takes. Each entity begins a chunk with each flush, and
+# a chunk takes more than a kilobyte.
+FLUSH_PERIOD_NS = 900_000_000
 # While nothing can be written, how often to look whether it can again.
 RETRY_PERIOD_NS = 1_000_000_000
 # Rerun's own queue has no bound: no more than this may wait in it between two flushes.

@@ -21,7 +21,7 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, Publisher, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, FasacoError
-from fasaco_edge.process_memory import resident_mb
+from fasaco_edge.process_memory import resident_mb, return_soon
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.clock import RunClock
@@ -39,7 +39,7 @@ from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.poses import decode_pose
 from fasaco_edge.wire.status import decode_json, encode_json
 
-TAKE_TIMEOUT_S = 0.1
+TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000
 # The planner speaks once a second.
 SILENCE_NS = 3_500_000_000
@@ -58,6 +58,7 @@ def run_recorder(settings: RecorderSettings, stop: threading.Event | None = None
         BusUnavailable: nothing listens at the endpoints.
         BadConfiguration: the folder cannot be made or written to.
     """
+    return_soon()
     stop = stop or threading.Event()
     repairs = _repaired(settings.out)
     with _stopped_by_signals(stop), open_bus(settings.bus) as bus:
@@ -140,7 +141,7 @@ class Recorder:
             if time.monotonic_ns() < deadline_ns:
                 self._write(arrival)
         self._journal.at(self._clock.now_ns())
-        self._inputs.write()
+        self._inputs.finish()
         self._tell("stopping", "asked to end")
         self._scene.finish()
         return self._journal.close()
