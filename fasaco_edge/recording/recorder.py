@@ -28,6 +28,8 @@ from fasaco_edge.recording.clock import RunClock
 from fasaco_edge.recording.inbox import Inbox
 from fasaco_edge.recording.input_log import InputLog
 from fasaco_edge.recording.journal import Journal, Room
+from fasaco_edge.recording.live import serve_live
+from fasaco_edge.recording.quota import Quota
 from fasaco_edge.recording.repair import repair_folder
 from fasaco_edge.recording.report import RecorderReport
 from fasaco_edge.recording.runcard import RunDescription
@@ -85,9 +87,12 @@ class Recorder:
         began_ns = self._clock.now_ns()
         began = datetime.fromtimestamp(began_ns / 1e9, UTC)
         name = _unused_name(settings.out, f"{began:%Y%m%dT%H%M%SZ}-{settings.robot}")
-        room = Room(settings.part_bytes, settings.least_free_bytes)
+        quota = Quota(settings.robot, settings.quota_bytes)
+        room = Room(settings.part_bytes, settings.least_free_bytes, settings.part_s, quota)
         self._journal = Journal(settings.out, name, room, build_blueprint(None))
         self._journal.at(began_ns)
+        if settings.serve is not None:
+            self._journal.serve(serve_live(name, *settings.serve))
         self._inputs = InputLog(self._journal, began_ns)
         description = RunDescription(settings.robot, f"{began:%Y-%m-%d %H:%M:%S} UTC")
         self._scene = Scene(self._journal, description)
