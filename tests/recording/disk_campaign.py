@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,7 +82,9 @@ def run_episodes(disk: Path, episodes: int) -> Episodes:
         for _ in range(episodes):
             time.sleep(CALM_S)
             room = os.statvfs(disk)
-            ballast.write_bytes(bytes(max(room.f_bavail * room.f_bsize - LEFT_BYTES, 0)))
+            # The recorder may have taken some of it meanwhile: then it is full, too.
+            with suppress(OSError):
+                ballast.write_bytes(bytes(max(room.f_bavail * room.f_bsize - LEFT_BYTES, 0)))
             recorder.wait_until(lambda report: report["state"] == "disk full")
             ballast.unlink()
             again = recorder.wait_until(lambda report: report["state"] == "recording")
