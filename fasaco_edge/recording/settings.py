@@ -26,7 +26,8 @@ class RecorderSettings:
             ones; "" for native.
         pose_schema: message type of poses that come without one, as under ROS 2.
         part_bytes: a part larger than this is followed by the next.
-        part_s: and so is one that is older [s]; 0 for never.
+        part_s: and so is one that is older [s]; 0 for never. What rerun keeps of each part until
+            its footer is written takes a megabyte a minute.
         quota_bytes: the recordings of this robot in ``out`` take at most about so much: the
             oldest parts are deleted, never the one being written; 0 for no limit.
         least_free_bytes: recording pauses while the disk has less room than this.
@@ -46,7 +47,7 @@ class RecorderSettings:
     pose_key: str = ""
     pose_schema: str = POSE_STAMPED
     part_bytes: int = 64 * MEGABYTE
-    part_s: float = 1200.0
+    part_s: float = 900.0
     quota_bytes: int = 0
     least_free_bytes: int = 50 * MEGABYTE
     serve: tuple[str, int] | None = None

@@ -33,6 +33,7 @@ from fasaco_edge.recording.journal import Journal, Room
 from fasaco_edge.recording.report import RecorderReport
 from fasaco_edge.recording.runcard import RunDescription
 from fasaco_edge.recording.scene import Scene
+from fasaco_edge.recording.settings import RecorderSettings
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path, encode_path
 from fasaco_edge.wire.pheromone import decode_pheromone, encode_pheromone
@@ -160,7 +161,9 @@ class Desk:
     """What a recorder does with a sample, at any speed."""
 
     def __init__(self, folder: Path) -> None:
-        self.journal = Journal(folder, "run", Room(64_000_000, 0), build_blueprint(None))
+        usual = RecorderSettings(folder)
+        room = Room(usual.part_bytes, usual.least_free_bytes, usual.part_s)
+        self.journal = Journal(folder, "run", room, build_blueprint(None))
         self.journal.at(BEGAN_NS)
         self._inputs = InputLog(self.journal, BEGAN_NS)
         self._scene = Scene(self.journal, RunDescription("robot", "now"))
