@@ -198,6 +198,8 @@ class Journal:
         """
         if now_ns < self._next_flush_ns and self._unflushed_bytes < FLUSH_BYTES:
             return
+        for broken in self._abandoned:
+            broken.cut()
         if self._part is None:
             self._try_again()
         elif self._is_flushed(self._part):
@@ -207,6 +209,8 @@ class Journal:
 
     def close(self) -> bool:
         """End the part in order; False where the disk holds rerun's writer up."""
+        for broken in self._abandoned:
+            broken.cut()
         if self._part is None:
             return True
         outcome = self._part.flush(CLOSE_TIMEOUT_S)

@@ -98,9 +98,13 @@ class Part:
         if not self._flushed_bytes:
             self.path.unlink(missing_ok=True)
             return
-        if self.path.stat().st_size > self._flushed_bytes:
+        self.cut()
+
+    def cut(self) -> None:
+        """Cut a broken part again: rerun may write to it long after it has given up on it."""
+        if self.path.is_file() and self.path.stat().st_size > self._flushed_bytes:
             os.truncate(self.path, self._flushed_bytes)
-        repair_recording(self.path)
+            repair_recording(self.path)
 
     def _has_writer(self) -> bool:
         """Tell whether rerun still holds the file open: its writer closes it when it dies."""
