@@ -5,17 +5,23 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seconds
 from fasaco_edge.bench.building import building, robot_pose, with_crate
 from fasaco_edge.bench.daemon_process import DaemonProcess, MapSource, warm_kernels
 from fasaco_edge.bench.machine import machine, peak_mb
+from fasaco_edge.bench.recorder_process import recorder_beside
 from fasaco_edge.bench.spread import percentile
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.process_memory import peak_mb as peak_mb_of
 
 GOAL_REST_P99_MS = 20.0
+GOAL_RECORDER_RATIO = 1.05
+# With and without a recorder by turns, so many of each.
+ROUNDS = 4
 # The first paths come with the kernels and the first plan of all.
 WARM_UP_MAPS = 5
 PARTS = (
@@ -34,12 +40,14 @@ class RoundTrip:
         plan_ms: what of it was planning, by the daemon's word [ms].
         steps: steps of the path.
         daemon_peak_mb: the most the daemon was resident with until then [MB].
+        recorded: whether a recorder listened.
     """
 
     total_ms: float
     plan_ms: float
     steps: int
     daemon_peak_mb: float
+    recorded: bool = False
 
     @property
     def rest_ms(self) -> float:
@@ -61,6 +69,12 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="between a path and the next map [s] (default: %(default)g)",
     )
+    parser.add_argument(
+        "--recorder",
+        action="store_true",
+        help=f"as many maps again with a recorder beside the daemon, in {ROUNDS} turns each, and "
+        "compare",
+    )
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[RoundTrip, None, None]:
@@ -68,27 +82,58 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[RoundTrip, None, N
     warm_kernels()
     with DaemonProcess({"planner": {"ants": args.ants}}) as daemon:
         say("first path")
-        source = MapSource(daemon, daemon.join())
+        bus = daemon.join()
+        source = MapSource(daemon, bus)
         source.put_pose(robot_pose(time.time_ns()))
         grid = building()
-        for number in range(WARM_UP_MAPS + args.samples):
-            stamp_ns = time.time_ns()
-            put_at = source.put_map(with_crate(grid, number, stamp_ns))
-            arrival = source.wait_path(stamp_ns)
-            if number >= WARM_UP_MAPS:
-                say("maps")
-                yield RoundTrip(
-                    total_ms=1e3 * (arrival.at - put_at),
-                    plan_ms=arrival.about["plan_ms"],
-                    steps=arrival.about["steps"],
-                    daemon_peak_mb=peak_mb_of(daemon.pid),
-                )
+        for number in range(WARM_UP_MAPS):
+            _round_trip(daemon, source, grid, number)
             time.sleep(args.pause)
+        number = WARM_UP_MAPS
+        for recorded, samples in _turns(args):
+            with recorder_beside(daemon, bus) if recorded else nullcontext():
+                say("maps, recorded" if recorded else "maps")
+                for _ in range(samples):
+                    yield replace(_round_trip(daemon, source, grid, number), recorded=recorded)
+                    time.sleep(args.pause)
+                    number += 1
 
 
-def _report(args: argparse.Namespace, trips: Sequence[RoundTrip]) -> Report:
+def _turns(args: argparse.Namespace) -> list[tuple[bool, int]]:
+    """Return of each turn whether it is recorded, and its number of maps."""
+    if not args.recorder:
+        return [(False, args.samples)]
+    # By turns: what else goes on on the machine then meets both.
+    shares = [args.samples // ROUNDS + (turn < args.samples % ROUNDS) for turn in range(ROUNDS)]
+    return [(recorded, share) for share in shares for recorded in (False, True)]
+
+
+def _round_trip(
+    daemon: DaemonProcess, source: MapSource, grid: OccupancyGrid, number: int
+) -> RoundTrip:
+    stamp_ns = time.time_ns()
+    put_at = source.put_map(with_crate(grid, number, stamp_ns))
+    arrival = source.wait_path(stamp_ns)
+    return RoundTrip(
+        total_ms=1e3 * (arrival.at - put_at),
+        plan_ms=arrival.about["plan_ms"],
+        steps=arrival.about["steps"],
+        daemon_peak_mb=peak_mb_of(daemon.pid),
+    )
+
+
+def _report(args: argparse.Namespace, all_trips: Sequence[RoundTrip]) -> Report:
+    trips = [trip for trip in all_trips if not trip.recorded]
+    beside = _part([trip.total_ms for trip in all_trips if trip.recorded])
     parts = {name: _part([getattr(trip, f"{name}_ms") for trip in trips]) for name, _ in PARTS}
     rows = [(label, *(_ms(value) for value in parts[name].values())) for name, label in PARTS]
+    goals = [Goal("p99 of all but planning", parts["rest"]["p99"], GOAL_REST_P99_MS, "ms")]
+    ratio = None
+    if args.recorder:
+        rows.append(("total beside a recorder", *(_ms(value) for value in beside.values())))
+        alone, slow = parts["total"]["p99"], beside["p99"]
+        ratio = round(slow / alone, 3) if slow is not None and alone else None
+        goals.append(Goal("p99 beside a recorder to p99 alone", ratio, GOAL_RECORDER_RATIO))
     daemon_mb = trips[-1].daemon_peak_mb if trips else None
     of_daemon = f"the daemon {daemon_mb} MB, of " if trips else ""
     return Report(
@@ -100,11 +145,13 @@ def _report(args: argparse.Namespace, trips: Sequence[RoundTrip]) -> Report:
             "ants": args.ants,
             "steps": trips[-1].steps if trips else None,
             **{f"{name}_ms": part for name, part in parts.items()},
+            "recorded_total_ms": beside if args.recorder else None,
+            "recorder_ratio": ratio,
             "daemon_peak_rss_mb": daemon_mb,
             "peak_rss_mb": peak_mb(),
             "machine": machine(),
         },
-        goals=(Goal("p99 of all but planning", parts["rest"]["p99"], GOAL_REST_P99_MS, "ms"),),
+        goals=tuple(goals),
         remarks=(f"peak memory of {of_daemon}this process {peak_mb()} MB",),
     )
 
@@ -127,12 +174,13 @@ LATENCY = Benchmark(
     "path. Time each from its put to the arrival of its path; what the daemon says that planning "
     "took is told apart. The planner has few ants, so that it does not hide the rest.",
     add_options=_add_options,
-    count=lambda args: int(args.samples),
+    count=lambda args: int(args.samples) * (2 if args.recorder else 1),
     measure=_measure,
     report=_report,
     epilog="""\
 examples:
   fasaco-edge bench latency
   fasaco-edge bench latency --samples 1000 --json
+  fasaco-edge bench latency --recorder
 """,
 )

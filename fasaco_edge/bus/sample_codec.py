@@ -108,11 +108,14 @@ class SampleEncoder:
         first = self._waiting[0].number if self._waiting else self._next
         self._again = [numbered for numbered in again if numbered.number < first]
 
-    def take(self) -> bytes:
-        """Return all samples added since the last batch; b"" if there are none."""
-        if not self._waiting:
+    def take(self, *, in_any_case: bool = False) -> bytes:
+        """Return all samples added since the last batch; b"" if there are none.
+
+        ``in_any_case``: then a batch of what was told before, if anything; nothing may follow it.
+        """
+        if not self._waiting and not in_any_case:
             return b""
-        first = self._waiting[0].number
+        first = self._waiting[0].number if self._waiting else self._next
         lanes = [self._lane(samples) for samples in _by_lane(self._again + self._waiting)]
         self._again, self._waiting, self.waiting_bytes = [], [], 0
         body = zlib.compress(msgspec.msgpack.encode(lanes), DEFLATE_LEVEL)

@@ -13,6 +13,8 @@ from fasaco_edge.wire.schemas import POSE_STAMPED
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
 
+DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
+
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
@@ -33,14 +35,65 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         help=f"type of poses that come without one: {', '.join(POSE_SCHEMAS)} "
         "(default: %(default)s)",
     )
+    _add_room(parser)
+    parser.add_argument(
+        "--serve",
+        type=address,
+        nargs="?",
+        const=(DEFAULT_HOST, DEFAULT_PORT),
+        metavar="[HOST:]PORT",
+        help="let viewers watch, too: `rerun rerun+http://HOST:PORT/proxy`; anybody who reaches "
+        f"the port may (default: {DEFAULT_HOST}:{DEFAULT_PORT})",
+    )
     add_robot_on_bus(parser)
     parser.set_defaults(command=run)
+
+
+def address(text: str) -> tuple[str, int]:
+    """Read ``HOST:PORT`` or ``PORT``; an IPv6 host stands in brackets."""
+    host, _, port = text.rpartition(":")
+    if not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
+        raise argparse.ArgumentTypeError(f"must be [HOST:]PORT, got {text!r}")
+    return host.strip("[]") or DEFAULT_HOST, int(port)
+
+
+def _add_room(parser: argparse.ArgumentParser) -> None:
+    room = parser.add_argument_group("room on the disk")
+    room.add_argument(
+        "--part-mb",
+        type=int,
+        default=64,
+        metavar="MB",
+        help="go on in the next file after so many megabytes (default: %(default)s)",
+    )
+    room.add_argument(
+        "--part-min",
+        type=float,
+        default=15.0,
+        metavar="MIN",
+        help="or minutes; 0 for never (default: %(default)g)",
+    )
+    room.add_argument(
+        "--quota-mb",
+        type=int,
+        default=0,
+        metavar="MB",
+        help="of more than this of the robot's recordings in DIR delete the oldest files, never "
+        "the one being written; 0 for no limit (default: %(default)s)",
+    )
+    room.add_argument(
+        "--least-free-mb",
+        type=int,
+        default=50,
+        metavar="MB",
+        help="write nothing while the disk has less room (default: %(default)s)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Record."""
     from fasaco_edge.recording.recorder import run_recorder
-    from fasaco_edge.recording.settings import RecorderSettings
+    from fasaco_edge.recording.settings import MEGABYTE, RecorderSettings
 
     settings = RecorderSettings(
         out=args.out,
@@ -48,5 +101,10 @@ def run(args: argparse.Namespace) -> int:
         base=args.base,
         bus=client_settings(args),
         pose_schema=args.pose_schema,
+        part_bytes=args.part_mb * MEGABYTE,
+        part_s=60.0 * args.part_min,
+        quota_bytes=args.quota_mb * MEGABYTE,
+        least_free_bytes=args.least_free_mb * MEGABYTE,
+        serve=args.serve,
     )
     return run_recorder(settings)

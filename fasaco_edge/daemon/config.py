@@ -14,6 +14,7 @@ from msgspec import Meta
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
 from fasaco_edge.daemon.mission_settings import MissionSettings
 from fasaco_edge.daemon.planner_config import PlannerConfig
+from fasaco_edge.daemon.recording_config import RecordingConfig
 from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.daemon.section import Section
 from fasaco_edge.daemon.security_config import SecurityConfig, check_security
@@ -103,6 +104,7 @@ class DaemonConfig(Section, frozen=True):
     pose: PoseConfig = PoseConfig()
     planner: PlannerConfig = PlannerConfig()
     mission: MissionSettings = MissionSettings()
+    recording: RecordingConfig = RecordingConfig()
     ros2: RosConfig | msgspec.UnsetType = msgspec.UNSET
 
     def keys(self) -> Keys:
@@ -154,6 +156,12 @@ def _check_together(config: DaemonConfig) -> None:
     check_security(bus.security, bus.listen, bus.connect, open_to_everyone=bus.open_to_everyone)
     if bus.security.roles.ros and not config.ros2:
         raise BadConfiguration("bus.security.roles.ros: without a block ros2 there is no such role")
+    part_mb, quota_mb = config.recording.part_mb, config.recording.quota_mb
+    if 0 < quota_mb < 2 * part_mb:
+        raise BadConfiguration(
+            f"recording.quota_mb must be 0 or at least twice recording.part_mb, {2 * part_mb}, "
+            f"got {quota_mb}"
+        )
     if "\0" in config.mission.state_dir:
         raise BadConfiguration("mission.state_dir must be a path, got one with a NUL")
     config.keys()

@@ -111,4 +111,13 @@ def _command(config: DaemonConfig, folder: Path) -> list[str]:
     pose = ["--pose-schema", config.pose.schema]
     program = [sys.executable, "-m", "fasaco_edge", "record"]
     parent = ["--with-parent", str(os.getpid())]
-    return [*program, *parent, "--out", str(folder), *connect, *robot, *pose]
+    return [
+        *program,
+        *parent,
+        "--out",
+        str(folder),
+        *connect,
+        *robot,
+        *pose,
+        *config.recording.words(),
+    ]

@@ -80,6 +80,17 @@ def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D
     return rr.LineStrips3D(strips, colors=[style.colour] * count, radii=[-style.width] * count)
 
 
+def strip_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:
+    """Return points [m] float64 (n, 2) as a line whose looks stand apart: ``style_archetype``."""
+    points = np.column_stack((xy, np.full(len(xy), style.z)))
+    return rr.LineStrips3D.from_fields(strips=[points])
+
+
+def style_archetype(style: LineStyle) -> rr.LineStrips3D:
+    """Return how lines look that say nothing of it themselves."""
+    return rr.LineStrips3D.from_fields(colors=[style.colour], radii=[-style.width])
+
+
 def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a line, points float64 (n, 2), without the points it runs straight through.
 

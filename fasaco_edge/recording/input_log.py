@@ -1,6 +1,6 @@
 """What the mission heard, byte for byte, beside what is drawn of it.
 
-Samples are gathered for a second and written as one blob, past rerun's own batches: a kill
+Samples are gathered for almost a second and written as one blob, past rerun's own batches: a kill
 costs no more. Each part begins with what is in force, told as a whole, so that it can be
 read without the parts before it.
 """
@@ -23,7 +23,7 @@ INPUTS: Final = ("map", "map_update", "pose", "command", "turns")
 """Topics that are logged as they come: all that a mission hears, and when it took it."""
 # What is in force for no longer than it takes to hear it.
 PASSING: Final = ("pose", "command", "turns")
-PERIOD_NS = 1_000_000_000
+PERIOD_NS = 900_000_000
 WAITING_BYTES = 4_000_000
 # Updates since the last full map; with more of them a part begins without the map.
 IN_FORCE_BYTES = 8_000_000
@@ -66,12 +66,20 @@ class InputLog:
             self._next_ns = now_ns + PERIOD_NS
             self.write()
 
+    def finish(self) -> None:
+        """Write what is left; a part begun just before the end gets a batch, too."""
+        part = self._journal.part_number
+        self._write(in_any_case=part > 1 and part != self._part)
+
     def write(self) -> None:
         """Write what has gathered."""
+        self._write(in_any_case=False)
+
+    def _write(self, *, in_any_case: bool) -> None:
         if self._part != self._journal.part_number:
             self._part = self._journal.part_number
             self._encoder.restart(self._in_force.samples())
-        batch = self._encoder.take()
+        batch = self._encoder.take(in_any_case=in_any_case)
         if batch and not self._journal.write_blob(batch):
             # What is not there, nothing can be told by.
             self._part = 0

@@ -8,18 +8,23 @@ id, so that a viewer shows them as one run.
 from __future__ import annotations
 
 import enum
+import logging
 import shutil
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording.part import Flush, Part
+from fasaco_edge.recording.quota import Quota
 from fasaco_edge.recording.sdk import rr, rrb
 from fasaco_edge.recording.standing import Standing
 
-# What a kill -9 costs of what is drawn. Each entity begins a chunk with each flush, and a
-# chunk takes a kilobyte.
-FLUSH_PERIOD_NS = 4_000_000_000
+LOG = logging.getLogger(__name__)
+
+# What a kill -9 costs, with what a flush takes. Each entity begins a chunk with each flush, and
+# a chunk takes more than a kilobyte.
+FLUSH_PERIOD_NS = 900_000_000
 # While nothing can be written, how often to look whether it can again.
 RETRY_PERIOD_NS = 1_000_000_000
 # Rerun's own queue has no bound: no more than this may wait in it between two flushes.
@@ -42,10 +47,16 @@ class JournalState(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """How much a part may take, and how much the disk must keep free [bytes]."""
+    """How much a part may take, and how much the disk must keep free [bytes].
+
+    A part older than ``part_s`` [s] is followed by the next, too, 0 for never; ``quota`` limits
+    what all take.
+    """
 
     part_bytes: int
     least_free_bytes: int
+    part_s: float = 0.0
+    quota: Quota | None = None
 
 
 class Journal:
@@ -67,9 +78,12 @@ class Journal:
         self._part: Part | None = None
         self._parts = 0
         self._abandoned: list[Part] = []
+        self._live: rr.RecordingStream | None = None
         self._next_flush_ns = 0
+        self._part_until_ns: int | None = None
         self._unflushed_messages = 0
         self._unflushed_bytes = 0
+        self._lost_before = 0
         self.lost = 0
         self.state = JournalState.RECORDING
         self.reason = ""
@@ -119,14 +133,14 @@ class Journal:
     def at(self, wall_ns: int) -> None:
         """Set the time [ns] of what is logged next."""
         self._standing.wall_ns = wall_ns
-        if self._part:
-            self._standing.set_times(self._part.stream)
+        for stream in self._streams():
+            self._standing.set_times(stream)
 
     def sequence(self, timeline: str, number: int) -> None:
         """Set the place on another timeline of all that is logged from now on."""
         self._standing.sequences[timeline] = number
-        if self._part:
-            self._standing.set_times(self._part.stream)
+        for stream in self._streams():
+            self._standing.set_times(stream)
 
     def log(
         self, entity: str, archetype: rr.AsComponents, *, latched: bool = False, size: int = 0
@@ -138,12 +152,12 @@ class Journal:
             latched: in force until the next, so parts begin with it.
             size: how much it is, where that is much [bytes].
         """
-        part = self._part if self.state is JournalState.RECORDING else None
         if latched:
-            self._standing.latch(entity, archetype, missed=part is None)
-        if part is not None:
-            part.stream.log(entity, archetype)
-            self._unflushed_bytes += size
+            missed = self._part is None or self.state is not JournalState.RECORDING
+            self._standing.latch(entity, archetype, missed=missed)
+        for stream in self._streams():
+            stream.log(entity, archetype)
+        self._unflushed_bytes += size
 
     def write_blob(self, blob: bytes) -> bool:
         """Write bytes at the time set, without waiting for a flush; False where it cannot be."""
@@ -156,20 +170,25 @@ class Journal:
     def log_static(self, entity: str, *archetypes: rr.AsComponents) -> None:
         """Log what holds for the whole run; takes the place of what held before."""
         self._standing.static[entity] = archetypes
-        if self._part and self.state is JournalState.RECORDING:
-            self._part.stream.log(entity, *archetypes, static=True)
+        for stream in self._streams():
+            stream.log(entity, *archetypes, static=True)
 
     def describe(self, name: str, properties: dict[str, str]) -> None:
         """Name the recording, and set its properties."""
         self._standing.name, self._standing.properties = name, properties
-        if self._part and self.state is JournalState.RECORDING:
-            self._standing.send_description(self._part.stream)
+        for stream in self._streams():
+            self._standing.send_description(stream)
 
     def show(self, blueprint: rrb.Blueprint) -> None:
         """Make ``blueprint`` the one that opens; a file's last one counts."""
         self._standing.blueprint = blueprint
-        if self._part and self.state is JournalState.RECORDING:
-            self._part.stream.send_blueprint(blueprint)
+        for stream in self._streams():
+            stream.send_blueprint(blueprint)
+
+    def serve(self, live: rr.RecordingStream) -> None:
+        """Let all that is logged go to ``live``, too, whatever becomes of the disk."""
+        self._live = live
+        self._standing.begin(live)
 
     def sync(self, now_ns: int) -> None:
         """Find out whether all is written, and act on it; call it often.
@@ -179,15 +198,19 @@ class Journal:
         """
         if now_ns < self._next_flush_ns and self._unflushed_bytes < FLUSH_BYTES:
             return
+        for broken in self._abandoned:
+            broken.cut()
         if self._part is None:
             self._try_again()
         elif self._is_flushed(self._part):
-            self._keep_room(self._part)
+            self._keep_room(self._part, now_ns)
         recording = self.state is JournalState.RECORDING
         self._next_flush_ns = now_ns + (FLUSH_PERIOD_NS if recording else RETRY_PERIOD_NS)
 
     def close(self) -> bool:
         """End the part in order; False where the disk holds rerun's writer up."""
+        for broken in self._abandoned:
+            broken.cut()
         if self._part is None:
             return True
         outcome = self._part.flush(CLOSE_TIMEOUT_S)
@@ -200,6 +223,12 @@ class Journal:
             self._part.close()
         self._part = None
         return True
+
+    def _streams(self) -> Iterator[rr.RecordingStream]:
+        if self._part is not None and self.state is JournalState.RECORDING:
+            yield self._part.stream
+        if self._live is not None:
+            yield self._live
 
     def _is_flushed(self, part: Part) -> bool:
         stalled = self.state is JournalState.STALLED
@@ -216,13 +245,17 @@ class Journal:
             self._standing.send_latched(part.stream)
         return True
 
-    def _keep_room(self, part: Part) -> None:
+    def _keep_room(self, part: Part, now_ns: int) -> None:
+        self._keep_quota()
+        if self._part_until_ns is None:
+            self._part_until_ns = now_ns + round(1e9 * self._room.part_s)
+        is_old = self._room.part_s > 0 and now_ns >= self._part_until_ns
         if self._free_bytes() < self._room.least_free_bytes:
             part.close()
             self._part = None
             floor_mb = self._room.least_free_bytes / 1e6
             self._enter(JournalState.DISK_FULL, f"less than {floor_mb:.0f} MB are free")
-        elif part.size >= self._room.part_bytes:
+        elif is_old or part.size >= self._room.part_bytes:
             try:
                 self._begin_part()
             except OSError as error:
@@ -257,8 +290,20 @@ class Journal:
         number = self._parts + 1
         path = self._folder / f"{self._recording_id}-part{number}.rrd"
         part = Part(path, self._recording_id)
-        self._part, self._parts = part, number
+        self._part, self._parts, self._part_until_ns = part, number, None
         self._standing.begin(part.stream)
+
+    def _keep_quota(self) -> None:
+        # Parts grow slowly: to look once in each is enough, and once before there is any other.
+        if self._room.quota is None or self._part_until_ns is not None:
+            return
+        try:
+            deleted = self._room.quota.keep(self._folder, self._room.part_bytes)
+        except OSError as error:
+            LOG.warning("recordings above their quota stay: %s", error)
+            return
+        if deleted:
+            LOG.info("deleted for the quota: %s", ", ".join(path.name for path in deleted))
 
     def _free_bytes(self) -> int:
         try:
@@ -268,4 +313,10 @@ class Journal:
             return 0
 
     def _enter(self, state: JournalState, reason: str) -> None:
+        if state is JournalState.RECORDING:
+            reason = f"{reason}; {self.lost - self._lost_before} samples were lost"
+            self._lost_before = self.lost
+        if state is not self.state:
+            level = logging.INFO if state is JournalState.RECORDING else logging.WARNING
+            LOG.log(level, "%s: %s", state.value, reason)
         self.state, self.reason = state, reason

@@ -39,7 +39,7 @@ class Part:
 
     def __init__(self, path: Path, recording_id: str) -> None:
         self.path = path
-        self.flushed = False
+        self._flushed_bytes = 0
         # Held while the part is written, so that no other recorder repairs it.
         self._lock = _locked(path)
         self.stream = rr.RecordingStream(
@@ -79,7 +79,7 @@ class Part:
             # (rerun 0.41).
             slow = "timed out" in str(error) and self._has_writer()
             return Flush.STALLED if slow else Flush.BROKEN
-        self.flushed = True
+        self._flushed_bytes = self.size
         return Flush.DONE
 
     def close(self) -> None:
@@ -88,14 +88,23 @@ class Part:
         os.close(self._lock)
 
     def abandon(self) -> None:
-        """Save of a broken part what can be read: whole frames, or nothing.
+        """Save of a broken part what can be read: what was flushed, or nothing.
 
+        Behind a frame that the disk took half of, rerun may still have written others, once there
+        was room again: nothing tells them from the rest of that frame.
         The stream stays: to disconnect it, or to let go of it, may hang for ever (rerun 0.41).
         """
         os.close(self._lock)
-        repair_recording(self.path)
-        if not self.flushed:
+        if not self._flushed_bytes:
             self.path.unlink(missing_ok=True)
+            return
+        self.cut()
+
+    def cut(self) -> None:
+        """Cut a broken part again: rerun may write to it long after it has given up on it."""
+        if self.path.is_file() and self.path.stat().st_size > self._flushed_bytes:
+            os.truncate(self.path, self._flushed_bytes)
+            repair_recording(self.path)
 
     def _has_writer(self) -> bool:
         """Tell whether rerun still holds the file open: its writer closes it when it dies."""

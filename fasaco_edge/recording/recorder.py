@@ -21,13 +21,15 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, Publisher, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, FasacoError
-from fasaco_edge.process_memory import resident_mb
+from fasaco_edge.process_memory import resident_mb, return_soon
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.clock import RunClock
 from fasaco_edge.recording.inbox import Inbox
 from fasaco_edge.recording.input_log import InputLog
 from fasaco_edge.recording.journal import Journal, Room
+from fasaco_edge.recording.live import serve_live
+from fasaco_edge.recording.quota import Quota
 from fasaco_edge.recording.repair import repair_folder
 from fasaco_edge.recording.report import RecorderReport
 from fasaco_edge.recording.runcard import RunDescription
@@ -39,7 +41,7 @@ from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.poses import decode_pose
 from fasaco_edge.wire.status import decode_json, encode_json
 
-TAKE_TIMEOUT_S = 0.1
+TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000
 # The planner speaks once a second.
 SILENCE_NS = 3_500_000_000
@@ -58,6 +60,7 @@ def run_recorder(settings: RecorderSettings, stop: threading.Event | None = None
         BusUnavailable: nothing listens at the endpoints.
         BadConfiguration: the folder cannot be made or written to.
     """
+    return_soon()
     stop = stop or threading.Event()
     repairs = _repaired(settings.out)
     with _stopped_by_signals(stop), open_bus(settings.bus) as bus:
@@ -84,9 +87,12 @@ class Recorder:
         began_ns = self._clock.now_ns()
         began = datetime.fromtimestamp(began_ns / 1e9, UTC)
         name = _unused_name(settings.out, f"{began:%Y%m%dT%H%M%SZ}-{settings.robot}")
-        room = Room(settings.part_bytes, settings.least_free_bytes)
+        quota = Quota(settings.robot, settings.quota_bytes)
+        room = Room(settings.part_bytes, settings.least_free_bytes, settings.part_s, quota)
         self._journal = Journal(settings.out, name, room, build_blueprint(None))
         self._journal.at(began_ns)
+        if settings.serve is not None:
+            self._journal.serve(serve_live(name, *settings.serve))
         self._inputs = InputLog(self._journal, began_ns)
         description = RunDescription(settings.robot, f"{began:%Y-%m-%d %H:%M:%S} UTC")
         self._scene = Scene(self._journal, description)
@@ -143,7 +149,7 @@ class Recorder:
             if time.monotonic_ns() < deadline_ns:
                 self._write(arrival)
         self._journal.at(self._clock.now_ns())
-        self._inputs.write()
+        self._inputs.finish()
         self._tell("stopping", "asked to end")
         self._scene.finish()
         return self._journal.close()

@@ -15,6 +15,7 @@ from fasaco_edge.recording import archetypes as draw
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.changes import Bounds, changed_bounds, known_bounds, union
+from fasaco_edge.recording.curves import TREMBLE, Curves
 from fasaco_edge.recording.fields import Json, integer, number, section, text
 from fasaco_edge.recording.journal import Journal
 from fasaco_edge.recording.layers import Layers, size_in_file
@@ -47,6 +48,7 @@ class Scene:
         self._errors = 0
         self._states: dict[str, str] = {}
         self._layers = Layers()
+        self._curves = Curves(journal)
         self._paths = PathDrawing(journal, self._layers)
         log_styles(journal)
         self._describe()
@@ -89,7 +91,7 @@ class Scene:
             self._last_place = here
         elif math.dist(self._last_place, here) >= TRAIL_SPACING_M:
             step = np.array([self._last_place, here])
-            self._journal.log(entities.TRAIL, draw.line_archetype(step, draw.TRAIL))
+            self._journal.log(entities.TRAIL, draw.strip_archetype(step, draw.TRAIL))
             self._last_place = here
 
     def add_command(self, command: Json) -> None:
@@ -114,8 +116,8 @@ class Scene:
         # It is drawn in four bytes a cell, which makes it twice as large.
         self._draw(entities.COVERAGE, 2 * size_in_file(grid.cells), draw_coverage)
         covered, recovered = draw.coverage_fractions(grid)
-        self._plot(entities.COVERED_FRACTION, covered)
-        self._plot(entities.RECOVERED_FRACTION, recovered)
+        self._curves.draw(entities.COVERED_FRACTION, covered)
+        self._curves.draw(entities.RECOVERED_FRACTION, recovered)
 
     def add_pheromone(self, message: PheromoneMessage) -> None:
         """Draw the pheromone after a cohort, and plot the best walk so far."""
@@ -131,19 +133,19 @@ class Scene:
             )
 
         self._draw(entities.PHEROMONE, size_in_file(message.levels), draw_pheromone)
-        self._plot(entities.BEST_STEPS, message.best_steps)
+        self._curves.draw(entities.BEST_STEPS, message.best_steps)
         # The levels' scale: with it they can be turned back into trails.
-        self._plot(f"{entities.TRAIL_RANGE}/min", message.trail_min)
-        self._plot(f"{entities.TRAIL_RANGE}/max", message.trail_max)
+        self._curves.draw(f"{entities.TRAIL_RANGE}/min", message.trail_min)
+        self._curves.draw(f"{entities.TRAIL_RANGE}/max", message.trail_max)
 
     def add_status(self, status: Json) -> None:
         """Plot the planner's figures, show its states, log its errors; any key may be missing."""
         for name, value in section(status, "latency_ms").items():
             if number({name: value}, name) is not None:
-                self._plot(f"{entities.LATENCY}/{name}", value)
+                self._curves.draw(f"{entities.LATENCY}/{name}", value, TREMBLE)
         memory = number(status, "rss_mb")
         if memory is not None:
-            self._plot(f"{entities.MEMORY}/planner", memory)
+            self._curves.draw(f"{entities.MEMORY}/planner", memory, TREMBLE)
         self._add_configuration(status)
         self.enter(entities.MISSION_STATE, text(status, "state"), text(status, "reason"))
         planning = section(status, "plan").get("planning")
@@ -154,7 +156,7 @@ class Scene:
     def add_report(self, report: RecorderReport) -> None:
         """Show the recorder's own state and memory."""
         self.enter(entities.RECORDER_STATE, report.state, report.reason)
-        self._plot(f"{entities.MEMORY}/recorder", report.rss_mb)
+        self._curves.draw(f"{entities.MEMORY}/recorder", report.rss_mb, TREMBLE)
 
     def enter(self, entity: str, state: str, reason: str = "") -> None:
         """Show that ``entity`` is in ``state`` from now on; log it where there is a reason."""
@@ -178,6 +180,7 @@ class Scene:
     def finish(self) -> None:
         """Draw what waits, and frame the map as it was at the end."""
         self._layers.finish()
+        self._curves.finish()
         if self._known is not None and self._known != self._framed:
             self._journal.show(build_blueprint(self._known))
 
@@ -225,9 +228,6 @@ class Scene:
             last = text(errors, "last") or "no text"
             self._say(entities.MISSION_LOG, f"error {total}: {last}", "ERROR")
         self._errors = total
-
-    def _plot(self, entity: str, value: float) -> None:
-        self._journal.log(entity, rr.Scalars(value))
 
     def _say(self, log: str, message: str, level: str = "INFO") -> None:
         self._journal.log(log, rr.TextLog(message, level=level))

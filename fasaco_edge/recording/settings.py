@@ -26,7 +26,12 @@ class RecorderSettings:
             ones; "" for native.
         pose_schema: message type of poses that come without one, as under ROS 2.
         part_bytes: a part larger than this is followed by the next.
+        part_s: and so is one that is older [s]; 0 for never. What rerun keeps of each part until
+            its footer is written takes a megabyte a minute.
+        quota_bytes: the recordings of this robot in ``out`` take at most about so much: the
+            oldest parts are deleted, never the one being written; 0 for no limit.
         least_free_bytes: recording pauses while the disk has less room than this.
+        serve: address and port to serve live viewers at; None for nowhere.
         queue_bytes: samples waiting to be written take at most this much memory.
 
     Raises:
@@ -42,7 +47,10 @@ class RecorderSettings:
     pose_key: str = ""
     pose_schema: str = POSE_STAMPED
     part_bytes: int = 64 * MEGABYTE
+    part_s: float = 900.0
+    quota_bytes: int = 0
     least_free_bytes: int = 50 * MEGABYTE
+    serve: tuple[str, int] | None = None
     queue_bytes: int = 64 * MEGABYTE
 
     def __post_init__(self) -> None:
@@ -51,6 +59,15 @@ class RecorderSettings:
                 raise BadConfiguration(
                     f"{name} must be at least {least}, got {getattr(self, name)}"
                 )
+        for name in ("part_s", "quota_bytes"):
+            # Negated, so that NaN is caught, too.
+            if not getattr(self, name) >= 0:
+                raise BadConfiguration(f"{name} must be at least 0, got {getattr(self, name)}")
+        if 0 < self.quota_bytes < 2 * self.part_bytes:
+            raise BadConfiguration(
+                f"quota_bytes must be 0 or at least two parts, {2 * self.part_bytes}, "
+                f"got {self.quota_bytes}"
+            )
         Keys(self.robot, self.base)
 
     @property

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.archetypes import COVERED_COLOUR, RECOVERED_COLOUR, Colour
+from fasaco_edge.recording.archetypes import (
+    COVERED_COLOUR,
+    RECOVERED_COLOUR,
+    TRAIL,
+    Colour,
+    style_archetype,
+)
 from fasaco_edge.recording.journal import Journal
 from fasaco_edge.recording.sdk import rr
 
@@ -56,8 +62,10 @@ STATES: dict[str, dict[str, int]] = {
 def log_styles(journal: Journal) -> None:
     """Log names and colours of all curves and states."""
     journal.log_static(entities.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    journal.log_static(entities.TRAIL, style_archetype(TRAIL))
     for entity, name, colour in CURVES:
-        journal.log_static(entity, rr.SeriesLines(names=name, colors=colour, widths=1.5))
+        line = rr.SeriesLines(names=name, colors=colour, widths=1.5, interpolation_mode="StepAfter")
+        journal.log_static(entity, line)
     for entity, colours in STATES.items():
         states = list(colours)
         palette = np.array(list(colours.values()), np.uint32)

@@ -100,6 +100,15 @@ def test_footprint(capsys):
     assert [goal["limit"] for goal in document["goals"]] == [1.5, 60.0, 200.0, 0.0]
 
 
+def test_latency_beside_a_recorder(capsys):
+    pytest.importorskip("rerun")
+    words = ("--samples", "4", "--pause", "0", "--recorder")
+    document = figures(capsys, "latency", *words)
+    assert document["samples"] == 4
+    assert document["recorded_total_ms"]["p99"] > 0
+    assert document["recorder_ratio"] > 0
+
+
 def test_latency(capsys):
     document = figures(capsys, "latency", "--samples", "3", "--pause", "0")
     assert (document["samples"], document["ants"]) == (3, 8)

@@ -324,3 +324,17 @@ def test_what_is_wrong_about_ros_is_named(load, block, text):
     with pytest.raises(BadConfiguration) as caught:
         load(f"ros2: {block}")
     assert text in str(caught.value)
+
+
+def test_the_recorder_gets_its_room_from_the_configuration(tmp_path):
+    from fasaco_edge.cli import _parser
+    from fasaco_edge.daemon.supervisor import _command
+
+    file = tmp_path / "config.yaml"
+    file.write_text("recording: {part_mb: 10, part_min: 2.5, quota_mb: 100, least_free_mb: 7}")
+    words = _command(load_config(file), tmp_path)[3:]
+    told = _parser().parse_args(words)
+    assert (told.part_mb, told.part_min, told.quota_mb, told.least_free_mb) == (10, 2.5, 100, 7)
+    file.write_text("recording: {part_mb: 60, quota_mb: 100}")
+    with pytest.raises(BadConfiguration, match=r"recording\.quota_mb must be 0 or at least"):
+        load_config(file)

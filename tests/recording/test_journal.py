@@ -16,6 +16,7 @@ from fasaco_edge.errors import BadConfiguration, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.journal import FLUSH_PERIOD_NS, Journal, JournalState, Room
+from fasaco_edge.recording.quota import Quota
 from fasaco_edge.recording.reading import read_column, read_summary
 from fasaco_edge.recording.sdk import rr
 
@@ -69,6 +70,41 @@ def test_parts_rotate_and_each_begins_with_what_is_in_force(tmp_path):
         assert list(read_cards(part)) == ["card"]
     assert sum(read_summary(part).rows.get("noise", 0) for part in parts) == 7
     assert journal.lost == 0
+
+
+def test_an_old_part_gives_way_and_the_oldest_go_by_the_quota(tmp_path):
+    others = [tmp_path / "20200101T000000Z-other-part1.rrd", tmp_path / "notes.rrd"]
+    before = [tmp_path / f"20200101T000000Z-robot-part{number}.rrd" for number in (2, 10)]
+    for path in (*others, *before):
+        path.write_bytes(bytes(400_000))
+    clock = Clock()
+    room = Room(300_000, 0, part_s=3 * FLUSH_PERIOD_NS / 1e9, quota=Quota("robot", 1_000_000))
+    name = "20260101T000000Z-robot"
+    journal = Journal(tmp_path, name, room, build_blueprint(None))
+    journal.sync(clock.tick())
+    # With the part that is coming, one of the two that there were is too much.
+    assert not before[0].exists()
+    assert before[1].exists()
+    for seed in range(20):
+        journal.log("noise", noise(seed, 20_000))
+        journal.sync(clock.tick())
+    last = journal.path
+    assert journal.close()
+    assert all(path.exists() for path in others)
+    assert not before[1].exists()
+    parts = list(tmp_path.glob(f"{name}-part*.rrd"))
+    assert last in parts
+    assert 2 <= len(parts) < 7
+    assert sum(part.stat().st_size for part in parts) < 1_000_000
+    assert all(read_summary(part).complete for part in parts)
+
+
+def test_a_part_that_is_written_is_not_deleted_for_the_quota(tmp_path):
+    room = Room(10**6, 0)
+    journal = Journal(tmp_path, "20200101T000000Z-robot", room, build_blueprint(None))
+    assert not Quota("robot", 1).keep(tmp_path)
+    assert journal.close()
+    assert Quota("robot", 1).keep(tmp_path)
 
 
 def test_no_part_is_written_below_the_floor(tmp_path):
