@@ -10,6 +10,7 @@ import pytest
 
 pytest.importorskip("rerun")
 
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.cli import main
 from fasaco_edge.errors import DifferentRuns, UnreadableRecording
 from fasaco_edge.review.document import document, side_by_side
@@ -40,10 +41,10 @@ def run_told(folder, *, faults, silent=0, killed=False):
     keys = Keys()
     with bus_on_free_port() as (bus, endpoint):
         topics = {
-            "map": bus.publisher(keys.map, schemas.OCCUPANCY_GRID, latched=True),
+            "map": bus.publisher(keys.map, schemas.OCCUPANCY_GRID, QOS["map"]),
             "pose": bus.publisher(keys.pose, schemas.POSE_STAMPED),
-            "path": bus.publisher(keys.path, schemas.PATH, latched=True),
-            "status": bus.publisher(keys.status, latched=True),
+            "path": bus.publisher(keys.path, schemas.PATH, QOS["path"]),
+            "status": bus.publisher(keys.status, qos=QOS["status"]),
         }
         with recorder_process(bus, endpoint, folder, part_bytes=1) as recorder:
             sent = 0
