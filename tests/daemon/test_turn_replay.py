@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from zlib import crc32
 
 import pytest
@@ -21,6 +22,9 @@ from tests.wire.schemas import check
 
 # Where the kernels have to be compiled first.
 pytestmark = pytest.mark.timeout(300)
+
+# What stands before the pixels of a map update is shorter.
+HEADER_BYTES = 100
 
 
 @pytest.fixture(scope="module")
@@ -87,17 +91,18 @@ def test_what_is_said_on_the_bus_is_that_of_the_contract(samples):
         check("turns.json", json.loads(samples[place].sample.payload))
 
 
-def with_walls(samples, count):
-    """Return the samples with so many walls at the end of a large update, and who took that."""
+def turned_over(samples, share):
+    """Return the samples with free for wall at the end of the largest update, and who took that."""
     index = max(places(samples, "map_update"), key=lambda place: len(samples[place].sample.payload))
     payload = samples[index].sample.payload
+    count = math.ceil(share * (len(payload) - HEADER_BYTES))
     others = bytes(0x00 if pixel == 0x64 else 0x64 for pixel in payload[-count:])
     (turn,) = first_use(samples, "map_update", crc32(payload))
     return changed(samples, index, lambda _: payload[:-count] + others), turn
 
 
 def test_a_pixel_that_is_another_is_found(samples):
-    altered, turn = with_walls(samples, 1)
+    altered, turn = turned_over(samples, 0.001)
     replay, _, _ = played(altered)
     assert [(lacking.turn, lacking.replayed) for lacking in replay.lacking] == [
         (turn, "another one")
@@ -106,7 +111,7 @@ def test_a_pixel_that_is_another_is_found(samples):
 
 
 def test_what_another_map_leads_to_is_found(samples):
-    altered, turn = with_walls(samples, 200)
+    altered, turn = turned_over(samples, 1.0)
     replay, _, _ = played(altered)
     assert replay.lacking[0].turn == turn
     assert replay.difference is not None
