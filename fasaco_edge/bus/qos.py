@@ -31,8 +31,6 @@ class Qos:
             for it.
         express: whether it is sent at once, never gathered with others into one packet.
         cache: how many samples are kept for those who join late; 0 for none.
-        heartbeat_s: after a sample it is told once, so long after it [s], which was the last:
-            who lost that asks for it. 0 for never.
     """
 
     priority: Priority = "data"
@@ -40,7 +38,6 @@ class Qos:
     congestion: Literal["drop", "block"] = "drop"
     express: bool = False
     cache: int = 0
-    heartbeat_s: float = 0.0
 
     @property
     def latched(self) -> bool:
@@ -51,14 +48,14 @@ class Qos:
 VOLATILE = Qos()
 
 QOS: dict[str, Qos] = {
-    "map": Qos("data_high", cache=1, heartbeat_s=0.5),
+    "map": Qos("data_high", cache=1),
     "map_update": Qos("data_high", congestion="block"),
     "pose": Qos("interactive_low", express=True),
-    "path": Qos("interactive_high", express=True, cache=1, heartbeat_s=0.5),
-    "status": Qos("interactive_low", cache=1, heartbeat_s=0.5),
+    "path": Qos("interactive_high", express=True, cache=1),
+    "status": Qos("interactive_low", cache=1),
     "command": Qos("interactive_low"),
-    "coverage": Qos("data_low", cache=1, heartbeat_s=0.5),
-    "recorder": Qos("data", cache=1, heartbeat_s=0.5),
+    "coverage": Qos("data_low", cache=1),
+    "recorder": Qos("data", cache=1),
     "turns": Qos("data_low"),
     "pheromone": Qos("background", "best_effort"),
 }

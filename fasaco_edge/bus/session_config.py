@@ -11,6 +11,9 @@ import zenoh
 MAX_MESSAGE_BYTES = 64 * 1024 * 1024
 # How long who connects may take to say who it is, and how many may do so at a time.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
+# A map or a path is many packets of 64 kB. Where two of them fill the queue, as by default, a
+# computer that is busy for 50 ms drops the map; these take a megabyte, and only when there is one.
+QUEUED_BATCHES = dict.fromkeys(("interactive_high", "data_high", "data", "data_low"), 16)
 
 
 def session_config(
@@ -43,7 +46,10 @@ def session_config(
             # Who connects and says nothing must not keep others out: by default a hundred of
             # those do, for twelve seconds.
             "unicast": {"accept_timeout": ACCEPT_TIMEOUT_MS, "accept_pending": ACCEPT_PENDING},
-            "link": {"rx": {"max_message_size": MAX_MESSAGE_BYTES}},
+            "link": {
+                "rx": {"max_message_size": MAX_MESSAGE_BYTES},
+                "tx": {"queue": {"size": QUEUED_BATCHES}},
+            },
         },
     }
     return zenoh.Config.from_json5(json.dumps(_merged(own, secured)))

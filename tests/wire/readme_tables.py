@@ -63,7 +63,6 @@ def qos_rows() -> list[str]:
             qos["congestion"],
             "yes" if qos["express"] else "no",
             str(qos["cache"]),
-            f"{qos['heartbeat_s']:g} s" if qos["heartbeat_s"] else "-",
             qos["blocks"].partition(",")[0],
         )
         for name, qos in load("qos.yaml")["qos"].items()
