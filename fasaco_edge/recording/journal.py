@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import enum
 import logging
-import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording.part import Flush, Part
-from fasaco_edge.recording.quota import Quota
+from fasaco_edge.recording.room import Room
 from fasaco_edge.recording.sdk import rr, rrb
 from fasaco_edge.recording.standing import Standing
 
@@ -33,8 +31,6 @@ FLUSH_TIMEOUT_S = 0.5
 # How long to look whether a stalled disk has come back.
 PROBE_TIMEOUT_S = 0.05
 CLOSE_TIMEOUT_S = 1.2
-# Room beyond the floor before recording goes on: not to fill the disk again at once.
-RESUME_BYTES = 1_000_000
 
 
 class JournalState(enum.Enum):
@@ -43,20 +39,6 @@ class JournalState(enum.Enum):
     RECORDING = "recording"
     DISK_FULL = "disk full"
     STALLED = "stalled"
-
-
-@dataclass(frozen=True, slots=True)
-class Room:
-    """How much a part may take, and how much the disk must keep free [bytes].
-
-    A part older than ``part_s`` [s] is followed by the next, too, 0 for never; ``quota`` limits
-    what all take.
-    """
-
-    part_bytes: int
-    least_free_bytes: int
-    part_s: float = 0.0
-    quota: Quota | None = None
 
 
 class Journal:
@@ -246,11 +228,12 @@ class Journal:
         return True
 
     def _keep_room(self, part: Part, now_ns: int) -> None:
-        self._keep_quota()
         if self._part_until_ns is None:
+            # Parts grow slowly: to look once in each is enough, once before there is any other.
+            self._room.keep_quota(self._folder)
             self._part_until_ns = now_ns + round(1e9 * self._room.part_s)
         is_old = self._room.part_s > 0 and now_ns >= self._part_until_ns
-        if self._free_bytes() < self._room.least_free_bytes:
+        if self._room.is_full(self._folder):
             part.close()
             self._part = None
             floor_mb = self._room.least_free_bytes / 1e6
@@ -269,15 +252,14 @@ class Journal:
         self._part = None
         self.lost += self._unflushed_messages
         self._unflushed_messages = self._unflushed_bytes = 0
-        full = self._free_bytes() < self._room.least_free_bytes + RESUME_BYTES
         reason = f"{part.path.name} can no longer be written"
-        if full:
-            self._enter(JournalState.DISK_FULL, f"{reason}: no space left")
-        else:
+        if self._room.may_begin(self._folder):
             self._enter(JournalState.STALLED, reason)
+        else:
+            self._enter(JournalState.DISK_FULL, f"{reason}: no space left")
 
     def _try_again(self) -> None:
-        if self._free_bytes() < self._room.least_free_bytes + RESUME_BYTES:
+        if not self._room.may_begin(self._folder):
             return
         try:
             self._begin_part()
@@ -292,25 +274,6 @@ class Journal:
         part = Part(path, self._recording_id)
         self._part, self._parts, self._part_until_ns = part, number, None
         self._standing.begin(part.stream)
-
-    def _keep_quota(self) -> None:
-        # Parts grow slowly: to look once in each is enough, and once before there is any other.
-        if self._room.quota is None or self._part_until_ns is not None:
-            return
-        try:
-            deleted = self._room.quota.keep(self._folder, self._room.part_bytes)
-        except OSError as error:
-            LOG.warning("recordings above their quota stay: %s", error)
-            return
-        if deleted:
-            LOG.info("deleted for the quota: %s", ", ".join(path.name for path in deleted))
-
-    def _free_bytes(self) -> int:
-        try:
-            return shutil.disk_usage(self._folder).free
-        except OSError:
-            # The folder, or the disk it was on, is gone: no room there until it is back.
-            return 0
 
     def _enter(self, state: JournalState, reason: str) -> None:
         if state is JournalState.RECORDING:

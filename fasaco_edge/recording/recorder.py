@@ -27,11 +27,12 @@ from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.clock import RunClock
 from fasaco_edge.recording.inbox import Inbox
 from fasaco_edge.recording.input_log import InputLog
-from fasaco_edge.recording.journal import Journal, Room
+from fasaco_edge.recording.journal import Journal
 from fasaco_edge.recording.live import serve_live
 from fasaco_edge.recording.quota import Quota
 from fasaco_edge.recording.repair import repair_folder
 from fasaco_edge.recording.report import RecorderReport
+from fasaco_edge.recording.room import Room
 from fasaco_edge.recording.runcard import RunDescription
 from fasaco_edge.recording.scene import Scene
 from fasaco_edge.recording.settings import RecorderSettings

@@ -29,8 +29,9 @@ from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.process_memory import resident_mb, return_soon
 from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.input_log import InputLog
-from fasaco_edge.recording.journal import Journal, Room
+from fasaco_edge.recording.journal import Journal
 from fasaco_edge.recording.report import RecorderReport
+from fasaco_edge.recording.room import Room
 from fasaco_edge.recording.runcard import RunDescription
 from fasaco_edge.recording.scene import Scene
 from fasaco_edge.recording.settings import RecorderSettings

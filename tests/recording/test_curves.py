@@ -8,8 +8,9 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.curves import PERIOD_NS, Curves
-from fasaco_edge.recording.journal import Journal, Room
+from fasaco_edge.recording.journal import Journal
 from fasaco_edge.recording.reading import SCALAR, read_column
+from fasaco_edge.recording.room import Room
 
 SECOND_NS = 1_000_000_000
 

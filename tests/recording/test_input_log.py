@@ -19,7 +19,8 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import input_log
 from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.input_log import InputLog
-from fasaco_edge.recording.journal import Journal, JournalState, Room
+from fasaco_edge.recording.journal import Journal, JournalState
+from fasaco_edge.recording.room import Room
 from fasaco_edge.recording.runcard import RunDescription
 from fasaco_edge.recording.samples import RecordedSamples
 from fasaco_edge.recording.scene import Scene

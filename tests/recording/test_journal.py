@@ -15,9 +15,10 @@ pytest.importorskip("rerun")
 from fasaco_edge.errors import BadConfiguration, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.blueprint import build_blueprint
-from fasaco_edge.recording.journal import FLUSH_PERIOD_NS, Journal, JournalState, Room
+from fasaco_edge.recording.journal import FLUSH_PERIOD_NS, Journal, JournalState
 from fasaco_edge.recording.quota import Quota
 from fasaco_edge.recording.reading import read_column, read_summary
+from fasaco_edge.recording.room import Room
 from fasaco_edge.recording.sdk import rr
 
 RUN = "run-1"
