@@ -42,11 +42,18 @@ class RecordedSamples:
             begin with the map that was in force.
 
     Raises:
-        UnreadableRecording: a file is none, or holds no samples.
+        UnreadableRecording: a file is none, or all hold no samples.
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        self._take([batch for path in paths for batch in _batches(path)])
+        batches = [batch for path in paths for batch in _batches(path)]
+        # One part alone may have none: its recorder was killed when it had just begun.
+        if paths and not batches:
+            files = ", ".join(str(path) for path in paths)
+            raise UnreadableRecording(
+                f"{files}: holds no samples", hint="recordings of this release and later ones do"
+            )
+        self._take(batches)
 
     @classmethod
     def of(cls, batches: Sequence[Batch]) -> Self:
@@ -93,16 +100,11 @@ def _batches(path: Path) -> list[Batch]:
             warnings.filterwarnings("ignore", message="RRD file has no footer")
             chunks = RrdReader(str(whole)).stream().filter(content=f"/{entities.INPUTS}")
             bodies = [body for chunk in chunks for body in blobs(chunk.to_record_batch())]
-        batches = [Batch(place_of(body), body, path) for body in bodies]
+        return [Batch(place_of(body), body, path) for body in bodies]
     except OSError as error:
         raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
     except (RuntimeError, ValueError, MalformedMessage) as error:
         raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error
-    if not batches:
-        raise UnreadableRecording(
-            f"{path}: holds no samples", hint="recordings of this release and later ones do"
-        )
-    return batches
 
 
 def blobs(batch: Any) -> Iterator[bytes]:  # noqa: ANN401 - pyarrow has no types

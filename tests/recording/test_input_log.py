@@ -166,6 +166,13 @@ def test_a_recording_without_samples_is_named(tmp_path):
         RecordedSamples([tmp_path / "a.rrd"])
 
 
+def test_a_part_that_had_just_begun_takes_nothing_from_the_others(tmp_path):
+    (empty,) = Desk(tmp_path / "killed").close()
+    desk = Desk(tmp_path / "before")
+    desk.hear("map", noise(0))
+    assert list(RecordedSamples([*desk.close(), empty])) == desk.told
+
+
 def test_an_hour_takes_at_most_60_megabytes(tmp_path):
     """A map of 1,024 x 1,024 at 1 Hz, poses at 20 Hz, as a robot in a large building gives them."""
     desk = Desk(tmp_path)
