@@ -14,7 +14,7 @@ from fasaco_edge.daemon.config import DaemonConfig, load_config
 from fasaco_edge.errors import BadConfiguration
 
 # For all together: a disk, a network or somebody on the bus may not answer.
-PATIENCE_S = 2.5
+PATIENCE_S = 2.0
 
 
 class _Looking:
