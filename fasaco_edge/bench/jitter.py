@@ -74,6 +74,14 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help=f"length of one [s], at most {LONGEST_BLOCK_S:g} (default: %(default)g)",
     )
 
+    parser.add_argument(
+        "--spare-share",
+        type=float,
+        metavar="X",
+        help="share of a core that goes into better paths; 1: the daemon plans all the time "
+        "(default: that of planner.spare_share)",
+    )
+
 
 def _block(text: str) -> float:
     length = seconds_above_zero(text)
@@ -87,7 +95,8 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Block, None, None]
     warm_kernels()
     all_cores = os.sched_getaffinity(0)
     one_core = {min(all_cores)}
-    with DaemonProcess() as daemon, weighed(daemon.pid, WEIGHT) as group:
+    given = {} if args.spare_share is None else {"spare_share": args.spare_share}
+    with DaemonProcess({"planner": given}) as daemon, weighed(daemon.pid, WEIGHT) as group:
         say("first path")
         with robot_beside(daemon, daemon.join()) as robot:
             try:
@@ -174,6 +183,7 @@ def _report(args: argparse.Namespace, blocks: Sequence[Block]) -> Report:
             "hz": HZ,
             "block_s": args.block,
             "rounds": args.rounds,
+            "spare_share": args.spare_share,
             "niceness": NICENESS,
             "control_group": group or None,
             "cases": cases,
@@ -205,5 +215,6 @@ JITTER = Benchmark(
 examples:
   fasaco-edge bench jitter
   fasaco-edge bench jitter --rounds 24 --json
+  fasaco-edge bench jitter --spare-share 1
 """,
 )
