@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import sys
 import threading
 import time
 from pathlib import Path
@@ -186,11 +187,16 @@ def test_a_read_only_disk_is_told(tmp_path):
 
 
 def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch):
-    patient = Patient(DaemonConfig(), unit=Unit({"Environment": f"NUMBA_CACHE_DIR={tmp_path}"}))
+    told = {"Environment": f"NUMBA_CACHE_DIR={tmp_path}", "DynamicUser": "yes"}
+    patient = Patient(DaemonConfig(), unit=Unit(told | {"CacheDirectory": "fasaco-edge"}))
     found = kernels.kernels(patient)
     assert found.level is Level.WARN
     assert found.found.startswith("not compiled for this version")
-    assert found.to_do == f"NUMBA_CACHE_DIR={tmp_path} fasaco-edge warmup"
+    # As root it would make a folder that the daemon does not trust.
+    assert found.to_do == (
+        "systemd-run --wait -p DynamicUser=yes -p User=fasaco-edge -p CacheDirectory=fasaco-edge "
+        f"-E NUMBA_CACHE_DIR={tmp_path} {Path(sys.executable).with_name('fasaco-edge')} warmup"
+    )
     assert list(tmp_path.iterdir()) == []
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     from fasaco_edge.kernels.cache import cache_folder

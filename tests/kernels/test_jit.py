@@ -92,13 +92,19 @@ def run(code, root, folder, **environ):
     return done.stdout.strip()
 
 
-def test_a_caller_in_another_file_never_meets_the_old_code_of_its_callee(tmp_path):
-    package = tmp_path / "fasaco_edge" / "kernels"
+def package_in(folder):
+    """Begin another installation, of no kernels yet; return the place for them."""
+    package = folder / "fasaco_edge" / "kernels"
     package.mkdir(parents=True)
     for part in (package.parent / "__init__.py", package / "__init__.py"):
         part.touch()
     for source in (jit.__file__, cache.__file__):
         shutil.copy(source, package)
+    return package
+
+
+def test_a_caller_in_another_file_never_meets_the_old_code_of_its_callee(tmp_path):
+    package = package_in(tmp_path)
     head = "from fasaco_edge.kernels.jit import kernel\n"
     callee = head + "@kernel\ndef one():\n    return {}\n"
     caller = (
@@ -140,12 +146,7 @@ note_all_compiled()
 @pytest.fixture
 def one_kernel(tmp_path):
     """Tells what was missing, loaded and compiled of an installation with one kernel."""
-    package = tmp_path / "fasaco_edge" / "kernels"
-    package.mkdir(parents=True)
-    for part in (package.parent / "__init__.py", package / "__init__.py"):
-        part.touch()
-    for source in (jit.__file__, cache.__file__):
-        shutil.copy(source, package)
+    package = package_in(tmp_path)
     (package / "seven.py").write_text(KERNEL)
 
     def tell(**environ):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from pathlib import Path
 
 from fasaco_edge.daemon.checks.finding import Finding, Level, Patient
 from fasaco_edge.kernels.cache import candidates, missing_from, outdated
@@ -11,8 +13,7 @@ from fasaco_edge.kernels.cache import candidates, missing_from, outdated
 def kernels(patient: Patient) -> Finding:
     """Tell whether the kernels are there, for this code and processor, and whose they are."""
     folder = candidates(patient.environ)[0]
-    given = patient.environ.get("NUMBA_CACHE_DIR")
-    command = f"NUMBA_CACHE_DIR={given} fasaco-edge warmup" if given else "fasaco-edge warmup"
+    command = _warmup(patient)
     later = "the first plan waits for them, up to a minute"
     try:
         owner = folder.stat().st_uid
@@ -31,6 +32,15 @@ def kernels(patient: Patient) -> Finding:
     if missing := missing_from(folder):
         return Finding(Level.WARN, f"{missing}: {later}", command, tuple(details))
     return Finding(Level.OK, "all compiled, for this code and processor", details=tuple(details))
+
+
+def _warmup(patient: Patient) -> str:
+    """Return the command that compiles them into that folder, as the user who is to trust it."""
+    if patient.unit is None:
+        return "fasaco-edge warmup"
+    given = patient.environ.get("NUMBA_CACHE_DIR")
+    variable = f"-E NUMBA_CACHE_DIR={given} " if given else ""
+    return patient.unit.run_as(f"{variable}{Path(sys.executable).with_name('fasaco-edge')} warmup")
 
 
 def _user(patient: Patient) -> int | None:

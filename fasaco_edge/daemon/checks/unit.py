@@ -12,7 +12,7 @@ NAME = "fasaco-edge.service"
 TIMEOUT_S = 1.0
 PROPERTIES = (
     "LoadState", "ActiveState", "MainPID", "Environment", "MemoryMax", "MemoryHigh",
-    "ControlGroup", "StateDirectory", "ProcSubset",
+    "StateDirectory", "CacheDirectory", "DynamicUser", "User",
 )  # fmt: skip
 
 
@@ -39,6 +39,18 @@ class Unit:
         if state := self.properties.get("StateDirectory", "").split():
             environ["STATE_DIRECTORY"] = f"/var/lib/{state[0]}"
         return environ
+
+    def run_as(self, command: str) -> str:
+        """Return how to run a command as the daemon is run, and into its folders."""
+        dynamic = self.properties.get("DynamicUser") == "yes"
+        user = self.properties.get("User") or (NAME.partition(".")[0] if dynamic else "")
+        given = {
+            "DynamicUser": "yes" if dynamic else "",
+            "User": user,
+            "CacheDirectory": self.properties.get("CacheDirectory", ""),
+        }
+        words = [f"-p {shlex.quote(f'{name}={value}')}" for name, value in given.items() if value]
+        return " ".join(["systemd-run --wait", *words, command])
 
     def limit(self, name: str) -> int | None:
         """Return a limit [bytes]; None for none."""
