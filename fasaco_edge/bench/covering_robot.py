@@ -50,6 +50,7 @@ class CoveringRobot:
         with self._lock:
             self._drive(SPEED_M_S / POSES_HZ)
         x, y = self._at
+        self._source.forget_paths()
         self._source.put_pose(StampedPose(Pose2D(x, y), stamp_ns=time.time_ns()))
         if now >= self._map_due:
             self._maps += 1

@@ -96,9 +96,10 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Block, None, None]
     all_cores = os.sched_getaffinity(0)
     one_core = {min(all_cores)}
     given = {} if args.spare_share is None else {"spare_share": args.spare_share}
-    with DaemonProcess({"planner": given}) as daemon, weighed(daemon.pid, WEIGHT) as group:
+    with DaemonProcess({"planner": given}) as daemon:
         say("first path")
-        with robot_beside(daemon, daemon.join()) as robot:
+        # Weighed only then: where much else is at work, the first one would not come in time.
+        with robot_beside(daemon, daemon.join()) as robot, weighed(daemon.pid, WEIGHT) as group:
             try:
                 for name in PLACES:
                     cores = all_cores if name == ANY_CORE else one_core
