@@ -199,6 +199,11 @@ class MapSource:
             f"no path for a map after {PATH_TIMEOUT_S:.0f} s", hint="is the machine overloaded?"
         )
 
+    def forget_paths(self) -> None:
+        """Let go of the paths that nobody waited for."""
+        while not self._arrivals.empty():
+            self._arrivals.get()
+
     def _await_listener(self, publisher: Publisher) -> None:
         deadline = time.monotonic() + START_TIMEOUT_S
         while not publisher.has_listeners():

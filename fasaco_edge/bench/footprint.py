@@ -1,4 +1,4 @@
-"""``bench footprint``: how soon a daemon is there, and how much memory it takes."""
+"""``bench footprint``: how soon a daemon is there, how much memory it takes, how idle it is."""
 
 from __future__ import annotations
 
@@ -7,19 +7,29 @@ import time
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seconds
+from fasaco_edge.bench.benchmark import (
+    Benchmark,
+    Goal,
+    Report,
+    Say,
+    positive,
+    seconds,
+    seconds_above_zero,
+)
 from fasaco_edge.bench.building import building, robot_pose, with_crate
 from fasaco_edge.bench.daemon_process import DaemonProcess, MapSource, warm_kernels
 from fasaco_edge.bench.machine import machine, peak_mb
+from fasaco_edge.bench.placement import cpu_seconds
 from fasaco_edge.bench.spread import Spread, document, median, text
 from fasaco_edge.process_memory import has_loaded, resident_mb
 from fasaco_edge.process_memory import peak_mb as peak_mb_of
 
-GOAL_READY_S, GOAL_IDLE_MB, GOAL_WARM_MB = 1.5, 60.0, 200.0
+GOAL_READY_S, GOAL_IDLE_MB, GOAL_IDLE_PERCENT, GOAL_WARM_MB = 1.5, 60.0, 0.5, 200.0
 MEASURES = (
     ("ready_s", "exec to liveliness token [s]", 3),
     ("status_s", "exec to first status [s]", 3),
     ("idle_mb", "memory before the first map [MB]", 1),
+    ("idle_percent", "share of a core before the first map [%]", 2),
     ("warm_mb", "memory after map and plan [MB]", 1),
     ("peak_mb", "peak memory [MB]", 1),
 )
@@ -41,6 +51,7 @@ class DaemonStart:
         ready_s: from exec to its liveliness token [s].
         status_s: from exec to the first status answered [s].
         idle_mb: resident before the first map [MB].
+        idle_percent: of a core, that it took until then [%].
         warm_mb: resident after a map and a plan [MB].
         peak_mb: the most it was ever resident with [MB].
         idle, warm: what was loaded at these two points.
@@ -49,6 +60,7 @@ class DaemonStart:
     ready_s: float
     status_s: float
     idle_mb: float
+    idle_percent: float
     warm_mb: float
     peak_mb: float
     idle: Loaded
@@ -65,6 +77,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         default=1.0,
         metavar="S",
         help="wait so long before memory is read [s] (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--idle",
+        type=seconds_above_zero,
+        default=5.0,
+        metavar="S",
+        help="how long a daemon without a map is watched [s] (default: %(default)g)",
     )
     parser.add_argument(
         "--ants", type=positive, default=200, help="of the one plan (default: %(default)s)"
@@ -87,6 +106,9 @@ def _start(args: argparse.Namespace) -> DaemonStart:
         source = MapSource(daemon, bus)
         time.sleep(args.settle)
         idle_mb, idle = resident_mb(daemon.pid), _loaded(daemon.pid)
+        began_s, cpu_s = time.monotonic(), cpu_seconds(daemon.pid)
+        time.sleep(args.idle)
+        share = (cpu_seconds(daemon.pid) - cpu_s) / (time.monotonic() - began_s)
         stamp_ns = time.time_ns()
         source.put_pose(robot_pose(stamp_ns))
         source.put_map(with_crate(building(), 0, stamp_ns))
@@ -96,6 +118,7 @@ def _start(args: argparse.Namespace) -> DaemonStart:
             ready_s=ready_s,
             status_s=status_s,
             idle_mb=idle_mb,
+            idle_percent=100.0 * share,
             warm_mb=resident_mb(daemon.pid),
             peak_mb=peak_mb_of(daemon.pid),
             idle=idle,
@@ -151,6 +174,7 @@ def _goals(
     return (
         Goal("ready", median(spreads["ready_s"]), GOAL_READY_S, "s"),
         Goal("memory before the first map", median(spreads["idle_mb"]), GOAL_IDLE_MB, "MB"),
+        Goal("share of a core, idle", median(spreads["idle_percent"]), GOAL_IDLE_PERCENT, "%"),
         Goal("memory after map and plan", median(spreads["warm_mb"]), GOAL_WARM_MB, "MB"),
         Goal("rerun loaded (0 = never)", recorders, 0.0),
     )
@@ -162,11 +186,11 @@ def _yes(loaded: bool) -> str:
 
 FOOTPRINT = Benchmark(
     name="footprint",
-    summary="a daemon's time to start and its memory, idle and planning",
+    summary="a daemon's time to start, its memory, idle and planning, and how idle it is",
     description="Start a real daemon on a free port of loopback several times; time it from exec "
     "to its liveliness token and to the first status it answers with; read its resident memory "
-    "before the first map, and after one map of 1000 x 1000 pixels and its plan; look at what "
-    "it has loaded at both points.",
+    "and its share of a core before the first map, and its memory after one map of 1000 x 1000 "
+    "pixels and its plan; look at what it has loaded at both points.",
     add_options=_add_options,
     count=lambda args: int(args.starts),
     measure=_measure,

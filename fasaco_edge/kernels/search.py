@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import kernel
 
-NO_DIRECTION = -1
-
 
 class Graph(NamedTuple):
     """Where walks go.

@@ -13,6 +13,7 @@ from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, plac
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 from fasaco_edge.kernels.changes import Box
 from fasaco_edge.kernels.free_pixels import tally_free
+from fasaco_edge.kernels.jit import note_all_compiled
 from fasaco_edge.kernels.reach import update_reach
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.colony import ColonyConfig
@@ -36,6 +37,7 @@ def warm_up(report: Callable[[str], None] | None = None) -> None:
     for stage in _stages():
         if report is not None:
             report(stage)
+    note_all_compiled()
 
 
 def _stages() -> Iterator[str]:

@@ -112,7 +112,6 @@ class Unreached(msgspec.Struct, frozen=True):
 class Mission(msgspec.Struct, frozen=True):
     """The order, and how far it is."""
 
-    ordered: str | None = None
     stage: str | None = None
     paused: bool = False
     zone: str | None = None

@@ -7,11 +7,13 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from fasaco_edge.bench import placement
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report
 from fasaco_edge.bench.table import BENCHMARKS
 from fasaco_edge.cli import bench, main
@@ -88,16 +90,72 @@ def test_speed_without_a_checkout_says_so(tmp_path):
 
 
 def test_footprint(capsys):
-    document = figures(capsys, "footprint", "--starts", "1", "--settle", "0.1", "--ants", "8")
+    words = ("--starts", "1", "--settle", "0.1", "--idle", "1", "--ants", "8")
+    document = figures(capsys, "footprint", *words)
     assert document["starts"] == 1
-    for name in ("ready_s", "status_s", "idle_mb", "warm_mb", "peak_mb"):
+    for name in ("ready_s", "status_s", "idle_mb", "idle_percent", "warm_mb", "peak_mb"):
         assert_ordered(document[name])
     assert document["ready_s"]["median"] <= document["status_s"]["median"]
     assert document["idle_mb"]["median"] < document["warm_mb"]["median"]
     assert document["warm_mb"]["median"] <= document["peak_mb"]["median"]
     assert document["loaded"]["warm"] == {"numba": True, "rerun": False}
     assert document["loaded"]["idle"]["rerun"] is False
-    assert [goal["limit"] for goal in document["goals"]] == [1.5, 60.0, 200.0, 0.0]
+    assert [goal["limit"] for goal in document["goals"]] == [1.5, 60.0, 0.5, 200.0, 0.0]
+
+
+def test_jitter(capsys):
+    document = figures(capsys, "jitter", "--rounds", "1", "--block", "1.5")
+    cases = {(case["place"], case["covering"]): case for case in document["cases"]}
+    assert list(cases) == [
+        ("on all cores", False),
+        ("on all cores", True),
+        ("on one core", False),
+        ("on one core", True),
+    ]
+    for (_, covering), case in cases.items():
+        late_us = case["late_us"]
+        assert case["ticks"] == 150
+        assert 0 < late_us["p50"] <= late_us["p99"] <= late_us["p99_9"] <= late_us["max"]
+        # Held, it takes nothing; what it has published may still arrive.
+        assert case["daemon_share"] > 0.0 if covering else case["daemon_share"] == 0.0
+        assert covering or case["paths"] <= 1
+    assert sum(case["paths"] for case in cases.values() if case["covering"]) > 0
+    assert document["goals"] == []
+
+
+def test_a_control_loop_that_is_held_knows_it():
+    command = [sys.executable, "-m", "fasaco_edge.bench.control_loop", "100", "1.5"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as loop:
+        time.sleep(0.7)
+        loop.send_signal(signal.SIGSTOP)
+        time.sleep(0.2)
+        loop.send_signal(signal.SIGCONT)
+        late_us = [int(line) for line in loop.communicate(timeout=20)[0].split()]
+    assert len(late_us) == 150
+    worst = late_us.index(max(late_us))
+    assert late_us[worst] > 150_000
+    # Its deadlines stay where they were: it catches up.
+    assert late_us[worst + 1] < late_us[worst] - 5_000
+    assert late_us[-1] < 50_000
+
+
+def test_where_a_process_runs(monkeypatch, tmp_path):
+    with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy:
+        try:
+            core = {min(os.sched_getaffinity(0))}
+            placement.place(busy.pid, core, 5)
+            assert os.sched_getaffinity(busy.pid) == core
+            assert os.getpriority(os.PRIO_PROCESS, busy.pid) == 5
+            before = placement.cpu_seconds(busy.pid)
+            time.sleep(0.5)
+            assert 0.0 < placement.cpu_seconds(busy.pid) - before < 0.6
+            # An ordinary folder is no control group: nothing is left in it.
+            monkeypatch.setattr(placement, "CGROUPS", tmp_path)
+            with placement.weighed(busy.pid, 20) as group:
+                assert group == ""
+            assert list(tmp_path.iterdir()) == []
+        finally:
+            busy.kill()
 
 
 def test_latency_beside_a_recorder(capsys):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -79,16 +80,22 @@ def test_it_answers_while_it_plans(tmp_path):
         assert max(np.diff([moment for moment in said if moment >= since])) < 2.0
 
 
-def test_a_killed_daemon_leaves_no_recorder(tmp_path):
+@contextmanager
+def recording_into(folder):
+    """A daemon that records, and the process of its recorder."""
     pytest.importorskip("rerun")
     with (
-        daemon_process(tmp_path, "--record", str(tmp_path)) as running,
+        daemon_process(folder, "--record", str(folder)) as running,
         Outsider(running.endpoint) as outsider,
     ):
         status = outsider.wait_status(
             lambda status: (status["recorder"] or {}).get("state") == "recording"
         )
-        recorder = status["recorder"]["pid"]
+        yield running, status["recorder"]["pid"]
+
+
+def test_a_killed_daemon_leaves_no_recorder(tmp_path):
+    with recording_into(tmp_path) as (running, recorder):
         assert is_running(recorder)
         running.process.send_signal(signal.SIGKILL)
         running.process.wait()
@@ -100,15 +107,7 @@ def test_a_killed_daemon_leaves_no_recorder(tmp_path):
 
 
 def test_a_recorder_that_hangs_does_not_hold_the_end_up(tmp_path):
-    pytest.importorskip("rerun")
-    with (
-        daemon_process(tmp_path, "--record", str(tmp_path)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        status = outsider.wait_status(
-            lambda status: (status["recorder"] or {}).get("state") == "recording"
-        )
-        recorder = status["recorder"]["pid"]
+    with recording_into(tmp_path) as (running, recorder):
         os.kill(recorder, signal.SIGSTOP)
         print(f"ended after {1e3 * running.stop():.0f} ms")
         assert not is_running(recorder)
