@@ -12,6 +12,7 @@ import yaml
 from msgspec import Meta
 
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
+from fasaco_edge.daemon.credentials import with_credentials
 from fasaco_edge.daemon.mission_settings import MissionSettings
 from fasaco_edge.daemon.planner_config import PlannerConfig
 from fasaco_edge.daemon.recording_config import RecordingConfig
@@ -134,7 +135,8 @@ def load_config(path: Path | None) -> DaemonConfig:
     except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, no such date
         raise BadConfiguration(f"{path}: not YAML: {error}") from error
     try:
-        config = msgspec.convert(document if document is not None else {}, DaemonConfig)
+        read = with_credentials(document if document is not None else {})
+        config = msgspec.convert(read, DaemonConfig)
         _check_together(config)
     except msgspec.ValidationError as error:
         raise BadConfiguration(f"{path}: {_explain(str(error), document)}") from error

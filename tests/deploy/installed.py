@@ -69,13 +69,10 @@ def warm(lab: Lab, cache: str = "/var/cache/fasaco-edge/numba") -> None:
     if not is_complete(CACHE_FOLDER):
         subprocess.run([*PROGRAM, "warmup"], check=True, capture_output=True)
     here = CACHE_FOLDER / _folder_of(str(CHECKOUT / "fasaco_edge/kernels"))
-    there = (
-        lab.root
-        / cache.lstrip("/")
-        / CACHE_FOLDER.name
-        / _folder_of(f"{SOURCE}/fasaco_edge/kernels")
-    )
-    shutil.copytree(here, there, dirs_exist_ok=True)
+    there = Path(CACHE_FOLDER.name, _folder_of(f"{SOURCE}/fasaco_edge/kernels"))
+    # For root, who runs robots and asks questions, they are kept elsewhere.
+    for home in (cache, "/root/.cache/fasaco-edge"):
+        shutil.copytree(here, lab.root / home.lstrip("/") / there, dirs_exist_ok=True)
     # Finds all of them, and marks the cache as complete.
     lab.run("env", f"NUMBA_CACHE_DIR={cache}", "fasaco-edge", "warmup")
 
