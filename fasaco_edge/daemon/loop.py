@@ -238,7 +238,7 @@ class Loop:
         if self._recorder is not None:
             self._status.recorder = self._recorder.poll(now)
         self._status.ledger = self._ledger.document(now)
-        self._status.faults.count(self._ledger.take_faults())
+        self._status.faults.count(self._ledger.take_faults(), is_logged=True)
         document = self._status.due(self._mission, self._assignment, self._loading, now)
         if document is not None:
             self._outbox.status(document)

@@ -68,7 +68,7 @@ def run_daemon(
         compile_kernels(manager, stop)
     with open_bus(config.bus.settings(config.keys().prefix, config.ros2 or None)) as bus:
         _serve(config, bus, ledger, record_to, stop, started, manager)
-    LOG.info("stopped")
+    LOG.info("stopped", extra={"event": "stopped"})
 
 
 def _serve(
@@ -93,7 +93,8 @@ def _serve(
     try:
         loop.announce()
         bus.token(keys.alive)
-        LOG.info("ready after %.2f s on %s", time.monotonic() - started, keys.prefix)
+        seconds = time.monotonic() - started
+        LOG.info("ready after %.2f s on %s", seconds, keys.prefix, extra={"event": "ready"})
         manager.ready()
         loop.run(stop)
     finally:

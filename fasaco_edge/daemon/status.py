@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from fasaco_edge import __version__
 from fasaco_edge.daemon.about import config_document
 from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.daemon.faults import log_fault
 from fasaco_edge.daemon.mission_report import mission_report
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.assignment import Assignment
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.events import PathUpdate
     from fasaco_edge.mission.mission import Mission
     from fasaco_edge.planners.path import CoveragePath
+
+LOG = logging.getLogger(__name__)
 
 HEARTBEAT_S = 1.0
 # Changes closer together than this go out as one.
@@ -40,15 +44,17 @@ PLAN_FIGURES = (
 
 
 class Faults:
-    """Counts what was refused, by code."""
+    """Counts what was refused, by code, and logs it."""
 
     def __init__(self) -> None:
         self._by_code: Counter[str] = Counter()
         self._last = ""
 
-    def count(self, faults: Sequence[FasacoError]) -> None:
-        """Note refused events."""
+    def count(self, faults: Sequence[FasacoError], *, is_logged: bool = False) -> None:
+        """Note refused events, and log them if that is not done already."""
         for fault in faults:
+            if not is_logged:
+                log_fault(LOG, fault)
             self._by_code[fault.code] += 1
             self._last = str(fault)
 

@@ -57,7 +57,7 @@ def test_a_hang_is_ended_and_the_mission_goes_on(service: Service):
 def test_it_ends_in_time_while_it_plans(service: Service):
     service.configure(planner=ENDLESS)
     service.start()
-    service.lab.run("/opt/fasaco-edge/current/bin/python3", "-m", "tests.deploy.mapper")
+    service.lab.run("/opt/fasaco-edge/current/bin/python3", "-m", "tests.deploy.mapper", "hall")
     assert service.ask()["plan"]["planning"]
     seconds = service.stop()
     print(f"ended after {seconds:.2f} s, in the middle of a plan")
