@@ -6,6 +6,7 @@ import argparse
 import logging
 import os
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -63,7 +64,8 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.daemon.config import load_config
     from fasaco_edge.daemon.service import run_daemon
 
-    run_daemon(load_config(args.config), args.record, args.state, fresh=args.fresh)
+    read = partial(load_config, args.config)
+    run_daemon(read(), args.record, args.state, fresh=args.fresh, read=read)
     # All is closed. What is left is the interpreter's own end, in which it was seen to wait for
     # ever, now and then, where Zenoh's threads had been at work: a service must not.
     logging.shutdown()

@@ -5,22 +5,24 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.daemon.beginning import Beginning
+from fasaco_edge.daemon.beginning import Beginning, heard_of
 from fasaco_edge.daemon.commands import Commands
 from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.daemon.coverage_news import CoverageNews
 from fasaco_edge.daemon.inbox import Inbox, Received
 from fasaco_edge.daemon.keeping import Keeping
 from fasaco_edge.daemon.ledger_writer import LedgerWriter
 from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.daemon.outbox import Outbox
-from fasaco_edge.daemon.status import StatusBoard, plan_figures
+from fasaco_edge.daemon.reload import Reload
+from fasaco_edge.daemon.status import StatusBoard, path_note
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.daemon.turn_log import TurnLog, TurnNote
 from fasaco_edge.daemon.vitals import Vitals
-from fasaco_edge.errors import FasacoError, PatchWithoutBase
+from fasaco_edge.errors import BadConfiguration, FasacoError, PatchWithoutBase
 from fasaco_edge.mission.assignment import Assignment
 from fasaco_edge.mission.events import (
     Decision,
@@ -28,20 +30,22 @@ from fasaco_edge.mission.events import (
     PathUpdate,
     PlanReady,
 )
-from fasaco_edge.wire.coverage import coverage_grid
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.worker import Observed, PlanningWorker
     from fasaco_edge.mission.mission import Mission
 
 TICK_S = 0.1
-COVERAGE_PERIOD_S = 0.5
 # Updates without their map come in swarms; it is asked for no more often than this [s].
 ASK_FOR_MAP_S = 2.0
 
 
 class Loop:
-    """Joins the bus to the mission; everything but planning happens on its thread."""
+    """Joins the bus to the mission; everything but planning happens on its thread.
+
+    Attributes:
+        config: the configuration in force.
+    """
 
     def __init__(
         self,
@@ -54,8 +58,9 @@ class Loop:
         recorder: RecorderSupervisor | None,
         turns: TurnLog,
         vitals: Vitals,
+        reload: Reload,
     ) -> None:
-        self._config = config
+        self.config = config
         self._mailbox = mailbox
         self._inbox = inbox
         self._commands = commands
@@ -68,6 +73,7 @@ class Loop:
         self._recorder = recorder
         self._turns = turns
         self._vitals = vitals
+        self._reload = reload
         self._status = StatusBoard(config)
         self._mission: Mission | None = None
         self._worker: PlanningWorker | None = None
@@ -76,8 +82,8 @@ class Loop:
         # that the plan under way was asked for.
         self._unanswered_map: float | None = None
         self._asked_map: float | None = None
-        self._asked_for_map_at = self._coverage_at = float("-inf")
-        self._coverage_key: tuple[object, ...] = ()
+        self._asked_for_map_at = float("-inf")
+        self._coverage = CoverageNews(outbox)
         if self._keeping.fault is not None:
             self._status.faults.count([self._keeping.fault])
 
@@ -85,6 +91,8 @@ class Loop:
         """Turn until ``stop`` is set."""
         while not stop.is_set():
             items = self._mailbox.take(TICK_S)
+            if self._reload.asked.is_set() and not self._loading:
+                items = self._reload_config(items)
             started = time.monotonic()
             lost = self._mailbox.take_lost("map_update")
             events, faults = self._inbox.decode(items, lost)
@@ -116,7 +124,36 @@ class Loop:
         return "" if self._mission else self._beginning.stage
 
     def _load(self) -> Loader:
-        return Loader(self._config, self._mailbox)
+        return Loader(self.config, self._mailbox)
+
+    def _reload_config(self, items: list[tuple[str, object]]) -> list[tuple[str, object]]:
+        """Read the configuration again; return what of ``items`` still counts then."""
+        try:
+            config = self._reload.read(self.config)
+        except BadConfiguration as error:
+            self._status.faults.count([error], is_logged=True)
+            self._vitals.remark = f"configuration refused: {error}"
+        else:
+            self._vitals.remark = ""
+            if config != self.config:
+                self._go_on_with(config)
+                items = [(kind, item) for kind, item in items if not isinstance(item, PlanReady)]
+        self._reload.done()
+        return items
+
+    def _go_on_with(self, config: DaemonConfig) -> None:
+        """Let another mission go on from the ledger, as after a restart."""
+        self.config = config
+        self._status.show(config)
+        self._turns.end("the configuration has changed")
+        held = self._beginning.held
+        if self._mission is not None and self._worker is not None:
+            self._worker.disown()
+            self._keeping.take_back(self._mission)
+            held = heard_of(self._mission)
+        self._mission = self._worker = None
+        self._beginning = Beginning(self._keeping, self._load, held)
+        self._coverage.forget()
 
     def _begin(self, events: list[Event]) -> Mission | None:
         """Hold ``events`` until there is a mission; once it is there, they are all that was."""
@@ -140,7 +177,7 @@ class Loop:
             self._worker.interrupt()  # what is needed comes before what is only better
         try:
             self._perform(mission, decision)
-            self._publish_coverage(mission, started)
+            self._coverage.publish(mission, started)
         except FasacoError as error:
             # What cannot be said in the protocol's limits costs this message alone.
             self._status.faults.count([error])
@@ -196,38 +233,12 @@ class Loop:
     def _publish_path(self, mission: Mission, update: PathUpdate) -> None:
         assert mission.grid is not None
         assert mission.lattice is not None
-        plan = update.plan
-        about: dict[str, Any] = {
-            "revision": update.revision,
-            "map_stamp_ns": mission.grid.stamp_ns,
-            "map_revision": mission.map_revision,
-            "reason": update.reason,
-            "steps": max(len(update.cells) - 1, 0),
-            **plan_figures(plan),
-            "plan_ms": round(1e3 * update.plan_s, 3),
-        }
         xy = mission.lattice.centres(update.cells)
+        about = path_note(mission, update)
         self._outbox.path(xy, mission.grid.frame, mission.grid.stamp_ns, about)
         self._status.path = update
-        if plan is not None and self._asked_map is not None:
+        if update.plan is not None and self._asked_map is not None:
             self._status.map_to_path_s = time.monotonic() - self._asked_map
-
-    def _publish_coverage(self, mission: Mission, now: float) -> None:
-        # An order may forget what was covered, and keep the robot out of cells.
-        key = (mission.ledger.total, mission.map_revision, mission.assignment)
-        if key == self._coverage_key or now - self._coverage_at < COVERAGE_PERIOD_S:
-            return
-        if mission.lattice is None or mission.grid is None:
-            return
-        self._coverage_at, self._coverage_key = now, key
-        lattice = mission.lattice
-        visits = mission.ledger.visits(lattice.window)
-        grid = mission.grid
-        self._outbox.coverage(
-            coverage_grid(
-                lattice.window, lattice.cell_m, lattice.states, visits, grid.frame, grid.stamp_ns
-            )
-        )
 
     def _publish_snapshot(self, seen: Observed) -> None:
         mission = self._mission

@@ -79,10 +79,14 @@ class StatusBoard:
         self.ledger: dict[str, Any] = {}
         self.path: PathUpdate | None = None
         self._config = config
-        self._shown_config = config_document(config)
+        self.show(config)
         self._started = time.monotonic()
         self._sent_at = float("-inf")
         self._sent_key: tuple[Any, ...] = ()
+
+    def show(self, config: DaemonConfig) -> None:
+        """Show this configuration as the one in force."""
+        self._shown_config = config_document(config)
 
     def due(
         self, mission: Mission | None, assignment: Assignment, loading: str, now: float
@@ -155,6 +159,19 @@ class StatusBoard:
             "reason": update.reason,
             **plan_figures(plan),
         }
+
+
+def path_note(mission: Mission, update: PathUpdate) -> dict[str, Any]:
+    """Return what is said of a path beside it."""
+    return {
+        "revision": update.revision,
+        "map_stamp_ns": mission.grid.stamp_ns if mission.grid else 0,
+        "map_revision": mission.map_revision,
+        "reason": update.reason,
+        "steps": max(len(update.cells) - 1, 0),
+        **plan_figures(update.plan),
+        "plan_ms": round(1e3 * update.plan_s, 3),
+    }
 
 
 def plan_figures(plan: CoveragePath | None) -> dict[str, Any]:

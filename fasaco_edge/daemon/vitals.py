@@ -20,9 +20,13 @@ class Vitals:
     """Feeds the watchdog from the loop itself, and only while the planning thread gets on, too.
 
     A thread of its own that fed it would do so beside a loop that hangs.
+
+    Attributes:
+        remark: what else is to be known of the service; "" for nothing.
     """
 
     def __init__(self, manager: ServiceManager) -> None:
+        self.remark = ""
         self._manager = manager
         self._period_s = SHARE * manager.watchdog_s
         self._fed_at = float("-inf")
@@ -45,7 +49,8 @@ class Vitals:
         if status["state"] != self._state:
             self._state = status["state"]
             LOG.info("%s", _doing(status), extra={"event": "state", "state": self._state})
-        self._manager.status(status_line(status))
+        remark = f"; {self.remark}" if self.remark else ""
+        self._manager.status(status_line(status) + remark)
 
 
 def status_line(status: dict[str, Any]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 from fasaco_edge.cli.journal import message_id
 from tests.deploy.service import Service
 
@@ -28,6 +30,7 @@ def test_why_it_did_not_start_is_an_error(service: Service):
 def test_a_storm_of_faults_is_a_line(service: Service):
     service.start()
     service.lab.run("/opt/fasaco-edge/current/bin/python3", "-m", "tests.deploy.mapper", "storm")
+    time.sleep(1.2)  # a status is told once a second
     refused = service.ask()["errors"]["by_code"]["malformed_message"]
     service.stop()
     lines = [line for line in service.journal() if line.get("FASACO_EVENT") == "fault"]
