@@ -16,6 +16,7 @@ from fasaco_edge.daemon.inbox import Inbox, Received
 from fasaco_edge.daemon.keeping import Keeping
 from fasaco_edge.daemon.ledger_writer import LedgerWriter
 from fasaco_edge.daemon.loading import Loader
+from fasaco_edge.daemon.map_clock import MapClock
 from fasaco_edge.daemon.outbox import Outbox
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.status import StatusBoard, path_note
@@ -24,20 +25,13 @@ from fasaco_edge.daemon.turn_log import TurnLog, TurnNote
 from fasaco_edge.daemon.vitals import Vitals
 from fasaco_edge.errors import BadConfiguration, FasacoError, PatchWithoutBase
 from fasaco_edge.mission.assignment import Assignment
-from fasaco_edge.mission.events import (
-    Decision,
-    Event,
-    PathUpdate,
-    PlanReady,
-)
+from fasaco_edge.mission.events import Decision, Event, PathUpdate, PlanReady
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.worker import Observed, PlanningWorker
     from fasaco_edge.mission.mission import Mission
 
 TICK_S = 0.1
-# Updates without their map come in swarms; it is asked for no more often than this [s].
-ASK_FOR_MAP_S = 2.0
 
 
 class Loop:
@@ -77,12 +71,7 @@ class Loop:
         self._status = StatusBoard(config)
         self._mission: Mission | None = None
         self._worker: PlanningWorker | None = None
-        self._map_arrived: float | None = None
-        # Arrival of the oldest map that no plan was asked for yet, and of the one
-        # that the plan under way was asked for.
-        self._unanswered_map: float | None = None
-        self._asked_map: float | None = None
-        self._asked_for_map_at = float("-inf")
+        self._maps = MapClock()
         self._coverage = CoverageNews(outbox)
         if self._keeping.fault is not None:
             self._status.faults.count([self._keeping.fault])
@@ -152,6 +141,7 @@ class Loop:
             self._keeping.take_back(self._mission)
             held = heard_of(self._mission)
         self._mission = self._worker = None
+        self._maps = MapClock()
         self._beginning = Beginning(self._keeping, self._load, held)
         self._coverage.forget()
 
@@ -172,7 +162,7 @@ class Loop:
         if mission.map_revision > maps:
             self._status.ingest_s = time.monotonic() - started
             if decision.plan is not None or mission.wants_plan:
-                self._unanswered_map = self._unanswered_map or self._map_arrived
+                self._maps.call_for_plan()
         if mission.wants_plan and mission.is_improving and self._worker is not None:
             self._worker.interrupt()  # what is needed comes before what is only better
         try:
@@ -196,7 +186,7 @@ class Loop:
 
     def _note(self, items: list[tuple[str, object]]) -> None:
         """Take what is not the mission's: snapshots, the recorder's word, failures."""
-        self._map_arrived = None
+        self._maps.arrived = None
         for kind, item in items:
             if kind == "snapshot":
                 self._publish_snapshot(cast("Observed", item))
@@ -206,7 +196,7 @@ class Loop:
                 if not (self._mission and self._mission.is_improving):
                     self._status.plan_s = item.seconds
             elif kind in ("map", "map_update") and isinstance(item, Received):
-                self._map_arrived = item.at
+                self._maps.arrived = item.at
 
     def _perform(self, mission: Mission, decision: Decision) -> None:
         self._refuse(decision.faults)
@@ -214,7 +204,7 @@ class Loop:
         if decision.forgotten:
             self._keeping.forget()
         if decision.plan is not None and self._worker is not None:
-            self._asked_map, self._unanswered_map = self._unanswered_map, None
+            self._maps.ask()
             self._worker.submit(decision.plan)
         if decision.path is not None:
             if decision.plan is None and decision.path.plan is None and self._worker is not None:
@@ -224,11 +214,8 @@ class Loop:
     def _refuse(self, faults: Sequence[FasacoError]) -> None:
         """Count what was refused; ask for the map that updates lack."""
         self._status.faults.count(faults)
-        now = time.monotonic()
-        lacking = any(isinstance(fault, PatchWithoutBase) for fault in faults)
-        if lacking and now - self._asked_for_map_at >= ASK_FOR_MAP_S:
-            self._asked_for_map_at = now
-            self._inbox.ask_for_map()
+        if any(isinstance(fault, PatchWithoutBase) for fault in faults):
+            self._inbox.ask_for_map(time.monotonic())
 
     def _publish_path(self, mission: Mission, update: PathUpdate) -> None:
         assert mission.grid is not None
@@ -237,8 +224,8 @@ class Loop:
         about = path_note(mission, update)
         self._outbox.path(xy, mission.grid.frame, mission.grid.stamp_ns, about)
         self._status.path = update
-        if update.plan is not None and self._asked_map is not None:
-            self._status.map_to_path_s = time.monotonic() - self._asked_map
+        if update.plan is not None and (seconds := self._maps.answer()) is not None:
+            self._status.map_to_path_s = seconds
 
     def _publish_snapshot(self, seen: Observed) -> None:
         mission = self._mission

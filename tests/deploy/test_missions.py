@@ -2,38 +2,16 @@
 
 from __future__ import annotations
 
-import re
-import subprocess
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import pytest
 
 from tests.daemon.processes import STOP_S
-from tests.deploy.lab import ENVIRONMENT, Lab
+from tests.deploy.recordings import recordings
+from tests.deploy.robots import covered_m2, robot
 from tests.deploy.service import Service, wait_for
 
-SPEED = 20
 ENDLESS = {"ants": 1_000_000, "budget_s": 3600.0, "local_search": False}
-
-
-@contextmanager
-def robot(lab: Lab) -> Iterator[subprocess.Popen[bytes]]:
-    """A simulated robot that maps a building and follows the path, as long as this lasts."""
-    words = lab.words("fasaco-edge", "simulate", "flat", "--speed", str(SPEED))
-    process = subprocess.Popen(words, env=ENVIRONMENT, stderr=subprocess.DEVNULL)
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.wait(10.0)
-
-
-def covered_m2(service: Service) -> int:
-    """Return what the unit's status says is covered [m2]."""
-    said = re.search(r"% covered, (\d+) of", service.show("StatusText"))
-    return int(said[1]) if said else 0
 
 
 def test_a_hang_is_ended_and_the_mission_goes_on(service: Service):
@@ -103,8 +81,3 @@ def test_a_recorder_may_die(service: Service):
         assert service.ask()["state"] == "waiting for map"
     finally:
         recorder.remove()
-
-
-def recordings(lab: Lab) -> int:
-    listed = lab.run("find", "/var/log/private/fasaco-edge-recorder", "-name", "*.rrd", check=False)
-    return len(listed.stdout.split())

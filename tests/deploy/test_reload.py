@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from tests.deploy.robots import covered_m2, robot
 from tests.deploy.service import QUIET, Service, wait_for
-from tests.deploy.test_missions import covered_m2, robot
 
 
 def reload(service: Service) -> None:
