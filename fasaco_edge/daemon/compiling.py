@@ -18,7 +18,7 @@ from fasaco_edge.errors import ProcessEnded
 LOG = logging.getLogger(__name__)
 
 # Longer than any one stage takes on a small computer; asked for with each anew [s].
-STAGE_S = 300.0
+STAGE_S = 600.0
 LOOK_S = 0.02
 
 
