@@ -6,6 +6,7 @@ import argparse
 import logging
 import os
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,9 @@ there already, it joins that one) under the keys fasaco/@v1/robot/...:
 It covers everything it can reach, unless it is told otherwise (`fasaco-edge mission`) or to wait
 for an order (mission.autostart: false). Order and coverage are kept on disk: after a restart the
 mission goes on where it stopped.
+As a service (deploy/) it tells systemd when it is ready and that it gets on, and reads its
+configuration again at SIGHUP: what can change at run time (planner, map, the robot's speeds, the
+mission's patience) does; what cannot is named; a file that is wrong is kept out.
 """
 
 
@@ -63,7 +67,8 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.daemon.config import load_config
     from fasaco_edge.daemon.service import run_daemon
 
-    run_daemon(load_config(args.config), args.record, args.state, fresh=args.fresh)
+    read = partial(load_config, args.config)
+    run_daemon(read(), args.record, args.state, fresh=args.fresh, read=read)
     # All is closed. What is left is the interpreter's own end, in which it was seen to wait for
     # ever, now and then, where Zenoh's threads had been at work: a service must not.
     logging.shutdown()

@@ -6,20 +6,25 @@ import logging
 import signal
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.daemon.about import serve_about
 from fasaco_edge.daemon.commands import Commands
+from fasaco_edge.daemon.compiling import KernelCompiler
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.inbox import Inbox, make_mailbox
 from fasaco_edge.daemon.ledger_writer import LedgerWriter, open_ledger
 from fasaco_edge.daemon.loop import Loop
+from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.daemon.outbox import Outbox
+from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.daemon.turn_log import TurnLog
+from fasaco_edge.daemon.vitals import Vitals
 
 LOG = logging.getLogger(__name__)
 
@@ -37,6 +42,7 @@ def run_daemon(
     state: Path | None = None,
     *,
     fresh: bool = False,
+    read: Callable[[], DaemonConfig] | None = None,
 ) -> None:
     """Serve until SIGTERM or SIGINT.
 
@@ -45,22 +51,37 @@ def run_daemon(
         record_to: folder for recordings; without it there are none.
         state: folder of the coverage ledger, in place of the configuration's.
         fresh: keep aside the ledger there is, and cover everything anew.
+        read: reads the configuration again, when a service manager sends SIGHUP.
 
     Raises:
         BusUnavailable: no session could be opened.
         LedgerFileError: another process keeps this robot's ledger.
         BadConfiguration: there is no place to keep it, or a file of bus.security is missing.
+        ProcessEnded: a service's kernels could not be compiled.
     """
     started = time.monotonic()
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
-    robot = config.robot
-    folder = state or config.mission.state_folder()
-    ledger = open_ledger(folder, robot.name, robot.tool_width_m, fresh=fresh)
-    with open_bus(config.bus.settings(config.keys().prefix, config.ros2 or None)) as bus:
-        _serve(config, bus, ledger, record_to, stop, started)
-    LOG.info("stopped")
+    manager = ServiceManager()
+    # Others are ready to answer; a service is ready to plan, see sd_notify(3).
+    reload = Reload(read or (lambda: config), manager)
+    if manager.is_there:
+        # Elsewhere it is what a terminal sends that is closed.
+        signal.signal(signal.SIGHUP, lambda *_: reload.asked.set())
+    compiler = KernelCompiler(manager) if manager.is_there else None
+    try:
+        robot = config.robot
+        folder = state or config.mission.state_folder()
+        ledger = open_ledger(folder, robot.name, robot.tool_width_m, fresh=fresh)
+        if compiler is not None:
+            compiler.wait(stop)
+        with open_bus(config.bus.settings(config.keys().prefix, config.ros2 or None)) as bus:
+            _serve(config, bus, ledger, record_to, stop, started, manager, reload)
+    finally:
+        if compiler is not None:
+            compiler.close()
+    LOG.info("stopped", extra={"event": "stopped"})
 
 
 def _serve(
@@ -70,6 +91,8 @@ def _serve(
     record_to: Path | None,
     stop: threading.Event,
     started: float,
+    manager: ServiceManager,
+    reload: Reload,
 ) -> None:
     keys = config.keys()
     mailbox = make_mailbox()
@@ -78,15 +101,20 @@ def _serve(
     inbox = Inbox(bus, keys, mailbox, config.pose.schema, ros)
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
     commands = Commands(bus, keys, mailbox)
-    serve_about(bus, keys, config)
     turns = TurnLog(bus.publisher(keys.turns, qos=QOS["turns"]), config, ledger.restored)
-    loop = Loop(config, mailbox, inbox, commands, outbox, ledger, recorder, turns)
+    vitals = Vitals(manager)
+    loop = Loop(config, mailbox, inbox, commands, outbox, ledger, recorder, turns, vitals, reload)
+    serve_about(bus, keys, lambda: loop.config)
     try:
         loop.announce()
         bus.token(keys.alive)
-        LOG.info("ready after %.2f s on %s", time.monotonic() - started, keys.prefix)
+        seconds = time.monotonic() - started
+        LOG.info("ready after %.2f s on %s", seconds, keys.prefix, extra={"event": "ready"})
+        if not stop.is_set():
+            manager.ready()
         loop.run(stop)
     finally:
+        manager.stopping()
         stopped = time.monotonic()
         loop.close(WORKER_STOP_S)
         if recorder is not None:

@@ -8,7 +8,7 @@ import yaml
 from fasaco_edge.daemon.config import DaemonConfig, load_config
 from fasaco_edge.daemon.ros_config import RosConfig
 
-EXAMPLE = Path(__file__).parent.parent / "deploy" / "fasaco-edge.yaml"
+EXAMPLE = Path(__file__).parents[2] / "deploy" / "fasaco-edge.yaml"
 
 
 def test_example_configuration_holds_every_key_with_its_default():

@@ -1,0 +1,84 @@
+"""This checkout as a service finds it installed, at /opt/fasaco-edge/current.
+
+A service with DynamicUser= sees neither home folders nor /tmp, where a checkout and its virtual
+environment often lie; so both are shown to it elsewhere, and run by the system's own Python.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from fasaco_edge.kernels.cache import missing_from
+from fasaco_edge.kernels.jit import CACHE_FOLDER
+from tests.daemon.processes import PROGRAM
+from tests.deploy.lab import Lab
+
+HOME = "/opt/fasaco-edge"
+PYTHON = Path("/usr/bin/python3")
+CHECKOUT = Path(__file__).parents[2]
+PACKAGES = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
+SOURCE = f"{HOME}/source"
+SCRIPT = f"""\
+#!{HOME}/current/bin/python3
+import sys
+from fasaco_edge.cli import main
+sys.exit(main())
+"""
+
+
+def why_not() -> str:
+    """Return why the system's Python cannot run what is installed here, "" if it can."""
+    if not PYTHON.exists():
+        return f"there is no {PYTHON}"
+    tell = [str(PYTHON), "-c", "import sys; print(*sys.version_info[:2], sep='.')"]
+    there = subprocess.run(tell, capture_output=True, text=True, check=True).stdout.strip()
+    here = f"{sys.version_info.major}.{sys.version_info.minor}"
+    return "" if there == here else f"{PYTHON} is {there}, the packages here are for {here}"
+
+
+def binds(folder: Path) -> dict[str, Path]:
+    """Return what a lab has to show for this to be installed in it; ``folder`` is an empty one."""
+    # An installer compiles the sources to byte code; nobody can inside, where they are read-only.
+    subprocess.run([sys.executable, "-m", "compileall", "-q", CHECKOUT / "fasaco_edge"], check=True)
+    shown = {SOURCE: CHECKOUT}
+    libraries = [path for path in map(Path, sys.path) if path.name == "site-packages"]
+    shown |= {f"{HOME}/packages/{number}": path for number, path in enumerate(libraries)}
+    current = folder / "current"
+    (current / "bin").mkdir(parents=True)
+    (current / PACKAGES).mkdir(parents=True)
+    (current / "pyvenv.cfg").write_text("home = /usr/bin\ninclude-system-site-packages = false\n")
+    (current / "bin/python3").symlink_to(PYTHON)
+    (current / PACKAGES / "shown.pth").write_text("\n".join(shown) + "\n")
+    script = current / "bin/fasaco-edge"
+    script.write_text(SCRIPT)
+    script.chmod(0o755)
+    # As for any service; pytest makes its folders for its own user alone.
+    folder.chmod(0o755)
+    return shown | {f"{HOME}/current": current}
+
+
+def warm(lab: Lab, cache: str = "/var/cache/fasaco-edge/numba") -> None:
+    """Give the service the kernels that were compiled for this checkout.
+
+    numba keeps them in a folder named after that of their sources, which has another place inside.
+    """
+    if missing_from(CACHE_FOLDER):
+        subprocess.run([*PROGRAM, "warmup"], check=True, capture_output=True)
+    here = CACHE_FOLDER / _folder_of(str(CHECKOUT / "fasaco_edge/kernels"))
+    # The folder's name tells the patch level of Python, of which the code in it is independent.
+    tell = "from fasaco_edge.kernels.cache import code_digest; print(f'kernels-{code_digest()}')"
+    name = lab.run(f"{HOME}/current/bin/python3", "-c", tell).stdout.strip()
+    there = Path(name, _folder_of(f"{SOURCE}/fasaco_edge/kernels"))
+    # For root, who runs robots and asks questions, they are kept elsewhere.
+    for home in (cache, "/root/.cache/fasaco-edge"):
+        shutil.copytree(here, lab.root / home.lstrip("/") / there, dirs_exist_ok=True)
+    # Finds all of them, and notes that the cache is complete.
+    lab.run("env", f"NUMBA_CACHE_DIR={cache}", "fasaco-edge", "warmup")
+
+
+def _folder_of(sources: str) -> str:
+    return f"kernels_{hashlib.sha1(sources.encode()).hexdigest()}"

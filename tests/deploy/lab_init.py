@@ -1,0 +1,133 @@
+"""Process 1 of a lab: builds a root of its own, throws the machine's away, and becomes systemd.
+
+Run by ``unshare`` in new namespaces; reads its orders, JSON, from the file that is its argument.
+It imports nothing but the standard library: it runs before there is anything else.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+SYSTEMD = "/usr/lib/systemd/systemd"
+PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
+DEVICES = ("null", "zero", "full", "random", "urandom", "tty")
+# The machine's own; a lab has neither hardware nor users who log in.
+MASKED = (
+    "systemd-udevd.service",
+    "systemd-udev-trigger.service",
+    "systemd-timesyncd.service",
+    "systemd-resolved.service",
+    "systemd-networkd.service",
+    "systemd-logind.service",
+    "systemd-random-seed.service",
+    "systemd-remount-fs.service",
+    "systemd-firstboot.service",
+    "getty.target",
+)
+TARGET = """\
+[Unit]
+Description=All that a lab starts by itself
+Requires=basic.target
+After=basic.target
+AllowIsolate=yes
+"""
+# Every line is to be seen: what limits them has to be the service itself.
+JOURNAL = "[Journal]\nStorage=volatile\nForwardToConsole=no\nRateLimitBurst=0\n"
+
+
+def main(orders: dict) -> None:
+    folder = Path(orders["folder"])
+    # /proc is still the machine's: this is the process id there.
+    (folder / "pid").write_text(os.readlink("/proc/self"))
+    mount("--make-rprivate", "/")
+    mount("-t", "tmpfs", "-o", "size=4g", "tmpfs", folder / "mnt")
+    upper, work, root = (folder / "mnt" / name for name in ("upper", "work", "root"))
+    for made in (upper, work, root):
+        made.mkdir()
+    layers = f"lowerdir={orders['lower']},upperdir={upper},workdir={work}"
+    mount("-t", "overlay", "overlay", "-o", layers, root)
+    kernel_interfaces(root, orders["limits"])
+    devices(root)
+    for inside, outside in orders["binds"].items():
+        place = root / inside.lstrip("/")
+        place.mkdir(parents=True, exist_ok=True)
+        mount("--bind", "-o", "ro", outside, place)
+    settings(root)
+    enter(root)
+    words = [SYSTEMD, "--system", "--unit=lab.target", "--log-target=journal", "--show-status=no"]
+    if orders["limits"]:
+        words.append("systemd.unified_cgroup_hierarchy=0")
+    os.execve(SYSTEMD, words, {"PATH": PATH, "container": "lab", "LANG": "C.UTF-8"})
+
+
+def mount(*words: object) -> None:
+    """Mount, or end with mount's own complaint."""
+    subprocess.run(["mount", *map(str, words)], check=True)
+
+
+def kernel_interfaces(root: Path, limits: list[str]) -> None:
+    """Mount /proc, /sys, cgroups, /run and /tmp."""
+    mount("-t", "proc", "proc", root / "proc")
+    mount("-t", "sysfs", "sysfs", root / "sys")
+    groups = root / "sys/fs/cgroup"
+    if limits:
+        mount("-t", "tmpfs", "-o", "mode=755", "tmpfs", groups)
+        for name in limits:
+            (groups / name).mkdir()
+            mount("-t", "cgroup", "-o", name, "cgroup", groups / name)
+        (groups / "systemd").mkdir()
+        mount("-t", "cgroup", "-o", "none,name=systemd", "cgroup", groups / "systemd")
+    else:
+        mount("-t", "cgroup2", "cgroup2", groups)
+    mount("-t", "tmpfs", "-o", "mode=755", "tmpfs", root / "run")
+    mount("-t", "tmpfs", "-o", "mode=1777", "tmpfs", root / "tmp")
+
+
+def devices(root: Path) -> None:
+    """Give the lab the devices that every program may expect, and no others."""
+    mount("-t", "tmpfs", "-o", "mode=755", "tmpfs", root / "dev")
+    for name in DEVICES:
+        (root / "dev" / name).touch()
+        mount("--bind", f"/dev/{name}", root / "dev" / name)
+    for name in ("pts", "shm"):
+        (root / "dev" / name).mkdir()
+    options = "newinstance,ptmxmode=0666,mode=620,gid=5"
+    mount("-t", "devpts", "-o", options, "devpts", root / "dev/pts")
+    mount("-t", "tmpfs", "tmpfs", root / "dev/shm")
+    for name, there in (("ptmx", "pts/ptmx"), ("fd", "/proc/self/fd")):
+        (root / "dev" / name).symlink_to(there)
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        (root / "dev" / name).symlink_to(f"fd/{number}")
+
+
+def settings(root: Path) -> None:
+    """Say what systemd is to start, and what of the machine's it is not."""
+    units = root / "run/systemd/system"
+    units.mkdir(parents=True)
+    (units / "lab.target").write_text(TARGET)
+    for name in MASKED:
+        (units / name).symlink_to("/dev/null")
+    journal = root / "etc/systemd/journald.conf.d/lab.conf"
+    journal.parent.mkdir(parents=True, exist_ok=True)
+    journal.write_text(JOURNAL)
+    (root / "etc/machine-id").write_text("")
+    subprocess.run(["hostname", "lab"], check=True)
+    subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
+
+
+def enter(root: Path) -> None:
+    """Make ``root`` the root, and let go of the machine's."""
+    old = root / ".old"
+    old.mkdir()
+    os.chdir(root)
+    subprocess.run(["pivot_root", ".", ".old"], check=True)
+    subprocess.run(["umount", "-l", "/.old"], check=True)
+    Path("/.old").rmdir()
+    # In a container systemd leaves this to whoever made it; LoadCredential= needs it.
+    mount("--make-rshared", "/")
+
+
+if __name__ == "__main__":
+    main(json.loads(Path(sys.argv[1]).read_text()))

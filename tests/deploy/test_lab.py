@@ -1,0 +1,72 @@
+"""The lab itself: what is done inside stays inside, and nothing of it is left."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from fasaco_edge import __version__
+from tests.daemon.processes import is_running
+from tests.deploy.lab import booted, why_not
+
+MARK = "/etc/fasaco-edge-lab-was-here"
+BOOT_AND_WAIT = """\
+import sys, time
+from pathlib import Path
+from tests.deploy.lab import booted
+with booted(Path(sys.argv[1]), {}) as lab:
+    print(lab.pid, flush=True)
+    time.sleep(60)
+"""
+
+
+def fail_in(folder: Path) -> None:
+    with booted(folder, {}):
+        raise AssertionError("a test that fails")
+
+
+def cgroups() -> set[Path]:
+    return set(Path("/sys/fs/cgroup").glob(f"**/fasaco-lab-*-{os.getpid()}"))
+
+
+def test_process_one_is_systemd_and_what_is_installed_runs(lab):
+    assert lab.run("cat", "/proc/1/comm").stdout == "systemd\n"
+    assert lab.run("fasaco-edge", "--version").stdout == f"fasaco-edge {__version__}\n"
+    warmup = lab.run("fasaco-edge", "warmup")
+    seconds = float(warmup.stderr.split("after ")[1].split()[0])
+    assert seconds < 15.0, "the kernels were compiled again"
+
+
+def test_what_is_written_inside_stays_inside(lab):
+    lab.write(MARK, "here")
+    assert lab.run("cat", MARK).stdout == "here"
+    assert not Path(MARK).exists()
+
+
+def test_a_lab_ends_with_the_process_that_booted_it(tmp_path):
+    if reason := why_not():
+        pytest.skip(reason)
+    words = [sys.executable, "-c", BOOT_AND_WAIT, str(tmp_path)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        systemd = int(process.stdout.readline())
+        assert is_running(systemd)
+        process.send_signal(signal.SIGKILL)
+    until = time.monotonic() + 5.0
+    while is_running(systemd) and time.monotonic() < until:
+        time.sleep(0.01)
+    assert not is_running(systemd)
+
+
+def test_nothing_is_left_of_a_lab(tmp_path):
+    if reason := why_not():
+        pytest.skip(reason)
+    before = cgroups()
+    with pytest.raises(AssertionError, match="a test that fails"):
+        fail_in(tmp_path)
+    assert cgroups() == before
+    assert not is_running(int((tmp_path / "pid").read_text()))
+    assert str(tmp_path) not in Path("/proc/mounts").read_text()
