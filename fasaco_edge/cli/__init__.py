@@ -12,6 +12,7 @@ from fasaco_edge import __version__
 from fasaco_edge.cli import (
     ask,
     bench,
+    check_config,
     demo,
     doctor,
     exits,
@@ -32,7 +33,7 @@ from fasaco_edge.errors import BadConfiguration, FasacoError
 
 COMMANDS = (
     demo, plan, run, mission, ask, watch, record, review, replay, simulate, bench, maps, warmup,
-    doctor,
+    check_config, doctor,
 )  # fmt: skip
 
 

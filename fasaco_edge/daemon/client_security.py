@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import yaml
 
-from fasaco_edge.daemon.security_config import SecurityConfig, check_security
+from fasaco_edge.daemon.security_config import SecurityConfig, security_faults
 from fasaco_edge.errors import BadConfiguration
 
 
@@ -21,7 +21,8 @@ def read_client_security(words: str, connect: Sequence[str]) -> SecurityConfig:
     try:
         text = words if words.startswith("{") else Path(words).read_text(encoding="utf-8")
         security = msgspec.convert(yaml.safe_load(text) or {}, SecurityConfig)
-        check_security(security, (), connect)
+        for fault in security_faults(security, (), connect):
+            raise fault
     except OSError as error:
         raise BadConfiguration(f"--security: {words}: {error.strerror}") from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:

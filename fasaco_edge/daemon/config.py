@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Literal
 
 import msgspec
-import yaml
 from msgspec import Meta
 
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
+from fasaco_edge.daemon.config_faults import Fault, section_faults
+from fasaco_edge.daemon.config_text import read_text
 from fasaco_edge.daemon.mission_settings import MissionSettings
 from fasaco_edge.daemon.planner_config import PlannerConfig
 from fasaco_edge.daemon.recording_config import RecordingConfig
 from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.daemon.section import Section
-from fasaco_edge.daemon.security_config import SecurityConfig, check_security
+from fasaco_edge.daemon.security_config import SecurityConfig, security_faults
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.wire import schemas
@@ -123,92 +125,81 @@ def load_config(path: Path | None) -> DaemonConfig:
         BadConfiguration: the file is missing, is no YAML, has unknown keys or
             impossible values; the text names key, value and what is allowed.
     """
+    config, faults = inspect_config(path)
+    if config is not None:
+        return config
+    first, *more = faults
+    where = f"{path}, line {first.line}" if first.line else str(path)
+    hint = first.error.hint
+    if more:
+        others = f"the {len(more)} others" if len(more) > 1 else "another one"
+        hint += f"; fasaco-edge check-config {path} tells {others}"
+    raise type(first.error)(f"{where}: {first.error}", hint=hint) from first.error
+
+
+def inspect_config(path: Path | None) -> tuple[DaemonConfig | None, tuple[Fault, ...]]:
+    """Read a YAML file; return the configuration, or None and all that is wrong.
+
+    What does not go together is only looked for where each value by itself is right.
+    """
     if path is None:
-        return DaemonConfig()
+        return DaemonConfig(), ()
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadConfiguration(f"{path}: {error.strerror}") from error
-    except RecursionError as error:
-        raise BadConfiguration(f"{path}: not YAML: nested too deeply") from error
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, no such date
-        raise BadConfiguration(f"{path}: not YAML: {error}") from error
-    try:
-        config = msgspec.convert(document if document is not None else {}, DaemonConfig)
-        _check_together(config)
-    except msgspec.ValidationError as error:
-        raise BadConfiguration(f"{path}: {_explain(str(error), document)}") from error
+        text = read_text(path)
     except BadConfiguration as error:
-        raise type(error)(f"{path}: {error}", hint=error.hint) from error
-    return config
+        return None, (Fault("", error),)
+    faults = [*text.twice, *section_faults(DaemonConfig, text.document)]
+    if not faults:
+        config = msgspec.convert(text.document, DaemonConfig)
+        faults = [Fault(_named_in(error), error) for error in _together(config)]
+        if not faults:
+            return config, ()
+    return None, tuple(
+        replace(fault, line=fault.line or text.line_of(fault.key)) for fault in faults
+    )
 
 
-def _check_together(config: DaemonConfig) -> None:
-    """Check what no single value shows."""
+def _named_in(error: BadConfiguration) -> str:
+    """Return the key that an error begins with."""
+    match = re.match(r"[\w.\[\]]*", str(error))
+    return match[0] if match else ""
+
+
+def _together(config: DaemonConfig) -> Iterator[BadConfiguration]:
+    """Yield what no single value shows."""
     low, high = config.map.free_at_most, config.map.occupied_at_least
     if low >= high:
-        raise BadConfiguration(
+        yield BadConfiguration(
             f"map.free_at_most must be below map.occupied_at_least, got {low} and {high}"
         )
-    if not (config.bus.listen or config.bus.connect):
-        raise BadConfiguration("bus.listen and bus.connect must not both be empty")
     bus = config.bus
-    check_security(bus.security, bus.listen, bus.connect, open_to_everyone=bus.open_to_everyone)
+    if not (bus.listen or bus.connect):
+        yield BadConfiguration("bus.listen and bus.connect must not both be empty")
+    yield from security_faults(
+        bus.security, bus.listen, bus.connect, open_to_everyone=bus.open_to_everyone
+    )
     if bus.security.roles.ros and not config.ros2:
-        raise BadConfiguration("bus.security.roles.ros: without a block ros2 there is no such role")
+        yield BadConfiguration("bus.security.roles.ros: without a block ros2 there is no such role")
     part_mb, quota_mb = config.recording.part_mb, config.recording.quota_mb
     if 0 < quota_mb < 2 * part_mb:
-        raise BadConfiguration(
+        yield BadConfiguration(
             f"recording.quota_mb must be 0 or at least twice recording.part_mb, {2 * part_mb}, "
             f"got {quota_mb}"
         )
     if "\0" in config.mission.state_dir:
-        raise BadConfiguration("mission.state_dir must be a path, got one with a NUL")
-    config.keys()
+        yield BadConfiguration("mission.state_dir must be a path, got one with a NUL")
     if config.ros2:
-        try:
-            config.ros2.check()
-        except BadConfiguration as error:
-            raise BadConfiguration(f"ros2.{error}") from error
+        for error in config.ros2.faults():
+            yield BadConfiguration(f"ros2.{error}")
+    yield from _refused("bus.", lambda: Keys(base=config.bus.base))
+    yield from _refused("robot.name: ", lambda: Keys(robot=config.robot.name))
+    yield from _refused("robot: ", config.robot.cost)
+    yield from _refused("planner.", config.planner.colony)
+
+
+def _refused(before: str, make: Callable[[], object]) -> Iterator[BadConfiguration]:
+    """Yield why something cannot be made of the configuration, if so."""
     try:
-        config.robot.cost()
+        make()
     except BadConfiguration as error:
-        raise BadConfiguration(f"robot: {error}") from error
-    try:
-        config.planner.colony()
-    except BadConfiguration as error:
-        raise BadConfiguration(f"planner.{error}") from error
-
-
-def _explain(message: str, document: object) -> str:
-    """Turn ``Expected `int` >= 1 - at `$.planner.ants``` into key, expectation and value."""
-    match = re.fullmatch(
-        r"(?P<what>.*?)(?: - at (?P<as_key>`key` in )?`\$\.?(?P<key>[^`]*)`)?", message, re.DOTALL
-    )
-    assert match is not None
-    what, key = match["what"].replace("`", ""), match["key"] or ""
-    unknown = re.fullmatch(r"Object contains unknown field (?P<name>.*)", what)
-    if unknown:
-        return f"unknown key {'.'.join(filter(None, (key, unknown['name'])))}"
-    value: Any = document
-    for part in re.findall(r"[^.\[\]]+", key):
-        value = value[int(part)] if isinstance(value, list) else value[part]
-    expected = _choices(key) or what[0].lower() + what[1:].partition(", got")[0]
-    if match["as_key"]:
-        expected += " as key"
-    elif expected == "expected str":
-        expected += ", in quotes"  # YAML 1.1 takes 8:1 for a number
-    return f"{key or 'the file'}: {expected}, got {value!r}"
-
-
-def _choices(key: str) -> str:
-    """Return what a key may be where that is one of a few names, else ""."""
-    kind: Any = DaemonConfig
-    for part in key.split("."):
-        kind = get_type_hints(kind).get(part) if isinstance(kind, type) else None
-        if get_origin(kind) is UnionType:  # of a section that may be left out
-            kind = get_args(kind)[0]
-    if get_origin(kind) is not Literal:
-        return ""
-    *others, last = get_args(kind)
-    return "expected " + (f"{', '.join(others)} or {last}" if others else str(last))
+        yield BadConfiguration(before + str(error))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from msgspec import Meta
@@ -113,38 +114,37 @@ class RosConfig(Section, frozen=True):
             [graph_key(self.domain)],
         )
 
-    def check(self) -> None:
-        """Check what no single value's type shows.
+    def faults(self) -> Iterator[BadConfiguration]:
+        """Yield what no single value's type shows.
 
-        Raises:
-            BadConfiguration: a name is none, two topics have one name, or what is for rmw_zenoh
-                alone was said of a bridge.
+        A name is none, two topics have one name, or what is for rmw_zenoh alone was said of a
+        bridge.
         """
         if self.namespace != "/" and not _TOPIC.fullmatch(self.namespace):
-            raise BadConfiguration(f"namespace must be / or like /robot1, got {self.namespace!r}")
+            yield BadConfiguration(f"namespace must be / or like /robot1, got {self.namespace!r}")
         if not _NODE.fullmatch(self.node):
-            raise BadConfiguration(f"node must be letters, digits and _, got {self.node!r}")
+            yield BadConfiguration(f"node must be letters, digits and _, got {self.node!r}")
         if self.kind == "bridge" and (self.domain != 0 or self.node != DEFAULT_NODE):
-            raise BadConfiguration("domain and node are for kind rmw_zenoh: a bridge has its own")
-        self._check_topics()
+            yield BadConfiguration("domain and node are for kind rmw_zenoh: a bridge has its own")
+        yield from self._topic_faults()
         for key in ("map", "robot"):
             frame = getattr(self.frames, key)
             # What cannot be printed may have no UTF-8, or be a NUL.
             printed = frame if frame.isprintable() else ""
             if not 0 < len(printed.encode()) <= MAX_STRING_BYTES:
-                raise BadConfiguration(f"frames.{key} must be the name of a frame, got {frame!r}")
+                yield BadConfiguration(f"frames.{key} must be the name of a frame, got {frame!r}")
         if self.frames.map == self.frames.robot:
             both = self.frames.map
-            raise BadConfiguration(f"frames.map and frames.robot must differ, got {both!r} twice")
+            yield BadConfiguration(f"frames.map and frames.robot must differ, got {both!r} twice")
 
-    def _check_topics(self) -> None:
+    def _topic_faults(self) -> Iterator[BadConfiguration]:
         keys: dict[str, str] = {}
         for key in RosTopicNames.__struct_fields__:
             name: str = getattr(self.topics, key)
             if not _TOPIC.fullmatch(name) or len(self._name(name)) > _MAX_TOPIC_LENGTH:
-                raise BadConfiguration(f"topics.{key} must be like /robot1/map, got {name!r}")
+                yield BadConfiguration(f"topics.{key} must be like /robot1/map, got {name!r}")
             if name in keys:
-                raise BadConfiguration(
+                yield BadConfiguration(
                     f"topics.{keys[name]} and topics.{key} must differ, got {name!r} twice"
                 )
             keys[name] = key

@@ -151,63 +151,62 @@ def files(security: SecurityConfig) -> Iterator[tuple[str, str]]:
             yield f"{security.kind}.{name}", getattr(section, name)
 
 
-def check_security(
+def security_faults(
     security: SecurityConfig,
     listen: Sequence[str],
     connect: Sequence[str],
     *,
     open_to_everyone: bool = False,
-) -> None:
-    """Check that what listens beyond this computer knows who speaks to it.
+) -> Iterator[BadConfiguration]:
+    """Yield what is missing, or does not go together.
 
-    Raises:
-        OpenToEveryone: an endpoint can be reached from elsewhere, by anybody.
-        BadConfiguration: something is missing, or does not go together.
+    That is OpenToEveryone where anybody could speak at an endpoint that can be reached from
+    elsewhere.
     """
     beyond = [endpoint for endpoint in listen if not is_local(endpoint)]
     if security.kind == "none":
         if beyond and not open_to_everyone:
-            raise OpenToEveryone(
+            yield OpenToEveryone(
                 f"bus.listen: {beyond[0]} can be reached from other computers, and everybody there "
                 "could give this robot maps and commands"
             )
         named = [role for role, who in security.names().items() if who]
         if named:
-            raise BadConfiguration(
+            yield BadConfiguration(
                 f"bus.security.roles.{named[0]}: with bus.security.kind none nobody shows a name"
             )
         return
     if open_to_everyone:
-        raise BadConfiguration(
+        yield BadConfiguration(
             f"bus.open_to_everyone: contradicts bus.security.kind {security.kind}"
         )
-    _check_complete(security, listen)
+    yield from _missing(security, listen)
     for key, endpoints in (("listen", listen), ("connect", connect)):
         for endpoint in endpoints:
-            _check_protocol(security.kind, key, endpoint)
+            yield from _protocol_faults(security.kind, key, endpoint)
 
 
-def _check_complete(security: SecurityConfig, listen: Sequence[str]) -> None:
+def _missing(security: SecurityConfig, listen: Sequence[str]) -> Iterator[BadConfiguration]:
     if security.kind == "user" and not security.user.name:
-        raise BadConfiguration("bus.security.user.name: needed with bus.security.kind user")
+        yield BadConfiguration("bus.security.user.name: needed with bus.security.kind user")
     for name, file in files(security):
         if "\0" in file:
-            raise BadConfiguration(f"bus.security.{name} must be a path, got one with a NUL")
+            yield BadConfiguration(f"bus.security.{name} must be a path, got one with a NUL")
         if not file and (name != "user.dictionary_file" or listen):
-            raise BadConfiguration(
+            yield BadConfiguration(
                 f"bus.security.{name}: needed with bus.security.kind {security.kind}"
             )
 
 
-def _check_protocol(kind: str, key: str, endpoint: str) -> None:
+def _protocol_faults(kind: str, key: str, endpoint: str) -> Iterator[BadConfiguration]:
     protocol = protocol_of(endpoint)
     if kind == "tls" and protocol != "tls":
-        raise BadConfiguration(
+        yield BadConfiguration(
             f"bus.{key}: {endpoint}: only tls/<host>:<port> carries certificates",
             hint="correct the endpoint, or bus.security.kind",
         )
     if kind == "user" and protocol not in ("tcp", "ws", *UNIX):
-        raise BadConfiguration(
+        yield BadConfiguration(
             f"bus.{key}: {endpoint}: user and password are shown over tcp, ws or a unix socket",
             hint="correct the endpoint, or bus.security.kind",
         )

@@ -70,7 +70,12 @@ class Pilot:
         """Ask for a better path, if nothing else is to be done."""
         parts, route = self._parts, self._parts.route
         is_free = self._state is State.COVERING and route.asked is None and not route.wanted
-        return route.ask_for_better() if is_free and parts.spare.is_there(parts.now) else None
+        if not is_free or not parts.spare.is_there(parts.now):
+            return None
+        request = route.ask_for_better()
+        if request is None:
+            parts.spare.skip(parts.now)
+        return request
 
     def _resting(self) -> tuple[State, str] | None:
         """Return why there is nothing to decide, if so."""

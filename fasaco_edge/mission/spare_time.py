@@ -12,13 +12,15 @@ from fasaco_edge.mission.agenda import Agenda
 from fasaco_edge.mission.progress import DrivenPath
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.repair import HELD_CELLS
 
-# What the robot is about to drive holds still; less than twice that is not worth a thought.
-HELD_CELLS = 20
 # A path is worth another only if that saves so many steps, and such a share of what is left.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
 # The share of time is halved so often at most.
 MOST_VAIN = 4
+# Where there is nothing to attempt it is asked again so late [s]: to find that out takes a look
+# at the whole lattice, and the answer rarely changes from one pose to the next.
+SKIPPED_S = 1.0
 
 
 class SpareTime:
@@ -44,6 +46,10 @@ class SpareTime:
         share = self._share / 2**self._vain
         self._resting_until = now + seconds * (1.0 / share - 1.0)
 
+    def skip(self, now: float) -> None:
+        """Note that there was nothing to attempt at ``now`` [s]."""
+        self._resting_until = now + SKIPPED_S
+
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
@@ -62,6 +68,7 @@ class Attempt:
     @classmethod
     def at(cls, path: DrivenPath, revision: int, agenda: Agenda, number: int) -> Attempt | None:
         """Return attempt ``number``, on a path; None where too little of it is left."""
+        # What the robot is about to drive holds still; less than twice that is not worth a thought.
         joint = path.index + HELD_CELLS
         if joint + HELD_CELLS > len(path.cells):
             return None

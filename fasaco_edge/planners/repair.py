@@ -40,7 +40,7 @@ KICKS_AT_ONCE = 10
 STRIDE, SPOT_CELLS, PASSES = 997, 400, 4
 
 # The robot is about to drive these cells: five metres of common ones.
-HELD = 18
+HELD_CELLS = 18
 
 
 def can_repair(problem: CoverageProblem) -> bool:
@@ -76,7 +76,7 @@ class _Repair:
         self._framed = FramedGround.of(problem)
         self._prices = Prices(cost.step_us, cost.quarter_turn_us, problem.end is None)
         self._effort = repair_for(cost)
-        self._walk = mended(problem, self._framed, problem.before, HELD)
+        self._walk = mended(problem, self._framed, problem.before, HELD_CELLS)
         self._first_walk_s = time.perf_counter() - began
         before = framed_cells(problem, self._framed, problem.before)
         self._changed = _changed(self._framed, before, self._walk)
@@ -100,7 +100,7 @@ class _Repair:
     def _places(self) -> Iterator[Neighbourhood]:
         """Yield where to look: around what changed; or here and there, until nothing is gained."""
         if not self._problem.only_better:
-            yield from neighbourhoods(self._framed, self._walk[:HELD], self._changed)
+            yield from neighbourhoods(self._framed, self._walk[:HELD_CELLS], self._changed)
             return
         gainless = 0
         for number in itertools.count(STRIDE * self._problem.attempt):
@@ -117,14 +117,14 @@ class _Repair:
 
         Moves that gain nothing carry a walk about: first where the robot is not yet.
         """
-        for held in (HELD, 0) if place.is_first else (0,):
+        for held in (HELD_CELLS, 0) if place.is_first else (0,):
             patch.hold(held)
             patch.touch_up(place.changed, self._effort.rules, self._random)
             yield
         for kicks in range(0, self._effort.kicks, KICKS_AT_ONCE):
             if self._is_proven():
                 return
-            patch.hold(HELD if place.is_first and kicks < self._effort.held_kicks else 0)
+            patch.hold(HELD_CELLS if place.is_first and kicks < self._effort.held_kicks else 0)
             patch.kick(self._effort.rules, KICKS_AT_ONCE, self._random)
             yield
 

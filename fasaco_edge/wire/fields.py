@@ -93,6 +93,11 @@ def yaw_of(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     return yaw
 
 
+def yaw_of_one(x: float, y: float, z: float, w: float) -> float:
+    """Return the yaw [rad] of one quaternion, as ``yaw_of`` has it."""
+    return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+
+
 def planar_poses(xy: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return poses, float64 (n, 7), at points (n, 2) [m] with yaws (n,) [rad]."""
     poses = np.zeros((len(xy), POSE_FLOATS))
@@ -197,9 +202,9 @@ def _check_pose(pose: Sequence[float], message: str, field: str) -> None:
 
 
 def _planar(pose: Sequence[float]) -> Pose2D:
-    """Return the place in the plane of one pose; its yaw as ``yaw_of`` has it."""
-    px, py, _, x, y, z, w = pose
-    return Pose2D(px, py, math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z))
+    """Return the place in the plane of one pose."""
+    x, y, _, *quaternion = pose
+    return Pose2D(x, y, yaw_of_one(*quaternion))
 
 
 def _refuse_nanosec(reader: CdrReader, field: str, nanosec: int) -> NoReturn:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.cdr import CdrReader
-from fasaco_edge.wire.fields import POSE_FLOATS, read_header
+from fasaco_edge.wire.fields import POSE_FLOATS, read_header, yaw_of_one
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
     MAX_TRANSFORM_TILT,
@@ -62,7 +62,7 @@ class Transform:
         if max(abs(turn[0]), abs(turn[1])) > MAX_TRANSFORM_TILT:
             expected = f"a turn about z (x and y within {MAX_TRANSFORM_TILT})"
             refuse(TF_MESSAGE, f"rotation {which}", expected, turn)
-        return Pose2D(x, y, _yaw(*turn))
+        return Pose2D(x, y, yaw_of_one(*turn))
 
 
 def decode_transforms(payload: bytes) -> tuple[Transform, ...]:
@@ -85,8 +85,3 @@ def _read_transform(reader: CdrReader, field: str) -> Transform:
     child = reader.string(f"{field}.child_frame_id")
     placement = reader.float64s(POSE_FLOATS, f"{field}.transform").tolist()
     return Transform(frame, child, stamp_ns, tuple(placement))
-
-
-def _yaw(x: float, y: float, z: float, w: float) -> float:
-    """Return the yaw [rad] of a quaternion, see ``wire.fields.yaw_of``."""
-    return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)

@@ -10,7 +10,7 @@ from fasaco_edge import __version__
 from fasaco_edge.cli import COMMANDS, main
 from tests.cli.commands import fasaco_edge
 
-NAMES = [module.__name__.rpartition(".")[2] for module in COMMANDS]
+NAMES = [module.__name__.rpartition(".")[2].replace("_", "-") for module in COMMANDS]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -34,7 +34,7 @@ def test_help_names_every_command(capsys):
         main(["--help"])
     told = capsys.readouterr().out
     for name in NAMES:
-        assert re.search(rf"^    {name} +\w", told, re.MULTILINE), name
+        assert re.search(rf"^    {name}\s+\w", told, re.MULTILINE), name
 
 
 def test_the_version_is_told(capsys):

@@ -7,10 +7,11 @@ import pytest
 
 from fasaco_edge.bench.checking import check_walk
 from fasaco_edge.mission.events import MapReceived, PlanReady
-from fasaco_edge.mission.spare_time import HELD_CELLS
+from fasaco_edge.mission.spare_time import SKIPPED_S, Attempt
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import never
+from fasaco_edge.planners.repair import HELD_CELLS
 from fasaco_edge.planners.stopping import WorkLimit
 from fasaco_edge.planners.work import SearchWork
 from tests.mission.world import CONFIG, Drive, building, patch, pose_at
@@ -79,6 +80,31 @@ def test_attempts_take_their_share_of_the_time_and_less_in_vain():
     assert len(gaps) >= len(shortest)
     for gap, least in zip(gaps, shortest, strict=False):
         assert least - 1e-9 <= gap < least + 0.15
+
+
+def test_where_nothing_can_be_attempted_it_is_not_tried_with_each_pose(monkeypatch):
+    """All is covered, but the path leads on: to find that out takes a look at the whole map."""
+    config = replace(CONFIG, spare_share=1.0)
+    drive = Drive((0, 0), MapReceived(building(*HALL[:3])), pose_at(0, 0), config=config)
+    request, drive.request = drive.request, None
+    hall = lanes(3, 12, 3)
+    drive.tell(plan(request, np.concatenate((hall, hall[-2::-1], hall[1:]))))
+    tried_at = []
+    attempt_at = Attempt.at
+    monkeypatch.setattr(
+        Attempt, "at", lambda *asked: tried_at.append(drive.now) or attempt_at(*asked)
+    )
+    for cell in hall.tolist():
+        drive.tell(pose_at(*cell))
+        if drive.request is not None:
+            request, drive.request = drive.request, None
+            drive.tell(plan(request, request.problem.before, seconds=0.0), after=0.0)
+    tried_at.clear()
+    for cell in hall[-2::-1].tolist():
+        drive.tell(pose_at(*cell))
+        assert drive.request is None
+    assert len(tried_at) > 2
+    assert min(np.diff(tried_at)) >= SKIPPED_S - 1e-9
 
 
 def test_without_a_share_nothing_is_asked_for():

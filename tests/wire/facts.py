@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.geometry import GridGeometry, StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
 
 
-def _placed(geometry: Any) -> dict[str, Any]:
+def placed(geometry: GridGeometry) -> dict[str, Any]:
+    """Return what an index says of where a grid lies."""
     origin = geometry.origin
     return {
         "rows": geometry.rows,
@@ -33,7 +34,7 @@ def facts_of(message: Any) -> dict[str, Any]:
     facts: dict[str, Any] = {"frame": message.frame, "stamp_ns": message.stamp_ns}
     match message:
         case OccupancyGrid():
-            facts |= {**_placed(message.geometry), "cells": message.cells.tolist()}
+            facts |= {**placed(message.geometry), "cells": message.cells.tolist()}
         case MapPatch():
             corner = {"row": message.window.row0, "col": message.window.col0}
             facts |= {**corner, "cells": message.cells.tolist()}
@@ -43,7 +44,7 @@ def facts_of(message: Any) -> dict[str, Any]:
             facts |= {"xy": message.xy.tolist(), "yaw": message.yaw.tolist()}
         case PheromoneMessage():
             names = ("cohort", "velocity", "ants", "best_steps", "trail_min", "trail_max")
-            facts |= {**_placed(message.geometry), "levels": message.levels.tolist()}
+            facts |= {**placed(message.geometry), "levels": message.levels.tolist()}
             facts |= {name: getattr(message, name) for name in names}
     return facts
 

@@ -11,6 +11,7 @@ import numpy as np
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.wire import schemas
 from tests.wire import oracle
+from tests.wire.facts import placed
 
 STAMP_NS = 1_700_000_000_123_456_789
 # Half the yaw has sine 0.6 and cosine 0.8: bytes that depend on no library's sine.
@@ -41,21 +42,11 @@ def _stamped(frame: str = "map") -> dict[str, Any]:
     return {"frame": frame, "stamp_ns": STAMP_NS}
 
 
-def _placed(geometry: GridGeometry) -> dict[str, Any]:
-    origin = geometry.origin
-    return {
-        "rows": geometry.rows,
-        "cols": geometry.cols,
-        "resolution": geometry.resolution,
-        "origin": [origin.x, origin.y, origin.yaw],
-    }
-
-
 def _valid_grids() -> list[Vector]:
     one, cell = GridGeometry(1, 1, 100.0, Pose2D(1e6, -1e6)), np.array([[-1]], np.int8)
     schema, update = schemas.OCCUPANCY_GRID, schemas.OCCUPANCY_GRID_UPDATE
     grid = oracle.to_bytes(schema, oracle.occupancy_grid("map", STAMP_NS, GEOMETRY, CELLS, ORIGIN))
-    facts = {**_stamped(), **_placed(GEOMETRY), "cells": CELLS.tolist()}
+    facts = {**_stamped(), **placed(GEOMETRY), "cells": CELLS.tolist()}
     return [
         Vector("occupancy_grid", schema, grid, facts),
         Vector("occupancy_grid_padded", schema, grid + bytes(1), facts),
@@ -66,7 +57,7 @@ def _valid_grids() -> list[Vector]:
             "occupancy_grid_at_the_limits",
             schema,
             oracle.to_bytes(schema, oracle.occupancy_grid("f" * 256, STAMP_NS, one, cell)),
-            {**_stamped("f" * 256), **_placed(one), "cells": [[-1]]},
+            {**_stamped("f" * 256), **placed(one), "cells": [[-1]]},
         ),
         Vector(
             "occupancy_grid_update",
@@ -161,7 +152,7 @@ def pheromone_bytes(levels: Any, trail_min: float, trail_max: float) -> bytes:
 
 def _valid_pheromone() -> list[Vector]:
     geometry = GridGeometry(2, 3, 0.3, Pose2D(-0.9, 0.6))
-    facts = {**_stamped(), **_placed(geometry)}
+    facts = {**_stamped(), **placed(geometry)}
     facts |= {"cohort": 2, "velocity": 4, "ants": 96, "best_steps": 31}
     return [
         Vector(

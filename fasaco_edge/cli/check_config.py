@@ -1,0 +1,106 @@
+"""``fasaco-edge check-config``: all that is wrong with a configuration."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fasaco_edge.cli import exits
+
+if TYPE_CHECKING:
+    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.daemon.config import DaemonConfig
+    from fasaco_edge.daemon.config_faults import Fault
+
+EPILOG = """\
+It reads the file as the daemon does and starts nothing. It looks at no file that the
+configuration names: keys and passwords may be there for the service alone; `fasaco-edge doctor`,
+run as its user, looks at those.
+exit codes: 0 a daemon would start with it, 78 it would not (EX_CONFIG)
+
+examples:
+  fasaco-edge check-config /etc/fasaco-edge/config.yaml
+  fasaco-edge check-config robot.yaml --show    # with the defaults of all that it leaves out
+  fasaco-edge check-config robot.yaml --json | jq -r '.faults[] | "\\(.line): \\(.said)"'
+"""
+
+
+def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "check-config",
+        parents=[common],
+        help="check a configuration: all that is wrong, with line, value and what is allowed",
+        description="Check a configuration before a daemon starts with it: all that is wrong, "
+        "each with its line, the value, and what is allowed.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="YAML configuration")
+    parser.add_argument(
+        "--show",
+        action="store_true",
+        help="print the configuration in force, defaults included, as YAML; without secrets",
+    )
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser.set_defaults(command=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check, and tell."""
+    from fasaco_edge.daemon.config import inspect_config
+
+    config, found = inspect_config(args.file)
+    faults = sorted(found, key=lambda fault: fault.line or 0)
+    if args.json:
+        print(json.dumps(_document(args, config, faults)))
+    elif config is None:
+        _print(args.file, faults)
+    elif args.show:
+        import yaml
+
+        from fasaco_edge.daemon.about import config_document
+
+        print(yaml.safe_dump(config_document(config), sort_keys=False), end="")
+    else:
+        print(f"{args.file}: in order")
+    return exits.OK if config is not None else exits.CONFIG
+
+
+def _document(
+    args: argparse.Namespace, config: DaemonConfig | None, faults: list[Fault]
+) -> dict[str, object]:
+    document: dict[str, object] = {
+        "file": str(args.file),
+        "ok": config is not None,
+        "faults": [
+            {
+                "key": fault.key,
+                "line": fault.line,
+                "code": fault.error.code,
+                "said": str(fault.error),
+                "hint": fault.error.hint,
+            }
+            for fault in faults
+        ],
+    }
+    if args.show:
+        from fasaco_edge.daemon.about import config_document
+
+        document["config"] = config_document(config) if config is not None else None
+    return document
+
+
+def _print(file: Path, faults: list[Fault]) -> None:
+    """Print a line for each fault, as compilers do, and each hint that is not everybody's."""
+    from fasaco_edge.cli.terminal import out
+    from fasaco_edge.errors import BadConfiguration
+
+    console = out()
+    for fault in faults:
+        where = f"{file}:{fault.line}" if fault.line else str(file)
+        console.print(f"{where}: {fault.error}", markup=False, soft_wrap=True)
+        if fault.error.hint != BadConfiguration.hint:
+            console.print(f"  -> {fault.error.hint}", markup=False, soft_wrap=True)

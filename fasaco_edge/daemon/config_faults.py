@@ -1,0 +1,130 @@
+"""All that is wrong with a document that is to be a section of the configuration."""
+
+from __future__ import annotations
+
+import re
+import reprlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any, Literal, get_args, get_origin
+
+import msgspec
+
+from fasaco_edge.daemon.section import Section
+from fasaco_edge.errors import BadConfiguration
+
+# A value is shown as it was written, unless somebody wrote a book, or one that holds itself.
+_SHOWN = reprlib.Repr()
+_SHOWN.maxstring = _SHOWN.maxother = _SHOWN.maxlong = 200
+_SHOWN.maxlist = _SHOWN.maxdict = 10
+_SHOWN.maxlevel = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing that is wrong.
+
+    Attributes:
+        key: where, like ``bus.listen[0]``; "" for the file.
+        error: what, and what is allowed; without the name of the file.
+        line: of the file, from 1 on; None where it has none.
+    """
+
+    key: str
+    error: BadConfiguration
+    line: int | None = None
+
+
+def section_faults(
+    kind: type[Section], document: object, key: str = "", root: type[Section] | None = None
+) -> Iterator[Fault]:
+    """Yield what keeps ``document`` from being a ``kind``, key by key.
+
+    Args:
+        kind: the section.
+        document: what YAML makes of its text.
+        key: of the section, "" for the whole.
+        root: the whole, where a key that is unknown here may belong elsewhere.
+    """
+    root = root or kind
+    fields = {field.encode_name: field for field in msgspec.structs.fields(kind)}
+    if not isinstance(document, dict):
+        yield _fault(key, f"{key or 'the file'}: expected object, got {_SHOWN.repr(document)}")
+        return
+    if any(not isinstance(name, str) for name in document):
+        shown = _SHOWN.repr(document)
+        yield _fault(key, f"{key or 'the file'}: expected str as key, got {shown}")
+    for name, value in document.items():
+        if not isinstance(name, str):
+            continue
+        path = f"{key}.{name}" if key else name
+        if name not in fields:
+            yield _fault(path, f"unknown key {path}{_meant(name, key, list(fields), root)}")
+        elif section := section_of(fields[name].type):
+            yield from section_faults(section, value, path, root)
+        elif fault := _value_fault(fields[name].type, value, path):
+            yield fault
+    for name, field in fields.items():
+        if field.required and name not in document:
+            yield _fault(key, f"{key}: object missing required field {name}")
+
+
+def section_of(kind: object) -> type[Section] | None:
+    """Return the section that a key of this type holds, one that may be left out, too."""
+    for choice in (kind, *get_args(kind)):
+        if isinstance(choice, type) and issubclass(choice, Section):
+            return choice
+    return None
+
+
+def _value_fault(kind: object, value: object, key: str) -> Fault | None:
+    wanted: Any = kind
+    try:
+        msgspec.convert(value, wanted)
+    except msgspec.ValidationError as error:
+        # "Expected `int` >= 1 - at `$[0]`"
+        match = re.fullmatch(r"(?P<what>.*?)(?: - at `\$(?P<at>[^`]*)`)?", str(error), re.DOTALL)
+        assert match is not None
+        at = match["at"] or ""
+        for index in re.findall(r"\[(\d+)\]", at):
+            assert isinstance(value, list)
+            value = value[int(index)]
+        what = match["what"].replace("`", "")
+        expected = _choices(kind) or what[0].lower() + what[1:].partition(", got")[0]
+        if expected == "expected str":
+            expected += ", in quotes"  # YAML 1.1 takes 8:1 for a number
+        return _fault(key + at, f"{key}{at}: {expected}, got {_SHOWN.repr(value)}")
+    return None
+
+
+def _choices(kind: object) -> str:
+    """Return what a key may be where that is one of a few names, else ""."""
+    if get_origin(kind) is not Literal:
+        return ""
+    *others, last = get_args(kind)
+    return "expected " + (f"{', '.join(others)} or {last}" if others else str(last))
+
+
+def _meant(name: str, key: str, names: list[str], root: type[Section]) -> str:
+    """Return which key was meant, or which there are."""
+    before = f"{key}." if key else ""
+    if near := get_close_matches(name, names, 1):
+        return f"; did you mean {before}{near[0]}?"
+    elsewhere = [path for path in _paths(root, "") if path.rpartition(".")[2] == name]
+    if elsewhere:
+        return f"; did you mean {' or '.join(elsewhere)}?"
+    return f"; there are {', '.join(names)}"
+
+
+def _paths(kind: type[Section], before: str) -> Iterator[str]:
+    """Yield all keys there are."""
+    for field in msgspec.structs.fields(kind):
+        path = before + field.encode_name
+        yield path
+        if section := section_of(field.type):
+            yield from _paths(section, f"{path}.")
+
+
+def _fault(key: str, text: str) -> Fault:
+    return Fault(key, BadConfiguration(text))

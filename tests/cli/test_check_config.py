@@ -1,0 +1,161 @@
+"""``check-config`` tells all that is wrong, with lines, and whether a daemon would start."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fasaco_edge.cli import main
+from fasaco_edge.daemon.config import load_config
+from fasaco_edge.errors import BadConfiguration
+from tests.cli.commands import fasaco_edge
+
+EXAMPLE = Path(__file__).parents[2] / "deploy" / "fasaco-edge.yaml"
+WRONG = """\
+robot:
+  radius: 0.2
+  tool_width_m: 20
+robots: {}
+bus:
+  listen: [tcp/127.0.0.1:1, 7447]
+  speed_m_s: 3
+  mode: dealer
+  security: {tls: {colour: red}}
+planner:
+  ants: 9
+  ants: 10
+ros2: {domain: x}
+"""
+TOLD = [
+    (2, "robot.radius", "unknown key robot.radius; did you mean robot.radius_m?"),
+    (3, "robot.tool_width_m", "robot.tool_width_m: expected float <= 10.0, got 20"),
+    (4, "robots", "unknown key robots; did you mean robot?"),
+    (6, "bus.listen[1]", "bus.listen[1]: expected str, in quotes, got 7447"),
+    (7, "bus.speed_m_s", "unknown key bus.speed_m_s; did you mean robot.speed_m_s?"),
+    (8, "bus.mode", "bus.mode: expected peer, client or router, got 'dealer'"),
+    (
+        9,
+        "bus.security.tls.colour",
+        "unknown key bus.security.tls.colour; there are root_ca, certificate, private_key",
+    ),
+    (12, "planner.ants", "planner.ants: stands twice, in line 11 and in line 12"),
+    (13, "ros2", "ros2: object missing required field kind"),
+    (13, "ros2.domain", "ros2.domain: expected int, got 'x'"),
+]
+TOGETHER = """\
+robot: {name: a/b}
+bus:
+  base: /x
+  listen: [tcp/0.0.0.0:1]
+map: {free_at_most: 70}
+planner: {ants: 1}
+ros2: {kind: bridge, domain: 3, namespace: x, topics: {map: map}}
+"""
+
+
+@pytest.fixture
+def check(tmp_path, capsys):
+    """Check a text; return the exit code and what was told as JSON."""
+
+    def run(text, *words):
+        file = tmp_path / "config.yaml"
+        file.write_text(text)
+        code = main(["check-config", str(file), "--json", *words])
+        told = json.loads(capsys.readouterr().out)
+        assert told["file"] == str(file)
+        assert told["ok"] == (code == 0)
+        return code, told
+
+    return run
+
+
+def test_all_that_is_wrong_is_told_with_its_line(check):
+    code, told = check(WRONG)
+    assert code == 78
+    found = [(fault["line"], fault["key"], fault["said"]) for fault in told["faults"]]
+    assert sorted(found) == TOLD
+
+
+def test_what_does_not_go_together_is_told_at_once(check):
+    code, told = check(TOGETHER)
+    assert code == 78
+    lines = [(fault["line"], fault["said"].partition(" must")[0]) for fault in told["faults"]]
+    assert [line for line, _ in lines] == [1, 3, 4, 5, 6, 7, 7, 7]
+    assert lines[0] == (1, "robot.name: robot")
+    assert told["faults"][2]["code"] == "open_to_everyone"
+    assert "bus.security.kind tls" in told["faults"][2]["hint"]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "said"),
+    [
+        ("a: [", None, "not YAML"),
+        ("a: &a {b: *a}", 1, "unknown key a; there are robot, bus"),
+        ("robot: &r {name: *r}", 1, "robot.name: expected str, in quotes, got {'name': {"),
+        ("[1, 2]", None, "the file: expected object, got [1, 2]"),
+        ("robot: {name: " + "x" * 9999 + "/}", 1, "robot.name: robot must be chunks"),
+    ],
+    ids=["no YAML", "in itself", "in itself, a known key", "a list", "a book"],
+)
+def test_files_that_are_no_configuration(check, text, line, said):
+    code, told = check(text)
+    assert code == 78
+    (fault,) = told["faults"]
+    assert fault["said"].startswith(said)
+    assert fault["line"] == line
+
+
+def test_a_document_that_grows_as_it_is_read_is_refused_in_a_few_words(check):
+    """A billion laughs: each list holds nine times the one before."""
+    text = "a0: &a0 [lol]\n" + "".join(
+        f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]\n" for n in range(1, 12)
+    )
+    code, told = check(text + "robot: {name: *a11}\n")
+    assert code == 78
+    assert len(json.dumps(told)) < 10_000
+
+
+def test_what_is_in_order_is_shown_as_it_is_in_force(check, capsys):
+    code, told = check("robot: {name: mower}\nbus: {connect: ['tcp/h:1#key=secret']}", "--show")
+    assert (code, told["faults"]) == (0, [])
+    assert told["config"]["robot"] == {
+        "name": "mower",
+        "radius_m": 0.18,
+        "tool_width_m": 0.3,
+        "speed_m_s": 0.25,
+        "quarter_turn_s": 1.5,
+    }
+    assert "secret" not in json.dumps(told["config"])
+    assert main(["check-config", str(EXAMPLE), "--show"]) == 0
+    assert (
+        load_config(EXAMPLE).planner.ants
+        == (yaml.safe_load(capsys.readouterr().out)["planner"]["ants"])
+    )
+
+
+def test_people_read_a_line_for_each(tmp_path):
+    file = tmp_path / "config.yaml"
+    file.write_text(WRONG)
+    ended = fasaco_edge("check-config", file)
+    assert ended.code == 78
+    said = ended.out.splitlines()
+    assert f"{file}:8: bus.mode: expected peer, client or router, got 'dealer'" in said
+    assert len(said) == len(TOLD)
+    missing = fasaco_edge("check-config", tmp_path / "none.yaml")
+    assert missing.code == 78
+    assert missing.out == f"{tmp_path / 'none.yaml'}: No such file or directory\n"
+    good = fasaco_edge("check-config", EXAMPLE)
+    assert (good.code, good.out) == (0, f"{EXAMPLE}: in order\n")
+
+
+def test_who_starts_a_daemon_with_it_is_told_the_first_and_where_the_others_are(tmp_path):
+    file = tmp_path / "config.yaml"
+    file.write_text(WRONG)
+    with pytest.raises(BadConfiguration) as refused:
+        load_config(file)
+    # What stands twice comes first: what the rest says depends on which of the two is meant.
+    assert str(refused.value).startswith(f"{file}, line 12: planner.ants: stands twice")
+    assert refused.value.hint.endswith(f"check-config {file} tells the 9 others")
