@@ -4,7 +4,7 @@ set -euo pipefail
 
 PROGRAM=uninstall.sh
 HERE=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
-# shellcheck source=deploy/steps/common.sh disable=SC2317
+# shellcheck source=deploy/steps/common.sh
 . "$HERE/steps/common.sh"
 
 # Of the service's folders: caches go always, what it has written only with --purge.
@@ -56,6 +56,7 @@ remove_services() {
     [[ ! $found || $DRY_RUN ]] || ! systemd_runs || systemctl daemon-reload
 }
 
+# shellcheck disable=SC2317  # `step` calls it
 remove_service() {
     if systemd_runs; then
         systemctl --quiet disable --now "$1"
