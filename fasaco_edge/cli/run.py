@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import logging
 import os
 import sys
@@ -63,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.daemon.config import load_config
     from fasaco_edge.daemon.service import run_daemon
 
+    # Where a watchdog ends a service that hangs (SIGABRT), the log shows in what.
+    faulthandler.enable()
     run_daemon(load_config(args.config), args.record, args.state, fresh=args.fresh)
     # All is closed. What is left is the interpreter's own end, in which it was seen to wait for
     # ever, now and then, where Zenoh's threads had been at work: a service must not.

@@ -19,6 +19,7 @@ from fasaco_edge.daemon.outbox import Outbox
 from fasaco_edge.daemon.status import StatusBoard, plan_figures
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.daemon.turn_log import TurnLog, TurnNote
+from fasaco_edge.daemon.vitals import Vitals
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
 from fasaco_edge.mission.assignment import Assignment
 from fasaco_edge.mission.events import (
@@ -52,6 +53,7 @@ class Loop:
         ledger: LedgerWriter,
         recorder: RecorderSupervisor | None,
         turns: TurnLog,
+        vitals: Vitals,
     ) -> None:
         self._config = config
         self._mailbox = mailbox
@@ -65,6 +67,7 @@ class Loop:
         self._beginning = Beginning(self._keeping, self._load)
         self._recorder = recorder
         self._turns = turns
+        self._vitals = vitals
         self._status = StatusBoard(config)
         self._mission: Mission | None = None
         self._worker: PlanningWorker | None = None
@@ -102,6 +105,7 @@ class Loop:
             if self._commands.are_asked:
                 report = self._status.report(mission, self._assignment, self._loading)
                 self._commands.answer(report, is_kept=self._keeping.is_kept(time.monotonic()))
+            self._vitals.beat(self._worker, time.monotonic())
 
     @property
     def _assignment(self) -> Assignment:
@@ -238,6 +242,7 @@ class Loop:
         document = self._status.due(self._mission, self._assignment, self._loading, now)
         if document is not None:
             self._outbox.status(document)
+            self._vitals.tell(document)
 
 
 def _plans(items: list[tuple[str, object]]) -> list[Event]:

@@ -12,14 +12,17 @@ from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.daemon.about import serve_about
 from fasaco_edge.daemon.commands import Commands
+from fasaco_edge.daemon.compiling import compile_kernels
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.inbox import Inbox, make_mailbox
 from fasaco_edge.daemon.ledger_writer import LedgerWriter, open_ledger
 from fasaco_edge.daemon.loop import Loop
+from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.daemon.outbox import Outbox
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.daemon.turn_log import TurnLog
+from fasaco_edge.daemon.vitals import Vitals
 
 LOG = logging.getLogger(__name__)
 
@@ -50,16 +53,21 @@ def run_daemon(
         BusUnavailable: no session could be opened.
         LedgerFileError: another process keeps this robot's ledger.
         BadConfiguration: there is no place to keep it, or a file of bus.security is missing.
+        ProcessEnded: a service's kernels could not be compiled.
     """
     started = time.monotonic()
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
+    manager = ServiceManager()
     robot = config.robot
     folder = state or config.mission.state_folder()
     ledger = open_ledger(folder, robot.name, robot.tool_width_m, fresh=fresh)
+    if manager.is_there:
+        # Others are ready to answer; a service is ready to plan, see sd_notify(3).
+        compile_kernels(manager, stop)
     with open_bus(config.bus.settings(config.keys().prefix, config.ros2 or None)) as bus:
-        _serve(config, bus, ledger, record_to, stop, started)
+        _serve(config, bus, ledger, record_to, stop, started, manager)
     LOG.info("stopped")
 
 
@@ -70,6 +78,7 @@ def _serve(
     record_to: Path | None,
     stop: threading.Event,
     started: float,
+    manager: ServiceManager,
 ) -> None:
     keys = config.keys()
     mailbox = make_mailbox()
@@ -80,13 +89,15 @@ def _serve(
     commands = Commands(bus, keys, mailbox)
     serve_about(bus, keys, config)
     turns = TurnLog(bus.publisher(keys.turns, qos=QOS["turns"]), config, ledger.restored)
-    loop = Loop(config, mailbox, inbox, commands, outbox, ledger, recorder, turns)
+    loop = Loop(config, mailbox, inbox, commands, outbox, ledger, recorder, turns, Vitals(manager))
     try:
         loop.announce()
         bus.token(keys.alive)
         LOG.info("ready after %.2f s on %s", time.monotonic() - started, keys.prefix)
+        manager.ready()
         loop.run(stop)
     finally:
+        manager.stopping()
         stopped = time.monotonic()
         loop.close(WORKER_STOP_S)
         if recorder is not None:

@@ -13,6 +13,7 @@ from fasaco_edge.mission.events import PlanReady, PlanRequest
 from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.planners.planner import CoveragePlanner
 from fasaco_edge.planners.stopping import AnyOf, Interrupt, Noted, TimeBudget
+from fasaco_edge.planners.work import SearchProgress
 
 # An attempt to make a path better takes so long [s].
 SPARE_S = 0.05
@@ -27,7 +28,12 @@ class Observed:
 
 
 class PlanningWorker:
-    """Plans one request at a time and posts the result."""
+    """Plans one request at a time and posts the result.
+
+    Attributes:
+        progress: counts what the thread has done: questions of a search, whether it is to stop,
+            and waits for a request. It stands still only where the thread hangs.
+    """
 
     def __init__(
         self,
@@ -35,6 +41,7 @@ class PlanningWorker:
         budget_s: float,
         post: Callable[[str, object], None],
     ) -> None:
+        self.progress = 0
         self._planner = planner
         self._budget_s = budget_s
         self._post = post
@@ -61,6 +68,7 @@ class PlanningWorker:
     def _run(self) -> None:
         try:
             while not self._stopping.is_set():
+                self.progress += 1
                 request = self._requests.take(timeout_s=0.2)
                 if request is not None:
                     self._plan(request)
@@ -73,11 +81,15 @@ class PlanningWorker:
         if self._stopping.is_set():
             return
         budget_s = SPARE_S if request.problem.only_better else self._budget_s
-        stop = Noted(AnyOf(TimeBudget(budget_s), Interrupt(self._interrupt)))
+        stop = Noted(AnyOf(self._count, TimeBudget(budget_s), Interrupt(self._interrupt)))
         # Costs some percent of a full plan, and a repair nothing.
         path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))
         seconds = time.monotonic() - started
         self._post("plan", PlanReady(request.number, path, seconds, tuple(stop.stops)))
+
+    def _count(self, progress: SearchProgress) -> bool:
+        self.progress += 1
+        return False
 
     def _observe(self, plan: int, snapshot: ColonySnapshot) -> None:
         self._post("snapshot", Observed(plan, snapshot))

@@ -8,6 +8,7 @@ import pytest
 
 from tests.deploy import installed
 from tests.deploy.lab import Lab, booted, why_not
+from tests.deploy.service import Service
 
 
 @pytest.fixture(scope="session")
@@ -20,3 +21,11 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
     with booted(tmp_path_factory.mktemp("lab"), shown) as running:
         installed.warm(running)
         yield running
+
+
+@pytest.fixture
+def service(lab: Lab) -> Iterator[Service]:
+    """The planner's unit, installed and not started."""
+    unit = Service(lab)
+    yield unit
+    unit.remove()

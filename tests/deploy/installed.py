@@ -12,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from fasaco_edge.kernels.cache import is_complete
 from fasaco_edge.kernels.jit import CACHE_FOLDER
 from tests.daemon.processes import PROGRAM
 from tests.deploy.lab import Lab
@@ -60,15 +61,23 @@ def binds(folder: Path) -> dict[str, Path]:
     return shown | {f"{HOME}/current": current}
 
 
-def warm(lab: Lab, cache: str = "var/cache/fasaco-edge/numba") -> None:
+def warm(lab: Lab, cache: str = "/var/cache/fasaco-edge/numba") -> None:
     """Give the service the kernels that were compiled for this checkout.
 
     numba keeps them in a folder named after that of their sources, which has another place inside.
     """
-    subprocess.run([*PROGRAM, "warmup"], check=True, capture_output=True)
+    if not is_complete(CACHE_FOLDER):
+        subprocess.run([*PROGRAM, "warmup"], check=True, capture_output=True)
     here = CACHE_FOLDER / _folder_of(str(CHECKOUT / "fasaco_edge/kernels"))
-    there = lab.root / cache / CACHE_FOLDER.name / _folder_of(f"{SOURCE}/fasaco_edge/kernels")
+    there = (
+        lab.root
+        / cache.lstrip("/")
+        / CACHE_FOLDER.name
+        / _folder_of(f"{SOURCE}/fasaco_edge/kernels")
+    )
     shutil.copytree(here, there, dirs_exist_ok=True)
+    # Finds all of them, and marks the cache as complete.
+    lab.run("env", f"NUMBA_CACHE_DIR={cache}", "fasaco-edge", "warmup")
 
 
 def _folder_of(sources: str) -> str:

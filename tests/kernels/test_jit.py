@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.kernels import jit
+from fasaco_edge.kernels import cache, jit
 
 ROOT = Path(__file__).parents[2]
 
@@ -19,35 +19,35 @@ def kernel_copy(tmp_path, monkeypatch):
     """The kernel sources as a copy that may be changed."""
     folder = tmp_path / "kernels"
     folder.mkdir()
-    for source in jit.KERNEL_SOURCES:
+    for source in cache.KERNEL_SOURCES:
         shutil.copy(source, folder)
-    monkeypatch.setattr(jit, "KERNEL_SOURCES", sorted(folder.glob("*.py")))
+    monkeypatch.setattr(cache, "KERNEL_SOURCES", sorted(folder.glob("*.py")))
     return folder
 
 
 def test_every_kernel_source_counts(kernel_copy):
-    seen = {jit.sources_digest()}
+    seen = {cache.sources_digest()}
     for source in sorted(kernel_copy.glob("*.py")):
         source.write_text(source.read_text() + "\n# changed\n")
-        seen.add(jit.sources_digest())
+        seen.add(cache.sources_digest())
     assert len(seen) == 1 + len(list(kernel_copy.glob("*.py")))
     assert all(len(digest) == 12 for digest in seen)
 
 
 def test_the_given_folder_is_taken(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "service"))
-    folder = jit.cache_folder()
-    assert folder == tmp_path / "service" / f"kernels-{jit.sources_digest()}"
+    folder = cache.cache_folder()
+    assert folder == tmp_path / "service" / f"kernels-{cache.sources_digest()}"
     assert folder.is_dir()
 
 
 def test_the_users_cache_is_the_default(tmp_path, monkeypatch):
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert jit.cache_folder().parent == tmp_path / "fasaco-edge"
+    assert cache.cache_folder().parent == tmp_path / "fasaco-edge"
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    assert jit.cache_folder().parent == tmp_path / "home" / ".cache" / "fasaco-edge"
+    assert cache.cache_folder().parent == tmp_path / "home" / ".cache" / "fasaco-edge"
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def no_cache_but_temporary(tmp_path, monkeypatch):
 
 
 def test_without_a_writable_cache_a_temporary_one_of_our_own_is_taken(no_cache_but_temporary):
-    folder = jit.cache_folder()
+    folder = cache.cache_folder()
     # Straight in the sticky folder: whoever owned one between could replace ours.
     assert folder.parent == no_cache_but_temporary
     assert folder.stat().st_mode & 0o777 == 0o700
@@ -72,17 +72,17 @@ def test_a_temporary_folder_of_another_user_is_not_trusted(no_cache_but_temporar
     them = os.getuid()
     me = them + 1
     monkeypatch.setattr(os, "getuid", lambda: me)
-    mine = no_cache_but_temporary / f"fasaco-edge-{me}-kernels-{jit.sources_digest()}"
+    mine = no_cache_but_temporary / f"fasaco-edge-{me}-kernels-{cache.sources_digest()}"
     mine.mkdir()  # by them, under my name
-    assert jit.cache_folder() != mine
+    assert cache.cache_folder() != mine
 
 
-def run(code, root, cache):
+def run(code, root, folder):
     """Run a program on the packages in ``root``."""
     done = subprocess.run(
         [sys.executable, "-c", code],
         cwd=root,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(cache)},
+        env={**os.environ, "NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(folder)},
         capture_output=True,
         text=True,
         check=False,
@@ -97,7 +97,8 @@ def test_a_caller_in_another_file_never_meets_the_old_code_of_its_callee(tmp_pat
     package.mkdir(parents=True)
     for part in (package.parent / "__init__.py", package / "__init__.py"):
         part.touch()
-    shutil.copy(jit.__file__, package)
+    for module in (cache, jit):
+        shutil.copy(module.__file__, package)
     head = "from fasaco_edge.kernels.jit import kernel\n"
     callee = head + "@kernel\ndef one():\n    return {}\n"
     caller = (
@@ -116,7 +117,7 @@ def test_a_caller_in_another_file_never_meets_the_old_code_of_its_callee(tmp_pat
 def test_numba_imported_before_us_keeps_its_code_in_our_folder_too(tmp_path):
     code = "import numba; from fasaco_edge.kernels import jit; print(numba.config.CACHE_DIR)"
     folder = run(code, ROOT, tmp_path)
-    assert folder == str(tmp_path / f"kernels-{jit.sources_digest()}")
+    assert folder == str(tmp_path / f"kernels-{cache.sources_digest()}")
 
 
 def test_twins_agree_without_the_compiler():
@@ -139,6 +140,6 @@ def test_twins_agree_without_the_compiler():
 
 def test_a_child_process_uses_the_same_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    parents = jit.cache_folder()
+    parents = cache.cache_folder()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(parents))
-    assert jit.cache_folder() == parents
+    assert cache.cache_folder() == parents

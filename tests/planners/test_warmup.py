@@ -9,7 +9,7 @@ import numpy as np
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.kernels.jit import KERNEL_SOURCES
+from fasaco_edge.kernels.cache import KERNEL_SOURCES
 from fasaco_edge.mission.events import MapReceived, PatchReceived, PlanReady, PoseReceived
 from fasaco_edge.mission.mission import Mission, MissionConfig
 from fasaco_edge.planners.fasaco import Fasaco

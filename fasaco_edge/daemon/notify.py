@@ -1,0 +1,68 @@
+"""The service manager, as sd_notify(3) has it: one datagram for each thing it is told."""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import time
+from collections.abc import MutableMapping
+
+LOG = logging.getLogger(__name__)
+
+
+class ServiceManager:
+    """Who has started this process, and waits to be told how it is; nobody, outside of a service.
+
+    Attributes:
+        is_there: whether anybody listens.
+        watchdog_s: the longest silence before it takes this process for hung [s]; 0 for any.
+    """
+
+    def __init__(self, environ: MutableMapping[str, str] = os.environ) -> None:
+        """Take the variables out of ``environ``: no other process may speak in our name."""
+        address = environ.pop("NOTIFY_SOCKET", "")
+        silence_us = environ.pop("WATCHDOG_USEC", "0")
+        is_ours = environ.pop("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
+        # "@" stands for the NUL of a name in the abstract namespace.
+        self._address = f"\0{address[1:]}" if address.startswith("@") else address
+        self.is_there = bool(address)
+        self.watchdog_s = int(silence_us) / 1e6 if is_ours and silence_us.isdecimal() else 0.0
+        self._status = ""
+
+    def ready(self) -> None:
+        """Say that the service is up, or that its configuration is read again."""
+        self._send("READY=1")
+
+    def status(self, text: str) -> None:
+        """Say in one line what the service does."""
+        if text != self._status:
+            self._status = text
+            self._send("STATUS=" + text.replace("\n", " "))
+
+    def alive(self) -> None:
+        """Say that there is progress; due before each ``watchdog_s`` is over."""
+        self._send("WATCHDOG=1")
+
+    def extend(self, seconds: float) -> None:
+        """Ask for so much more time [s] to start."""
+        self._send(f"EXTEND_TIMEOUT_USEC={seconds * 1e6:.0f}")
+
+    def reloading(self) -> None:
+        """Say that the configuration is being read again; ``ready`` follows."""
+        now_us = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
+        self._send(f"RELOADING=1\nMONOTONIC_USEC={now_us}")
+
+    def stopping(self) -> None:
+        """Say that the service ends."""
+        self._send("STOPPING=1")
+
+    def _send(self, text: str) -> None:
+        if not self.is_there:
+            return
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as out:
+                out.setblocking(False)  # whoever does not listen must not hold the loop up
+                out.sendto(text.encode(), self._address)
+        except OSError as error:
+            LOG.warning("the service manager cannot be told %s: %s", text.partition("=")[0], error)

@@ -1,0 +1,86 @@
+"""What the service manager is told, on a socket as it makes one."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from fasaco_edge.daemon.notify import ServiceManager
+
+
+@pytest.fixture(params=["path", "abstract"])
+def listening(request, tmp_path) -> Iterator[tuple[socket.socket, str]]:
+    """A socket with its name, as $NOTIFY_SOCKET has it."""
+    name = str(tmp_path / "notify") if request.param == "path" else f"@fasaco-test-{os.getpid()}"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as heard:
+        heard.bind(name.replace("@", "\0", 1) if name.startswith("@") else name)
+        heard.settimeout(5.0)
+        yield heard, name
+
+
+def test_each_word_is_one_datagram(listening):
+    heard, name = listening
+    manager = ServiceManager({"NOTIFY_SOCKET": name})
+    assert manager.is_there
+    manager.status("waiting")
+    manager.ready()
+    manager.alive()
+    manager.extend(1.5)
+    manager.stopping()
+    said = [heard.recv(4096) for _ in range(5)]
+    words = [b"READY=1", b"WATCHDOG=1", b"EXTEND_TIMEOUT_USEC=1500000", b"STOPPING=1"]
+    assert said == [b"STATUS=waiting", *words]
+
+
+def test_a_status_is_one_line_and_told_once(listening):
+    heard, name = listening
+    manager = ServiceManager({"NOTIFY_SOCKET": name})
+    for text in ("two\nlines", "two\nlines", "another"):
+        manager.status(text)
+    assert [heard.recv(4096) for _ in range(2)] == [b"STATUS=two lines", b"STATUS=another"]
+
+
+def test_reloading_says_when(listening):
+    heard, name = listening
+    before = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
+    ServiceManager({"NOTIFY_SOCKET": name}).reloading()
+    first, second = heard.recv(4096).decode().splitlines()
+    assert first == "RELOADING=1"
+    assert before <= int(second.removeprefix("MONOTONIC_USEC=")) <= before + 5_000_000
+
+
+def test_children_inherit_nothing_to_speak_with():
+    environ = {"NOTIFY_SOCKET": "/x", "WATCHDOG_USEC": "1", "WATCHDOG_PID": "1", "HOME": "/"}
+    ServiceManager(environ)
+    assert environ == {"HOME": "/"}
+
+
+@pytest.mark.parametrize(
+    ("environ", "seconds"),
+    [
+        ({"WATCHDOG_USEC": "30000000"}, 30.0),
+        ({"WATCHDOG_USEC": "30000000", "WATCHDOG_PID": str(os.getpid())}, 30.0),
+        ({"WATCHDOG_USEC": "30000000", "WATCHDOG_PID": "1"}, 0.0),
+        ({"WATCHDOG_USEC": "soon"}, 0.0),
+        ({}, 0.0),
+    ],
+)
+def test_a_watchdog_is_ours_or_none(environ, seconds):
+    assert ServiceManager(environ).watchdog_s == seconds
+
+
+def test_a_manager_that_is_gone_costs_nothing_but_a_warning(tmp_path, caplog):
+    manager = ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
+    manager.ready()
+    assert "cannot be told READY" in caplog.text
+
+
+def test_without_one_nothing_is_said(caplog):
+    manager = ServiceManager({})
+    manager.ready()
+    assert not manager.is_there
+    assert caplog.text == ""

@@ -1,0 +1,116 @@
+"""The watchdog is fed by progress, and by nothing else."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from fasaco_edge.daemon.vitals import Vitals, status_line
+from fasaco_edge.daemon.worker import PlanningWorker
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.events import PlanRequest
+from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.problem import CoverageProblem
+
+
+class Told:
+    """Counts how often it is told that there is progress."""
+
+    watchdog_s = 4.0
+
+    def __init__(self) -> None:
+        self.beats = 0
+
+    def alive(self) -> None:
+        self.beats += 1
+
+
+class Hung:
+    """A planner that never comes back, and never asks whether to stop."""
+
+    def __init__(self) -> None:
+        self.release = threading.Event()
+
+    def plan(self, problem, stop, observe):
+        self.release.wait()
+        return Fasaco().plan(problem)
+
+
+class Slow:
+    """A planner that takes long, and gets on."""
+
+    def plan(self, problem, stop, observe):
+        while not stop(None):
+            time.sleep(0.01)
+        return Fasaco().plan(problem)
+
+
+@pytest.fixture
+def problem():
+    cells = np.zeros((4, 4), np.int8)
+    grid = OccupancyGrid(GridGeometry(4, 4, 1.0, Pose2D(0.0, 0.0)), cells)
+    lattice = CoverageLattice.from_map(grid, Footprint(1.0, 0.4))
+    return CoverageProblem.of(lattice, (0, 0))
+
+
+def beats(worker: PlanningWorker, turns: int = 5) -> int:
+    """Return how often a loop that turns at times two seconds apart feeds the watchdog."""
+    told = Told()
+    vitals = Vitals(told)
+    for turn in range(turns):
+        vitals.beat(worker, 2.0 * turn)
+        time.sleep(0.3)
+    return told.beats
+
+
+def test_an_idle_worker_counts_as_progress():
+    worker = PlanningWorker(Fasaco(), 0.1, lambda *_: None)
+    assert beats(worker) == 5
+    worker.close(1.0)
+
+
+def test_a_search_that_gets_on_feeds_it(problem):
+    worker = PlanningWorker(Slow(), 60.0, lambda *_: None)
+    worker.submit(PlanRequest(1, problem, "test"))
+    assert beats(worker) == 5
+    worker.close(1.0)
+
+
+def test_a_planner_that_hangs_starves_it(problem):
+    planner = Hung()
+    worker = PlanningWorker(planner, 60.0, lambda *_: None)
+    worker.submit(PlanRequest(1, problem, "test"))
+    time.sleep(0.3)
+    assert beats(worker) == 1  # what was done before it hung
+    planner.release.set()
+    worker.close(1.0)
+
+
+def test_it_is_fed_in_time_and_not_at_every_turn():
+    told = Told()
+    vitals = Vitals(told)
+    for turn in range(101):
+        vitals.beat(None, 0.1 * turn)
+    # Ten seconds, a watchdog of four: each second.
+    assert told.beats in (10, 11)
+
+
+def test_a_status_is_told_in_a_line():
+    coverage = {"covered_m2": 12.3, "to_cover_m2": 48.9, "fraction": 0.2515}
+    status = {
+        "state": "covering",
+        "reason": "",
+        "coverage": coverage,
+        "path": {"revision": 3, "remaining_steps": 120},
+        "ledger": {"fault": "cannot write: no space"},
+    }
+    assert status_line(status) == (
+        "covering; 25 % covered, 12 of 49 m2; path 3 with 120 steps to go; cannot write: no space"
+    )
+    waiting = {"state": "waiting", "reason": "no map", "coverage": None, "path": None, "ledger": {}}
+    assert status_line(waiting) == "waiting: no map"

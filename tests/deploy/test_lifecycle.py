@@ -1,0 +1,88 @@
+"""The service's life in a real systemd: start, ready, stop, and what it does not survive."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from tests.daemon.processes import STOP_S
+from tests.deploy.service import Service, wait_for
+
+WARM_S = 1.5
+IDLE_MB = 60.0
+IDLE_SHARE = 0.005
+
+
+def ready_s(service: Service) -> float:
+    """Return how long it took from systemd's fork until READY=1."""
+    began, ready = (
+        int(service.show(name))
+        for name in ("ExecMainStartTimestampMonotonic", "ActiveEnterTimestampMonotonic")
+    )
+    return (ready - began) / 1e6
+
+
+def test_it_is_ready_at_once_where_the_kernels_are_compiled(service: Service):
+    service.start()
+    first = ready_s(service)
+    service.stop()
+    service.start()
+    print(f"ready after {first:.2f} s, again after {ready_s(service):.2f} s")
+    assert min(first, ready_s(service)) <= WARM_S
+    assert service.show("StatusText") == "waiting for map: no map yet"
+    assert service.ask()["state"] == "waiting for map"
+
+
+def test_it_is_small_and_sleeps_while_nothing_comes(service: Service):
+    service.start()
+    time.sleep(1.0)
+    before_ns, since = int(service.show("CPUUsageNSec")), time.monotonic()
+    time.sleep(4.0)
+    share = (int(service.show("CPUUsageNSec")) - before_ns) / 1e9 / (time.monotonic() - since)
+    status = service.lab.run("cat", f"/proc/{service.pid}/status").stdout
+    resident_mb = int(status.partition("VmRSS:")[2].split()[0]) * 1024 / 1e6
+    print(f"idle: {resident_mb:.1f} MB, {100 * share:.2f} % of a core")
+    assert resident_mb <= IDLE_MB
+    # Four seconds on a busy machine tell not much: the bar is held by bench footprint.
+    assert share <= 4 * IDLE_SHARE
+
+
+def test_it_is_not_ready_before_the_kernels_are_compiled(service: Service):
+    service.drop_in("cold", "[Service]\nEnvironment=NUMBA_CACHE_DIR=%T/cold\n")
+    service.lab.run("systemctl", "start", "--no-block", service.name)
+    wait_for(lambda: "compiling kernels: " in service.show("StatusText"), 20.0, "compiling")
+    assert service.show("ActiveState") == "activating"
+    seconds = service.stop()
+    print(f"stopped while it compiles: {seconds:.2f} s")
+    assert seconds <= STOP_S
+    assert service.show("Result") == "success"
+
+
+def test_kernels_that_are_all_there_are_found_again(service: Service):
+    """As after an update of numba that changed nothing, or a clock that was set."""
+    marks = "/var/cache/private/fasaco-edge/numba"
+    service.lab.run("find", marks, "-name", "complete", "-delete")
+    print(f"loaded all kernels: ready after {service.start():.2f} s")
+    assert "kernels compiled in" in service.text()
+    assert service.lab.run("find", marks, "-name", "complete").stdout
+
+
+def test_a_wrong_configuration_is_no_reason_to_try_again(service: Service):
+    service.configure("planner: {ants: many}\n")
+    service.start(fails=True)
+    assert service.show("ExecMainStatus") == "78"
+    time.sleep(2.5)  # RestartSec= is 2
+    assert service.show("ActiveState") == "failed"
+    assert service.show("NRestarts") == "0"
+    assert "planner.ants: expected int, got 'many'" in service.text()
+
+
+@pytest.mark.parametrize("name", ["KILL", "SEGV"])
+def test_whatever_ends_it_it_comes_back(service: Service, name):
+    service.start()
+    before = service.pid
+    service.signal(name)
+    wait_for(lambda: service.pid not in (0, before), 10.0, "another process")
+    wait_for(lambda: service.show("ActiveState") == "active", 5.0, "ready again")
+    assert service.ask()["state"] == "waiting for map"
