@@ -48,7 +48,7 @@ exit codes:
 TEXT
 }
 
-WHEELS='' RECORDING=yes PYTHON=/usr/bin/python3 NO_START='' ROLLBACK=''
+WHEELS='' RECORDING=yes PYTHON=/usr/bin/python3 START=yes ROLLBACK=''
 SCRATCH='' BUILDING='' SWITCHING_FROM='' SWITCHING_TO='' SINCE=0
 
 read_words() {
@@ -62,7 +62,7 @@ read_words() {
         --wheels=*) WHEELS=${1#*=} ;;
         --python=*) PYTHON=${1#*=} ;;
         --without-recording) RECORDING='' ;;
-        --no-start) NO_START=yes ;;
+        --no-start) START='' ;;
         --rollback) ROLLBACK=yes ;;
         --dry-run) DRY_RUN=yes ;;
         --help | -h)
@@ -86,19 +86,18 @@ install_version() {
     if ! is_complete "$NAME"; then
         require_room
         step "build version $NAME in $PREFIX/$NAME" build_version
-        step "check it, and compile its kernels" try_version
-        step "call it complete" write_complete
+        step "check it${START:+, and compile its kernels}" try_version
+        [[ $DRY_RUN ]] || write_complete
     fi
     lay_settings "$old"
     if [[ $old != "$NAME" ]]; then
-        step "switch from ${old:-nothing} to $NAME, and start it" switch "$old" "$NAME"
+        step "switch from ${old:-nothing} to $NAME${START:+, and start it}" switch "$old" "$NAME"
         [[ ! $DRY_RUN ]] || lay_units "$NAME"
     else
         keep_up
     fi
     [[ -L $COMMAND && $(readlink $COMMAND) == "$PREFIX/current/bin/fasaco-edge" ]] ||
-        step "link $COMMAND" ln --symbolic --force --no-dereference \
-            "$PREFIX/current/bin/fasaco-edge" $COMMAND
+        step "link $COMMAND" link_command
     prune
     conclude
 }
@@ -119,20 +118,25 @@ lay_settings() {
     fi
 }
 
+link_command() {
+    mkdir -p "$(dirname $COMMAND)"
+    ln --symbolic --force --no-dereference "$PREFIX/current/bin/fasaco-edge" $COMMAND
+}
+
 # The version is there already: see that its service is, too.
 keep_up() {
     lay_units "$NAME"
     systemctl --quiet is-enabled $DAEMON || step "enable $DAEMON" systemctl --quiet enable $DAEMON
-    if [[ ! $NO_START ]] && { [[ $CHANGES -gt 0 ]] || ! systemctl --quiet is-active $DAEMON; }; then
+    if [[ $START ]] && { [[ $CHANGES -gt 0 ]] || ! systemctl --quiet is-active $DAEMON; }; then
         step "start $DAEMON" switch "$NAME" "$NAME"
     fi
 }
 
 conclude() {
     if [[ $CHANGES -eq 0 ]]; then
-        say "nothing to do: version $NAME is installed${NO_START:+, not started}"
+        say "nothing to do: version $NAME is installed"
     elif [[ ! $DRY_RUN ]]; then
-        say "version $NAME is installed$([[ $NO_START ]] || echo ' and runs')"
+        say "version $NAME is installed${START:+ and runs}"
     fi
 }
 

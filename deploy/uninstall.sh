@@ -93,8 +93,6 @@ remove_folders() {
     for parent in "$@"; do
         remove "$parent"/fasaco-edge "$parent"/fasaco-edge-* "$parent"/private/fasaco-edge \
             "$parent"/private/fasaco-edge-*
-        [[ $DRY_RUN || ! -d $parent/private ]] ||
-            rmdir --ignore-fail-on-non-empty "$parent/private"
     done
 }
 

@@ -22,7 +22,7 @@ require_python() {
 require_systemd() {
     command -v systemctl >/dev/null || fail $NOT_POSSIBLE "there is no systemd here" \
         "elsewhere run the daemon by hand: pip install fasaco-edge, then fasaco-edge run"
-    [[ $NO_START ]] || systemd_runs || fail $NOT_POSSIBLE "systemd is installed but does not run" \
+    [[ ! $START ]] || systemd_runs || fail $NOT_POSSIBLE "systemd is installed but does not run" \
         "in a container or an image being built give --no-start: the service starts with the system"
 }
 

@@ -49,7 +49,7 @@ point() {
 switch_to() {
     point current "$1" && lay_units "$1" && systemctl --quiet enable $DAEMON || return
     [[ ! -f $UNITS/$RECORDER ]] || systemctl --quiet enable $RECORDER || return
-    [[ ! $NO_START ]] || return 0
+    [[ $START ]] || return 0
     systemctl reset-failed $DAEMON 2>/dev/null || true
     SINCE=$(date +%s)
     systemctl restart $DAEMON && stays_up || return
@@ -83,7 +83,7 @@ roll_back() {
     local old=$SWITCHING_FROM new=$SWITCHING_TO
     SWITCHING_TO=
     if [[ ! $old || $old == "$new" ]]; then
-        [[ $old ]] || take_back_first
+        [[ $old ]] || take_back_first "$new"
         fail $ROLLED_BACK "version $new did not come up; above are the last lines of its journal" \
             "mend what is said there and run this again; nothing was running before"
     fi
@@ -98,11 +98,12 @@ roll_back() {
         "it is linked again; look into \`journalctl -u $DAEMON\`"
 }
 
-# A first version that does not come up leaves no service behind that would try for ever.
+# take_back_first VERSION: leave no service behind that would try for ever to come up.
 take_back_first() {
     systemctl disable --now $DAEMON 2>/dev/null || true
     drop_unit $RECORDER
     rm -f "$UNITS/$DAEMON" "$PREFIX/current"
+    rm -rf "${PREFIX:?}/$1"
     systemctl daemon-reload
 }
 

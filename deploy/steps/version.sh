@@ -65,7 +65,7 @@ as_service() {
 try_version() {
     local program=$PREFIX/$NAME/bin/fasaco-edge config=$SETTINGS/config.yaml said
     [[ -f $config ]] || config=$PREFIX/$NAME/deploy/$EXAMPLE
-    if [[ $NO_START ]]; then
+    if [[ ! $START ]]; then
         HOME=$SCRATCH NUMBA_CACHE_DIR=$SCRATCH "$program" check-config "$config" >"$SCRATCH/said" 2>&1 ||
             not_fit "its own check of $config"
         return
