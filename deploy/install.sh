@@ -20,7 +20,7 @@ usage: install.sh [--wheels DIR] [--without-recording] [--python PYTHON] [--no-s
        install.sh --rollback [--dry-run]
 
 Install fasaco_edge as the service fasaco-edge, or upgrade it. Needs bash, systemd, Python 3.11 or
-newer with venv (Debian: python3-venv), and root.
+newer, and root.
 
   --wheels DIR         a folder made by `make wheelhouse`; no network is used. Without it the wheels
                        beside this script, or, in a source tree, those it downloads

@@ -7,7 +7,7 @@ require_python() {
     "$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || fail $NOT_POSSIBLE \
         "fasaco_edge needs Python 3.11 or newer, $PYTHON is $("$PYTHON" -V 2>&1)" \
         "name a newer one with --python"
-    "$PYTHON" -c 'import ensurepip, venv' 2>/dev/null || fail $NOT_POSSIBLE \
+    "$PYTHON" -c 'import venv' 2>/dev/null || fail $NOT_POSSIBLE \
         "$PYTHON cannot make virtual environments" "apt install python3-venv"
     # The service sees no home folders, so its Python must not lie in one.
     local home
@@ -51,7 +51,8 @@ make_wheels() {
         exit 0
     fi
     say "downloading the wheels that this source tree needs"
-    scratch_pip
+    "$PYTHON" -m venv "$SCRATCH/pip" >&2 || fail $NOT_POSSIBLE \
+        "$PYTHON cannot make an environment with pip, see above" "apt install python3-venv"
     local with=()
     [[ $RECORDING ]] || with=(--without-recording)
     PYTHONPATH=$HERE "$SCRATCH/pip/bin/python" -m wheelhouse --out "$SCRATCH" \

@@ -37,14 +37,26 @@ def make_release(target: Target, out: Path, *, recording: bool) -> Path:
         _pip("download", "--dest", wheels, *_platform(target), wanted)
         for rerun in wheels.glob("rerun_sdk-*.whl"):
             without_viewer(rerun)
+        _pip("download", "--no-deps", "--dest", scratch, "pip")
+        pip = next(Path(scratch).glob("pip-*.whl"))
         release = out / f"fasaco-edge-{own.name.split('-')[1]}-{target.name}"
-        fill_release(release, wheels, target, recording=recording)
+        fill_release(release, wheels, pip, target, recording=recording)
     _try_out(release, target)
     return release
 
 
-def fill_release(release: Path, wheels: Path, target: Target, *, recording: bool) -> None:
+def fill_release(
+    release: Path, wheels: Path, pip: Path, target: Target, *, recording: bool
+) -> None:
     """Put the wheels and the files of ``deploy`` into a release folder, with what describes them.
+
+    Args:
+        release: the folder; one that is there is replaced.
+        wheels: a folder of wheels.
+        pip: pip's wheel. It comes along to do its work from there: the robot's own may be old, or
+            not there, and what is installed needs none.
+        target: the computer they are for.
+        recording: whether Rerun comes along.
 
     Raises:
         IncompleteError: a wheel that another one needs is not there.
@@ -56,6 +68,7 @@ def fill_release(release: Path, wheels: Path, target: Target, *, recording: bool
     (release / "wheels").mkdir(parents=True)
     for file in whole.files.values():
         shutil.copy2(file, release / "wheels")
+    shutil.copy2(pip, release / "wheels")
     shutil.copytree(DEPLOY, release, ignore=without, dirs_exist_ok=True)
     _write_lock(release / "wheels" / LOCK, base, target)
     if recording:

@@ -6,6 +6,8 @@ configuration file that points to where a lab shows this machine's packages. Our
 
 from __future__ import annotations
 
+import ensurepip
+import platform
 import sys
 from collections.abc import Mapping
 from importlib import metadata
@@ -15,7 +17,7 @@ from pip._vendor.packaging.requirements import Requirement
 from pip._vendor.packaging.utils import canonicalize_name
 
 from fasaco_edge import __version__
-from tests.deploy.installed import CHECKOUT, PYTHON
+from tests.deploy.installed import CHECKOUT
 from tests.deploy.wheels import write_wheel
 from wheelhouse.closure import Target
 from wheelhouse.release import fill_release
@@ -59,19 +61,18 @@ def write_release(
         write_wheel(wheels, name.replace("-", "_"), there)
     paths = "".join(f"{place}\n" for place in binds())
     write_wheel(wheels, "linked", "1.0", files={"linked.pth": paths.encode()})
-    here = Target(_machine(), f"{sys.version_info.major}.{sys.version_info.minor}")
+    here = Target(platform.machine(), f"{sys.version_info.major}.{sys.version_info.minor}")
     release = folder / f"fasaco-edge-{version}"
-    fill_release(release, wheels, target or here, recording=True)
+    fill_release(release, wheels, bundled_pip(), target or here, recording=True)
     for made in (folder, release):
         made.chmod(0o755)
     return release
 
 
-def _machine() -> str:
-    assert PYTHON.exists()
-    import platform
-
-    return platform.machine()
+def bundled_pip() -> Path:
+    """Return the wheel of pip that Python brings along for new environments."""
+    folders = Path(ensurepip.__file__).with_name("_bundled"), Path("/usr/share/python-wheels")
+    return next(wheel for folder in folders for wheel in folder.glob("pip-*.whl"))
 
 
 def _required() -> list[str]:

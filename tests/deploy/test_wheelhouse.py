@@ -5,6 +5,7 @@ import zipfile
 
 import pytest
 
+from tests.deploy.releases import bundled_pip
 from tests.deploy.wheels import write_wheel
 from wheelhouse.closure import IncompleteError, Target, closure_of
 from wheelhouse.release import fill_release
@@ -59,7 +60,7 @@ def test_a_release_folder_lists_every_wheel_with_its_hash(tmp_path):
     write_wheel(wheels, "kernels", "2.1")
     recorder = write_wheel(wheels, "recorder", "1.0")
     write_wheel(wheels, "left_over", "1.0")
-    fill_release(release, wheels, PI, recording=True)
+    fill_release(release, wheels, bundled_pip(), PI, recording=True)
     files = {file.name for file in (release / "wheels").iterdir()}
     assert "left_over-1.0-py3-none-any.whl" not in files
     listed = (release / "wheels/requirements-record.txt").read_text()
@@ -74,7 +75,7 @@ def test_without_recording_there_is_no_recorder(tmp_path):
     wheels, release = tmp_path / "found", tmp_path / "release"
     write_wheel(wheels, "fasaco_edge", "1.0", needs=OURS)
     write_wheel(wheels, "kernels", "2.1")
-    fill_release(release, wheels, PI, recording=False)
+    fill_release(release, wheels, bundled_pip(), PI, recording=False)
     assert not (release / "wheels/requirements-record.txt").exists()
 
 
