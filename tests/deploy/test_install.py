@@ -1,193 +1,156 @@
-"""install.sh and uninstall.sh in a lab whose network is ``lo`` alone, as on a robot in the field.
+"""install.sh and uninstall.sh on a robot whose network is ``lo`` alone.
 
-The kernels run as plain Python there: what is tried is what is installed, not how fast it is.
+All but the first share one robot; each leaves it as it was, with the first version running, and
+the last uninstalls it.
 """
 
 from __future__ import annotations
 
-import hashlib
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.deploy import installed, releases
-from tests.deploy.lab import Lab, booted, why_not
+from tests.deploy.lab import why_not
+from tests.deploy.robots import CONFIG, PREFIX, Robot, bare_robot
 
-PREFIX = "/opt/fasaco-edge"
-CONFIG = "/etc/fasaco-edge/config.yaml"
-# Where what is installed could leave something.
-WATCHED = ("/etc", "/opt", "/usr/local", "/var/lib", "/var/cache", "/var/log", "/srv/home")
 DIES = """\
 def run_daemon(*words, **more):
     raise RuntimeError("a screw is loose")
 """
 FIRST, SECOND, BROKEN, DYING = "1.0", "1.1", "1.2", "1.3"
+# Of the same version as the first, but not the same.
+OTHER = "other"
+CHANGES = {
+    BROKEN: {"fasaco_edge/daemon/config.py": "import nothing_of_that_name\n"},
+    DYING: {"fasaco_edge/daemon/service.py": DIES},
+    OTHER: {"fasaco_edge/_share/maps/README.md": "other maps\n"},
+}
+MINE = "robot: {name: maja}\nmission: {lost_pose_s: 0.0}\n"
+KERNELS = "/var/cache/"
 
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     if reason := why_not() or installed.why_not():
         pytest.skip(reason)
-    changes = {
-        BROKEN: {"fasaco_edge/daemon/config.py": "import nothing_of_that_name\n"},
-        DYING: {"fasaco_edge/daemon/service.py": DIES},
-    }
     return {
         version: releases.write_release(
-            tmp_path_factory.mktemp("release"), version, changes.get(version)
+            tmp_path_factory.mktemp("release"),
+            FIRST if version == OTHER else version,
+            CHANGES.get(version),
         )
-        for version in (FIRST, SECOND, BROKEN, DYING)
+        for version in (FIRST, SECOND, BROKEN, DYING, OTHER)
     }
 
 
-@pytest.fixture
-def bare(folders: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
-    """A lab on which nothing is installed."""
-    shown = {f"/srv/{version}": folder for version, folder in folders.items()}
-    with booted(tmp_path_factory.mktemp("lab"), shown | releases.binds()) as running:
-        # What the machine has of it already would be taken for ours.
-        running.run("sh", "-c", f"rm -rf {PREFIX} /etc/fasaco-edge /var/*/private/fasaco-edge*")
-        running.run("mkdir", "/srv/home")
-        running.run("systemctl", "set-environment", "NUMBA_DISABLE_JIT=1")
+@pytest.fixture(scope="module")
+def untouched() -> dict[str, str]:
+    """The robot's files before anything was installed."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def robot(
+    folders: dict[str, Path], untouched: dict[str, str], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Robot]:
+    """A robot on which the first version was installed."""
+    with bare_robot(tmp_path_factory.mktemp("lab"), folders) as running:
+        untouched |= running.files()
+        running.install(FIRST)
         yield running
 
 
-@pytest.fixture
-def robot(bare: Lab) -> Lab:
-    """One on which the first version is installed."""
-    install(bare, FIRST)
-    return bare
+def test_a_first_version_that_does_not_come_up_leaves_no_service_behind(folders, tmp_path):
+    with bare_robot(tmp_path, folders) as bare:
+        done = bare.install(DYING, code=5)
+        assert "a screw is loose" in done.stderr
+        assert bare.run("systemctl", "is-active", "fasaco-edge", check=False).stdout != "active\n"
+        assert not (bare.root / "etc/systemd/system/fasaco-edge.service").exists()
+        assert not (bare.root / "opt/fasaco-edge").exists()
 
 
-def install(lab: Lab, version: str, *words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
-    done = lab.run(
-        "env",
-        "SETTLE_S=1",
-        "HOME=/srv/home",
-        f"/srv/{version}/install.sh",
-        *words,
-        check=False,
-        timeout_s=100.0,
-    )
-    assert done.returncode == code, f"{done.returncode}\n{done.stdout}{done.stderr}"
-    return done
-
-
-def uninstall(lab: Lab, *words: str) -> str:
-    return lab.run(f"{PREFIX}/current/deploy/uninstall.sh", *words).stdout
-
-
-def current(lab: Lab) -> str:
-    return lab.run("readlink", f"{PREFIX}/current").stdout.strip()
-
-
-def is_running(lab: Lab, version: str) -> bool:
-    state = lab.run("systemctl", "is-active", "fasaco-edge", check=False).stdout.strip()
-    answer = lab.run("fasaco-edge", "ask", "version", check=False)
-    return state == "active" and version in answer.stdout
-
-
-def all_files(lab: Lab) -> dict[str, str]:
-    """Return every file of the folders watched, with what it holds."""
-    found = lab.run("find", *WATCHED, "-xdev", "-printf", r"%y %m %p %l\0").stdout.split("\0")
-    lines = {line.split(" ", 2)[2]: line for line in found if line}
-    # The journal and what others cache is theirs.
-    theirs = ("/var/lib/systemd", "/var/log/journal", "/var/lib/private ")
-    return {path: line for path, line in lines.items() if not path.startswith(theirs)}
-
-
-def contents(lab: Lab, path: str) -> str:
-    return hashlib.sha256((lab.root / path.lstrip("/")).read_bytes()).hexdigest()
-
-
-def test_from_nothing_to_a_service_that_answers_and_again_is_nothing_to_do(bare):
-    install(bare, FIRST)
-    assert is_running(bare, FIRST)
-    assert bare.run("systemctl", "is-enabled", "fasaco-edge").stdout == "enabled\n"
-    assert current(bare) == FIRST
-    compiled = bare.run("find", f"{PREFIX}/{FIRST}", "-name", "config.cpython-*.pyc").stdout
+def test_from_nothing_to_a_service_and_again_is_nothing_to_do(robot):
+    assert robot.answers(FIRST)
+    assert robot.run("systemctl", "is-enabled", "fasaco-edge").stdout == "enabled\n"
+    compiled = robot.run("find", f"{PREFIX}/{FIRST}", "-name", "config.cpython-*.pyc").stdout
     assert "fasaco_edge/daemon" in compiled
-    pid = bare.run("systemctl", "show", "-P", "MainPID", "fasaco-edge").stdout
-    before = all_files(bare)
-    assert install(bare, FIRST).stdout == f"nothing to do: version {FIRST} is installed\n"
-    assert all_files(bare) == before
-    assert bare.run("systemctl", "show", "-P", "MainPID", "fasaco-edge").stdout == pid
+    pid = robot.run("systemctl", "show", "-P", "MainPID", "fasaco-edge").stdout
+    before = robot.files()
+    assert robot.install(FIRST).stdout == f"nothing to do: version {FIRST} is installed\n"
+    assert robot.files() == before
+    assert robot.run("systemctl", "show", "-P", "MainPID", "fasaco-edge").stdout == pid
 
 
-def test_an_upgrade_keeps_the_configuration_and_the_version_before(robot):
-    mine = "robot: {name: maja}\nmission: {lost_pose_s: 0.0}\n"
-    robot.write(CONFIG, mine)
-    install(robot, SECOND)
-    assert current(robot) == SECOND
-    assert robot.run("cat", CONFIG).stdout == mine
-    assert SECOND in robot.run("fasaco-edge", "ask", "version", "--robot", "maja").stdout
-    robot.run(f"{PREFIX}/current/deploy/install.sh", "--rollback")
-    assert current(robot) == FIRST
-    assert robot.run("readlink", f"{PREFIX}/previous").stdout.strip() == SECOND
+def test_a_service_that_was_stopped_is_started_again(robot):
+    robot.run("systemctl", "disable", "--now", "fasaco-edge")
+    robot.install(FIRST)
+    assert robot.answers(FIRST)
+    assert robot.run("systemctl", "is-enabled", "fasaco-edge").stdout == "enabled\n"
 
 
 @pytest.mark.parametrize(
     ("version", "code", "told"),
-    [
-        (BROKEN, 4, "No module named 'nothing_of_that_name'"),
-        (DYING, 5, "a screw is loose"),
-    ],
+    [(BROKEN, 4, "No module named 'nothing_of_that_name'"), (DYING, 5, "a screw is loose")],
 )
 def test_a_version_that_does_not_work_leaves_the_old_one_running(robot, version, code, told):
-    before = all_files(robot)
-    done = install(robot, version, code=code)
+    before = robot.files()
+    done = robot.install(version, code=code)
     assert told in done.stderr
-    assert FIRST in done.stderr
-    assert is_running(robot, FIRST)
-    now = all_files(robot)
-    kernels = "/var/cache/private/fasaco-edge/"
-    assert {path for path in now.keys() ^ before.keys() if not path.startswith(kernels)} == set()
+    assert f"{FIRST} runs" in done.stderr
+    assert robot.answers(FIRST)
+    changed = robot.files().keys() ^ before.keys()
+    assert not [path for path in changed if not path.startswith(KERNELS)]
 
 
-def test_a_first_version_that_does_not_come_up_leaves_no_service_behind(bare):
-    done = install(bare, DYING, code=5)
-    assert "a screw is loose" in done.stderr
-    assert bare.run("systemctl", "is-active", "fasaco-edge", check=False).stdout != "active\n"
-    assert not (bare.root / "etc/systemd/system/fasaco-edge.service").exists()
-    assert not (bare.root / "opt/fasaco-edge").exists()
+def test_a_dry_run_changes_nothing(robot):
+    before = robot.files()
+    steps = robot.install(SECOND, "--dry-run").stdout
+    assert f"would switch from {FIRST} to {SECOND}" in steps
+    assert all(line.startswith("would ") for line in steps.splitlines())
+    assert f"would remove {PREFIX}" in robot.uninstall("--purge", "--dry-run")
+    assert robot.files() == before
+    assert robot.answers(FIRST)
+
+
+def test_an_upgrade_keeps_the_configuration_and_the_version_before(robot):
+    robot.write(CONFIG, MINE)
+    robot.install(SECOND)
+    assert robot.version() == SECOND
+    assert robot.run("cat", CONFIG).stdout == MINE
+    assert SECOND in robot.run("fasaco-edge", "ask", "version", "--robot", "maja").stdout
+    robot.run(f"{PREFIX}/current/deploy/install.sh", "--rollback")
+    assert (robot.version(), robot.version("previous")) == (FIRST, SECOND)
+    assert FIRST in robot.run("fasaco-edge", "ask", "version", "--robot", "maja").stdout
 
 
 def test_a_configuration_that_is_wrong_is_told_before_anything_is_switched(robot):
+    before = robot.run("cat", CONFIG).stdout
     robot.write(CONFIG, "robot: {radius_m: -1}\n")
-    done = install(robot, SECOND, code=4)
-    assert "radius_m" in done.stderr
-    assert current(robot) == FIRST
+    assert "radius_m" in robot.install(OTHER, code=4).stderr
+    assert robot.version() == FIRST
+    robot.write(CONFIG, before)
 
 
-def test_what_is_uninstalled_leaves_what_was_written_and_purged_nothing(bare):
-    before = all_files(bare)
-    install(bare, FIRST)
-    mine = "mission: {lost_pose_s: 0.0}\n"
-    bare.write(CONFIG, mine)
-    bare.run("systemctl", "restart", "fasaco-edge")
-    told = uninstall(bare)
+def test_another_build_of_the_same_version_stands_beside_it(robot):
+    robot.install(OTHER)
+    assert robot.version().startswith(f"{FIRST}-")
+    assert robot.version("previous") == FIRST
+    robot.run(f"{PREFIX}/current/deploy/install.sh", "--rollback")
+    assert robot.version() == FIRST
+
+
+def test_uninstalled_it_leaves_what_was_written_and_purged_nothing(robot, untouched):
+    robot.write(CONFIG, MINE)
+    told = robot.uninstall()
+    left = robot.files().keys() - untouched.keys()
     assert "what stays" in told
-    left = all_files(bare).keys() - before.keys()
-    kept = ("/etc/fasaco-edge", "/var/lib/", "/var/log/")
-    assert left
-    assert all(path.startswith(kept) for path in left), left
-    assert bare.run("cat", CONFIG).stdout == mine
-    assert bare.run("systemctl", "list-units", "--all", "fasaco*", "--plain", "-q").stdout == ""
-    bare.run("/srv/1.0/uninstall.sh", "--purge")
-    assert all_files(bare) == before
-    assert bare.run("/srv/1.0/uninstall.sh").stdout.startswith("nothing to do")
-
-
-def test_a_dry_run_changes_nothing(bare):
-    before = all_files(bare)
-    steps = install(bare, FIRST, "--dry-run").stdout
-    assert all(line.startswith("would ") for line in steps.splitlines())
-    assert all_files(bare) == before
-    install(bare, FIRST)
-    before = all_files(bare)
-    assert f"would switch from {FIRST} to {SECOND}" in install(bare, SECOND, "--dry-run").stdout
-    assert "would remove /opt/fasaco-edge" in uninstall(bare, "--purge", "--dry-run")
-    assert all_files(bare) == before
-    assert is_running(bare, FIRST)
+    assert {path.strip() for path in left} >= {"/etc/fasaco-edge", CONFIG}
+    assert all(path.startswith(("/etc/fasaco-edge", "/var/lib/", "/var/log/")) for path in left)
+    assert robot.run("cat", CONFIG).stdout == MINE
+    assert robot.run("systemctl", "list-units", "--all", "fasaco*", "--plain", "-q").stdout == ""
+    again = f"/srv/{FIRST}/uninstall.sh"
+    robot.run(again, "--purge")
+    assert robot.files() == untouched
+    assert robot.run(again).stdout.startswith("nothing to do")
