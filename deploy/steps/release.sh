@@ -2,7 +2,7 @@
 # shellcheck shell=bash disable=SC2034,SC2154
 
 require_python() {
-    command -v "$PYTHON" >/dev/null || fail $NOT_POSSIBLE "there is no $PYTHON here" \
+    "$PYTHON" -V >/dev/null 2>&1 || fail $NOT_POSSIBLE "there is no $PYTHON here" \
         "apt install python3 python3-venv, or name another with --python"
     "$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || fail $NOT_POSSIBLE \
         "fasaco_edge needs Python 3.11 or newer, $PYTHON is $("$PYTHON" -V 2>&1)" \
@@ -20,7 +20,7 @@ require_python() {
 }
 
 require_systemd() {
-    command -v systemctl >/dev/null || fail $NOT_POSSIBLE "there is no systemd here" \
+    systemctl --version >/dev/null 2>&1 || fail $NOT_POSSIBLE "there is no systemd here" \
         "elsewhere run the daemon by hand: pip install fasaco-edge, then fasaco-edge run"
     [[ ! $START ]] || systemd_runs || fail $NOT_POSSIBLE "systemd is installed but does not run" \
         "in a container or an image being built give --no-start: the service starts with the system"
@@ -102,11 +102,11 @@ require_libc() {
 }
 
 require_room() {
-    local place=$PREFIX free
+    local place=$PREFIX free needed=$((NEEDED_MB + 50))
     while [[ ! -d $place ]]; do place=$(dirname "$place"); done
     free=$(df --output=avail --block-size=1000000 "$place" | tail -n 1)
-    [[ $free -gt $((NEEDED_MB + 50)) ]] || fail $NOT_POSSIBLE \
-        "$place has ${free// /} MB free, this version takes $NEEDED_MB MB" \
+    [[ $free -ge $needed ]] || fail $NOT_POSSIBLE \
+        "$place has ${free// /} MB free, this version needs $needed MB" \
         "make room, or give --without-recording; uninstalling keeps state and configuration"
 }
 

@@ -24,6 +24,7 @@ from wheelhouse.release import fill_release
 
 SHOWN = "/srv/packages"
 LIBRARIES = [path for path in map(Path, sys.path) if path.name == "site-packages"]
+THIS = Target(platform.machine(), f"{sys.version_info.major}.{sys.version_info.minor}")
 SHARED = ("maps", "protocol")
 
 
@@ -61,9 +62,8 @@ def write_release(
         write_wheel(wheels, name.replace("-", "_"), there)
     paths = "".join(f"{place}\n" for place in binds())
     write_wheel(wheels, "linked", "1.0", files={"linked.pth": paths.encode()})
-    here = Target(platform.machine(), f"{sys.version_info.major}.{sys.version_info.minor}")
     release = folder / f"fasaco-edge-{version}"
-    fill_release(release, wheels, bundled_pip(), target or here, recording=True)
+    fill_release(release, wheels, bundled_pip(), target or THIS, recording=True)
     for made in (folder, release):
         made.chmod(0o755)
     return release
