@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from tests.deploy import installed, releases
+from tests.deploy.installing import CONFIG, PREFIX, Robot, bare_robot
 from tests.deploy.lab import why_not
-from tests.deploy.robots import CONFIG, PREFIX, Robot, bare_robot
 
 DIES = """\
 def run_daemon(*words, **more):

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import pytest
 
 from tests.deploy import installed, releases
+from tests.deploy.installing import PREFIX, Robot, bare_robot
 from tests.deploy.lab import why_not
-from tests.deploy.robots import PREFIX, Robot, bare_robot
 from wheelhouse.closure import Target
 
 HERE, ELSEWHERE, NEWER, DAMAGED = "here", "elsewhere", "newer", "damaged"

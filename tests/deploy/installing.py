@@ -1,4 +1,4 @@
-"""A lab as the computer of a robot, and the two scripts that install and uninstall there."""
+"""A robot's computer on which nothing is installed, and the scripts that install and uninstall."""
 
 from __future__ import annotations
 
