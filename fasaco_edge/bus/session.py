@@ -138,6 +138,13 @@ class Bus:
         """Id of the session, which no other has."""
         return str(self._session.zid())
 
+    def met(self) -> list[str]:
+        """Return what sessions this one speaks with, like "a router" or "3 peers"."""
+        info = self._session.info
+        met = (("router", info.routers_zid()), ("peer", info.peers_zid()))
+        counts = [(kind, len(ids)) for kind, ids in met if ids]
+        return [f"a {kind}" if count == 1 else f"{count} {kind}s" for kind, count in counts]
+
     def publisher(self, key: str, schema: str = "", qos: Qos = VOLATILE) -> Publisher:
         """Declare a publisher; ``schema`` names a CDR type, "" means JSON."""
         publisher = Publisher(self._session, key, schema, qos)
@@ -262,6 +269,18 @@ def open_bus(settings: BusSettings) -> Bus:
     )
     try:
         return Bus(zenoh.open(_config(joining)))
+    except zenoh.ZError as error:
+        raise BusUnavailable(_first_line(error)) from error
+
+
+def check_settings(settings: BusSettings) -> None:
+    """Check what a session would be opened with, and open none.
+
+    Raises:
+        BusUnavailable: Zenoh does not take it.
+    """
+    try:
+        _config(settings)
     except zenoh.ZError as error:
         raise BusUnavailable(_first_line(error)) from error
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -28,6 +27,7 @@ from fasaco_edge.cli import (
     watch,
 )
 from fasaco_edge.cli.arguments import with_negative_pairs
+from fasaco_edge.cli.logs import begin_logging, say_why
 from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
@@ -41,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the process's exit code."""
     words = sys.argv[1:] if argv is None else argv
     args = _parser().parse_args(with_negative_pairs(words))
-    logging.basicConfig(level=args.log_level.upper(), format="%(levelname)s %(name)s: %(message)s")
+    begin_logging(args.log_level)
     if args.with_parent is not None:
         end_with_parent(args.with_parent)
     try:
@@ -85,7 +85,5 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _fail(error: FasacoError) -> int:
-    print(f"fasaco-edge: {error}", file=sys.stderr)
-    if error.hint:
-        print(f"  hint: {error.hint}", file=sys.stderr)
+    say_why(error)
     return exits.CONFIG if isinstance(error, BadConfiguration) else exits.ERROR

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
+import sys
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,9 +17,18 @@ if TYPE_CHECKING:
     from fasaco_edge.daemon.checks.finding import Finding
 
 EPILOG = """\
-Nothing is started, changed or sent; run it as the user the daemon runs as, so that
-it may read what the daemon reads. What it looks at:
+Nothing is started or changed: it joins the bus for a second, listens, and asks. Run it as the user
+the daemon runs as, or as root, so that it may read what the daemon reads. What it looks at:
   configuration   whether the file is in order
+  platform        processor, system, Python
+  C library       whether it is as new as the installed packages want it
+  memory          how much there is, and whether limits on it hold
+  clock           whether it is synchronised
+  kernels         whether they are compiled, for this code and processor, and whose they are
+  disk            room for state, kernels and, with --recordings, recordings
+  permissions     whether others may change configuration or state
+  session         whether the daemon can join the bus, and who is in its place
+  peers           daemon, other robots, maps and poses on the bus
   endpoints       where the daemon listens, from where that can be reached, by whom
   identity        certificate, key and CA: whether they fit together, and until when;
                   or user and password
@@ -39,9 +51,9 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     parser = commands.add_parser(
         "doctor",
         parents=[common],
-        help="look through a configuration: what is open to whom, and what to do about it",
-        description="Look through the configuration of a daemon: what is open to whom, whether "
-        "certificates are in order, and what to do where something is not.",
+        help="look through computer, bus and configuration, and say what to do",
+        description="Look through a computer on which a daemon runs or is to run, the bus and the "
+        "configuration: what is missing, what is open to whom, and what to do about it.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -51,6 +63,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="the daemon's YAML configuration (default: what a daemon without one does)",
     )
+    parser.add_argument("--recordings", type=Path, metavar="DIR", help="where recordings are to go")
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     parser.set_defaults(command=run)
 
@@ -60,13 +73,18 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.daemon.checks.finding import Level
     from fasaco_edge.daemon.checks.report import findings
 
-    found = list(findings(args.config))
+    found = list(findings(args.config, recordings=args.recordings))
     if args.json:
         print(json.dumps(_document(found)))
     else:
         _print(found)
     failed = any(finding.level is Level.FAIL for _, finding in found)
-    return exits.ERROR if failed else exits.OK
+    code = exits.ERROR if failed else exits.OK
+    if threading.active_count() > 1:
+        # Something hangs, which the interpreter's end would wait for.
+        sys.stdout.flush()
+        os._exit(code)
+    return code
 
 
 def _document(found: list[tuple[str, Finding]]) -> dict[str, object]:

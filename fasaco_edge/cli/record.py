@@ -6,12 +6,14 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fasaco_edge.bus.session import BusSettings
 from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings
 from fasaco_edge.wire.poses import POSE_SCHEMAS
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.recording.settings import RecorderSettings
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
 
@@ -27,6 +29,13 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         "with `rerun FILE.rrd`, play it again with `fasaco-edge replay FILE.rrd`.",
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
+    parser.add_argument(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="the daemon's YAML configuration: robot, bus, pose and recording, in place of the "
+        "options for those",
+    )
     parser.add_argument(
         "--pose-schema",
         choices=POSE_SCHEMAS,
@@ -93,9 +102,37 @@ def _add_room(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Record."""
     from fasaco_edge.recording.recorder import run_recorder
+
+    settings = _settings(args) if args.config is None else _settings_of_daemon(args)
+    return run_recorder(settings)
+
+
+def _settings_of_daemon(args: argparse.Namespace) -> RecorderSettings:
+    from fasaco_edge.daemon.config import load_config
+    from fasaco_edge.daemon.endpoints import from_here
     from fasaco_edge.recording.settings import MEGABYTE, RecorderSettings
 
-    settings = RecorderSettings(
+    config = load_config(args.config)
+    bus, room = config.bus, config.recording
+    endpoints = tuple(map(from_here, bus.listen or bus.connect))
+    return RecorderSettings(
+        out=args.out,
+        robot=config.robot.name,
+        base=bus.base,
+        bus=BusSettings("client", endpoints, secured=bus.security.of_client()),
+        pose_schema=config.pose.schema,
+        part_bytes=room.part_mb * MEGABYTE,
+        part_s=60.0 * room.part_min,
+        quota_bytes=room.quota_mb * MEGABYTE,
+        least_free_bytes=room.least_free_mb * MEGABYTE,
+        serve=args.serve,
+    )
+
+
+def _settings(args: argparse.Namespace) -> RecorderSettings:
+    from fasaco_edge.recording.settings import MEGABYTE, RecorderSettings
+
+    return RecorderSettings(
         out=args.out,
         robot=args.robot,
         base=args.base,
@@ -107,4 +144,3 @@ def run(args: argparse.Namespace) -> int:
         least_free_bytes=args.least_free_mb * MEGABYTE,
         serve=args.serve,
     )
-    return run_recorder(settings)

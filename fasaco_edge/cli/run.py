@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import faulthandler
 import logging
 import os
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,9 +64,8 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.daemon.config import load_config
     from fasaco_edge.daemon.service import run_daemon
 
-    # Where a watchdog ends a service that hangs (SIGABRT), the log shows in what.
-    faulthandler.enable()
-    run_daemon(load_config(args.config), args.record, args.state, fresh=args.fresh)
+    read = partial(load_config, args.config)
+    run_daemon(read(), args.record, args.state, fresh=args.fresh, read=read)
     # All is closed. What is left is the interpreter's own end, in which it was seen to wait for
     # ever, now and then, where Zenoh's threads had been at work: a service must not.
     logging.shutdown()

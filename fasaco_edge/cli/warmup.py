@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from typing import TYPE_CHECKING
 
+from fasaco_edge.cli import exits
+
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
+
+EPILOG = """\
+The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Code in it is for
+these very sources, for one numba, llvmlite and Python, and for one processor; a daemon that finds
+none compiles it itself, with its first map.
+exit codes: 0 all is there, 1 (--check) it is not
+
+examples:
+  fasaco-edge warmup
+  fasaco-edge warmup --check || echo 'the first plan will take its time'
+  NUMBA_CACHE_DIR=/var/cache/fasaco-edge/numba fasaco-edge warmup --prune
+"""
 
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
@@ -16,21 +31,48 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         "warmup",
         parents=[common],
         help="compile the kernels into the cache, so that the first plan starts at once",
-        description="Compile the kernels into the cache, so that the first plan starts at once. "
-        "NUMBA_CACHE_DIR moves the cache.",
+        description="Compile the kernels into the cache, so that the first plan starts at once.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument(
+        "--check", action="store_true", help="compile nothing, tell whether all is there"
+    )
+    parser.add_argument(
+        "--prune", action="store_true", help="then remove what other versions have left there"
+    )
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
     parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compile, and say where to."""
+    """Compile or check, and say where."""
     from fasaco_edge.cli.terminal import err
+    from fasaco_edge.kernels import cache
 
-    seconds = compile_kernels()
-    from fasaco_edge.kernels.jit import CACHE_FOLDER
-
-    err().print(f"kernels ready after {seconds:.1f} s in {CACHE_FOLDER}")
-    return 0
+    seconds = 0.0 if args.check else compile_kernels()
+    folder = cache.usable_folder()
+    missing = cache.missing_from(folder)
+    removed, freed_mb = cache.prune(folder) if args.prune else (0, 0.0)
+    if args.json:
+        document = {
+            "ready": not missing,
+            "folder": str(folder),
+            "missing": missing,
+            "seconds": round(seconds, 3),
+            "removed": removed,
+            "freed_mb": freed_mb,
+        }
+        print(json.dumps(document))
+    elif missing:
+        # After a run that compiled them: a folder that cannot be written, say.
+        err().print(f"kernels not ready: {missing}; in {folder}", soft_wrap=True)
+    else:
+        after = "" if args.check else f" after {seconds:.1f} s"
+        err().print(f"kernels ready{after} in {folder}", soft_wrap=True)
+    if args.prune and not args.json:
+        err().print(f"removed {removed} folders of other versions, {freed_mb} MB")
+    return exits.ERROR if missing and args.check else exits.OK
 
 
 def compile_kernels() -> float:

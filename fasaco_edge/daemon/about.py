@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from functools import partial
 from typing import Any, cast
 
@@ -21,16 +22,17 @@ SECRET = re.compile(r"password|passphrase|secret|private_key|credential|token", 
 LEFT_OUT = "(left out)"
 
 
-def serve_about(bus: Bus, keys: Keys, config: DaemonConfig) -> None:
-    """Serve ``config`` and ``version``, and tell who asks anything else what there is."""
+def serve_about(bus: Bus, keys: Keys, config: Callable[[], DaemonConfig]) -> None:
+    """Serve ``config``, as it is then, and ``version``; tell others what there is to ask."""
     versions = {
         "package": "fasaco-edge",
         "version": __version__,
         "protocol": VERSION.removeprefix("@"),
         "zenoh": ZENOH_VERSION,
     }
-    for name, document in (("config", config_document(config)), ("version", versions)):
-        bus.serve(keys.rpc(name), answering(partial(_tell, Reply(encode_json(document)))))
+    documents = {"config": lambda: config_document(config()), "version": lambda: versions}
+    for name, document in documents.items():
+        bus.serve(keys.rpc(name), answering(partial(_tell, document)))
     bus.serve(f"{keys.prefix}/@rpc/*", partial(_unknown, keys), complete=False)
 
 
@@ -56,9 +58,9 @@ def _shown(value: object) -> object:
     return value
 
 
-def _tell(reply: Reply, request: Request) -> Reply:
+def _tell(document: Callable[[], dict[str, Any]], request: Request) -> Reply:
     check(request)
-    return reply
+    return Reply(encode_json(document()))
 
 
 def _unknown(keys: Keys, request: Request) -> Reply | None:

@@ -24,12 +24,15 @@ class Beginning:
         held: the newest map with the updates after it, and the newest pose.
     """
 
-    def __init__(self, keeping: Keeping, load: Callable[[], Loader]) -> None:
+    def __init__(
+        self, keeping: Keeping, load: Callable[[], Loader], held: Sequence[Event] = ()
+    ) -> None:
         self.assignment = keeping.first
         self.held: list[Event] = []
         self._keeping = keeping
         self._load = load
         self._loader: Loader | None = None
+        self.take(held)
 
     @property
     def stage(self) -> str:
@@ -75,3 +78,13 @@ class Beginning:
                 self._keeping.forget()
             answers.append(Answer(asked.number))
         return answers
+
+
+def heard_of(mission: Mission) -> list[Event]:
+    """Return the events after which another mission knows map and pose, too."""
+    heard: list[Event] = []
+    if mission.grid is not None:
+        heard.append(MapReceived(mission.grid))
+    if mission.pose is not None:
+        heard.append(PoseReceived(mission.pose))
+    return heard

@@ -14,6 +14,7 @@ from msgspec import Meta
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
 from fasaco_edge.daemon.config_faults import Fault, section_faults
 from fasaco_edge.daemon.config_text import read_text
+from fasaco_edge.daemon.credentials import with_credentials
 from fasaco_edge.daemon.mission_settings import MissionSettings
 from fasaco_edge.daemon.planner_config import PlannerConfig
 from fasaco_edge.daemon.recording_config import RecordingConfig
@@ -150,7 +151,7 @@ def inspect_config(path: Path | None) -> tuple[DaemonConfig | None, tuple[Fault,
         return None, (Fault("", error),)
     faults = [*text.twice, *section_faults(DaemonConfig, text.document)]
     if not faults:
-        config = msgspec.convert(text.document, DaemonConfig)
+        config = msgspec.convert(with_credentials(text.document), DaemonConfig)
         faults = [Fault(_named_in(error), error) for error in _together(config)]
         if not faults:
             return config, ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from typing import TYPE_CHECKING
 
+from fasaco_edge.kernels.cache import sources_digest
 from fasaco_edge.mission.events import Decision
 from fasaco_edge.wire.turns import Decided
 
@@ -52,7 +53,5 @@ def cells_checksum(cells: NDArray[np.int32]) -> int:
 
 
 def kernels_name() -> str:
-    """Return the name of the kernels in use; to be asked for once they are loaded."""
-    from fasaco_edge.kernels.jit import CACHE_FOLDER  # noqa: PLC0415
-
-    return CACHE_FOLDER.name
+    """Return the name of the kernels in use, by what they compute."""
+    return f"kernels-{sources_digest()}"

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 # From one map to the next that is taken in, at least [s]: a flood of maps, by mistake or malice,
 # must not take a core. No mapper is that fast.
 MAP_SPACING_S = 0.05
+# Updates without their map come in swarms; it is asked for no more often than this [s].
+ASK_FOR_MAP_S = 2.0
 
 # Samples that wait for the loop, as ``protocol/limits.yaml`` has it.
 QUEUES = {"map": 4, "map_update": 256, "tf_static": 256, "pose": 1024, "command": 16}
@@ -66,6 +68,7 @@ class Inbox:
         ros: RosBridge | None = None,
     ) -> None:
         self._pose_schema = pose_schema
+        self._asked_for_map_at = float("-inf")
         self._transforms = ros.transforms if ros else None
         self._maps = [bus.subscribe(keys.map, _poster(mailbox, "map"), latched=True)]
         if ros is not None:
@@ -73,8 +76,11 @@ class Inbox:
         for kind, key in (("map_update", keys.map_update), ("pose", keys.pose)):
             bus.subscribe(key, _poster(mailbox, kind))
 
-    def ask_for_map(self) -> None:
+    def ask_for_map(self, now: float) -> None:
         """Ask whoever publishes the map, and keeps the newest for late joiners, for it."""
+        if now - self._asked_for_map_at < ASK_FOR_MAP_S:
+            return
+        self._asked_for_map_at = now
         for subscription in self._maps:
             subscription.renew()
 

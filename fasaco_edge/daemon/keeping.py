@@ -40,6 +40,10 @@ class Keeping:
             mission.resume(self._before)
         mission.assign(assignment)
 
+    def take_back(self, mission: Mission) -> None:
+        """Keep what a mission has done for the one that goes on in its place."""
+        self._before, self.first = mission.snapshot(), mission.assignment
+
     def keep(self, mission: Mission | None, assignment: Assignment, now: float) -> None:
         """Hand over what has changed: an order at once, coverage once a period."""
         total = mission.ledger.total if mission else self._before.total

@@ -12,6 +12,7 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
+from fasaco_edge.daemon.faults import fault_text, log_fault
 from fasaco_edge.daemon.ledger_codec import LedgerFileError
 from fasaco_edge.daemon.ledger_file import Found, LedgerFile, reason_of
 from fasaco_edge.errors import FasacoError
@@ -68,7 +69,7 @@ class LedgerWriter:
         # What is wrong as long as nothing can be written, and what was found at the start.
         self._trouble, self._told = "", ""
         if found.fault is not None:
-            self._told = _log(found.fault)
+            self._told = log_fault(LOG, found.fault)
             self._faults.append(found.fault)
         self._changed = threading.Condition()
         self._waiting: LedgerSnapshot | None = None
@@ -95,7 +96,7 @@ class LedgerWriter:
             fault: what has been told already, for the status; None where it was asked for.
             why: a word.
         """
-        self._told = _log(fault) if fault is not None else ""
+        self._told = fault_text(fault) if fault is not None else ""
         self._restored_cells = 0
         with self._changed:
             self._waiting = None
@@ -154,7 +155,7 @@ class LedgerWriter:
             # Whatever it is, it must not cost the mission.
             fault = _cannot_write(self._file, error)
             if str(fault) not in self._trouble:
-                self._trouble = _log(fault)
+                self._trouble = log_fault(LOG, fault)
                 self._faults.append(fault)
             return False
         with self._changed:
@@ -169,13 +170,6 @@ class LedgerWriter:
         if self._trouble:
             LOG.warning("ledger %s: written again", self._file.path)
             self._trouble = ""
-
-
-def _log(fault: FasacoError) -> str:
-    """Log a fault; return it with what to do."""
-    text = f"{fault}: {fault.hint}" if fault.hint else str(fault)
-    LOG.warning("%s", text)
-    return text
 
 
 def _cannot_write(file: LedgerFile, error: Exception) -> LedgerFileError:

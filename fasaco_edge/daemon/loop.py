@@ -5,43 +5,41 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.daemon.beginning import Beginning
+from fasaco_edge.daemon.beginning import Beginning, heard_of
 from fasaco_edge.daemon.commands import Commands
 from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.daemon.coverage_news import CoverageNews
 from fasaco_edge.daemon.inbox import Inbox, Received
 from fasaco_edge.daemon.keeping import Keeping
 from fasaco_edge.daemon.ledger_writer import LedgerWriter
 from fasaco_edge.daemon.loading import Loader
+from fasaco_edge.daemon.map_clock import MapClock
 from fasaco_edge.daemon.outbox import Outbox
-from fasaco_edge.daemon.status import StatusBoard, plan_figures
+from fasaco_edge.daemon.reload import Reload
+from fasaco_edge.daemon.status import StatusBoard, path_note
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.daemon.turn_log import TurnLog, TurnNote
 from fasaco_edge.daemon.vitals import Vitals
-from fasaco_edge.errors import FasacoError, PatchWithoutBase
+from fasaco_edge.errors import BadConfiguration, FasacoError, PatchWithoutBase
 from fasaco_edge.mission.assignment import Assignment
-from fasaco_edge.mission.events import (
-    Decision,
-    Event,
-    PathUpdate,
-    PlanReady,
-)
-from fasaco_edge.wire.coverage import coverage_grid
+from fasaco_edge.mission.events import Decision, Event, PathUpdate, PlanReady
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.worker import Observed, PlanningWorker
     from fasaco_edge.mission.mission import Mission
 
 TICK_S = 0.1
-COVERAGE_PERIOD_S = 0.5
-# Updates without their map come in swarms; it is asked for no more often than this [s].
-ASK_FOR_MAP_S = 2.0
 
 
 class Loop:
-    """Joins the bus to the mission; everything but planning happens on its thread."""
+    """Joins the bus to the mission; everything but planning happens on its thread.
+
+    Attributes:
+        config: the configuration in force.
+    """
 
     def __init__(
         self,
@@ -54,8 +52,9 @@ class Loop:
         recorder: RecorderSupervisor | None,
         turns: TurnLog,
         vitals: Vitals,
+        reload: Reload,
     ) -> None:
-        self._config = config
+        self.config = config
         self._mailbox = mailbox
         self._inbox = inbox
         self._commands = commands
@@ -68,16 +67,12 @@ class Loop:
         self._recorder = recorder
         self._turns = turns
         self._vitals = vitals
+        self._reload = reload
         self._status = StatusBoard(config)
         self._mission: Mission | None = None
         self._worker: PlanningWorker | None = None
-        self._map_arrived: float | None = None
-        # Arrival of the oldest map that no plan was asked for yet, and of the one
-        # that the plan under way was asked for.
-        self._unanswered_map: float | None = None
-        self._asked_map: float | None = None
-        self._asked_for_map_at = self._coverage_at = float("-inf")
-        self._coverage_key: tuple[object, ...] = ()
+        self._maps = MapClock()
+        self._coverage = CoverageNews(outbox)
         if self._keeping.fault is not None:
             self._status.faults.count([self._keeping.fault])
 
@@ -85,6 +80,8 @@ class Loop:
         """Turn until ``stop`` is set."""
         while not stop.is_set():
             items = self._mailbox.take(TICK_S)
+            if self._reload.asked.is_set() and not self._loading:
+                items = self._reload_config(items)
             started = time.monotonic()
             lost = self._mailbox.take_lost("map_update")
             events, faults = self._inbox.decode(items, lost)
@@ -116,7 +113,37 @@ class Loop:
         return "" if self._mission else self._beginning.stage
 
     def _load(self) -> Loader:
-        return Loader(self._config, self._mailbox)
+        return Loader(self.config, self._mailbox)
+
+    def _reload_config(self, items: list[tuple[str, object]]) -> list[tuple[str, object]]:
+        """Read the configuration again; return what of ``items`` still counts then."""
+        try:
+            config = self._reload.read(self.config)
+        except BadConfiguration as error:
+            self._status.faults.count([error], is_logged=True)
+            self._vitals.remark = f"configuration refused: {error}"
+        else:
+            self._vitals.remark = ""
+            if config != self.config:
+                self._go_on_with(config)
+                items = [(kind, item) for kind, item in items if not isinstance(item, PlanReady)]
+        self._reload.done()
+        return items
+
+    def _go_on_with(self, config: DaemonConfig) -> None:
+        """Let another mission go on from the ledger, as after a restart."""
+        self.config = config
+        self._status.show(config)
+        self._turns.end("the configuration has changed")
+        held = self._beginning.held
+        if self._mission is not None and self._worker is not None:
+            self._worker.disown()
+            self._keeping.take_back(self._mission)
+            held = heard_of(self._mission)
+        self._mission = self._worker = None
+        self._maps = MapClock()
+        self._beginning = Beginning(self._keeping, self._load, held)
+        self._coverage.forget()
 
     def _begin(self, events: list[Event]) -> Mission | None:
         """Hold ``events`` until there is a mission; once it is there, they are all that was."""
@@ -135,12 +162,12 @@ class Loop:
         if mission.map_revision > maps:
             self._status.ingest_s = time.monotonic() - started
             if decision.plan is not None or mission.wants_plan:
-                self._unanswered_map = self._unanswered_map or self._map_arrived
+                self._maps.call_for_plan()
         if mission.wants_plan and mission.is_improving and self._worker is not None:
             self._worker.interrupt()  # what is needed comes before what is only better
         try:
             self._perform(mission, decision)
-            self._publish_coverage(mission, started)
+            self._coverage.publish(mission, started)
         except FasacoError as error:
             # What cannot be said in the protocol's limits costs this message alone.
             self._status.faults.count([error])
@@ -159,7 +186,7 @@ class Loop:
 
     def _note(self, items: list[tuple[str, object]]) -> None:
         """Take what is not the mission's: snapshots, the recorder's word, failures."""
-        self._map_arrived = None
+        self._maps.arrived = None
         for kind, item in items:
             if kind == "snapshot":
                 self._publish_snapshot(cast("Observed", item))
@@ -169,7 +196,7 @@ class Loop:
                 if not (self._mission and self._mission.is_improving):
                     self._status.plan_s = item.seconds
             elif kind in ("map", "map_update") and isinstance(item, Received):
-                self._map_arrived = item.at
+                self._maps.arrived = item.at
 
     def _perform(self, mission: Mission, decision: Decision) -> None:
         self._refuse(decision.faults)
@@ -177,7 +204,7 @@ class Loop:
         if decision.forgotten:
             self._keeping.forget()
         if decision.plan is not None and self._worker is not None:
-            self._asked_map, self._unanswered_map = self._unanswered_map, None
+            self._maps.ask()
             self._worker.submit(decision.plan)
         if decision.path is not None:
             if decision.plan is None and decision.path.plan is None and self._worker is not None:
@@ -187,47 +214,18 @@ class Loop:
     def _refuse(self, faults: Sequence[FasacoError]) -> None:
         """Count what was refused; ask for the map that updates lack."""
         self._status.faults.count(faults)
-        now = time.monotonic()
-        lacking = any(isinstance(fault, PatchWithoutBase) for fault in faults)
-        if lacking and now - self._asked_for_map_at >= ASK_FOR_MAP_S:
-            self._asked_for_map_at = now
-            self._inbox.ask_for_map()
+        if any(isinstance(fault, PatchWithoutBase) for fault in faults):
+            self._inbox.ask_for_map(time.monotonic())
 
     def _publish_path(self, mission: Mission, update: PathUpdate) -> None:
         assert mission.grid is not None
         assert mission.lattice is not None
-        plan = update.plan
-        about: dict[str, Any] = {
-            "revision": update.revision,
-            "map_stamp_ns": mission.grid.stamp_ns,
-            "map_revision": mission.map_revision,
-            "reason": update.reason,
-            "steps": max(len(update.cells) - 1, 0),
-            **plan_figures(plan),
-            "plan_ms": round(1e3 * update.plan_s, 3),
-        }
         xy = mission.lattice.centres(update.cells)
+        about = path_note(mission, update)
         self._outbox.path(xy, mission.grid.frame, mission.grid.stamp_ns, about)
         self._status.path = update
-        if plan is not None and self._asked_map is not None:
-            self._status.map_to_path_s = time.monotonic() - self._asked_map
-
-    def _publish_coverage(self, mission: Mission, now: float) -> None:
-        # An order may forget what was covered, and keep the robot out of cells.
-        key = (mission.ledger.total, mission.map_revision, mission.assignment)
-        if key == self._coverage_key or now - self._coverage_at < COVERAGE_PERIOD_S:
-            return
-        if mission.lattice is None or mission.grid is None:
-            return
-        self._coverage_at, self._coverage_key = now, key
-        lattice = mission.lattice
-        visits = mission.ledger.visits(lattice.window)
-        grid = mission.grid
-        self._outbox.coverage(
-            coverage_grid(
-                lattice.window, lattice.cell_m, lattice.states, visits, grid.frame, grid.stamp_ns
-            )
-        )
+        if update.plan is not None and (seconds := self._maps.answer()) is not None:
+            self._status.map_to_path_s = seconds
 
     def _publish_snapshot(self, seen: Observed) -> None:
         mission = self._mission
@@ -238,7 +236,7 @@ class Loop:
         if self._recorder is not None:
             self._status.recorder = self._recorder.poll(now)
         self._status.ledger = self._ledger.document(now)
-        self._status.faults.count(self._ledger.take_faults())
+        self._status.faults.count(self._ledger.take_faults(), is_logged=True)
         document = self._status.due(self._mission, self._assignment, self._loading, now)
         if document is not None:
             self._outbox.status(document)

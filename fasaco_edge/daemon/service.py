@@ -6,19 +6,21 @@ import logging
 import signal
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.daemon.about import serve_about
 from fasaco_edge.daemon.commands import Commands
-from fasaco_edge.daemon.compiling import compile_kernels
+from fasaco_edge.daemon.compiling import KernelCompiler
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.inbox import Inbox, make_mailbox
 from fasaco_edge.daemon.ledger_writer import LedgerWriter, open_ledger
 from fasaco_edge.daemon.loop import Loop
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.daemon.outbox import Outbox
+from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.daemon.turn_log import TurnLog
@@ -40,6 +42,7 @@ def run_daemon(
     state: Path | None = None,
     *,
     fresh: bool = False,
+    read: Callable[[], DaemonConfig] | None = None,
 ) -> None:
     """Serve until SIGTERM or SIGINT.
 
@@ -48,6 +51,7 @@ def run_daemon(
         record_to: folder for recordings; without it there are none.
         state: folder of the coverage ledger, in place of the configuration's.
         fresh: keep aside the ledger there is, and cover everything anew.
+        read: reads the configuration again, when a service manager sends SIGHUP.
 
     Raises:
         BusUnavailable: no session could be opened.
@@ -60,15 +64,24 @@ def run_daemon(
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     manager = ServiceManager()
-    robot = config.robot
-    folder = state or config.mission.state_folder()
-    ledger = open_ledger(folder, robot.name, robot.tool_width_m, fresh=fresh)
+    # Others are ready to answer; a service is ready to plan, see sd_notify(3).
+    reload = Reload(read or (lambda: config), manager)
     if manager.is_there:
-        # Others are ready to answer; a service is ready to plan, see sd_notify(3).
-        compile_kernels(manager, stop)
-    with open_bus(config.bus.settings(config.keys().prefix, config.ros2 or None)) as bus:
-        _serve(config, bus, ledger, record_to, stop, started, manager)
-    LOG.info("stopped")
+        # Elsewhere it is what a terminal sends that is closed.
+        signal.signal(signal.SIGHUP, lambda *_: reload.asked.set())
+    compiler = KernelCompiler(manager) if manager.is_there else None
+    try:
+        robot = config.robot
+        folder = state or config.mission.state_folder()
+        ledger = open_ledger(folder, robot.name, robot.tool_width_m, fresh=fresh)
+        if compiler is not None:
+            compiler.wait(stop)
+        with open_bus(config.bus.settings(config.keys().prefix, config.ros2 or None)) as bus:
+            _serve(config, bus, ledger, record_to, stop, started, manager, reload)
+    finally:
+        if compiler is not None:
+            compiler.close()
+    LOG.info("stopped", extra={"event": "stopped"})
 
 
 def _serve(
@@ -79,6 +92,7 @@ def _serve(
     stop: threading.Event,
     started: float,
     manager: ServiceManager,
+    reload: Reload,
 ) -> None:
     keys = config.keys()
     mailbox = make_mailbox()
@@ -87,14 +101,17 @@ def _serve(
     inbox = Inbox(bus, keys, mailbox, config.pose.schema, ros)
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
     commands = Commands(bus, keys, mailbox)
-    serve_about(bus, keys, config)
     turns = TurnLog(bus.publisher(keys.turns, qos=QOS["turns"]), config, ledger.restored)
-    loop = Loop(config, mailbox, inbox, commands, outbox, ledger, recorder, turns, Vitals(manager))
+    vitals = Vitals(manager)
+    loop = Loop(config, mailbox, inbox, commands, outbox, ledger, recorder, turns, vitals, reload)
+    serve_about(bus, keys, lambda: loop.config)
     try:
         loop.announce()
         bus.token(keys.alive)
-        LOG.info("ready after %.2f s on %s", time.monotonic() - started, keys.prefix)
-        manager.ready()
+        seconds = time.monotonic() - started
+        LOG.info("ready after %.2f s on %s", seconds, keys.prefix, extra={"event": "ready"})
+        if not stop.is_set():
+            manager.ready()
         loop.run(stop)
     finally:
         manager.stopping()

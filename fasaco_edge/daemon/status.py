@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from fasaco_edge import __version__
 from fasaco_edge.daemon.about import config_document
 from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.daemon.faults import log_fault
 from fasaco_edge.daemon.mission_report import mission_report
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.assignment import Assignment
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.events import PathUpdate
     from fasaco_edge.mission.mission import Mission
     from fasaco_edge.planners.path import CoveragePath
+
+LOG = logging.getLogger(__name__)
 
 HEARTBEAT_S = 1.0
 # Changes closer together than this go out as one.
@@ -40,15 +44,17 @@ PLAN_FIGURES = (
 
 
 class Faults:
-    """Counts what was refused, by code."""
+    """Counts what was refused, by code, and logs it."""
 
     def __init__(self) -> None:
         self._by_code: Counter[str] = Counter()
         self._last = ""
 
-    def count(self, faults: Sequence[FasacoError]) -> None:
-        """Note refused events."""
+    def count(self, faults: Sequence[FasacoError], *, is_logged: bool = False) -> None:
+        """Note refused events, and log them if that is not done already."""
         for fault in faults:
+            if not is_logged:
+                log_fault(LOG, fault)
             self._by_code[fault.code] += 1
             self._last = str(fault)
 
@@ -73,10 +79,14 @@ class StatusBoard:
         self.ledger: dict[str, Any] = {}
         self.path: PathUpdate | None = None
         self._config = config
-        self._shown_config = config_document(config)
+        self.show(config)
         self._started = time.monotonic()
         self._sent_at = float("-inf")
         self._sent_key: tuple[Any, ...] = ()
+
+    def show(self, config: DaemonConfig) -> None:
+        """Show this configuration as the one in force."""
+        self._shown_config = config_document(config)
 
     def due(
         self, mission: Mission | None, assignment: Assignment, loading: str, now: float
@@ -149,6 +159,19 @@ class StatusBoard:
             "reason": update.reason,
             **plan_figures(plan),
         }
+
+
+def path_note(mission: Mission, update: PathUpdate) -> dict[str, Any]:
+    """Return what is said of a path beside it."""
+    return {
+        "revision": update.revision,
+        "map_stamp_ns": mission.grid.stamp_ns if mission.grid else 0,
+        "map_revision": mission.map_revision,
+        "reason": update.reason,
+        "steps": max(len(update.cells) - 1, 0),
+        **plan_figures(update.plan),
+        "plan_ms": round(1e3 * update.plan_s, 3),
+    }
 
 
 def plan_figures(plan: CoveragePath | None) -> dict[str, Any]:

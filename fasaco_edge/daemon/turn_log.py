@@ -157,7 +157,13 @@ class TurnLog:
             self._heard_at, self._told_until = now, time.monotonic() + MARGIN_S
 
     def _close(self) -> None:
-        LOG.info("nobody listens to the turn log: it ends")
+        self.end("nobody listens to it")
+
+    def end(self, why: str) -> None:
+        """End the log: what comes after could not be repeated."""
+        if not self._is_open:
+            return
+        LOG.info("the turn log ends: %s", why)
         self._is_open = False
         self._times, self._turns, self._restored = [], [], None
         self._samples = SampleEncoder(run=0)

@@ -59,10 +59,14 @@ class PlanningWorker:
         """End the search under way with the best walk it has: something newer came."""
         self._interrupt.set()
 
-    def close(self, timeout_s: float) -> None:
-        """Interrupt the search and end the thread."""
+    def disown(self) -> None:
+        """Interrupt the search; nothing of it is posted any more, and the thread ends by itself."""
         self._stopping.set()
         self._interrupt.set()
+
+    def close(self, timeout_s: float) -> None:
+        """Interrupt the search and end the thread."""
+        self.disown()
         self._thread.join(timeout_s)
 
     def _run(self) -> None:
@@ -85,6 +89,8 @@ class PlanningWorker:
         # Costs some percent of a full plan, and a repair nothing.
         path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))
         seconds = time.monotonic() - started
+        if self._stopping.is_set():
+            return
         self._post("plan", PlanReady(request.number, path, seconds, tuple(stop.stops)))
 
     def _count(self, progress: SearchProgress) -> bool:
@@ -92,4 +98,5 @@ class PlanningWorker:
         return False
 
     def _observe(self, plan: int, snapshot: ColonySnapshot) -> None:
-        self._post("snapshot", Observed(plan, snapshot))
+        if not self._stopping.is_set():
+            self._post("snapshot", Observed(plan, snapshot))

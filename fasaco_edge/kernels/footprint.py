@@ -77,7 +77,7 @@ def centre(placement: Placement, row: float, col: float) -> tuple[float, float]:
     )
 
 
-@inlined
+@lean_kernel
 def reach_of(placement: Placement) -> float:
     """Return how far off a cell's centre, on either axis, a pixel may be to matter for it."""
     return max(abs(placement.ux), abs(placement.uy)) + placement.radius

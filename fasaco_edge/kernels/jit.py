@@ -1,11 +1,11 @@
-"""How kernels are compiled; ``kernels.cache`` tells where the compiled code is kept."""
+"""How kernels are compiled; ``kernels.cache`` says where the compiled code is kept."""
 
 import os
 import sys
 from collections.abc import Callable
 from typing import TypeVar
 
-from fasaco_edge.kernels.cache import cache_folder
+from fasaco_edge.kernels.cache import cache_folder, note_complete
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
@@ -43,3 +43,9 @@ def inlined(function: Kernel) -> Kernel:
     """Compile a small function without allocations into each kernel that calls it."""
     compiled: Kernel = _compile_into(function)
     return compiled
+
+
+def note_all_compiled() -> None:
+    """Note that every kernel has been compiled by now, or loaded."""
+    if not numba.config.DISABLE_JIT:
+        note_complete(CACHE_FOLDER)

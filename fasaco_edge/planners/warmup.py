@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -12,10 +11,9 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
-from fasaco_edge.kernels.cache import mark_complete
 from fasaco_edge.kernels.changes import Box
 from fasaco_edge.kernels.free_pixels import tally_free
-from fasaco_edge.kernels.jit import CACHE_FOLDER
+from fasaco_edge.kernels.jit import note_all_compiled
 from fasaco_edge.kernels.reach import update_reach
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.colony import ColonyConfig
@@ -39,8 +37,7 @@ def warm_up(report: Callable[[str], None] | None = None) -> None:
     for stage in _stages():
         if report is not None:
             report(stage)
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") == "0":
-        mark_complete(CACHE_FOLDER)
+    note_all_compiled()
 
 
 def _stages() -> Iterator[str]:

@@ -8,7 +8,6 @@ import pytest
 
 from fasaco_edge import __version__
 from fasaco_edge.cli import COMMANDS, main
-from tests.cli.commands import fasaco_edge
 
 NAMES = [module.__name__.rpartition(".")[2].replace("_", "-") for module in COMMANDS]
 
@@ -48,10 +47,3 @@ def test_the_maps_are_listed_and_can_be_planned_on(capsys):
     told = capsys.readouterr().out
     for name in ("office", "flat", "basement", "warehouse"):
         assert name in told
-
-
-def test_warmup_says_where_the_kernels_are():
-    ended = fasaco_edge("warmup")
-    assert ended.code == 0
-    assert "kernels ready after" in ended.err
-    assert "kernels-" in ended.err

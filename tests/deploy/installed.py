@@ -12,7 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from fasaco_edge.kernels.cache import is_complete
+from fasaco_edge.kernels.cache import missing_from
 from fasaco_edge.kernels.jit import CACHE_FOLDER
 from tests.daemon.processes import PROGRAM
 from tests.deploy.lab import Lab
@@ -66,17 +66,17 @@ def warm(lab: Lab, cache: str = "/var/cache/fasaco-edge/numba") -> None:
 
     numba keeps them in a folder named after that of their sources, which has another place inside.
     """
-    if not is_complete(CACHE_FOLDER):
+    if missing_from(CACHE_FOLDER):
         subprocess.run([*PROGRAM, "warmup"], check=True, capture_output=True)
     here = CACHE_FOLDER / _folder_of(str(CHECKOUT / "fasaco_edge/kernels"))
-    there = (
-        lab.root
-        / cache.lstrip("/")
-        / CACHE_FOLDER.name
-        / _folder_of(f"{SOURCE}/fasaco_edge/kernels")
-    )
-    shutil.copytree(here, there, dirs_exist_ok=True)
-    # Finds all of them, and marks the cache as complete.
+    # The folder's name tells the patch level of Python, of which the code in it is independent.
+    tell = "from fasaco_edge.kernels.cache import code_digest; print(f'kernels-{code_digest()}')"
+    name = lab.run(f"{HOME}/current/bin/python3", "-c", tell).stdout.strip()
+    there = Path(name, _folder_of(f"{SOURCE}/fasaco_edge/kernels"))
+    # For root, who runs robots and asks questions, they are kept elsewhere.
+    for home in (cache, "/root/.cache/fasaco-edge"):
+        shutil.copytree(here, lab.root / home.lstrip("/") / there, dirs_exist_ok=True)
+    # Finds all of them, and notes that the cache is complete.
     lab.run("env", f"NUMBA_CACHE_DIR={cache}", "fasaco-edge", "warmup")
 
 

@@ -50,7 +50,9 @@ class Lab:
 
     def words(self, *words: str) -> list[str]:
         """Return the command line that runs ``words`` inside."""
-        return [*NSENTER, f"--target={self.pid}", "--", *words]
+        # nsenter forks: what it has started is to end with it.
+        alone = ("setpriv", "--pdeathsig", "KILL")
+        return [*NSENTER, f"--target={self.pid}", "--", *alone, *words]
 
     def run(
         self, *words: str, check: bool = True, timeout_s: float = 60.0

@@ -37,7 +37,7 @@ def test_every_kernel_source_counts(kernel_copy):
 def test_the_given_folder_is_taken(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "service"))
     folder = cache.cache_folder()
-    assert folder == tmp_path / "service" / f"kernels-{cache.sources_digest()}"
+    assert folder == tmp_path / "service" / f"kernels-{cache.code_digest()}"
     assert folder.is_dir()
 
 
@@ -72,17 +72,17 @@ def test_a_temporary_folder_of_another_user_is_not_trusted(no_cache_but_temporar
     them = os.getuid()
     me = them + 1
     monkeypatch.setattr(os, "getuid", lambda: me)
-    mine = no_cache_but_temporary / f"fasaco-edge-{me}-kernels-{cache.sources_digest()}"
+    mine = no_cache_but_temporary / f"fasaco-edge-{me}-kernels-{cache.code_digest()}"
     mine.mkdir()  # by them, under my name
     assert cache.cache_folder() != mine
 
 
-def run(code, root, folder):
+def run(code, root, folder, **environ):
     """Run a program on the packages in ``root``."""
     done = subprocess.run(
         [sys.executable, "-c", code],
         cwd=root,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(folder)},
+        env={**os.environ, "NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(folder)} | environ,
         capture_output=True,
         text=True,
         check=False,
@@ -97,8 +97,8 @@ def test_a_caller_in_another_file_never_meets_the_old_code_of_its_callee(tmp_pat
     package.mkdir(parents=True)
     for part in (package.parent / "__init__.py", package / "__init__.py"):
         part.touch()
-    for module in (cache, jit):
-        shutil.copy(module.__file__, package)
+    for source in (jit.__file__, cache.__file__):
+        shutil.copy(source, package)
     head = "from fasaco_edge.kernels.jit import kernel\n"
     callee = head + "@kernel\ndef one():\n    return {}\n"
     caller = (
@@ -114,10 +114,105 @@ def test_a_caller_in_another_file_never_meets_the_old_code_of_its_callee(tmp_pat
     assert len(list((tmp_path / "cache").glob("kernels-*/**/*.nbi"))) == 4
 
 
+def test_other_compilers_have_a_folder_of_their_own():
+    now = cache.code_digest()
+    for changed in cache.COMPILERS:
+        versions = {"numba": "1", "llvmlite": "1"}
+        one = cache.code_digest(versions.__getitem__)
+        versions[changed] = "2"
+        assert len({now, one, cache.code_digest(versions.__getitem__)}) == 3
+
+
+KERNEL = """
+from fasaco_edge.kernels.jit import kernel, note_all_compiled
+from fasaco_edge.kernels.cache import missing_from, usable_folder
+@kernel
+def seven():
+    return 7
+print(missing_from(usable_folder()) or "nothing", end="; ")
+seven()
+stats = seven.stats
+print(sum(stats.cache_hits.values()), "loaded", sum(stats.cache_misses.values()), "compiled")
+note_all_compiled()
+"""
+
+
+@pytest.fixture
+def one_kernel(tmp_path):
+    """Tells what was missing, loaded and compiled of an installation with one kernel."""
+    package = tmp_path / "fasaco_edge" / "kernels"
+    package.mkdir(parents=True)
+    for part in (package.parent / "__init__.py", package / "__init__.py"):
+        part.touch()
+    for source in (jit.__file__, cache.__file__):
+        shutil.copy(source, package)
+    (package / "seven.py").write_text(KERNEL)
+
+    def tell(**environ):
+        code = "import fasaco_edge.kernels.seven"
+        return run(code, tmp_path, tmp_path / "cache", **environ)
+
+    return tell
+
+
+def test_what_is_said_to_be_there_is_loaded(one_kernel):
+    assert one_kernel() == "they were never all compiled for this installation; 0 loaded 1 compiled"
+    assert one_kernel() == "nothing; 1 loaded 0 compiled"
+
+
+def test_code_of_another_processor_is_not_run(one_kernel):
+    """As in a folder that was copied from another robot."""
+    one_kernel()
+    told = one_kernel(NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="")
+    assert told.startswith("they were compiled for another processor")
+    assert told.endswith("; 0 loaded 1 compiled")
+    # Both are kept from then on; what is noted is of the one that came last.
+    assert one_kernel().endswith("; 1 loaded 0 compiled")
+
+
+def test_an_installation_elsewhere_compiles_its_own(one_kernel, tmp_path):
+    one_kernel()
+    shutil.move(tmp_path / "fasaco_edge", tmp_path / "moved" / "fasaco_edge")
+    told = run("import fasaco_edge.kernels.seven", tmp_path / "moved", tmp_path / "cache")
+    assert told == "they were never all compiled for this installation; 0 loaded 1 compiled"
+
+
+@pytest.mark.parametrize(
+    ("harm", "said"),
+    [
+        (lambda file, note: file.unlink(), "is gone; 0 loaded 1 compiled"),
+        (lambda file, note: note.write_text("[]"), "cannot be read; 1 loaded 0 compiled"),
+        (lambda file, note: note.unlink(), "for this installation; 1 loaded 0 compiled"),
+    ],
+    ids=["removed", "no note", "none"],
+)
+def test_what_was_harmed_is_missing(one_kernel, tmp_path, harm, said):
+    one_kernel()
+    (file,) = (tmp_path / "cache").glob("kernels-*/*/*.nbc")
+    (note,) = (tmp_path / "cache").glob("kernels-*/complete-*.json")
+    harm(file, note)
+    assert one_kernel().endswith(said)
+    assert one_kernel() == "nothing; 1 loaded 0 compiled"
+
+
+def test_folders_of_other_versions_are_removed_and_nothing_else(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    folder = cache.cache_folder()
+    kept = [folder, tmp_path / "kernels-mine", tmp_path / "other"]
+    elsewhere = tmp_path / "other" / "precious"
+    for other in (*kept, elsewhere, tmp_path / f"kernels-{'0' * 12}" / "kernels_abc"):
+        other.mkdir(parents=True, exist_ok=True)
+    (tmp_path / f"kernels-{'0' * 12}" / "kernels_abc" / "a.nbc").write_bytes(bytes(100_000))
+    (tmp_path / f"kernels-{'1' * 12}").symlink_to(elsewhere)
+    assert cache.prune(folder) == (1, 0.1)
+    assert all(other.is_dir() for other in (*kept, elsewhere))
+    assert not (tmp_path / f"kernels-{'0' * 12}").exists()
+
+
 def test_numba_imported_before_us_keeps_its_code_in_our_folder_too(tmp_path):
-    code = "import numba; from fasaco_edge.kernels import jit; print(numba.config.CACHE_DIR)"
+    code = "import numba; from fasaco_edge.kernels import cache, jit; print(numba.config.CACHE_DIR)"
     folder = run(code, ROOT, tmp_path)
-    assert folder == str(tmp_path / f"kernels-{cache.sources_digest()}")
+    assert folder == str(tmp_path / f"kernels-{cache.code_digest()}")
 
 
 def test_twins_agree_without_the_compiler():

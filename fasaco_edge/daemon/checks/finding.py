@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 
+from fasaco_edge.daemon.checks.unit import Unit
 from fasaco_edge.daemon.config import DaemonConfig
 
 
@@ -40,11 +43,22 @@ class Patient:
 
     Attributes:
         config: the daemon's configuration.
-        source: where that was read, for people.
+        file: where that was read; None for the defaults.
+        unit: the daemon's unit, as systemd has it; None where there is none.
+        recordings: where recordings are to go; None where nobody said.
+        root: the computer's root folder.
     """
 
     config: DaemonConfig
-    source: str
+    file: Path | None = None
+    unit: Unit | None = None
+    recordings: Path | None = None
+    root: Path = Path("/")
+
+    @property
+    def environ(self) -> Mapping[str, str]:
+        """The environment the daemon would find: its unit's, else ours."""
+        return self.unit.environ if self.unit else os.environ
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +67,13 @@ class Check:
 
     Attributes:
         name: one or two words.
-        look: finds the answer; it changes nothing, and raises nothing.
+        look: finds the answer; it changes nothing.
+        of_machine: whether it says something without a configuration, too.
     """
 
     name: str
     look: Callable[[Patient], Finding]
+    of_machine: bool = False
 
 
 def worst(levels: list[Level]) -> Level:

@@ -1,0 +1,107 @@
+"""SIGHUP: the configuration is read again, and kept out if it is wrong."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.daemon.notify import ServiceManager
+from fasaco_edge.errors import BadConfiguration
+
+LOG = logging.getLogger(__name__)
+
+# Sections, and keys, that a running daemon can take up. What the session, the ledger or another
+# process was opened with, it cannot.
+CHANGEABLE = frozenset(
+    {
+        "planner",
+        "map",
+        "robot.speed_m_s",
+        "robot.quarter_turn_s",
+        "mission.retries",
+        "mission.retry_s",
+        "mission.lost_pose_s",
+        "mission.stale_map_s",
+    }
+)
+
+
+class Reload:
+    """Reads the configuration again once that is asked for.
+
+    Attributes:
+        asked: set where it is, by a signal.
+    """
+
+    def __init__(self, read: Callable[[], DaemonConfig], manager: ServiceManager) -> None:
+        self.asked = threading.Event()
+        self._read = read
+        self._manager = manager
+
+    def read(self, running: DaemonConfig) -> DaemonConfig:
+        """Return the running configuration with all that has changed in the file and can change.
+
+        Raises:
+            BadConfiguration: the file is wrong; nothing of it is taken.
+        """
+        self.asked.clear()
+        self._manager.reloading()
+        try:
+            written = self._read()
+        except BadConfiguration as error:
+            text = "configuration refused, the one before stays in force: %s (%s)"
+            extra = {"event": "reload_refused", "code": error.code}
+            LOG.error(text, error, error.hint, extra=extra)
+            raise
+        changed = changed_keys(running, written)
+        for_restart = [key for key in changed if not is_changeable(key)]
+        if for_restart:
+            keys = ", ".join(for_restart)
+            LOG.warning("%s: needs a restart", keys, extra={"event": "reload_needs_restart"})
+        taken = ", ".join(key for key in changed if is_changeable(key))
+        LOG.info("configuration read again: %s", taken or "no change", extra={"event": "reload"})
+        return with_changeable(running, written)
+
+    def done(self) -> None:
+        """Tell that what was read is in force."""
+        self._manager.ready()
+
+
+def is_changeable(key: str) -> bool:
+    """Tell whether a running daemon can take up another value."""
+    return key in CHANGEABLE or key.partition(".")[0] in CHANGEABLE
+
+
+def changed_keys(before: DaemonConfig, after: DaemonConfig) -> list[str]:
+    """Return the keys whose values differ, each as ``section.key``."""
+    first, second = _flat(before), _flat(after)
+    return sorted(key for key in first | second if first.get(key) != second.get(key))
+
+
+def with_changeable(running: DaemonConfig, written: DaemonConfig) -> DaemonConfig:
+    """Return ``running`` with the values of ``written`` for each changeable key."""
+    sections = {}
+    for name in running.__struct_fields__:
+        section, other = getattr(running, name), getattr(written, name)
+        if isinstance(section, msgspec.Struct) and isinstance(other, msgspec.Struct):
+            keys = [k for k in section.__struct_fields__ if is_changeable(f"{name}.{k}")]
+            taken = {key: getattr(other, key) for key in keys}
+            sections[name] = msgspec.structs.replace(section, **taken)
+    return msgspec.structs.replace(running, **sections)
+
+
+def _flat(config: DaemonConfig) -> dict[str, Any]:
+    """Return the values by ``section.key``; a section that may be left out counts as one value."""
+    flat: dict[str, Any] = {}
+    for name in config.__struct_fields__:
+        section = getattr(config, name)
+        if name == "ros2":
+            flat[name] = section
+        else:
+            flat |= {f"{name}.{key}": getattr(section, key) for key in section.__struct_fields__}
+    return flat

@@ -1,0 +1,57 @@
+"""``warmup`` compiles all, and says truly whether all is there."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+from tests.cli.commands import ENVIRONMENT, fasaco_edge
+
+COUNT = """
+import importlib
+from fasaco_edge.kernels.cache import KERNEL_SOURCES
+from fasaco_edge.planners.warmup import warm_up
+warm_up()
+modules = [importlib.import_module(f"fasaco_edge.kernels.{file.stem}") for file in KERNEL_SOURCES]
+kernels = {id(k): k for m in modules for k in vars(m).values() if hasattr(k, "stats")}.values()
+print(sum(sum(kernel.stats.cache_misses.values()) for kernel in kernels))
+"""
+
+
+def test_warmup_says_where_the_kernels_are():
+    ended = fasaco_edge("warmup")
+    assert ended.code == 0
+    assert "kernels ready after" in ended.err
+    assert "kernels-" in ended.err
+
+
+def test_what_is_ready_is_loaded_and_never_compiled():
+    told = json.loads(fasaco_edge("warmup", "--json").out)
+    assert told["ready"] is True
+    checked = fasaco_edge("warmup", "--check", "--json")
+    assert checked.code == 0
+    again = json.loads(checked.out)
+    assert (again["ready"], again["folder"], again["seconds"]) == (True, told["folder"], 0.0)
+    counted = subprocess.run(
+        [sys.executable, "-c", COUNT], env=ENVIRONMENT, capture_output=True, text=True, check=True
+    )
+    assert counted.stdout == "0\n"
+
+
+def test_a_check_compiles_nothing_and_makes_no_folder(tmp_path, monkeypatch):
+    monkeypatch.setitem(ENVIRONMENT, "NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    ended = fasaco_edge("warmup", "--check")
+    assert ended.code == 1
+    assert "kernels not ready: they were never all compiled" in ended.err
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_check_with_prune_removes_what_others_have_left(tmp_path, monkeypatch):
+    monkeypatch.setitem(ENVIRONMENT, "NUMBA_CACHE_DIR", str(tmp_path))
+    old = tmp_path / f"kernels-{'0' * 12}"
+    old.mkdir()
+    ended = fasaco_edge("warmup", "--check", "--prune", "--json")
+    assert json.loads(ended.out)["removed"] == 1
+    assert not old.exists()

@@ -1,0 +1,93 @@
+"""The configuration, read again: what is taken, what needs a restart, what is kept out."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.daemon.notify import ServiceManager
+from fasaco_edge.daemon.reload import (
+    CHANGEABLE,
+    Reload,
+    changed_keys,
+    is_changeable,
+    with_changeable,
+)
+from fasaco_edge.errors import BadConfiguration
+
+RUNNING = DaemonConfig()
+
+
+def configured(**sections) -> DaemonConfig:
+    return msgspec.convert(sections, DaemonConfig)
+
+
+def reloaded(written: DaemonConfig) -> DaemonConfig:
+    reload = Reload(lambda: written, ServiceManager({}))
+    reload.asked.set()
+    config = reload.read(RUNNING)
+    assert not reload.asked.is_set()
+    return config
+
+
+@pytest.mark.parametrize(
+    "sections",
+    [
+        {"planner": {"ants": 50, "seed": 3}},
+        {"map": {"free_at_most": 10}},
+        {"mission": {"retries": 5, "retry_s": 1.0, "lost_pose_s": 9.0, "stale_map_s": 8.0}},
+        {"robot": {"speed_m_s": 1.0, "quarter_turn_s": 0.0}},
+    ],
+)
+def test_what_can_change_is_taken(sections, caplog):
+    written = configured(**sections)
+    caplog.set_level("INFO")
+    assert reloaded(written) == written
+    for name, section in sections.items():
+        assert all(f"{name}.{key}" in caplog.text for key in section)
+    assert "needs a restart" not in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("key", "sections"),
+    [
+        ("robot.name", {"robot": {"name": "other"}}),
+        ("robot.tool_width_m", {"robot": {"tool_width_m": 0.5}}),
+        ("bus.base", {"bus": {"base": "else"}}),
+        ("bus.security", {"bus": {"security": {"roles": {"mapper": ["a"]}}}}),
+        ("mission.autostart", {"mission": {"autostart": False}}),
+        ("pose.schema", {"pose": {"schema": "nav_msgs/msg/Odometry"}}),
+        ("recording.part_mb", {"recording": {"part_mb": 7}}),
+        ("ros2", {"ros2": {"kind": "bridge"}}),
+    ],
+)
+def test_what_cannot_is_named_and_left_as_it_is(key, sections, caplog):
+    assert reloaded(configured(**sections)) == RUNNING
+    assert f"{key}: needs a restart" in caplog.text
+
+
+def test_of_both_each_goes_its_own_way():
+    written = configured(robot={"name": "other", "speed_m_s": 2.0})
+    taken = reloaded(written)
+    assert (taken.robot.name, taken.robot.speed_m_s) == ("robot", 2.0)
+
+
+def test_what_is_wrong_is_kept_out(caplog):
+    def read() -> DaemonConfig:
+        raise BadConfiguration("planner.ants: expected int, got 'many'")
+
+    reload = Reload(read, ServiceManager({}))
+    with pytest.raises(BadConfiguration):
+        reload.read(RUNNING)
+    assert "configuration refused" in caplog.text
+    assert "planner.ants" in caplog.text
+
+
+def test_every_changeable_key_is_one():
+    keys = {f"{n}.{k}" for n in ("robot", "mission") for k in getattr(RUNNING, n).__struct_fields__}
+    assert {"planner", "map"} | keys >= CHANGEABLE
+    assert is_changeable("planner.ants")
+    assert not is_changeable("robot.name")
+    assert changed_keys(RUNNING, RUNNING) == []
+    assert with_changeable(RUNNING, RUNNING) == RUNNING

@@ -1,0 +1,48 @@
+"""systemctl reload, while a robot drives."""
+
+from __future__ import annotations
+
+from tests.deploy.robots import covered_m2, robot
+from tests.deploy.service import QUIET, Service, wait_for
+
+
+def reload(service: Service) -> None:
+    """Reload as an operator does; systemd waits for READY=1."""
+    service.lab.run("systemctl", "reload", service.name)
+    wait_for(lambda: service.show("ActiveState") == "active", 5.0, "reloaded")
+
+
+def test_a_good_configuration_is_taken_and_the_mission_goes_on(service: Service):
+    service.start()
+    process = service.pid
+    with robot(service.lab):
+        wait_for(lambda: covered_m2(service) >= 3, 40.0, "3 m2 covered")
+        before = covered_m2(service)
+        service.configure(planner={"ants": 77, "spare_share": 0.0}, robot={"name": "other"})
+        reload(service)
+        wait_for(lambda: service.ask("config")["planner"]["ants"] == 77, 5.0, "taken")
+        status = service.ask()
+        assert status["robot"] == "robot"
+        assert status["coverage"]["covered_m2"] > before - 0.5  # it is told rounded
+        wait_for(lambda: covered_m2(service) > before, 30.0, "more covered than before")
+    assert service.pid == process
+    assert "robot.name: needs a restart" in service.text()
+    assert "configuration read again: planner.ants" in service.text()
+
+
+def test_a_wrong_one_is_kept_out(service: Service):
+    service.start()
+    process = service.pid
+    before = service.ask("config")
+    service.configure("planner: {ants: many}\n")
+    reload(service)
+    wait_for(lambda: "refused" in service.show("StatusText"), 5.0, "said")
+    assert "planner.ants" in service.show("StatusText")
+    assert service.ask()["errors"]["by_code"] == {"bad_configuration": 1}
+    (refused,) = [e for e in service.journal() if e.get("FASACO_EVENT") == "reload_refused"]
+    assert refused["PRIORITY"] == "3"
+    assert service.ask("config") == before
+    assert service.pid == process
+    service.configure(**QUIET)
+    reload(service)
+    wait_for(lambda: "refused" not in service.show("StatusText"), 5.0, "all is well again")
