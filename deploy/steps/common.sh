@@ -5,6 +5,7 @@ PREFIX=/opt/fasaco-edge
 COMMAND=/usr/local/bin/fasaco-edge
 SETTINGS=/etc/fasaco-edge
 UNITS=/etc/systemd/system
+KERNELS=/var/cache/fasaco-edge/numba
 DAEMON=fasaco-edge.service
 RECORDER=fasaco-edge-recorder.service
 

@@ -103,7 +103,7 @@ take_back_first() {
     systemctl disable --now $DAEMON 2>/dev/null || true
     drop_unit $RECORDER
     rm -f "$UNITS/$DAEMON" "$PREFIX/current"
-    rm -rf "${PREFIX:?}/$1"
+    drop_version "$1"
     systemctl daemon-reload
 }
 
@@ -114,7 +114,17 @@ prune() {
         name=$(basename "$folder")
         case $name in
         current | previous | '*' | "$NAME" | "$(version_of current)" | "$(version_of previous)") ;;
-        *) step "remove version $name" rm -rf "${PREFIX:?}/$name" ;;
+        *) step "remove version $name" drop_version "$name" ;;
         esac
     done
+}
+
+# drop_version VERSION: its folder, and what was compiled for it. numba names folders of compiled
+# code after the place of the sources.
+drop_version() {
+    local sources
+    for sources in "$PREFIX/$1"/lib/python3.*/site-packages/fasaco_edge/kernels; do
+        rm -rf "$KERNELS"/kernels-*/"kernels_$(printf '%s' "$sources" | sha1sum | cut -d ' ' -f 1)"
+    done
+    rm -rf "${PREFIX:?}/$1"
 }

@@ -52,7 +52,7 @@ as_service() {
         --property=DynamicUser=yes --property=User=fasaco-edge \
         --property=CacheDirectory=fasaco-edge --property=PrivateNetwork=yes \
         --property=ProtectHome=yes --property=Nice=10 --property=CPUWeight=20 \
-        --setenv=NUMBA_CACHE_DIR=/var/cache/fasaco-edge/numba --setenv=HOME=/nonexistent \
+        --setenv=NUMBA_CACHE_DIR=$KERNELS --setenv=HOME=/nonexistent \
         --setenv=PYTHONNOUSERSITE=1 -- "$@" </dev/null
 }
 
