@@ -1,10 +1,13 @@
 # One command sets up all that is needed and does the job; nothing has to be run before.
 PYTHON ?= python3
+# The robot's processor (`uname -m` there) and its Python.
+ARCH ?= $(shell uname -m)
+TARGET_PYTHON ?= 3.11
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test check format bench clean
+.PHONY: demo test check format bench wheelhouse clean
 
 demo: $(STAMP)  ## watch a robot cover a building nobody mapped before
 	$(BIN)/fasaco-edge demo $(ARGS)
@@ -28,6 +31,9 @@ bench: $(STAMP)  ## speed, footprint, latency
 	$(BIN)/fasaco-edge bench speed
 	$(BIN)/fasaco-edge bench footprint
 	$(BIN)/fasaco-edge bench latency
+
+wheelhouse: $(STAMP)  ## a folder in dist/ from which a robot is installed without a network
+	PYTHONPATH=deploy $(BIN)/python -m wheelhouse --arch $(ARCH) --python $(TARGET_PYTHON) $(ARGS)
 
 clean:  ## remove the environment and all that tools left behind
 	rm -rf $(VENV) dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,0 +1,1 @@
+"""Makes a folder from which a robot is installed without a network."""

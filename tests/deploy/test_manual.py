@@ -1,0 +1,71 @@
+"""What deploy/README.md tells people to type and to write is understood."""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import subprocess
+
+import pytest
+
+from fasaco_edge.daemon.config import load_config
+from tests.daemon.processes import PROGRAM
+from tests.deploy.manual import MANUAL, blocks
+
+DEPLOY = MANUAL.parent
+COMMANDS = [command for block in blocks() for command in block.commands]
+
+
+def test_every_block_of_commands_is_one():
+    scripts = [block.text for block in blocks() if block.kind == "sh"]
+    assert len(scripts) >= 10
+    for script in scripts:
+        subprocess.run(["bash", "-n"], input=script, text=True, check=True)
+
+
+def test_every_configuration_is_one(tmp_path):
+    texts = [block.text for block in blocks() if block.kind == "yaml"]
+    assert len(texts) >= 3
+    for text in texts:
+        (tmp_path / "config.yaml").write_text(text)
+        load_config(tmp_path / "config.yaml")
+
+
+@pytest.mark.parametrize("command", sorted({c for c in COMMANDS if c.startswith("fasaco-edge")}))
+def test_the_program_knows_every_word(command):
+    name, *words = shlex.split(command)[1:]
+    told = subprocess.run([*PROGRAM, name, "--help"], capture_output=True, text=True, check=True)
+    assert all(word in told.stdout for word in words if word.startswith("-"))
+
+
+def test_every_file_of_ours_is_there():
+    named = {word for command in COMMANDS for word in shlex.split(command)}
+    for prefix in ("/opt/fasaco-edge/current/deploy/", "./"):
+        files = [word.removeprefix(prefix) for word in named if word.startswith(prefix)]
+        assert files
+        assert [name for name in files if not (DEPLOY / name).is_file()] == []
+
+
+@pytest.mark.parametrize("script", ["install.sh", "uninstall.sh"])
+def test_the_scripts_explain_themselves_and_know_the_manuals_options(script):
+    told = subprocess.run([DEPLOY / script, "--help"], capture_output=True, text=True, check=True)
+    lines = [shlex.split(command) for command in COMMANDS if script in command]
+    assert lines
+    for words in lines:
+        assert all(word in told.stdout for word in words if word.startswith("--"))
+
+
+def test_the_kernels_are_compiled_to_where_the_service_looks_for_them():
+    unit = (DEPLOY / "fasaco-edge.service").read_text()
+    place = (DEPLOY / "steps/common.sh").read_text()
+    assert "\nEnvironment=NUMBA_CACHE_DIR=%C/fasaco-edge/numba\n" in unit
+    assert "\nKERNELS=/var/cache/fasaco-edge/numba\n" in place
+
+
+def test_the_shell_scripts_are_clean():
+    if shutil.which("shellcheck") is None:
+        pytest.skip("shellcheck is not installed")
+    scripts = [DEPLOY / "install.sh", DEPLOY / "uninstall.sh"]
+    words = ["shellcheck", "--external-sources", *scripts]
+    told = subprocess.run(words, cwd=DEPLOY.parent, capture_output=True, text=True, check=False)
+    assert told.stdout == ""
