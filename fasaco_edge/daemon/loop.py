@@ -16,7 +16,7 @@ from fasaco_edge.daemon.keeping import Keeping
 from fasaco_edge.daemon.ledger_writer import LedgerWriter
 from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.daemon.outbox import Outbox
-from fasaco_edge.daemon.status import StatusBoard, plan_figures
+from fasaco_edge.daemon.status import StatusBoard, changed_document, plan_figures
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.daemon.turn_log import TurnLog, TurnNote
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
@@ -201,6 +201,7 @@ class Loop:
             "steps": max(len(update.cells) - 1, 0),
             **plan_figures(plan),
             "plan_ms": round(1e3 * update.plan_s, 3),
+            "changed": changed_document(update.changed, mission.lattice.cell_m),
         }
         xy = mission.lattice.centres(update.cells)
         self._outbox.path(xy, mission.grid.frame, mission.grid.stamp_ns, about)
