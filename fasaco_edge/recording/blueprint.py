@@ -1,4 +1,4 @@
-"""How a recording opens: the field large, figures on the right, the course below."""
+"""How a recording opens: the map large, states below it, figures on the right."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ MARGIN = 1.1
 # Rerun's vertical field of view, and the shape (width / height) that a spatial view has
 # in this layout at 1280 x 720.
 FIELD_OF_VIEW_RAD = math.radians(55.0)
-VIEW_ASPECT = 1.0
-COLUMNS = [5, 5, 4]
+VIEW_ASPECT = 1.12
+COLUMNS = [11, 8, 9]
 TRAIL_S = 30.0
 CHANGE_S = 4.0
 
@@ -29,12 +29,11 @@ def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
     """Return the layout, its eyes over ``bounds`` (x_min, y_min, x_max, y_max) [m]."""
     bounds = bounds or NO_MAP
     return rrb.Blueprint(
-        rrb.Vertical(
-            rrb.Horizontal(
-                _map_view(bounds), _pheromone_view(bounds), _figures(), column_shares=COLUMNS
-            ),
-            rrb.Horizontal(_states(), _log(), _card(), column_shares=COLUMNS),
-            row_shares=[5, 2],
+        rrb.Horizontal(
+            rrb.Vertical(_map_view(bounds), _states(), row_shares=[5, 2]),
+            rrb.Vertical(_pheromone_view(bounds), _plan(), _log(), row_shares=[9, 5, 7]),
+            rrb.Vertical(_figures(), _card(), row_shares=[5, 2]),
+            column_shares=COLUMNS,
         ),
         rrb.TimePanel(state="collapsed", timeline=entities.WALL),
         rrb.BlueprintPanel(state="collapsed"),
@@ -48,7 +47,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin="/",
         name="Map, coverage and path",
-        contents=["/world/**", f"- /{entities.PHEROMONE}/**"],
+        contents=["/world/**", f"- /{entities.PHEROMONE}/**", f"- /{entities.DIRECTIONS}/**"],
         eye_controls=_eye_above(bounds),
         line_grid=False,
         background=MAP_BACKGROUND,
@@ -59,30 +58,35 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
 def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin="/",
-        name="Pheromone",
-        contents=[f"/{entities.PHEROMONE}/**", f"/{entities.ROBOT}/**"],
+        name="Pheromone, main directions",
+        contents=[
+            f"/{entities.PHEROMONE}/**",
+            f"/{entities.DIRECTIONS}/**",
+            f"/{entities.ROBOT}/**",
+        ],
         eye_controls=_eye_above(bounds),
         line_grid=False,
         background=PHEROMONE_BACKGROUND,
     )
 
 
+def _plot(name: str, origin: str, legend: rrb.PlotLegend, top: float = 0.0) -> rrb.TimeSeriesView:
+    axis = rrb.ScalarAxis(range=(0.0, top)) if top else None
+    return rrb.TimeSeriesView(origin=f"/{origin}", name=name, axis_y=axis, plot_legend=legend)
+
+
 def _figures() -> rrb.Vertical:
-    corner = rrb.PlotLegend(rrb.Corner2D.LeftTop)
+    left, right = (rrb.PlotLegend(c) for c in (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop))
     return rrb.Vertical(
-        rrb.TimeSeriesView(
-            origin="/metrics/coverage",
-            name="Coverage [fraction]",
-            axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
-            plot_legend=corner,
-        ),
-        rrb.TimeSeriesView(origin=f"/{entities.LATENCY}", name="Latency [ms]", plot_legend=corner),
-        rrb.TimeSeriesView(
-            origin="/metrics/colony",
-            name="Colony: best walk so far [steps]",
-            plot_legend=rrb.PlotLegend(visible=False),
-        ),
+        _plot("Coverage [share of the cells known]", "metrics/coverage", left, 1.1),
+        _plot("Latency [ms]", entities.LATENCY, right),
+        _plot("Memory [MB], processor [% of a core]", "metrics/resources", right),
     )
+
+
+def _plan() -> rrb.TimeSeriesView:
+    none = rrb.PlotLegend(visible=False)
+    return _plot("Plan: gap to the lower bound [share]", f"{entities.PLANNED}/gap", none)
 
 
 def _states() -> rrb.StateTimelineView:
@@ -90,10 +94,12 @@ def _states() -> rrb.StateTimelineView:
 
 
 def _log() -> rrb.TextLogView:
-    columns = [rrb.encodings.TextLogColumn(kind) for kind in ("LogLevel", "Body")]
-    return rrb.TextLogView(
-        origin="/log", name="Log", columns=rrb.TextLogColumns(text_log_columns=columns)
+    # Of a time there is room for a digit only: the line says where in the log it is now.
+    columns = rrb.TextLogColumns(
+        timeline_columns=[rrb.encodings.TimelineColumn(entities.WALL, visible=False)],
+        text_log_columns=[rrb.encodings.TextLogColumn("Body")],
     )
+    return rrb.TextLogView(origin="/log", name="Log", columns=columns)
 
 
 def _card() -> rrb.TextDocumentView:

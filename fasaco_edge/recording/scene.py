@@ -17,9 +17,11 @@ from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.changes import Bounds, changed_bounds, known_bounds, union
 from fasaco_edge.recording.curves import TREMBLE, Curves
 from fasaco_edge.recording.fields import Json, integer, number, section, text
+from fasaco_edge.recording.figures import StatusFigures
 from fasaco_edge.recording.journal import Journal
 from fasaco_edge.recording.layers import Layers, size_in_file
 from fasaco_edge.recording.path_drawing import PathDrawing
+from fasaco_edge.recording.pheromone_drawing import PheromoneDrawing
 from fasaco_edge.recording.report import RecorderReport
 from fasaco_edge.recording.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
@@ -44,12 +46,13 @@ class Scene:
         self._known: Bounds | None = None
         self._framed: Bounds | None = None
         self._last_place: tuple[float, float] | None = None
-        self._cohorts = 0
-        self._errors = 0
+        self._errors = self._restored = 0
         self._states: dict[str, str] = {}
         self._layers = Layers()
         self._curves = Curves(journal)
+        self._figures = StatusFigures(self._curves)
         self._paths = PathDrawing(journal, self._layers)
+        self._pheromone = PheromoneDrawing(journal, self._layers, self._curves)
         log_styles(journal)
         self._describe()
         self._draw_robot(DEFAULT_RADIUS_M)
@@ -62,7 +65,7 @@ class Scene:
                 return
             changed = changed_bounds(before, grid)
             if changed is not None:
-                self._journal.log(entities.MAP_CHANGE, draw.change_archetype(changed))
+                self._journal.log(entities.MAP_CHANGE, draw.box_archetype(changed, draw.CHANGE))
 
         def draw_map() -> None:
             self._journal.log(
@@ -101,6 +104,7 @@ class Scene:
     def add_path(self, message: PathMessage, note: Json) -> None:
         """Draw the path to drive, over the one before it, and log why it came."""
         self._paths.add(message, note)
+        self._figures.add_path(note)
 
     def add_coverage(self, grid: OccupancyGrid) -> None:
         """Tint what is covered, and plot how much that is."""
@@ -121,32 +125,16 @@ class Scene:
 
     def add_pheromone(self, message: PheromoneMessage) -> None:
         """Draw the pheromone after a cohort, and plot the best walk so far."""
-        self._cohorts += 1
-        self._journal.sequence(entities.ITER, self._cohorts)
-
-        def draw_pheromone() -> None:
-            self._journal.log(
-                entities.PHEROMONE,
-                draw.pheromone_archetype(message),
-                latched=True,
-                size=message.levels.size,
-            )
-
-        self._draw(entities.PHEROMONE, size_in_file(message.levels), draw_pheromone)
-        self._curves.draw(entities.BEST_STEPS, message.best_steps)
-        # The levels' scale: with it they can be turned back into trails.
-        self._curves.draw(f"{entities.TRAIL_RANGE}/min", message.trail_min)
-        self._curves.draw(f"{entities.TRAIL_RANGE}/max", message.trail_max)
+        self._pheromone.add(message)
+        if self._pheromone.trail_range != self._run.trail_range:
+            self._run = replace(self._run, trail_range=self._pheromone.trail_range)
+            self._describe()
 
     def add_status(self, status: Json) -> None:
         """Plot the planner's figures, show its states, log its errors; any key may be missing."""
-        for name, value in section(status, "latency_ms").items():
-            if number({name: value}, name) is not None:
-                self._curves.draw(f"{entities.LATENCY}/{name}", value, TREMBLE)
-        memory = number(status, "rss_mb")
-        if memory is not None:
-            self._curves.draw(f"{entities.MEMORY}/planner", memory, TREMBLE)
+        self._figures.add(status)
         self._add_configuration(status)
+        self._add_restored(section(status, "ledger"))
         self.enter(entities.MISSION_STATE, text(status, "state"), text(status, "reason"))
         planning = section(status, "plan").get("planning")
         if isinstance(planning, bool):
@@ -218,6 +206,12 @@ class Scene:
         body, heading = draw.body_archetypes(radius_m)
         self._journal.log_static(entities.ROBOT_BODY, body)
         self._journal.log_static(entities.ROBOT_HEADING, heading)
+
+    def _add_restored(self, ledger: Json) -> None:
+        restored = integer(ledger, "restored_cells") or 0
+        if restored != self._restored:
+            self._restored = restored
+            self._say(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
 
     def _add_errors(self, errors: Json) -> None:
         total = integer(errors, "total")
