@@ -95,10 +95,13 @@ def lines_archetype(lines: NDArray[np.float64], style: LineStyle) -> rr.LineStri
     return rr.LineStrips3D(strips, colors=style.colour, radii=-style.width)
 
 
-def label_archetype(bounds: Bounds, text: str) -> rr.Points3D:
-    """Return a line of text above a rectangle (x_min, y_min, x_max, y_max) [m]."""
-    x0, _, x1, y1 = bounds
-    place = ((x0 + x1) / 2, y1, LABEL_Z)
+def label_archetype(bounds: Bounds, text: str, above: float = 0.0) -> rr.Points3D:
+    """Return text over the upper edge of a rectangle (x_min, y_min, x_max, y_max) [m].
+
+    ``above``: how far above it, as a share of the rectangle's height.
+    """
+    x0, y0, x1, y1 = bounds
+    place = ((x0 + x1) / 2, y1 + above * (y1 - y0), LABEL_Z)
     return rr.Points3D([place], radii=0.0, labels=[text], colors=LABEL_COLOUR, show_labels=True)
 
 

@@ -11,12 +11,12 @@ Bounds = tuple[float, float, float, float]
 
 # Before there is a map [m].
 NO_MAP: Bounds = (-5.0, -5.0, 5.0, 5.0)
-# Room for the map to grow a little before the eye moves.
-MARGIN = 1.1
-# Rerun's vertical field of view, and the shape (width / height) that a spatial view has
+# Room for the map to grow a little before the eye moves, and for a label above the field.
+MARGIN, PHEROMONE_MARGIN = 1.1, 1.3
+# Rerun's vertical field of view, and the shapes (width / height) that the spatial views have
 # in this layout at 1280 x 720.
 FIELD_OF_VIEW_RAD = math.radians(55.0)
-VIEW_ASPECT = 1.12
+VIEW_ASPECT, PHEROMONE_ASPECT = 1.12, 1.45
 COLUMNS = [11, 8, 9]
 TRAIL_S = 30.0
 CHANGE_S = 4.0
@@ -48,7 +48,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
         origin="/",
         name="Map, coverage and path",
         contents=["/world/**", f"- /{entities.PHEROMONE}/**", f"- /{entities.DIRECTIONS}/**"],
-        eye_controls=_eye_above(bounds),
+        eye_controls=_eye_above(bounds, MARGIN, VIEW_ASPECT),
         line_grid=False,
         background=MAP_BACKGROUND,
         overrides={entities.TRAIL: _last(TRAIL_S), entities.MAP_CHANGE: _last(CHANGE_S)},
@@ -64,7 +64,7 @@ def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
             f"/{entities.DIRECTIONS}/**",
             f"/{entities.ROBOT}/**",
         ],
-        eye_controls=_eye_above(bounds),
+        eye_controls=_eye_above(bounds, PHEROMONE_MARGIN, PHEROMONE_ASPECT),
         line_grid=False,
         background=PHEROMONE_BACKGROUND,
     )
@@ -86,7 +86,7 @@ def _figures() -> rrb.Vertical:
 
 def _plan() -> rrb.TimeSeriesView:
     none = rrb.PlotLegend(visible=False)
-    return _plot("Plan: gap to the lower bound [share]", f"{entities.PLANNED}/gap", none)
+    return _plot("Plan: gap to the lower bound [share]", entities.GAP, none)
 
 
 def _states() -> rrb.StateTimelineView:
@@ -106,11 +106,11 @@ def _card() -> rrb.TextDocumentView:
     return rrb.TextDocumentView(origin=f"/{entities.RUN_CARD}", name="Run")
 
 
-def _eye_above(bounds: Bounds) -> rrb.EyeControls3D:
+def _eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3D:
     x0, y0, x1, y1 = bounds
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
-    reach = max((y1 - y0) / 2, (x1 - x0) / 2 / VIEW_ASPECT, 0.5)
-    height = MARGIN * reach / math.tan(FIELD_OF_VIEW_RAD / 2)
+    reach = max((y1 - y0) / 2, (x1 - x0) / 2 / aspect, 0.5)
+    height = margin * reach / math.tan(FIELD_OF_VIEW_RAD / 2)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
         # Straight down the eye's up axis would be undefined.

@@ -15,7 +15,7 @@ from fasaco_edge.recording.sdk import rr
 # that a part, and what follows a gap, soon has all of them.
 PERIOD_NS = 60_000_000_000
 # Latencies and memory tremble: by less than this share of them nothing has changed.
-TREMBLE = 0.05
+TREMBLE = 0.1
 
 
 @dataclass(slots=True)

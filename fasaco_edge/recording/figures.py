@@ -9,17 +9,15 @@ from fasaco_edge.recording.curves import TREMBLE, Curves
 from fasaco_edge.recording.fields import Json, number, section
 
 # Counts that go on and on are drawn no more often than this.
-COUNT_SPACING_NS = 10_000_000_000
+COUNT_SPACING_NS = 30_000_000_000
 # Processor time is told as a share of so many seconds at least.
-LEAST_SHARE_S = 5.0
+LEAST_SHARE_S = 30.0
 # By the contract there are some dozens; another's may not fill the recording.
 MOST_CODES = 50
 _CODE = re.compile(r"[a-z_]{1,40}")
 
 CELLS = ("coverable", "covered", "recovered", "unreachable")
 PLANS = ("plans", "unchanged", "outdated", "attempts")
-# Of the path in force, as its attachment has them.
-PLANNED = ("planned_steps", "lower_bound_steps", "planned_cost_s", "gap")
 
 
 class StatusFigures:
@@ -51,11 +49,10 @@ class StatusFigures:
             self._draw(f"{entities.ERRORS}/{code}", number(by_code, code))
 
     def add_path(self, note: Json) -> None:
-        """Draw how good a planned path is."""
-        for name in PLANNED:
-            value = number(note, name)
-            if value is not None:
-                self._curves.draw(f"{entities.PLANNED}/{name}", value)
+        """Draw how good a planned path is; steps, bound and cost are in the log and the inputs."""
+        gap = number(note, "gap")
+        if gap is not None:
+            self._curves.draw(entities.GAP, gap)
 
     def _add_processor(self, status: Json) -> None:
         uptime_s, cpu_s = number(status, "uptime_s"), number(status, "cpu_s")

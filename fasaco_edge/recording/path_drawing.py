@@ -87,6 +87,9 @@ def _line(message: PathMessage, note: Json) -> str:
     named = "path" if revision is None else f"path {revision}"
     facts = [f"{max(len(message.xy) - 1, 0)} steps"]
     planner, plan_ms, gap = text(note, "planner"), number(note, "plan_ms"), number(note, "gap")
+    cost_s = number(note, "planned_cost_s")
+    if cost_s is not None:
+        facts.append(f"{cost_s:.0f} s")
     if gap is not None:
         facts.append(f"{100 * gap:.0f} % over the bound")
     if planner:

@@ -13,6 +13,8 @@ from fasaco_edge.recording.journal import Journal
 from fasaco_edge.recording.layers import Layers, size_in_file
 from fasaco_edge.wire.pheromone import PheromoneMessage
 
+# How far above the field its label stands, as a share of the field's height.
+LABEL_ABOVE = 0.1
 # A range that grows by less than this is still told as it was.
 SLACK = 1.1
 
@@ -38,7 +40,7 @@ class PheromoneDrawing:
 
         def draw_pheromone() -> None:
             field = draw.pheromone_archetype(message)
-            label = draw.label_archetype(message.geometry.bounds(), _line(message))
+            label = draw.label_archetype(message.geometry.bounds(), _line(message), LABEL_ABOVE)
             self._journal.log(entities.PHEROMONE, field, latched=True, size=message.levels.size)
             self._journal.log(entities.COHORT, label, latched=True)
 

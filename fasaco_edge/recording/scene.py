@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -26,10 +25,10 @@ from fasaco_edge.recording.report import RecorderReport
 from fasaco_edge.recording.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.styles import log_styles
+from fasaco_edge.recording.trail_drawing import TrailDrawing
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
 
-TRAIL_SPACING_M = 0.02
 DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
 # takes 120 kB.
@@ -45,11 +44,11 @@ class Scene:
         self._map: OccupancyGrid | None = None
         self._known: Bounds | None = None
         self._framed: Bounds | None = None
-        self._last_place: tuple[float, float] | None = None
         self._errors = self._restored = 0
         self._states: dict[str, str] = {}
         self._layers = Layers()
         self._curves = Curves(journal)
+        self._trail = TrailDrawing(journal)
         self._figures = StatusFigures(self._curves)
         self._paths = PathDrawing(journal, self._layers)
         self._pheromone = PheromoneDrawing(journal, self._layers, self._curves)
@@ -89,13 +88,7 @@ class Scene:
         """Move the robot, and draw its trail."""
         pose = stamped.pose
         self._journal.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
-        here = (pose.x, pose.y)
-        if self._last_place is None:
-            self._last_place = here
-        elif math.dist(self._last_place, here) >= TRAIL_SPACING_M:
-            step = np.array([self._last_place, here])
-            self._journal.log(entities.TRAIL, draw.strip_archetype(step, draw.TRAIL))
-            self._last_place = here
+        self._trail.add(pose.x, pose.y)
 
     def add_command(self, command: Json) -> None:
         """Log a command that the mission has taken."""
@@ -164,10 +157,12 @@ class Scene:
     def catch_up(self) -> None:
         """Draw what had to wait; call it often."""
         self._layers.catch_up(self._journal.wall_ns)
+        self._trail.catch_up()
 
     def finish(self) -> None:
         """Draw what waits, and frame the map as it was at the end."""
         self._layers.finish()
+        self._trail.finish()
         self._curves.finish()
         if self._known is not None and self._known != self._framed:
             self._journal.show(build_blueprint(self._known))

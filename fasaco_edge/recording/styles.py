@@ -22,7 +22,7 @@ CURVES: tuple[tuple[str, str, Colour], ...] = (
     (f"{entities.LATENCY}/plan", "plan", (167, 139, 250)),
     (f"{entities.LATENCY}/map_to_path", "map to path", (245, 140, 40)),
     (entities.BEST_STEPS, "best walk", (250, 204, 21)),
-    (f"{entities.PLANNED}/gap", "gap of the plan", (250, 204, 21)),
+    (entities.GAP, "gap of the plan", (250, 204, 21)),
     (f"{entities.MEMORY}/planner", "planner MB", (167, 139, 250)),
     (f"{entities.MEMORY}/recorder", "recorder MB", (156, 163, 175)),
     (entities.PROCESSOR, "planner %", (245, 140, 40)),

@@ -146,7 +146,7 @@ def test_the_numbers_of_statuses_and_paths_are_curves(recorded):
     assert curve(f"{entities.PLANS}/plans")[-1] == revision
     assert set(curve(entities.PROCESSOR)) == {20.0}
     assert curve(entities.THREADS) == [9]
-    assert len(curve(f"{entities.PLANNED}/gap")) == revision
+    assert len(curve(entities.GAP)) == revision
     assert curve(f"{entities.ERRORS}/malformed_message") == [2]
 
 
