@@ -1,8 +1,9 @@
-"""What a process is resident with and what it has loaded, by proc(5)."""
+"""What a process is resident with, its threads and what it has loaded, by proc(5)."""
 
 from __future__ import annotations
 
 import ctypes
+import os
 from pathlib import Path, PurePath
 
 # Options of mallopt(3) and what they are set to.
@@ -19,6 +20,11 @@ def resident_mb(pid: int | str = "self") -> float:
 def peak_mb(pid: int) -> float:
     """Return the most it was ever resident with [MB]."""
     return _field_mb(pid, "VmHWM")
+
+
+def thread_count() -> int:
+    """Return how many threads this process has."""
+    return len(os.listdir("/proc/self/task"))
 
 
 def has_loaded(pid: int, package: str) -> bool:

@@ -78,7 +78,7 @@ def _add_room(parser: argparse.ArgumentParser) -> None:
     room.add_argument(
         "--part-min",
         type=float,
-        default=15.0,
+        default=10.0,
         metavar="MIN",
         help="or minutes; 0 for never (default: %(default)g)",
     )

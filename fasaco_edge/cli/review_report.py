@@ -9,12 +9,17 @@ from fasaco_edge.cli import terminal
 from fasaco_edge.review.curve import curve
 from fasaco_edge.review.document import troubles
 from fasaco_edge.review.rows import (
+    MOST_REPLANS,
+    REASONS,
+    REPLANS,
     amount,
     card_rows,
     clock,
     compared_rows,
     ending,
     figure_rows,
+    reason_rows,
+    replan_rows,
 )
 from fasaco_edge.review.series import covered_share
 
@@ -41,9 +46,11 @@ def print_review(review: Review, told: dict[str, Any]) -> None:
     _print_table(
         console,
         "Why replans came",
-        ("reason", "replans"),
-        [(reason, str(count)) for reason, count in told["replans_by_reason"].items()],
+        REASONS,
+        reason_rows(told),
     )
+    slowest = replan_rows(review.replans.slowest_first(MOST_REPLANS))
+    _print_table(console, "The slowest replans", REPLANS, slowest)
     _print_table(
         console,
         "Worst moments",

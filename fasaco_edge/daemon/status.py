@@ -15,9 +15,10 @@ from fasaco_edge.daemon.faults import log_fault
 from fasaco_edge.daemon.mission_report import mission_report
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.assignment import Assignment
-from fasaco_edge.process_memory import resident_mb
+from fasaco_edge.process_memory import resident_mb, thread_count
 
 if TYPE_CHECKING:
+    from fasaco_edge.grid.geometry import Window
     from fasaco_edge.mission.events import PathUpdate
     from fasaco_edge.mission.mission import Mission
     from fasaco_edge.planners.path import CoveragePath
@@ -132,6 +133,8 @@ class StatusBoard:
             "path": self._path(mission),
             "plan": {
                 "plans": mission.plans if mission else 0,
+                "unchanged": mission.unchanged if mission else 0,
+                "outdated": mission.outdated if mission else 0,
                 "attempts": mission.attempts if mission else 0,
                 "planning": bool(mission and mission.planning),
             },
@@ -144,6 +147,8 @@ class StatusBoard:
             "ledger": self.ledger,
             "recorder": self.recorder,
             "rss_mb": resident_mb(),
+            "cpu_s": round(time.process_time(), 3),
+            "threads": thread_count(),
             "config": self._shown_config,
         }
 
@@ -163,14 +168,17 @@ class StatusBoard:
 
 def path_note(mission: Mission, update: PathUpdate) -> dict[str, Any]:
     """Return what is said of a path beside it."""
+    assert mission.grid is not None
+    assert mission.lattice is not None
     return {
         "revision": update.revision,
-        "map_stamp_ns": mission.grid.stamp_ns if mission.grid else 0,
+        "map_stamp_ns": mission.grid.stamp_ns,
         "map_revision": mission.map_revision,
         "reason": update.reason,
         "steps": max(len(update.cells) - 1, 0),
         **plan_figures(update.plan),
         "plan_ms": round(1e3 * update.plan_s, 3),
+        "changed": changed_document(update.changed, mission.lattice.cell_m),
     }
 
 
@@ -190,6 +198,15 @@ def plan_figures(plan: CoveragePath | None) -> dict[str, Any]:
         None if plan.gap is None else round(plan.gap, 6),
     )
     return dict(zip(PLAN_FIGURES, values, strict=True))
+
+
+def changed_document(window: Window | None, cell_m: float) -> dict[str, float] | None:
+    """Return where a window of the lattice lies in the map's frame [m]; None without one."""
+    if window is None:
+        return None
+    edges = (window.col0, window.row0, window.col1, window.row1)
+    names = ("x_min", "y_min", "x_max", "y_max")
+    return {name: round(edge * cell_m, 3) for name, edge in zip(names, edges, strict=True)}
 
 
 def _state(mission: Mission | None, assignment: Assignment, loading: str) -> tuple[str, str]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.geometry import StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.order import EVERYTHING_ONCE, MissionOrder
 from fasaco_edge.mission.order_document import CommandName
@@ -75,11 +75,16 @@ Event = MapReceived | PatchReceived | PatchesLost | PoseReceived | PlanReady | C
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """A walk is wanted; ``reason`` says why."""
+    """A walk is wanted; ``reason`` says why.
+
+    ``changed`` is the window of cells that have changed since the plan before; None where the
+    reason is another.
+    """
 
     number: int
     problem: CoverageProblem
     reason: str
+    changed: Window | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +97,7 @@ class PathUpdate:
         reason: why it replaces the one before.
         plan: the plan it comes from; None where none was needed.
         plan_s: how long that took [s].
+        changed: window of the cells whose change is the reason; None where it is another.
     """
 
     revision: int
@@ -99,6 +105,7 @@ class PathUpdate:
     reason: str
     plan: CoveragePath | None = None
     plan_s: float = 0.0
+    changed: Window | None = None
 
 
 @dataclass(frozen=True, slots=True)

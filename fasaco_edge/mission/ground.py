@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange, carried
-from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
 from fasaco_edge.kernels.directions import COL_STEP, ROW_STEP
 from fasaco_edge.kernels.reach import update_reach
@@ -26,11 +26,15 @@ LOCAL_SHARE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class GroundChange:
-    """How many reachable cells came, went, or have other steps than before."""
+    """How many reachable cells came, went, or have other steps than before.
+
+    ``window`` is the smallest around all of them; None where nobody has looked.
+    """
 
     gained: int
     lost: int
     rewired: int
+    window: Window | None = field(default=None, compare=False)
 
     def __bool__(self) -> bool:
         return bool(self.gained or self.lost or self.rewired)
@@ -90,17 +94,26 @@ class Ground:
         common = mine.intersection(theirs)
         total, total_before = np.count_nonzero(self.reachable), np.count_nonzero(before.reachable)
         if common is None:
-            return GroundChange(int(total), int(total_before), 0)
+            window = Window.around(_around(self.reachable, mine), _around(before.reachable, theirs))
+            return GroundChange(int(total), int(total_before), 0, window)
         here, there = common.slices_in(mine), common.slices_in(theirs)
         now, then = self.reachable[here], before.reachable[there]
         both = now & then
         kept = np.count_nonzero(both)
-        steps_differ = self.lattice.steps[here] != before.lattice.steps[there]
-        return GroundChange(
+        rewired = (self.lattice.steps[here] != before.lattice.steps[there]) & both
+        change = GroundChange(
             gained=int(total - kept),
             lost=int(total_before - kept),
-            rewired=int(np.count_nonzero(steps_differ & both)),
+            rewired=int(np.count_nonzero(rewired)),
         )
+        if not change:
+            return change
+        # Reachable in one of the two alone, also where only one of them has cells.
+        came, went = self.reachable.copy(), before.reachable.copy()
+        came[here] &= ~then
+        went[there] &= ~now
+        window = Window.around(_around(rewired, common), _around(came, mine), _around(went, theirs))
+        return replace(change, window=window)
 
     def legal_steps(self, cells: NDArray[np.int32]) -> int:
         """Return how many leading steps of a walk, int32 (n, 2), are legal here."""
@@ -125,6 +138,15 @@ class Ground:
         walk = shortest_walk(lattice.steps, lattice.local(start), lattice.local(goal))
         offset = np.array((lattice.window.row0, lattice.window.col0), np.int32)
         return (walk + offset).astype(np.int32)
+
+
+def _around(marked: NDArray[np.bool_], window: Window) -> Window | None:
+    """Return the smallest window around the marked cells of ``window``, bool (rows, cols)."""
+    rows, cols = np.flatnonzero(marked.any(axis=1)), np.flatnonzero(marked.any(axis=0))
+    if not len(rows):
+        return None
+    first = Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
+    return first.moved(window.row0, window.col0)
 
 
 def anchor_cell(lattice: CoverageLattice, pose: Pose2D) -> Cell | None:

@@ -151,6 +151,16 @@ class Mission:
         return self._parts.route.attempts
 
     @property
+    def unchanged(self) -> int:
+        """How many of the plans found the path there is."""
+        return self._parts.route.unchanged
+
+    @property
+    def outdated(self) -> int:
+        """How many of the plans did not hold any more when they came."""
+        return self._parts.route.outdated
+
+    @property
     def planning(self) -> bool:
         """Whether a plan that is needed has been asked for and is not there yet."""
         return self._parts.route.asked is not None and not self.is_improving

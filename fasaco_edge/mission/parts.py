@@ -62,4 +62,4 @@ class Parts:
             again = "robot is on coverable ground again"
             route.wanted = again if route.revision else self.log.opening
         elif change := ground.change_since(before):
-            route.wanted = str(change)
+            route.want(str(change), change.window)

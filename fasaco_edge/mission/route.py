@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.agenda import Agenda
 from fasaco_edge.mission.events import PathUpdate, PlanReady, PlanRequest
@@ -22,6 +23,8 @@ class Route:
         path: the published path, and how far the robot is on it.
         revision: counts the published paths.
         plans, attempts: count the plans that came back, and the attempts at better paths.
+        unchanged, outdated: count those of the plans that led to no path, because they found
+            the one there is, or because they did not hold any more.
         wanted: why a new plan is wanted; "" where none is.
         asked: the plan under way.
         now: time of the step [s].
@@ -32,6 +35,7 @@ class Route:
         self.path = DrivenPath.none()
         self.revision = 0
         self.plans = self.attempts = 0
+        self.unchanged = self.outdated = 0
         self.wanted = ""
         self.asked: PlanRequest | None = None
         self.now = 0.0
@@ -41,6 +45,8 @@ class Route:
         self._disowned = False
         # Why a plan is wanted that keeps nothing of the path; "" where none is.
         self._anew = ""
+        # What has changed since the last plan was asked for.
+        self._changed: Window | None = None
         self._checked_on: Ground | None = None
         self._attempt: Attempt | None = None
 
@@ -55,7 +61,9 @@ class Route:
 
     def ask(self, problem: CoverageProblem) -> PlanRequest:
         """Ask for the plan that is wanted."""
-        self.asked = PlanRequest(self._number, problem, self._anew or self.wanted)
+        reason = self._anew or self.wanted
+        changed = None if self._anew else self._changed
+        self.asked = PlanRequest(self._number, problem, reason, changed)
         self.want_none()
         return self.asked
 
@@ -67,9 +75,15 @@ class Route:
         self.asked = PlanRequest(self._number, self._attempt.problem, "spare time")
         return self.asked
 
+    def want(self, reason: str, changed: Window | None) -> None:
+        """Want a plan because the cells in a window have changed."""
+        self.wanted = reason
+        self._changed = Window.around(self._changed, changed)
+
     def want_none(self) -> None:
         """Want no plan any more."""
         self.wanted = self._anew = ""
+        self._changed = None
 
     def want_anew(self, reason: str) -> int:
         """Want a plan that keeps nothing of the path; return which of the plans it will be."""
@@ -98,18 +112,21 @@ class Route:
         self.attempts += attempt is not None
         cell = self._site.cell()
         if disowned or cell is None or ground is None:
+            self.outdated += attempt is None
             return None
         if attempt is not None:
             return self._take_better(attempt, event, ground)
         cells = self._from_here(event.path.cells, cell, ground)
         if not len(cells) or ground.legal_steps(cells) < len(cells) - 1:
-            self.wanted = self.wanted or "the map changed while planning"
+            self.outdated += 1
+            self.want(self.wanted or "the map changed while planning", asked.changed)
             return None
         if np.array_equal(cells, self.path.ahead):
             # Nothing to change: whoever drives it need not hear of it again.
+            self.unchanged += 1
             self.published_at = self.now
             return None
-        return self.publish(cells, asked.reason, event)
+        return self.publish(cells, asked.reason, event, asked.changed)
 
     def _take_better(self, attempt: Attempt, event: PlanReady, ground: Ground) -> PathUpdate | None:
         """Publish the path with a better rest; None where that is not worth it."""
@@ -137,14 +154,18 @@ class Route:
         return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead
 
     def publish(
-        self, cells: NDArray[np.int32], reason: str, ready: PlanReady | None = None
+        self,
+        cells: NDArray[np.int32],
+        reason: str,
+        ready: PlanReady | None = None,
+        changed: Window | None = None,
     ) -> PathUpdate:
         """Publish a path in place of the one before."""
         self.revision += 1
         self.published_at = self.now
         self.path = DrivenPath(cells)
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
-        return PathUpdate(self.revision, cells, reason, plan, seconds)
+        return PathUpdate(self.revision, cells, reason, plan, seconds, changed)
 
     def stop(self, reason: str) -> PathUpdate | None:
         """Publish an empty path; None where the robot has none to drive."""
@@ -164,4 +185,4 @@ class Route:
             return None
         row, col = ahead[legal + 1]
         self.wanted = f"path blocked at cell ({row}, {col})"
-        return self.publish(ahead[: legal + 1], self.wanted)
+        return self.publish(ahead[: legal + 1], self.wanted, changed=self._changed)

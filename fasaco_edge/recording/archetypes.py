@@ -26,9 +26,10 @@ HEADING_COLOUR: Colour = (250, 204, 21)
 COVERED_COLOUR: Colour = (56, 152, 222)
 RECOVERED_COLOUR: Colour = (245, 140, 40)
 BLOCKED_COLOUR: Colour = (120, 120, 130)
+LABEL_COLOUR: Colour = (255, 255, 255)
 
 # Heights [m] only say what lies on what: the eye looks down from far above.
-ROBOT_Z = 0.06
+ROBOT_Z, LABEL_Z = 0.06, 0.1
 MAP_ORDER, COVERAGE_ORDER = 0.0, 1.0
 
 # Sine over cosine of a bend that is none.
@@ -44,9 +45,11 @@ class LineStyle:
     width: float
 
 
-CHANGE = LineStyle((219, 39, 119), z=0.02, width=1.6)
+CHANGE = LineStyle((8, 145, 178), z=0.02, width=1.6)
+WINDOW = LineStyle((219, 39, 119), z=0.055, width=2.0)
 OLD_PATH = LineStyle((196, 181, 253), z=0.03, width=0.8)
 PATH = LineStyle((124, 58, 237), z=0.04, width=1.2)
+DIRECTION = LineStyle((226, 232, 240), z=0.03, width=1.2)
 TRAIL = LineStyle((5, 150, 105), z=0.05, width=1.6)
 
 
@@ -86,6 +89,27 @@ def strip_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3
     return rr.LineStrips3D.from_fields(strips=[points])
 
 
+def lines_archetype(lines: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:
+    """Return lines of two points each [m], float64 (n, 2, 2)."""
+    strips = np.concatenate((lines, np.full((len(lines), 2, 1), style.z)), axis=2)
+    return rr.LineStrips3D(strips, colors=style.colour, radii=-style.width)
+
+
+def label_archetype(bounds: Bounds, text: str, above: float = 0.0) -> rr.Points3D:
+    """Return text over the upper edge of a rectangle (x_min, y_min, x_max, y_max) [m].
+
+    ``above``: how far above it, as a share of the rectangle's height.
+    """
+    x0, y0, x1, y1 = bounds
+    place = ((x0 + x1) / 2, y1 + above * (y1 - y0), LABEL_Z)
+    return rr.Points3D([place], radii=0.0, labels=[text], colors=LABEL_COLOUR, show_labels=True)
+
+
+def no_label_archetype() -> rr.Points3D:
+    """Return no text."""
+    return rr.Points3D(np.zeros((0, 3)))
+
+
 def style_archetype(style: LineStyle) -> rr.LineStrips3D:
     """Return how lines look that say nothing of it themselves."""
     return rr.LineStrips3D.from_fields(colors=[style.colour], radii=[-style.width])
@@ -123,10 +147,10 @@ def body_archetypes(radius_m: float) -> tuple[rr.Ellipsoids3D, rr.LineStrips3D]:
     return body, heading
 
 
-def change_archetype(bounds: Bounds) -> rr.LineStrips3D:
-    """Return the outline of a rectangle (x_min, y_min, x_max, y_max) [m] of the map."""
+def box_archetype(bounds: Bounds, style: LineStyle) -> rr.LineStrips3D:
+    """Return the outline of a rectangle (x_min, y_min, x_max, y_max) [m]."""
     x0, y0, x1, y1 = bounds
-    return line_archetype(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]), CHANGE)
+    return line_archetype(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]), style)
 
 
 def coverage_fractions(grid: OccupancyGrid) -> tuple[float, float]:

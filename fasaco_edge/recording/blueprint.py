@@ -1,4 +1,4 @@
-"""How a recording opens: the field large, figures on the right, the course below."""
+"""How a recording opens: the map large, states below it, figures on the right."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ Bounds = tuple[float, float, float, float]
 
 # Before there is a map [m].
 NO_MAP: Bounds = (-5.0, -5.0, 5.0, 5.0)
-# Room for the map to grow a little before the eye moves.
-MARGIN = 1.1
-# Rerun's vertical field of view, and the shape (width / height) that a spatial view has
+# Room for the map to grow a little before the eye moves, and for a label above the field.
+MARGIN, PHEROMONE_MARGIN = 1.1, 1.3
+# Rerun's vertical field of view, and the shapes (width / height) that the spatial views have
 # in this layout at 1280 x 720.
 FIELD_OF_VIEW_RAD = math.radians(55.0)
-VIEW_ASPECT = 1.0
-COLUMNS = [5, 5, 4]
+VIEW_ASPECT, PHEROMONE_ASPECT = 1.12, 1.45
+COLUMNS = [11, 8, 9]
 TRAIL_S = 30.0
 CHANGE_S = 4.0
 
@@ -29,12 +29,11 @@ def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
     """Return the layout, its eyes over ``bounds`` (x_min, y_min, x_max, y_max) [m]."""
     bounds = bounds or NO_MAP
     return rrb.Blueprint(
-        rrb.Vertical(
-            rrb.Horizontal(
-                _map_view(bounds), _pheromone_view(bounds), _figures(), column_shares=COLUMNS
-            ),
-            rrb.Horizontal(_states(), _log(), _card(), column_shares=COLUMNS),
-            row_shares=[5, 2],
+        rrb.Horizontal(
+            rrb.Vertical(_map_view(bounds), _states(), row_shares=[5, 2]),
+            rrb.Vertical(_pheromone_view(bounds), _plan(), _log(), row_shares=[9, 5, 7]),
+            rrb.Vertical(_figures(), _card(), row_shares=[5, 2]),
+            column_shares=COLUMNS,
         ),
         rrb.TimePanel(state="collapsed", timeline=entities.WALL),
         rrb.BlueprintPanel(state="collapsed"),
@@ -48,8 +47,8 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin="/",
         name="Map, coverage and path",
-        contents=["/world/**", f"- /{entities.PHEROMONE}/**"],
-        eye_controls=_eye_above(bounds),
+        contents=["/world/**", f"- /{entities.PHEROMONE}/**", f"- /{entities.DIRECTIONS}/**"],
+        eye_controls=_eye_above(bounds, MARGIN, VIEW_ASPECT),
         line_grid=False,
         background=MAP_BACKGROUND,
         overrides={entities.TRAIL: _last(TRAIL_S), entities.MAP_CHANGE: _last(CHANGE_S)},
@@ -59,30 +58,35 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
 def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin="/",
-        name="Pheromone",
-        contents=[f"/{entities.PHEROMONE}/**", f"/{entities.ROBOT}/**"],
-        eye_controls=_eye_above(bounds),
+        name="Pheromone, main directions",
+        contents=[
+            f"/{entities.PHEROMONE}/**",
+            f"/{entities.DIRECTIONS}/**",
+            f"/{entities.ROBOT}/**",
+        ],
+        eye_controls=_eye_above(bounds, PHEROMONE_MARGIN, PHEROMONE_ASPECT),
         line_grid=False,
         background=PHEROMONE_BACKGROUND,
     )
 
 
+def _plot(name: str, origin: str, legend: rrb.PlotLegend, top: float = 0.0) -> rrb.TimeSeriesView:
+    axis = rrb.ScalarAxis(range=(0.0, top)) if top else None
+    return rrb.TimeSeriesView(origin=f"/{origin}", name=name, axis_y=axis, plot_legend=legend)
+
+
 def _figures() -> rrb.Vertical:
-    corner = rrb.PlotLegend(rrb.Corner2D.LeftTop)
+    left, right = (rrb.PlotLegend(c) for c in (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop))
     return rrb.Vertical(
-        rrb.TimeSeriesView(
-            origin="/metrics/coverage",
-            name="Coverage [fraction]",
-            axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
-            plot_legend=corner,
-        ),
-        rrb.TimeSeriesView(origin=f"/{entities.LATENCY}", name="Latency [ms]", plot_legend=corner),
-        rrb.TimeSeriesView(
-            origin="/metrics/colony",
-            name="Colony: best walk so far [steps]",
-            plot_legend=rrb.PlotLegend(visible=False),
-        ),
+        _plot("Coverage [share of the cells known]", "metrics/coverage", left, 1.1),
+        _plot("Latency [ms]", entities.LATENCY, right),
+        _plot("Memory [MB], processor [% of a core]", "metrics/resources", right),
     )
+
+
+def _plan() -> rrb.TimeSeriesView:
+    none = rrb.PlotLegend(visible=False)
+    return _plot("Plan: gap to the lower bound [share]", entities.GAP, none)
 
 
 def _states() -> rrb.StateTimelineView:
@@ -90,21 +94,23 @@ def _states() -> rrb.StateTimelineView:
 
 
 def _log() -> rrb.TextLogView:
-    columns = [rrb.encodings.TextLogColumn(kind) for kind in ("LogLevel", "Body")]
-    return rrb.TextLogView(
-        origin="/log", name="Log", columns=rrb.TextLogColumns(text_log_columns=columns)
+    # Of a time there is room for a digit only: the line says where in the log it is now.
+    columns = rrb.TextLogColumns(
+        timeline_columns=[rrb.encodings.TimelineColumn(entities.WALL, visible=False)],
+        text_log_columns=[rrb.encodings.TextLogColumn("Body")],
     )
+    return rrb.TextLogView(origin="/log", name="Log", columns=columns)
 
 
 def _card() -> rrb.TextDocumentView:
     return rrb.TextDocumentView(origin=f"/{entities.RUN_CARD}", name="Run")
 
 
-def _eye_above(bounds: Bounds) -> rrb.EyeControls3D:
+def _eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3D:
     x0, y0, x1, y1 = bounds
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
-    reach = max((y1 - y0) / 2, (x1 - x0) / 2 / VIEW_ASPECT, 0.5)
-    height = MARGIN * reach / math.tan(FIELD_OF_VIEW_RAD / 2)
+    reach = max((y1 - y0) / 2, (x1 - x0) / 2 / aspect, 0.5)
+    height = margin * reach / math.tan(FIELD_OF_VIEW_RAD / 2)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
         # Straight down the eye's up axis would be undefined.

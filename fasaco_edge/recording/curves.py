@@ -13,9 +13,9 @@ from fasaco_edge.recording.sdk import rr
 
 # A curve goes on as a step (``styles``); at the latest after so long it is drawn anyway, so
 # that a part, and what follows a gap, soon has all of them.
-PERIOD_NS = 30_000_000_000
+PERIOD_NS = 60_000_000_000
 # Latencies and memory tremble: by less than this share of them nothing has changed.
-TREMBLE = 0.05
+TREMBLE = 0.1
 
 
 @dataclass(slots=True)
@@ -32,8 +32,15 @@ class Curves:
         self._journal = journal
         self._curves: dict[str, _Curve] = {}
 
-    def draw(self, entity: str, value: float, tremble: float = 0.0) -> None:
-        """Draw ``value`` where it differs from the one drawn by more than that share of it."""
+    def draw(self, entity: str, value: float, tremble: float = 0.0, spacing_ns: int = 0) -> None:
+        """Draw ``value`` where it differs from the one drawn.
+
+        Args:
+            entity: what to draw it as.
+            value: the figure as it is now.
+            tremble: the share of it by which it has to differ by more.
+            spacing_ns: the least time from one drawn to the next [ns].
+        """
         now_ns = self._journal.wall_ns
         curve = self._curves.get(entity)
         if curve is None:
@@ -41,7 +48,7 @@ class Curves:
         else:
             curve.last = value
             same = abs(value - curve.drawn) <= tremble * abs(curve.drawn)
-            if same and now_ns - curve.drawn_ns < PERIOD_NS:
+            if now_ns - curve.drawn_ns < (PERIOD_NS if same else spacing_ns):
                 return
         self._draw(entity, curve)
 

@@ -15,6 +15,7 @@ from typing import Final
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
 from fasaco_edge.bus.sample_codec import Numbered, SampleEncoder
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.recording.fields import section
 from fasaco_edge.recording.journal import Journal
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.status import decode_json
@@ -24,6 +25,7 @@ INPUTS: Final = ("map", "map_update", "pose", "command", "turns")
 # What is in force for no longer than it takes to hear it.
 PASSING: Final = ("pose", "command", "turns")
 PERIOD_NS = 900_000_000
+STATUS_PERIOD_NS = 15_000_000_000
 WAITING_BYTES = 4_000_000
 # Updates since the last full map; with more of them a part begins without the map.
 IN_FORCE_BYTES = 8_000_000
@@ -32,7 +34,8 @@ IN_FORCE_BYTES = 8_000_000
 class InputLog:
     """Writes samples into a journal; for the journal's thread only.
 
-    Of paths only a digest is kept, of statuses those that tell another state or configuration.
+    Of paths only a digest is kept, of statuses those that tell something new, and one in
+    ``STATUS_PERIOD_NS``: how far the mission is, is known so exactly whatever comes.
     """
 
     def __init__(self, journal: Journal, run: int) -> None:
@@ -43,6 +46,7 @@ class InputLog:
         self._lost = 0
         self._next_ns = 0
         self._told: tuple[object, ...] = ()
+        self._told_ns = 0
 
     def add(self, arrival: Arrival) -> None:
         """Take a sample, if it is one that matters."""
@@ -93,10 +97,16 @@ class InputLog:
             return False
         # A map in it: the mission has begun.
         has_map = status.get("map") is not None
-        told = (status.get("state"), has_map, status.get("version"), status.get("config"))
-        is_news = told != self._told
-        self._told = told
-        return is_news
+        told = (
+            *(status.get("state"), has_map, status.get("version"), status.get("config")),
+            sorted(section(section(status, "errors"), "by_code")),
+            section(status, "ledger").get("fault"),
+            section(status, "recorder").get("state"),
+        )
+        if told == self._told and arrival.at_ns - self._told_ns < STATUS_PERIOD_NS:
+            return False
+        self._told, self._told_ns = told, arrival.at_ns
+        return True
 
 
 def _path_digest(arrival: Arrival) -> Arrival:

@@ -17,6 +17,7 @@ from fasaco_edge.recording.part import Flush, Part
 from fasaco_edge.recording.room import Room
 from fasaco_edge.recording.sdk import rr, rrb
 from fasaco_edge.recording.standing import Standing
+from fasaco_edge.recording.streams import send_blueprint, sweep
 
 LOG = logging.getLogger(__name__)
 
@@ -165,7 +166,7 @@ class Journal:
         """Make ``blueprint`` the one that opens; a file's last one counts."""
         self._standing.blueprint = blueprint
         for stream in self._streams():
-            stream.send_blueprint(blueprint)
+            send_blueprint(stream, blueprint)
 
     def serve(self, live: rr.RecordingStream) -> None:
         """Let all that is logged go to ``live``, too, whatever becomes of the disk."""
@@ -245,6 +246,9 @@ class Journal:
                 self._part = None
                 self._enter(JournalState.DISK_FULL, f"no new part: {error}")
             part.close()
+            del part
+            if not self._abandoned:
+                sweep()
 
     def _give_up(self, part: Part) -> None:
         part.abandon()

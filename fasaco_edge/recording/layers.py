@@ -21,7 +21,7 @@ BURST_S = 60.0
 RATES = {
     entities.MAP: 3_000,
     entities.COVERAGE: 1_000,
-    entities.PHEROMONE: 2_000,
+    entities.PHEROMONE: 1_500,
     entities.PATH: 2_000,
 }
 # A grid's size in the file is judged by every so many-th row.

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from fasaco_edge.recording import archetypes as draw
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.fields import Json, integer, number, text
+from fasaco_edge.recording.directions import main_directions
+from fasaco_edge.recording.fields import Json, integer, number, section, text
 from fasaco_edge.recording.journal import Journal
 from fasaco_edge.recording.layers import Layers
 from fasaco_edge.recording.sdk import rr
@@ -25,6 +26,8 @@ class PathDrawing:
         self._layers = layers
         self._revision: int | None = None
         self._count = 0
+        self._has_window = False
+        self._directions = np.zeros((0, 2, 2))
         # Which of the paths is drawn, and its line.
         self._drawn: tuple[int, NDArray[np.float64] | None] = (0, None)
 
@@ -35,16 +38,44 @@ class PathDrawing:
             self._journal.sequence(entities.REPLAN, revision)
         if not self._count or revision != self._revision:
             self._journal.log(entities.PATH_LOG, rr.TextLog(_line(message, note), level="INFO"))
+            self._draw_window(section(note, "changed"), text(note, "reason"))
             self._count += 1
         self._revision, count, line = revision, self._count, draw.corners(message.xy)
 
+        lines = main_directions(message.xy)
+
         def draw_path() -> None:
+            self._draw_directions(lines)
             (before, old), self._drawn = self._drawn, (count, line)
             if old is not None and before != count:
                 self._draw(entities.OLD_PATH, old, draw.OLD_PATH)
             self._draw(entities.PATH, line, draw.PATH)
 
         self._layers.draw(entities.PATH, POINT_BYTES * len(line), draw_path, self._journal.wall_ns)
+
+    def _draw_directions(self, lines: NDArray[np.float64]) -> None:
+        if np.array_equal(lines, self._directions):
+            return
+        self._directions = lines
+        archetype = draw.lines_archetype(lines, draw.DIRECTION)
+        self._journal.log(entities.DIRECTIONS, archetype, latched=True, size=lines.nbytes)
+
+    def _draw_window(self, changed: Json, reason: str) -> None:
+        """Draw which part of the map the path is because of; nothing where it is not of the map."""
+        edges = [number(changed, name) for name in ("x_min", "y_min", "x_max", "y_max")]
+        known = [edge for edge in edges if edge is not None]
+        if len(known) == len(edges):
+            x0, y0, x1, y1 = known
+            box = draw.box_archetype((x0, y0, x1, y1), draw.WINDOW)
+            label = draw.label_archetype((x0, y0, x1, y1), reason)
+        elif self._has_window:
+            box = draw.line_archetype(np.zeros((0, 2)), draw.WINDOW)
+            label = draw.no_label_archetype()
+        else:
+            return
+        self._has_window = len(known) == len(edges)
+        self._journal.log(entities.REPLAN_WINDOW, box, latched=True)
+        self._journal.log(entities.REPLAN_REASON, label, latched=True)
 
     def _draw(self, entity: str, line: NDArray[np.float64], style: draw.LineStyle) -> None:
         archetype = draw.line_archetype(line, style)
@@ -55,10 +86,15 @@ def _line(message: PathMessage, note: Json) -> str:
     revision = integer(note, "revision")
     named = "path" if revision is None else f"path {revision}"
     facts = [f"{max(len(message.xy) - 1, 0)} steps"]
-    planner, plan_ms = text(note, "planner"), number(note, "plan_ms")
+    planner, plan_ms, gap = text(note, "planner"), number(note, "plan_ms"), number(note, "gap")
+    cost_s = number(note, "planned_cost_s")
+    if cost_s is not None:
+        facts.append(f"{cost_s:.0f} s")
+    if gap is not None:
+        facts.append(f"{100 * gap:.0f} % over the bound")
     if planner:
         facts.append(planner)
     if plan_ms is not None:
         facts.append(f"{plan_ms:.0f} ms")
     reason = text(note, "reason")
-    return f"{named} ({', '.join(facts)}){': ' if reason else ''}{reason}"
+    return f"{named}{': ' if reason else ''}{reason} ({', '.join(facts)})"

@@ -11,12 +11,26 @@ from fasaco_edge.recording.fields import Json
 # Settings that say most about a run come first, the others by name.
 FIRST = ("planner", "cell_m", "robot_radius_m", "seed")
 
+HEAD = (
+    ("seed", "seed", ""),
+    ("tool_width_m", "cells of", " m"),
+    ("radius_m", "radius", " m"),
+)
+
 LEGEND = """\
 - **Map** white free, black occupied, grey unknown
 - **Tint** blue covered, orange covered more than once
-- **Path** violet, pale the one before; **trail** green
-- **Pink** an obstacle came or went
-- **Pheromone** dark little, bright much, black none"""
+- **Path** violet, pale the one before; **driven** green
+- **Pink** what of the map led to this path, and how
+- **Cyan** an obstacle came or went
+- **Pheromone** dark little, bright much, black none
+- **White bars** which way the lanes of the path run"""
+
+# Each field has its own range, so that it is never flat.
+LEVELS = (
+    "level l from 1 to 255 is trail_min * (trail_max / trail_min) ** ((l - 1) / 254), with what "
+    "metrics/trail/min and max are then; level 0 cannot be covered"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,12 +42,14 @@ class RunDescription:
         began: when the recording began, UTC, as text.
         version: of the planner; "" while unknown.
         config: its configuration, as its status gives it.
+        trail_range: least and greatest pheromone of all fields; None while there is none.
     """
 
     robot: str
     began: str
     version: str = ""
     config: dict[str, Any] = field(default_factory=dict)
+    trail_range: tuple[float, float] | None = None
 
     @property
     def name(self) -> str:
@@ -46,6 +62,9 @@ class RunDescription:
         settings = {
             name.replace(".", "_"): str(value) for name, value in flat_settings(self.config)
         }
+        if self.trail_range:
+            least, most = self.trail_range
+            known |= {"trail_min": f"{least:.6g}", "trail_max": f"{most:.6g}", "trail": LEVELS}
         return {name: value for name, value in (settings | known).items() if value}
 
     def markdown(self) -> str:
@@ -55,9 +74,18 @@ class RunDescription:
             ("began", self.began),
             ("version", self.version or "unknown until the first status"),
         ]
+        if self.trail_range:
+            least, most = self.trail_range
+            rows.append(("pheromone", f"{least:.3g} to {most:.3g}, log scale"))
         rows += sorted(flat_settings(self.config), key=_rank)
         table = "\n".join(f"| {name} | {_cell(value)} |" for name, value in rows)
-        return f"{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"
+        return f"{self._head()}\n\n{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"
+
+    def _head(self) -> str:
+        """Return in a line what is asked for first."""
+        told = {name.rpartition(".")[2]: value for name, value in flat_settings(self.config)}
+        facts = [f"{text} {told[name]}{unit}" for name, text, unit in HEAD if name in told]
+        return ", ".join([f"**{self.robot}**", f"version {self.version or 'unknown'}", *facts])
 
 
 def flat_settings(config: Json, prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -17,17 +16,19 @@ from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.changes import Bounds, changed_bounds, known_bounds, union
 from fasaco_edge.recording.curves import TREMBLE, Curves
 from fasaco_edge.recording.fields import Json, integer, number, section, text
+from fasaco_edge.recording.figures import StatusFigures
 from fasaco_edge.recording.journal import Journal
 from fasaco_edge.recording.layers import Layers, size_in_file
 from fasaco_edge.recording.path_drawing import PathDrawing
+from fasaco_edge.recording.pheromone_drawing import PheromoneDrawing
 from fasaco_edge.recording.report import RecorderReport
 from fasaco_edge.recording.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.styles import log_styles
+from fasaco_edge.recording.trail_drawing import TrailDrawing
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
 
-TRAIL_SPACING_M = 0.02
 DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
 # takes 120 kB.
@@ -43,13 +44,14 @@ class Scene:
         self._map: OccupancyGrid | None = None
         self._known: Bounds | None = None
         self._framed: Bounds | None = None
-        self._last_place: tuple[float, float] | None = None
-        self._cohorts = 0
-        self._errors = 0
+        self._errors = self._restored = 0
         self._states: dict[str, str] = {}
         self._layers = Layers()
         self._curves = Curves(journal)
+        self._trail = TrailDrawing(journal)
+        self._figures = StatusFigures(self._curves)
         self._paths = PathDrawing(journal, self._layers)
+        self._pheromone = PheromoneDrawing(journal, self._layers, self._curves)
         log_styles(journal)
         self._describe()
         self._draw_robot(DEFAULT_RADIUS_M)
@@ -62,7 +64,7 @@ class Scene:
                 return
             changed = changed_bounds(before, grid)
             if changed is not None:
-                self._journal.log(entities.MAP_CHANGE, draw.change_archetype(changed))
+                self._journal.log(entities.MAP_CHANGE, draw.box_archetype(changed, draw.CHANGE))
 
         def draw_map() -> None:
             self._journal.log(
@@ -86,13 +88,7 @@ class Scene:
         """Move the robot, and draw its trail."""
         pose = stamped.pose
         self._journal.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
-        here = (pose.x, pose.y)
-        if self._last_place is None:
-            self._last_place = here
-        elif math.dist(self._last_place, here) >= TRAIL_SPACING_M:
-            step = np.array([self._last_place, here])
-            self._journal.log(entities.TRAIL, draw.strip_archetype(step, draw.TRAIL))
-            self._last_place = here
+        self._trail.add(pose.x, pose.y)
 
     def add_command(self, command: Json) -> None:
         """Log a command that the mission has taken."""
@@ -101,6 +97,7 @@ class Scene:
     def add_path(self, message: PathMessage, note: Json) -> None:
         """Draw the path to drive, over the one before it, and log why it came."""
         self._paths.add(message, note)
+        self._figures.add_path(note)
 
     def add_coverage(self, grid: OccupancyGrid) -> None:
         """Tint what is covered, and plot how much that is."""
@@ -121,32 +118,16 @@ class Scene:
 
     def add_pheromone(self, message: PheromoneMessage) -> None:
         """Draw the pheromone after a cohort, and plot the best walk so far."""
-        self._cohorts += 1
-        self._journal.sequence(entities.ITER, self._cohorts)
-
-        def draw_pheromone() -> None:
-            self._journal.log(
-                entities.PHEROMONE,
-                draw.pheromone_archetype(message),
-                latched=True,
-                size=message.levels.size,
-            )
-
-        self._draw(entities.PHEROMONE, size_in_file(message.levels), draw_pheromone)
-        self._curves.draw(entities.BEST_STEPS, message.best_steps)
-        # The levels' scale: with it they can be turned back into trails.
-        self._curves.draw(f"{entities.TRAIL_RANGE}/min", message.trail_min)
-        self._curves.draw(f"{entities.TRAIL_RANGE}/max", message.trail_max)
+        self._pheromone.add(message)
+        if self._pheromone.trail_range != self._run.trail_range:
+            self._run = replace(self._run, trail_range=self._pheromone.trail_range)
+            self._describe()
 
     def add_status(self, status: Json) -> None:
         """Plot the planner's figures, show its states, log its errors; any key may be missing."""
-        for name, value in section(status, "latency_ms").items():
-            if number({name: value}, name) is not None:
-                self._curves.draw(f"{entities.LATENCY}/{name}", value, TREMBLE)
-        memory = number(status, "rss_mb")
-        if memory is not None:
-            self._curves.draw(f"{entities.MEMORY}/planner", memory, TREMBLE)
+        self._figures.add(status)
         self._add_configuration(status)
+        self._add_restored(section(status, "ledger"))
         self.enter(entities.MISSION_STATE, text(status, "state"), text(status, "reason"))
         planning = section(status, "plan").get("planning")
         if isinstance(planning, bool):
@@ -176,10 +157,12 @@ class Scene:
     def catch_up(self) -> None:
         """Draw what had to wait; call it often."""
         self._layers.catch_up(self._journal.wall_ns)
+        self._trail.catch_up()
 
     def finish(self) -> None:
         """Draw what waits, and frame the map as it was at the end."""
         self._layers.finish()
+        self._trail.finish()
         self._curves.finish()
         if self._known is not None and self._known != self._framed:
             self._journal.show(build_blueprint(self._known))
@@ -218,6 +201,12 @@ class Scene:
         body, heading = draw.body_archetypes(radius_m)
         self._journal.log_static(entities.ROBOT_BODY, body)
         self._journal.log_static(entities.ROBOT_HEADING, heading)
+
+    def _add_restored(self, ledger: Json) -> None:
+        restored = integer(ledger, "restored_cells") or 0
+        if restored != self._restored:
+            self._restored = restored
+            self._say(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
 
     def _add_errors(self, errors: Json) -> None:
         total = integer(errors, "total")

@@ -47,7 +47,7 @@ class RecorderSettings:
     pose_key: str = ""
     pose_schema: str = POSE_STAMPED
     part_bytes: int = 64 * MEGABYTE
-    part_s: float = 900.0
+    part_s: float = 600.0
     quota_bytes: int = 0
     least_free_bytes: int = 50 * MEGABYTE
     serve: tuple[str, int] | None = None

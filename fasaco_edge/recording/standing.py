@@ -6,6 +6,7 @@ import numpy as np
 
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
+from fasaco_edge.recording.streams import send_blueprint
 
 
 class Standing:
@@ -33,7 +34,7 @@ class Standing:
 
     def begin(self, stream: rr.RecordingStream) -> None:
         """Begin a part with all that holds."""
-        stream.send_blueprint(self.blueprint)
+        send_blueprint(stream, self.blueprint)
         self.send_description(stream)
         for entity, archetypes in self.static.items():
             stream.log(entity, *archetypes, static=True)

@@ -17,13 +17,15 @@ from fasaco_edge.recording.sdk import rr
 
 CURVES: tuple[tuple[str, str, Colour], ...] = (
     (entities.COVERED_FRACTION, "covered", COVERED_COLOUR),
-    (entities.RECOVERED_FRACTION, "covered again", RECOVERED_COLOUR),
-    (f"{entities.LATENCY}/ingest", "map taken in", (56, 152, 222)),
+    (entities.RECOVERED_FRACTION, "again", RECOVERED_COLOUR),
+    (f"{entities.LATENCY}/ingest", "map in", (56, 152, 222)),
     (f"{entities.LATENCY}/plan", "plan", (167, 139, 250)),
     (f"{entities.LATENCY}/map_to_path", "map to path", (245, 140, 40)),
     (entities.BEST_STEPS, "best walk", (250, 204, 21)),
-    (f"{entities.MEMORY}/planner", "planner", (167, 139, 250)),
-    (f"{entities.MEMORY}/recorder", "recorder", (156, 163, 175)),
+    (entities.GAP, "gap of the plan", (250, 204, 21)),
+    (f"{entities.MEMORY}/planner", "planner MB", (167, 139, 250)),
+    (f"{entities.MEMORY}/recorder", "recorder MB", (156, 163, 175)),
+    (entities.PROCESSOR, "planner %", (245, 140, 40)),
 )
 
 GREEN, AMBER, RED, BLUE, VIOLET, GREY = (
@@ -40,6 +42,7 @@ STATES: dict[str, dict[str, int]] = {
         "idle": GREY,
         "waiting for map": GREY,
         "waiting for pose": GREY,
+        "loading": VIOLET,
         "planning": VIOLET,
         "covering": GREEN,
         "returning": GREEN,

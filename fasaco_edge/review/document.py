@@ -7,10 +7,13 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
+from fasaco_edge.bench.spread import percentile
+from fasaco_edge.recording import entities
 from fasaco_edge.recording.runcard import flat_settings
 from fasaco_edge.review.drive import milestones
 from fasaco_edge.review.moments import RECORDER_IN_ORDER, TROUBLES, Span
 from fasaco_edge.review.review import Review, seconds_by_state
+from fasaco_edge.review.story import TakenPath
 
 
 def document(review: Review) -> dict[str, Any]:
@@ -62,6 +65,14 @@ def document(review: Review) -> dict[str, Any]:
         "replan_ms_p50": _rounded(replans.milliseconds(50)),
         "replan_ms_p99": _rounded(replans.milliseconds(99)),
         "replan_ms_max": _rounded(replans.milliseconds(100)),
+        "replan_ms_by_reason": {
+            kind: {"p50": _rounded(median), "max": _rounded(most)}
+            for kind, (median, most) in replans.spread_by_reason.items()
+        },
+        "replan_list": [_replan(path) for path in replans.later],
+        **_plans(review),
+        **_resources(review),
+        "restored_cells": _restored(review),
         "states": {name: round(s, 3) for name, s in seconds_by_state(review.states).items()},
         "troubles": [
             {"state": s.name, "reason": s.reason, "at_s": _rounded(s.begin_s)}
@@ -116,6 +127,52 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
+def _replan(path: TakenPath) -> dict[str, Any]:
+    names = ("x_min", "y_min", "x_max", "y_max")
+    return {
+        "at_s": _rounded(path.at_s),
+        "revision": path.revision,
+        "reason": path.reason,
+        "plan_ms": _rounded(path.plan_ms),
+        "steps": path.steps,
+        "lower_bound_steps": path.lower_bound,
+        "gap": path.gap,
+        "cost_s": path.cost_s,
+        "changed": path.changed and dict(zip(names, path.changed, strict=True)),
+    }
+
+
+def _plans(review: Review) -> dict[str, Any]:
+    """Return what the turn log tells of plans; null where there is none."""
+    made = review.story.made.plans
+    plans = [plan for plan in made if not plan.is_attempt]
+    attempts = [plan for plan in made if plan.is_attempt]
+    took = [plan.took_ms for plan in plans]
+    return {
+        "plans": len(plans) if made else None,
+        "plans_unused": sum(not plan.is_used for plan in plans) if made else None,
+        "plan_ms_p50": _rounded(percentile(took, 50)),
+        "plan_ms_p99": _rounded(percentile(took, 99)),
+        "plan_ms_max": _rounded(percentile(took, 100)),
+        "attempts": len(attempts) if made else None,
+        "attempts_used": sum(plan.is_used for plan in attempts) if made else None,
+    }
+
+
+def _resources(review: Review) -> dict[str, Any]:
+    curves = {
+        "memory_mb_max": f"{entities.MEMORY}/planner",
+        "recorder_memory_mb_max": f"{entities.MEMORY}/recorder",
+        "processor_percent_max": entities.PROCESSOR,
+        "threads_max": entities.THREADS,
+    }
+    plots = review.record.plots
+    return {
+        name: _rounded(float(plots[entity][:, 1].max())) if entity in plots else None
+        for name, entity in curves.items()
+    }
+
+
 def _reached(review: Review) -> dict[str, float | None] | None:
     if review.drive is None or _restored(review):
         return None
@@ -144,6 +201,10 @@ def _not_recorded(review: Review) -> dict[str, str]:
         )
     if not review.replans.later:
         why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "no plan was made anew"
+    if not story.made.plans:
+        why["plans, plans_unused, plan_ms_p50, plan_ms_p99, plan_ms_max, attempts"] = (
+            "there is no turn log"
+        )
     if review.faults.lost is None:
         why["recorder_lost"] = "no recorded status tells of the recorder"
     return why

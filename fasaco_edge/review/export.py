@@ -13,13 +13,21 @@ from numpy.typing import NDArray
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.series import covered_share
 
+PATH_COLUMNS = (
+    *("at_s", "revision", "steps", "planner", "plan_ms", "lower_bound_steps", "gap", "cost_s"),
+    *("x_min", "y_min", "x_max", "y_max", "reason"),
+)
+
 
 def export(review: Review, folder: Path) -> None:
     """Write all series of a review into ``folder``, which is made if missing.
 
     ==============  ==========================================================================
     trail.csv       at_s, x_m, y_m, yaw_rad: each pose
-    paths.csv       at_s, revision, steps, planner, plan_ms, reason: each published path
+    paths.csv       at_s, revision, steps, planner, plan_ms, lower_bound_steps, gap, cost_s,
+                    x_min, y_min, x_max, y_max, reason: each published path, and where the
+                    map had changed [m]
+    plans.csv       at_s, took_ms, attempt, used, reason: each plan that was made
     states.csv      begin_s, end_s, state, reason: what the mission was doing
     coverage.csv    at_s, share: covered share of the cells coverable at the end
     plots.csv       at_s, name, value: all that was plotted: latencies, memory, fractions
@@ -40,10 +48,21 @@ def export(review: Review, folder: Path) -> None:
     )
     _write(
         folder / "paths.csv",
-        ("at_s", "revision", "steps", "planner", "plan_ms", "reason"),
+        PATH_COLUMNS,
         (
-            (f"{p.at_s:.6f}", p.revision, p.steps, p.planner, p.plan_ms, p.reason)
+            (
+                *(f"{p.at_s:.6f}", p.revision, p.steps, p.planner, p.plan_ms),
+                *(p.lower_bound, p.gap, p.cost_s, *(p.changed or (None,) * 4), p.reason),
+            )
             for p in story.paths
+        ),
+    )
+    _write(
+        folder / "plans.csv",
+        ("at_s", "took_ms", "attempt", "used", "reason"),
+        (
+            (f"{p.at_s:.6f}", f"{p.took_ms:.3f}", int(p.is_attempt), int(p.is_used), p.reason)
+            for p in story.made.plans
         ),
     )
     _write(

@@ -7,6 +7,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fields import integer
 from fasaco_edge.recording.run_reading import RunRecord
@@ -25,7 +28,7 @@ class Faults:
 
     Attributes:
         by_code: what the daemon refused; under ``NOT_TOLD`` what it counted after the last
-            status whose counts by code were recorded.
+            counts by code that were recorded.
         lost: samples that the recorder could not write; None where it never said.
         torn_bytes: what a crash tore off the files [bytes].
         complaints: what the recorder wrote into its log.
@@ -45,6 +48,8 @@ class Faults:
 def faults_of(story: Story, record: RunRecord) -> Faults:
     """Return what a recording tells of faults."""
     by_code = _over_restarts(status.faults for status in story.statuses)
+    # As curves they are recorded up to the end; of a daemon that was started again not each one.
+    by_code |= _plotted(record.plots)
     total = _counted(line for _, line in record.log.get(entities.MISSION_LOG, ()))
     if total > by_code.total():
         by_code[NOT_TOLD] = total - by_code.total()
@@ -61,6 +66,17 @@ def faults_of(story: Story, record: RunRecord) -> Faults:
             if not line.startswith(IN_ORDER)
         ),
     )
+
+
+def _plotted(plots: Mapping[str, NDArray[np.float64]]) -> Counter[str]:
+    """Return what curves tell of the counts by code, over restarts."""
+    counts: Counter[str] = Counter()
+    for entity, points in plots.items():
+        if entity.startswith(f"{entities.ERRORS}/"):
+            values = points[:, 1]
+            ended = values[:-1][np.diff(values) < 0]
+            counts[entity.removeprefix(f"{entities.ERRORS}/")] = round(ended.sum() + values[-1])
+    return counts
 
 
 def _over_restarts(counts: Iterable[Mapping[str, int]]) -> Counter[str]:

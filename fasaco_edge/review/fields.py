@@ -29,6 +29,18 @@ FIELDS: Final = {
     "replans_by_reason": "how many for each kind of reason",
     "first_plan_ms": "how long the first plan took [ms]",
     "replan_ms_p50, replan_ms_p99, replan_ms_max": "how long replans took [ms], nearest rank",
+    "replan_ms_by_reason": "median (p50) and slowest (max) of each kind of reason [ms]",
+    "replan_list": "each replan: at_s, revision, reason, plan_ms, steps, lower_bound_steps, gap "
+    "(steps above that bound, as a share of it), cost_s (driving it, by the configuration) and "
+    "changed, the rectangle of the map that led to it [m]",
+    "plans, plans_unused": "by the turn log: plans that were made, those of them that became no "
+    "path, because they found the one there was or did not hold any more",
+    "plan_ms_p50, plan_ms_p99, plan_ms_max": "how long they took, the unused ones too [ms]",
+    "attempts, attempts_used": "plans that were only to make the path better, and did",
+    "memory_mb_max, recorder_memory_mb_max": "most memory of daemon and recorder [MB]",
+    "processor_percent_max, threads_max": "of the daemon: processor time over half a minute [% of "
+    "a core], threads",
+    "restored_cells": "cells that were covered before a restart",
     "states": "seconds in each state",
     "troubles": "each time the mission was degraded, blocked or silent, or the recorder could not "
     "write (`recorder: disk full`, `recorder: stalled`): state, reason, at_s, seconds",

@@ -13,7 +13,19 @@ from fasaco_edge.review.charts import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.document import document, troubles
 from fasaco_edge.review.picture import draw_map
 from fasaco_edge.review.review import Review
-from fasaco_edge.review.rows import amount, card_rows, clock, compared_rows, ending, figure_rows
+from fasaco_edge.review.rows import (
+    MOST_REPLANS,
+    REASONS,
+    REPLANS,
+    amount,
+    card_rows,
+    clock,
+    compared_rows,
+    ending,
+    figure_rows,
+    reason_rows,
+    replan_rows,
+)
 from fasaco_edge.review.style import STYLE
 from fasaco_edge.review.svg import svg_of
 
@@ -32,6 +44,10 @@ GLOSSARY = {
     "revisits": "visits of cells beyond the first of each",
     "replan": "a plan made anew; its time is that of planning alone",
     "map: cells more, fewer": "a new map showed more or less ground to cover than the one before",
+    "gap": "steps of a plan above those that no plan can do without; where turns cost, more steps "
+    "may be the better way",
+    "changed on the map": "the rectangle in which cells came, went or have other neighbours",
+    "plans that became no path": "they found the path there was, or the map had changed meanwhile",
     "better further on": "spare time was used to find a better rest of the way",
     "p99": "of a hundred replans, 99 were not slower",
     "degraded": "poses or maps had stopped, or a pose jumped; the robot went on",
@@ -54,7 +70,7 @@ def page_of(review: Review, other: Review | None = None) -> str:
         _maps(reviews, told),
         _section("Over time", *_charts(reviews, told)),
         _section("Figures", *_figures(told)),
-        _section("Replans", _reasons(told)),
+        _section("Replans", *_reasons(reviews, told)),
         *(
             _stories(each, document, len(told))
             for each, document in zip(reviews, told, strict=True)
@@ -150,14 +166,21 @@ def _figures(told: Sequence[Mapping[str, Any]]) -> list[str]:
     return [_table(("", *names, "first less second"), compared_rows(told[0], told[1]))]
 
 
-def _reasons(told: Sequence[Mapping[str, Any]]) -> str:
+def _reasons(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> list[str]:
     counts = [document["replans_by_reason"] for document in told]
     kinds = dict.fromkeys(kind for count in counts for kind in count)
     if not kinds:
-        return "<p>There were none.</p>"
-    names = ("replans",) if len(told) == 1 else tuple(d["recording"] for d in told)
+        return ["<p>There were none.</p>"]
+    if len(told) == 1:
+        slowest = replan_rows(reviews[0].replans.slowest_first(MOST_REPLANS))
+        return [
+            _table(("why it came", *REASONS[1:]), reason_rows(told[0])),
+            "<p>The slowest ones:</p>",
+            _table(REPLANS, slowest, "told"),
+        ]
+    names = tuple(document["recording"] for document in told)
     rows = [(kind, *(str(count.get(kind, 0)) for count in counts)) for kind in kinds]
-    return _table(("why it came", *names), rows)
+    return [_table(("why it came", *names), rows)]
 
 
 def _stories(review: Review, told: Mapping[str, Any], of: int) -> str:

@@ -43,6 +43,19 @@ class Replans:
         return dict(Counter(kind_of(path.reason) for path in self.later).most_common())
 
     @property
+    def spread_by_reason(self) -> dict[str, tuple[float | None, float | None]]:
+        """The median and the slowest [ms] of each kind of reason, the most frequent first."""
+        took: dict[str, list[float]] = {kind: [] for kind in self.by_reason}
+        for path in self.later:
+            if path.plan_ms is not None:
+                took[kind_of(path.reason)].append(path.plan_ms)
+        return {kind: (percentile(ms, 50), percentile(ms, 100)) for kind, ms in took.items()}
+
+    def slowest_first(self, most: int) -> list[TakenPath]:
+        """Return up to ``most`` of them, those that took longest first."""
+        return sorted(self.later, key=lambda path: -(path.plan_ms or 0.0))[:most]
+
+    @property
     def slowest(self) -> TakenPath | None:
         """The one that took longest."""
         timed = [path for path in self.later if path.plan_ms is not None]

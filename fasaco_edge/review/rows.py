@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from fasaco_edge.review.drive import MILESTONES
+from fasaco_edge.review.story import TakenPath
 
 Row = tuple[str, str, str, str]
 """Name, the texts of one recording and of the other, and the difference; "" for none."""
@@ -26,11 +27,24 @@ NUMBERS = (
     ("replan, median", "replan_ms_p50", "ms"),
     ("replan, p99", "replan_ms_p99", "ms"),
     ("replan, slowest", "replan_ms_max", "ms"),
+    ("plans made", "plans", ""),
+    ("plans that became no path", "plans_unused", ""),
+    ("slowest plan", "plan_ms_max", "ms"),
+    ("attempts at a better path", "attempts", ""),
+    ("attempts that found one", "attempts_used", ""),
+    ("memory of the daemon, most", "memory_mb_max", "MB"),
+    ("memory of the recorder, most", "recorder_memory_mb_max", "MB"),
+    ("processor time, most", "processor_percent_max", "% of a core"),
     ("messages refused", "faults", ""),
     ("lost by the recorder", "recorder_lost", "samples"),
     ("samples missing", "samples_missing", ""),
 )
 """Names of figures, the members of the document they are, and their units."""
+
+REASONS = ("reason", "replans", "median", "slowest")
+REPLANS = ("at", "took", "steps", "gap", "to drive", "changed on the map", "why")
+"""Columns of ``reason_rows`` and ``replan_rows``."""
+MOST_REPLANS = 8
 
 # Settings that say most about a run; the others are in the run card and in the JSON document.
 SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
@@ -73,6 +87,38 @@ def card_rows(told: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("settings", ", ".join(settings) or "not told"),
         ("recording", f"{len(parts)} part{'s' * (len(parts) != 1)}, {megabytes:.1f} MB{state}"),
     ]
+
+
+def reason_rows(told: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
+    """Return each kind of reason for a replan: how many there were, the median, the slowest."""
+    took = told["replan_ms_by_reason"]
+    return [
+        (kind, str(count), amount(took[kind]["p50"], "ms"), amount(took[kind]["max"], "ms"))
+        for kind, count in told["replans_by_reason"].items()
+    ]
+
+
+def replan_rows(paths: Iterable[TakenPath]) -> list[tuple[str, ...]]:
+    """Return of each replan when it was, how long it took, what came of it, where and why."""
+    return [
+        (
+            clock(path.at_s),
+            amount(path.plan_ms, "ms"),
+            str(path.steps),
+            "-" if path.gap is None else f"{100 * path.gap:.1f} %",
+            "-" if path.cost_s is None else clock(path.cost_s),
+            _place(path.changed),
+            path.reason,
+        )
+        for path in paths
+    ]
+
+
+def _place(changed: tuple[float, ...] | None) -> str:
+    if changed is None:
+        return "-"
+    x0, y0, x1, y1 = changed
+    return f"{x1 - x0:.1f} x {y1 - y0:.1f} m at ({(x0 + x1) / 2:.1f}, {(y0 + y1) / 2:.1f})"
 
 
 def figure_rows(told: Mapping[str, Any]) -> list[tuple[str, str]]:

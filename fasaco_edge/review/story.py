@@ -16,10 +16,12 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.order_document import read_command
 from fasaco_edge.mission.polygons import Polygon
 from fasaco_edge.recording.fields import Json, integer, number, section, text
+from fasaco_edge.review.plans import PlanLog
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.poses import decode_pose
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from fasaco_edge.wire.status import decode_json
+from fasaco_edge.wire.turns import decode_turns
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,10 @@ class TakenPath:
         steps: from its first cell to its last.
         planner: what found it; "" where no plan was needed.
         plan_ms: how long planning took [ms]; None where no plan was needed.
+        gap: steps of the plan above the lower bound, as a share of it; None where not told.
+        cost_s: what driving it takes [s]; None where not told.
+        lower_bound: no plan has fewer steps; None where not told.
+        changed: x_min, y_min, x_max, y_max [m] of what of the map led to it; None for nothing.
     """
 
     at_s: float
@@ -41,6 +47,10 @@ class TakenPath:
     steps: int
     planner: str
     plan_ms: float | None
+    gap: float | None = None
+    cost_s: float | None = None
+    lower_bound: int | None = None
+    changed: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +85,7 @@ class Story:
         pose_s, poses: when each pose came, and x [m], y [m], yaw [rad] of it.
         map_s: when each map and each update came.
         paths, statuses, commands: in order.
+        made: plans, by the turn log.
         grid: the map at the end, with all updates.
         keep_out: polygons of the last order.
         config, version, robot: of the daemon, as its last status has them.
@@ -88,6 +99,7 @@ class Story:
     paths: list[TakenPath] = field(default_factory=list)
     statuses: list[HeardStatus] = field(default_factory=list)
     commands: list[tuple[float, str]] = field(default_factory=list)
+    made: PlanLog = field(default_factory=PlanLog)
     grid: OccupancyGrid | None = None
     keep_out: tuple[Polygon, ...] = ()
     config: Mapping[str, Any] = field(default_factory=dict)
@@ -129,6 +141,7 @@ class _Listener:
             "pose": self._pose,
             "command": self._command,
             "status": self._status,
+            "turns": self._turns,
             PATH_DIGEST: self._path,
         }
 
@@ -187,6 +200,9 @@ class _Listener:
             )
         )
 
+    def _turns(self, arrival: Arrival) -> None:
+        self.story.made.take(decode_turns(arrival.sample.payload), self._now)
+
     def _path(self, arrival: Arrival) -> None:
         note = _note(arrival)
         revision = integer(note, "revision") or 0
@@ -203,8 +219,18 @@ class _Listener:
                 steps=integer(note, "steps") or 0,
                 planner=planner,
                 plan_ms=number(note, "plan_ms") if planner else None,
+                gap=number(note, "gap"),
+                cost_s=number(note, "planned_cost_s"),
+                lower_bound=integer(note, "lower_bound_steps"),
+                changed=_rectangle(section(note, "changed")),
             )
         )
+
+
+def _rectangle(changed: Json) -> tuple[float, ...] | None:
+    edges = [number(changed, name) for name in ("x_min", "y_min", "x_max", "y_max")]
+    known = tuple(edge for edge in edges if edge is not None)
+    return known if len(known) == len(edges) else None
 
 
 def _note(arrival: Arrival) -> Json:

@@ -15,15 +15,16 @@ HEADER = b"\0\1\0\0" + struct.pack("<iII4s", 1, 0, 4, b"map\0")
 def show(sample: zenoh.Sample) -> None:
     payload = sample.payload.to_bytes()
     if sample.attachment is None:
-        print("status", json.loads(payload)["state"], flush=True)
+        print(f"status; {json.loads(payload)['state']}\n", end="")
         return
     # In a frame of this name the first pose's x stands at byte 44, and one more every 72 bytes.
     (count,) = struct.unpack_from("<I", payload, 20)
     points = [struct.unpack_from("<2d", payload, 44 + 72 * pose) for pose in range(count)]
     about = json.loads(sample.attachment.to_bytes())
-    print("path", about["revision"], about["reason"], *points, sep="; ", flush=True)
+    print("; ".join(map(str, ("path", about["revision"], about["reason"], *points))) + "\n", end="")
 
 
+sys.stdout.reconfigure(line_buffering=True)  # each topic has a thread: whole lines only
 link = {"mode": "client", "connect": {"endpoints": sys.argv[1:] or ["tcp/127.0.0.1:7447"]}}
 with zenoh.open(zenoh.Config.from_json5(json.dumps(link))) as session:
     newest = HistoryConfig(max_samples=1, detect_late_publishers=True)

@@ -89,5 +89,5 @@ def test_the_example_gets_a_path_over_every_cell(tmp_path):
         assert said == "path"
         visited = cells_of([[float(x) for x in point.strip("()\n").split(",")] for point in points])
         assert set(visited) == coverable_cells(room(4.0, 3.0))
-        assert "status waiting for map\n" in heard
+        assert "status; waiting for map\n" in heard
         assert "Traceback" not in rest

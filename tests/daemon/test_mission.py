@@ -168,7 +168,8 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     free_pixels = sum((row // 6, col // 6) not in fits for row, col in np.argwhere(pixels == FREE))
     assert set(status) == {
         *("robot", "version", "state", "reason", "uptime_s", "map", "pose", "coverage", "path"),
-        *("plan", "latency_ms", "errors", "ledger", "recorder", "rss_mb", "config", "mission"),
+        *("plan", "latency_ms", "errors", "ledger", "recorder", "rss_mb", "cpu_s"),
+        *("threads", "config", "mission"),
     }
     assert (status["robot"], status["state"], status["reason"]) == ("robot", "covering", "path 1")
     assert status["map"] == {
@@ -201,7 +202,7 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     }
     attempts = status["plan"].pop("attempts")
     assert attempts >= 0
-    assert status["plan"] == {"plans": 1, "planning": False}
+    assert status["plan"] == {"plans": 1, "unchanged": 0, "outdated": 0, "planning": False}
     assert status["latency_ms"]["plan"] > 0
     assert status["errors"] == {"total": 0, "last": "", "by_code": {}}
     assert status["ledger"]["restored_cells"] == 0

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.changes import LatticeChange
-from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission import ground as ground_module
 from fasaco_edge.mission.ground import Ground, GroundChange, anchor_cell
@@ -32,6 +32,16 @@ def test_changes_are_counted_over_reachable_cells_only():
     assert ground(".......", "....#..").change_since(before) == GroundChange(5, 0, 1)
     assert ground("....", "....").change_since(before) == GroundChange(0, 0, 0)
     assert ground("..", "..", at=(50, 50)).change_since(before) == GroundChange(4, 8, 0)
+
+
+def test_a_change_knows_where_it_is():
+    before = ground("....#..", "....#..")
+    assert ground("...##..", "....#..").change_since(before).window == Window(0, 2, 2, 4)
+    assert ground(".......", "....#..").change_since(before).window == Window(0, 3, 2, 7)
+    assert ground("....", "....").change_since(before).window is None
+    # What one of the two has no cells for counts, too.
+    assert ground("....", "....", "....").change_since(before).window == Window(1, 0, 3, 4)
+    assert ground("..", "..", at=(50, 50)).change_since(before).window == Window(0, 0, 52, 52)
 
 
 def test_a_shifted_window_is_no_change():

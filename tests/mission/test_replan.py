@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.assignment import Assignment, CommandError
 from fasaco_edge.mission.events import MapReceived
 from tests.mission.world import Drive, building, pose_at, started
@@ -83,3 +84,39 @@ def test_a_mission_that_rests_is_not_planned():
     assert drive.command("replan").plan is None
     assert "no reachable cell is left" in str(drive.refused)
     assert drive.mission.state == "done"
+
+
+def test_a_path_says_which_cells_it_is_because_of():
+    drive = started(*ROOM)
+    assert drive.updates[-1].changed is None, "the first plan is not because of a change"
+    drive.tell(MapReceived(building("...#....", *ROOM)))
+    # What comes while it plans belongs to the next one.
+    drive.tell(MapReceived(building("........", "...#....", *ROOM)))
+    drive.plan()
+    # Those beside the new ones have other neighbours.
+    assert drive.updates[-1].changed == Window(5, 0, 7, 8)
+    assert drive.updates[-1].reason == "map: 7 cells more"
+    drive.plan()
+    assert drive.updates[-1].changed == Window(6, 0, 8, 8)
+    assert drive.command("replan").plan.changed is None
+
+
+def test_a_path_cut_off_says_where():
+    drive = started("........")
+    decision = drive.tell(MapReceived(building(".....#..")))
+    assert decision.path.reason == "path blocked at cell (0, 5)"
+    assert decision.path.changed == Window(0, 4, 1, 8)
+    drive.plan()
+    assert drive.updates[-1].changed == Window(0, 4, 1, 8)
+
+
+def test_plans_that_lead_to_no_path_are_counted():
+    drive = started("........")
+    drive.command("replan")
+    drive.plan()
+    assert (drive.mission.unchanged, drive.mission.outdated) == (1, 0), "there is one way only"
+    drive.command("replan")
+    drive.tell(MapReceived(building(".....#..")))
+    drive.plan()
+    assert (drive.mission.unchanged, drive.mission.outdated) == (1, 1)
+    assert drive.mission.plans == 3

@@ -95,6 +95,7 @@ class Hall:
         self._walk = walk[~self._blocked[walk[:, 0], walk[:, 1]]]
         self._covered = np.where(self._blocked, 100, 0).astype(np.int8)
         self._plans = 0
+        self._cpu_s = 0.0
 
     def second(self, second: int) -> Iterator[tuple[float, str, bytes, bytes]]:
         """Yield (seconds into it, topic, payload, attachment)."""
@@ -108,7 +109,7 @@ class Hall:
         self._covered[row, col] = 75 if self._covered[row, col] else 50
         geometry = GridGeometry(SIDE, SIDE, CELL_M, Pose2D(0.0, 0.0))
         yield 0.95, "coverage", encode_occupancy_grid(OccupancyGrid(geometry, self._covered)), b""
-        yield 0.96, "status", self._status(), b""
+        yield 0.96, "status", self._status(second), b""
 
     def _map(self, second: int) -> bytes:
         pixels = self._pixels.copy()
@@ -130,7 +131,15 @@ class Hall:
             )
             yield 0.0, "pheromone", encode_pheromone(snapshot, "map", 0), b""
         rest = CELL_M * (self._walk[place:, ::-1] + 0.5)
-        note = encode_json({"revision": self._plans, "reason": "the map grew", "plan_ms": 80.0})
+        changed = dict(
+            zip(("x_min", "y_min", "x_max", "y_max"), (0, 0, 75, self._plans), strict=True)
+        )
+        note = encode_json(
+            {"revision": self._plans, "reason": "map: 120 cells more", "plan_ms": 80.0}
+            | {"planner": "fasaco", "planned_steps": len(rest), "gap": 0.02 + 1e-4 * self._plans}
+            | {"lower_bound_steps": 60_000 - place, "planned_cost_s": 1.3 * len(rest)}
+            | {"changed": changed}
+        )
         yield 0.0, "path", encode_path(rest, np.zeros(len(rest)), "map", 0), note
 
     def _pose(self, place: float) -> bytes:
@@ -141,10 +150,24 @@ class Hall:
         pose = Pose2D(CELL_M * (col + 0.5) + noise[0], CELL_M * (row + 0.5) + noise[1], noise[2])
         return encode_pose_stamped(StampedPose(pose, "map", 0))
 
-    def _status(self) -> bytes:
+    def _status(self, second: int) -> bytes:
         ingest_ms, rss_mb = self._rng.normal([6.0, 150.0], 0.2).round(3).tolist()
+        self._cpu_s += float(self._rng.uniform(0.1, 0.3))
+        covered, recovered = (int(np.count_nonzero(self._covered == value)) for value in (50, 75))
         return encode_json(
             {
+                "uptime_s": float(second),
+                "cpu_s": self._cpu_s,
+                "threads": 9,
+                "coverage": {
+                    "coverable": 50_000 + second,
+                    "covered": covered + recovered,
+                    "recovered": recovered,
+                    "unreachable": 40,
+                },
+                "path": {"remaining_steps": 60_000 - covered},
+                "plan": {"plans": self._plans, "unchanged": second // 100, "outdated": 0},
+                "errors": {"total": 0, "last": "", "by_code": {"malformed_message": second // 60}},
                 "state": "covering",
                 "version": "1.0.0",
                 "latency_ms": {

@@ -97,10 +97,20 @@ class Mission:
             "steps": len(rest) - 1,
             "plan_ms": 40.0 + 10.0 * math.sin(self.revision),
             "ants": 60,
+            "planned_steps": len(rest) - 1,
+            "lower_bound_steps": len(rest) - 4,
+            "planned_cost_s": 1.2 * len(rest),
+            "gap": 3 / (len(rest) - 4),
+            "changed": self.changed(done) if reason == "the map grew" else None,
         }
         yaw = np.zeros(len(rest))
         self._path.put(encode_path(rest, yaw, "map", _stamp()), json.dumps(note).encode())
         self.publish_status("covering", done, planning=False)
+
+    def changed(self, done: float) -> dict[str, float]:
+        """Return where the map has just grown."""
+        x, y = ORIGIN[0] + RESOLUTION_M * known_columns(done), ORIGIN[1]
+        return {"x_min": x - 0.75, "y_min": y + 0.5, "x_max": x - 0.25, "y_max": y + 5.0}
 
     def publish_cohort(self, cohort: int, done: float) -> None:
         """Publish pheromone that gathers along the walk."""
@@ -149,7 +159,11 @@ class Mission:
             "version": "1.0.0",
             "state": state,
             "reason": "",
-            "plan": {"plans": self.revision, "planning": planning},
+            "uptime_s": 40.0 * self.revision,
+            "cpu_s": 8.0 * self.revision,
+            "threads": 9,
+            "coverage": {"coverable": 500, "covered": round(500 * done), "recovered": 3},
+            "plan": {"plans": self.revision, "unchanged": 2, "outdated": 1, "planning": planning},
             "latency_ms": {"ingest": 4.0 + done, "plan": 45.0, "map_to_path": 60.0 + 20 * done},
             "errors": {"total": 0, "last": "", "by_code": {}},
             "rss_mb": 120.0,

@@ -73,6 +73,21 @@ def test_parts_rotate_and_each_begins_with_what_is_in_force(tmp_path):
     assert journal.lost == 0
 
 
+def test_parts_leave_no_threads_behind(tmp_path):
+    clock, threads = Clock(), []
+    journal = journal_in(tmp_path, part_bytes=1)
+    for _ in range(6):
+        journal.message(clock.now_ns)
+        journal.log("metrics/a", rr.Scalars(1.0))
+        journal.sync(clock.tick())
+        journal.show(build_blueprint(None))
+        time.sleep(0.1)  # they end a moment after they were told to
+        threads.append(len(os.listdir("/proc/self/task")))
+    assert journal.part_number == 7
+    assert threads[-1] <= threads[1]
+    assert journal.close()
+
+
 def test_an_old_part_gives_way_and_the_oldest_go_by_the_quota(tmp_path):
     others = [tmp_path / "20200101T000000Z-other-part1.rrd", tmp_path / "notes.rrd"]
     before = [tmp_path / f"20200101T000000Z-robot-part{number}.rrd" for number in (2, 10)]

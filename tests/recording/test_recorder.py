@@ -22,7 +22,7 @@ from fasaco_edge.errors import MissingExtra
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.input_log import PERIOD_NS as INPUT_PERIOD_NS
 from fasaco_edge.recording.journal import FLUSH_PERIOD_NS
-from fasaco_edge.recording.reading import RecordingSummary, read_column, read_summary
+from fasaco_edge.recording.reading import SCALAR, RecordingSummary, read_column, read_summary
 from fasaco_edge.recording.samples import RecordedSamples
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_occupancy_grid
@@ -30,6 +30,7 @@ from fasaco_edge.wire.schemas import OCCUPANCY_GRID
 from tests.recording.mission import CELL_M, COLS, ORIGIN, ROWS, Mission, building
 from tests.recording.recorders import bus_on_free_port, recorder_process
 
+ERRORS = {"total": 2, "last": "", "by_code": {"malformed_message": 2, "no code": 3}}
 FRAMES = 40
 FRAME_S = 0.04
 
@@ -57,7 +58,7 @@ def recorded(tmp_path_factory):
         mission = Mission(bus)
         play(mission)
         bus.publisher(Keys().coverage, OCCUPANCY_GRID).put(b"\x00\x01\x00\x00not a map")
-        mission.publish_status("done", 1.0, planning=False, latency_ms="none", errors={"total": 2})
+        mission.publish_status("done", 1.0, planning=False, latency_ms="none", errors=ERRORS)
         report = recorder.wait_until(lambda report: report["malformed"] > 0)
         assert bus.alive(f"{Keys().recorder}/alive")
         recorder.process.send_signal(signal.SIGTERM)
@@ -107,7 +108,7 @@ def test_the_summary_gives_the_last_figures(recorded):
     assert recorded.summary.covered == pytest.approx(mission.covered, abs=1e-6)
     assert recorded.summary.recovered == pytest.approx(mission.recovered, abs=1e-6)
     assert recorded.summary.best_steps == mission.best_steps
-    assert recorded.summary.paths[0].endswith("first map")
+    assert recorded.summary.paths[0].startswith("path 1: first map (")
     assert len(recorded.summary.paths) == mission.revision
 
 
@@ -124,6 +125,37 @@ def test_the_robot_stands_where_it_was_published(recorded):
     places = read_column(recorded.path, entities.ROBOT, "Transform3D:translation").values
     assert np.allclose(places[0][0][:2], recorded.mission.walk[0], atol=1e-5)
     assert np.allclose(places[-1][0][:2], recorded.mission.walk[-1], atol=1e-5)
+
+
+def test_a_path_says_where_the_map_has_changed(recorded):
+    labels = read_column(recorded.path, entities.REPLAN_REASON, "Points3D:labels").values
+    assert labels == [["the map grew"]] * (recorded.mission.revision - 1)
+    box = read_column(recorded.path, entities.REPLAN_WINDOW, "LineStrips3D:strips").values[-1][0]
+    changed = recorded.mission.changed(1.0)
+    assert np.allclose(np.min(box, axis=0)[:2], [changed["x_min"], changed["y_min"]])
+    assert np.allclose(np.max(box, axis=0)[:2], [changed["x_max"], changed["y_max"]])
+
+
+def test_the_numbers_of_statuses_and_paths_are_curves(recorded):
+    def curve(name):
+        return [value[0] for value in read_column(recorded.path, name, SCALAR).values]
+
+    revision = recorded.mission.revision
+    assert curve(f"{entities.CELLS}/covered")[-1] == 500
+    assert curve(f"{entities.PLANS}/unchanged") == [2]
+    assert curve(f"{entities.PLANS}/plans")[-1] == revision
+    assert set(curve(entities.PROCESSOR)) == {20.0}
+    assert curve(entities.THREADS) == [9]
+    assert len(curve(entities.GAP)) == revision
+    assert curve(f"{entities.ERRORS}/malformed_message") == [2]
+
+
+def test_main_directions_are_drawn_with_the_path(recorded):
+    strips = read_column(recorded.path, entities.DIRECTIONS, "LineStrips3D:strips").values
+    spans = np.ptp(np.array(strips[0]), axis=1)
+    # Up and down the columns of cells.
+    assert (spans[:, 1] > spans[:, 0]).all()
+    assert len(spans) > 3
 
 
 def test_the_map_is_not_mirrored(recorded):

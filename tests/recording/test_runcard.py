@@ -17,7 +17,7 @@ JSON = st.recursive(
 
 def test_settings_that_matter_come_first():
     config = {"zeta": 1, "robot": {"robot_radius_m": 0.2}, "planner": "fasaco", "seed": 7}
-    card = RunDescription("r2", "2026-01-01", "1.0", config).markdown()
+    card = RunDescription("r2", "2026-01-01", "1.0", config).markdown().partition("| setting |")[2]
     order = [card.index(name) for name in ("r2", "planner", "robot_radius_m", "seed", "zeta")]
     assert order == sorted(order)
 
@@ -52,3 +52,15 @@ def test_a_truth_value_is_no_number():
     assert integer({"a": False}, "a") is None
     assert integer({"a": 10**400}, "a") is None
     assert number({"a": 10**400}, "a") is None
+
+
+def test_what_is_asked_for_first_stands_in_a_line():
+    card = RunDescription("r2", "2026-01-01", "1.0", {"planner": {"seed": 7}}).markdown()
+    assert card.startswith("**r2**, version 1.0, seed 7\n")
+
+
+def test_the_range_of_the_pheromone_is_a_property():
+    told = RunDescription("r2", "2026-01-01", trail_range=(0.1, 0.25)).properties()
+    assert (told["trail_min"], told["trail_max"]) == ("0.1", "0.25")
+    assert "trail_min * (trail_max / trail_min)" in told["trail"]
+    assert "trail" not in RunDescription("r2", "2026-01-01").properties()

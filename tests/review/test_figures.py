@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fasaco_edge.recording.run_reading import RunRecord
 from fasaco_edge.review.curve import curve
 from fasaco_edge.review.drive import milestones, walk_figures
+from fasaco_edge.review.faults import faults_of
 from fasaco_edge.review.moments import Span, largest_drop, longest_gap, longest_stand, spans_of
+from fasaco_edge.review.plans import PlanLog
 from fasaco_edge.review.replans import kind_of
 from fasaco_edge.review.rows import clock
+from fasaco_edge.review.story import Story
+from fasaco_edge.wire.turns import Beginning, Decided, PlanTaken, Turn, TurnBatch
 
 ALL = Span("under way", 0.0, 100.0)
 
@@ -102,3 +107,45 @@ def test_times_are_told_as_on_a_clock():
         "1:00:00.0",
         "2:02:05.2",
     ]
+
+
+def turn(number, *, ready=None, asked=None, path=None):
+    plan = ready and PlanTaken(ready, 0.002 * ready, [], (1, 0, 0), 7)
+    decided = Decided("covering", "", asked, path) if asked or path else None
+    return Turn(number, plan=plan, decided=decided)
+
+
+def test_plans_are_told_from_those_that_became_a_path():
+    log = PlanLog()
+    first = [
+        turn(1, asked=(1, "first plan")),
+        turn(2, ready=1, path=(1, "first plan", 7), asked=(2, "spare time")),
+    ]
+    log.take(TurnBatch(1, [10.0, 10.5], first, Beginning("1", {})), at_s=3.0)
+    # A path that was cut off just then is not the one that was planned.
+    second = [
+        turn(3, ready=2, path=(2, "better further on", 8), asked=(3, "map: 1 cell more")),
+        turn(4, ready=3, path=(3, "path blocked at cell (1, 2)", 9)),
+        turn(5, ready=4),
+    ]
+    log.take(TurnBatch(3, [11.0, 11.5, 12.0], second), at_s=5.0)
+    assert [(p.reason, p.is_attempt, p.is_used) for p in log.plans] == [
+        ("first plan", False, True),
+        ("spare time", True, True),
+        ("map: 1 cell more", False, False),
+        ("", False, False),
+    ]
+    assert [p.at_s for p in log.plans] == [3.0, 4.0, 4.5, 5.0]
+    assert [p.took_ms for p in log.plans] == [2.0, 4.0, 6.0, 8.0]
+    # A daemon that was started again counts from 1 again.
+    log.take(TurnBatch(1, [1.0], [turn(1, ready=3)], Beginning("1", {})), at_s=9.0)
+    assert log.plans[-1].reason == ""
+
+
+def test_counts_by_code_go_on_after_a_restart():
+    plots = {
+        "metrics/errors/wrong_frame": np.array([(0, 1), (1, 3), (2, 1), (3, 2)], np.float64),
+        "metrics/latency/plan": np.array([(0, 9)], np.float64),
+    }
+    record = RunRecord("", (), 0, 0, plots, {}, {}, ())
+    assert faults_of(Story(), record).by_code == {"wrong_frame": 5}

@@ -169,7 +169,7 @@ def test_the_command_writes_them(parts, tmp_path):
     assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
     names = {file.name for file in folder.iterdir()}
     assert names == {
-        *(f"{name}.csv" for name in ("trail", "paths", "states", "coverage", "plots")),
+        *(f"{name}.csv" for name in ("trail", "paths", "plans", "states", "coverage", "plots")),
         "end.npz",
     }
 

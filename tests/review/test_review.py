@@ -124,6 +124,37 @@ def test_replans_are_those_heard(told, recording):
     assert sum(told["replans_by_reason"].values()) == len(took_ms)
 
 
+def test_each_replan_says_why_and_where(told, recording):
+    notes = {note["revision"]: note for _, note in recording.notes}
+    for replan in told["replan_list"]:
+        note = notes[replan["revision"]]
+        assert replan["reason"] == note["reason"]
+        assert replan["lower_bound_steps"] == note["lower_bound_steps"]
+        assert (replan["gap"], replan["cost_s"]) == (note["gap"], note["planned_cost_s"])
+        assert replan["changed"] == note["changed"]
+        assert (note["changed"] is not None) == note["reason"].startswith(("map: ", "path blocked"))
+    assert len(told["replan_list"]) == told["replans"]
+    took = [replan["plan_ms"] for replan in told["replan_list"]]
+    assert max(spread["max"] for spread in told["replan_ms_by_reason"].values()) == max(took)
+
+
+def test_plans_are_those_of_the_status(told, recording):
+    plan = recording.status["plan"]
+    assert told["plans"] == plan["plans"]
+    assert told["plans_unused"] == plan["unchanged"] + plan["outdated"]
+    assert told["attempts"] == plan["attempts"]
+    notes = {note["revision"]: note["reason"] for _, note in recording.notes}
+    assert told["attempts_used"] == list(notes.values()).count("better further on")
+    assert told["plan_ms_max"] >= told["first_plan_ms"] - 0.001
+
+
+def test_what_it_took_is_told(told, recording):
+    most = max(status["rss_mb"] for _, status in recording.statuses)
+    assert told["memory_mb_max"] == pytest.approx(most, rel=0.11)
+    assert told["threads_max"] >= recording.status["threads"] > 1
+    assert told["restored_cells"] == 0
+
+
 def test_states_are_those_heard(told, review, recording):
     names = [name for name, _ in _groups(status["state"] for _, status in recording.statuses)]
     mine = [span.name for span in review.states]
