@@ -116,9 +116,8 @@ def test_jitter(capsys):
         late_us = case["late_us"]
         assert case["ticks"] == 150
         assert 0 < late_us["p50"] <= late_us["p99"] <= late_us["p99_9"] <= late_us["max"]
-        # Held, it takes nothing; what it has published may still arrive.
+        # Held, it takes nothing; what it has published before may still arrive.
         assert case["daemon_share"] > 0.0 if covering else case["daemon_share"] == 0.0
-        assert covering or case["paths"] <= 1
     assert sum(case["paths"] for case in cases.values() if case["covering"]) > 0
     assert document["goals"] == []
 
