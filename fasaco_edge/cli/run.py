@@ -27,6 +27,9 @@ there already, it joins that one) under the keys fasaco/@v1/robot/...:
 It covers everything it can reach, unless it is told otherwise (`fasaco-edge mission`) or to wait
 for an order (mission.autostart: false). Order and coverage are kept on disk: after a restart the
 mission goes on where it stopped.
+As a service (deploy/) it tells systemd when it is ready and that it gets on, and reads its
+configuration again at SIGHUP: what can change at run time (planner, map, the robot's speeds, the
+mission's patience) does; what cannot is named; a file that is wrong is kept out.
 """
 
 

@@ -10,6 +10,10 @@ from collections.abc import MutableMapping
 
 LOG = logging.getLogger(__name__)
 
+# A manager that is busy, as at a boot, is waited for with what it is told only once [s]; nothing
+# else may hold the loop up.
+PATIENCE_S = 1.0
+
 
 class ServiceManager:
     """Who has started this process, and waits to be told how it is; nobody, outside of a service.
@@ -32,13 +36,12 @@ class ServiceManager:
 
     def ready(self) -> None:
         """Say that the service is up, or that its configuration is read again."""
-        self._send("READY=1")
+        self._send("READY=1", PATIENCE_S)
 
     def status(self, text: str) -> None:
         """Say in one line what the service does."""
-        if text != self._status:
+        if text != self._status and self._send("STATUS=" + text.replace("\n", " ")):
             self._status = text
-            self._send("STATUS=" + text.replace("\n", " "))
 
     def alive(self) -> None:
         """Say that there is progress; due before each ``watchdog_s`` is over."""
@@ -51,18 +54,24 @@ class ServiceManager:
     def reloading(self) -> None:
         """Say that the configuration is being read again; ``ready`` follows."""
         now_us = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
-        self._send(f"RELOADING=1\nMONOTONIC_USEC={now_us}")
+        self._send(f"RELOADING=1\nMONOTONIC_USEC={now_us}", PATIENCE_S)
 
     def stopping(self) -> None:
         """Say that the service ends."""
         self._send("STOPPING=1")
 
-    def _send(self, text: str) -> None:
+    def _send(self, text: str, patience_s: float = 0.0) -> bool:
+        """Send a datagram; tell whether it was taken."""
         if not self.is_there:
-            return
+            return True
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as out:
-                out.setblocking(False)  # whoever does not listen must not hold the loop up
+                out.settimeout(patience_s)
                 out.sendto(text.encode(), self._address)
         except OSError as error:
-            LOG.warning("the service manager cannot be told %s: %s", text.partition("=")[0], error)
+            word = text.partition("=")[0]
+            LOG.warning(
+                "the service manager cannot be told %s: %s", word, error, extra={"event": "unheard"}
+            )
+            return False
+        return True

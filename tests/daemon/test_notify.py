@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import threading
 import time
 from collections.abc import Iterator
 
@@ -77,6 +78,34 @@ def test_a_manager_that_is_gone_costs_nothing_but_a_warning(tmp_path, caplog):
     manager = ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
     manager.ready()
     assert "cannot be told READY" in caplog.text
+
+
+def test_a_status_that_was_not_taken_is_told_again(tmp_path):
+    name = str(tmp_path / "notify")
+    manager = ServiceManager({"NOTIFY_SOCKET": name})
+    manager.status("waiting")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as heard:
+        heard.bind(name)
+        heard.settimeout(5.0)
+        manager.status("waiting")
+        assert heard.recv(4096) == b"STATUS=waiting"
+
+
+def test_a_busy_manager_hears_that_it_is_ready(tmp_path):
+    name = str(tmp_path / "notify")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as heard:
+        heard.bind(name)
+        manager = ServiceManager({"NOTIFY_SOCKET": name})
+        started = time.monotonic()
+        for _ in range(1000):
+            manager.alive()
+        assert time.monotonic() - started < 0.5, "it waits for nobody"
+        threading.Timer(0.2, lambda: [heard.recv(4096) for _ in range(5)]).start()
+        manager.ready()
+        heard.settimeout(1.0)
+        said = []
+        while not said or said[-1] != b"READY=1":
+            said.append(heard.recv(4096))
 
 
 def test_without_one_nothing_is_said(caplog):

@@ -1,0 +1,174 @@
+"""The daemon under a service manager: what it is told, and what SIGHUP does. No systemd needed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import Daemon, daemon_process
+from tests.daemon.rooms import fill, map_bytes, pillared_room, pose_bytes, two_rooms
+
+WATCHDOG_S = 1.0
+# Neither free nor occupied by the default thresholds.
+DOUBTFUL = 40
+
+
+class Manager:
+    """Listens on $NOTIFY_SOCKET, all the time."""
+
+    def __init__(self, folder: Path) -> None:
+        self.said: list[str] = []
+        self.address = str(folder / "notify")
+        self._read = 0
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.bind(self.address)
+        self._socket.settimeout(0.05)
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._listen)
+        self._thread.start()
+
+    def count(self, word: str, seconds: float) -> int:
+        """Return how often ``word`` is said within so many seconds from now."""
+        before = len(self.said)
+        time.sleep(seconds)
+        return self.said[before:].count(word)
+
+    def wait(self, word: str, seconds: float = 30.0) -> str:
+        """Return what is said next that begins with ``word``."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            for number, text in enumerate(self.said[self._read :], self._read):
+                if text.startswith(word):
+                    self._read = number + 1
+                    return text
+            time.sleep(0.02)
+        raise AssertionError(f"{word} was not said, but {self.said[self._read :]}")
+
+    def close(self) -> None:
+        self._closed.set()
+        self._thread.join()
+        self._socket.close()
+
+    def _listen(self) -> None:
+        while not self._closed.is_set():
+            with suppress(TimeoutError):
+                self.said.append(self._socket.recv(65536).decode())
+
+
+@contextmanager
+def service(folder: Path, **sections) -> Iterator[tuple[Daemon, Manager]]:
+    """A daemon with a service manager, once it is ready."""
+    manager = Manager(folder)
+    env = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": str(int(1e6 * WATCHDOG_S))}
+    try:
+        with daemon_process(folder, env=env, **sections) as running:
+            manager.wait("READY=1", 100.0)
+            yield running, manager
+    finally:
+        manager.close()
+
+
+def test_ready_means_that_the_token_stands_and_a_plan_needs_no_compiler(tmp_path):
+    with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
+        assert outsider.alive()
+        path = outsider.listen("path")
+        outsider.put("map", map_bytes(pillared_room()))
+        outsider.put("pose", pose_bytes(1.0, 1.0))
+        path.wait(lambda heard: len(heard.payload) > 100)
+        manager.wait("STATUS=covering")
+        running.stop()
+        manager.wait("STOPPING=1", 1.0)
+
+
+def test_the_watchdog_is_fed_until_the_process_stands_still(tmp_path):
+    with service(tmp_path) as (running, manager):
+        fed = manager.count("WATCHDOG=1", 2.0)
+        assert 5 <= fed <= 9, "four times in a second"
+        os.kill(running.pid, signal.SIGSTOP)
+        time.sleep(0.3)
+        assert manager.count("WATCHDOG=1", 1.0) == 0
+        os.kill(running.pid, signal.SIGCONT)
+        time.sleep(0.5)
+        assert manager.count("WATCHDOG=1", 1.0) > 0
+
+
+def rewritten(running: Daemon, **sections) -> None:
+    """Change some sections of its configuration, and tell it."""
+    (file,) = running.log.parent.glob("daemon0.yaml")
+    before = yaml.safe_load(file.read_text())
+    after = {**before, **{k: before.get(k, {}) | v for k, v in sections.items()}}
+    file.write_text(yaml.safe_dump(after))
+    running.process.send_signal(signal.SIGHUP)
+
+
+def test_a_reload_is_told_and_in_force(tmp_path):
+    with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
+        rewritten(running, planner={"seed": 7})
+        reloading = manager.wait("RELOADING=1")
+        assert "\nMONOTONIC_USEC=" in reloading
+        manager.wait("READY=1")
+        assert outsider.ask("@rpc/config").json()["planner"]["seed"] == 7
+        status = outsider.wait_status(lambda status: status["config"]["planner"]["seed"] == 7)
+        assert status["errors"]["total"] == 0
+
+
+def test_other_thresholds_show_another_map_and_nothing_covered_is_lost(tmp_path):
+    doubtful = fill(two_rooms(door=True), 3.2, 0.2, 5.8, 2.8, DOUBTFUL)
+    with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
+        path = outsider.listen("path")
+        outsider.put("map", map_bytes(doubtful))
+        outsider.put("pose", pose_bytes(0.5, 0.5))
+        outsider.wait_status(lambda status: status["path"])
+        for x in (0.8, 1.1, 1.4):
+            outsider.put("pose", pose_bytes(x, 0.5))
+        before = outsider.wait_status(lambda status: status["coverage"]["covered"] == 4)
+        paths = len(path.heard)
+        rewritten(running, map={"free_at_most": 45})
+        manager.wait("READY=1")
+        after = outsider.wait_status(
+            lambda status: (
+                status["coverage"]
+                and status["coverage"]["coverable"] > before["coverage"]["coverable"] + 10
+            )
+        )
+        assert after["coverage"]["covered"] == before["coverage"]["covered"]
+        path.wait(lambda heard: len(heard.payload) > 100, since=paths)
+        assert after["errors"]["total"] == 0
+
+
+@pytest.mark.parametrize("planning", [False, True])
+def test_a_wrong_file_changes_nothing(tmp_path, planning):
+    with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
+        if planning:
+            outsider.put("map", map_bytes(pillared_room()))
+            outsider.put("pose", pose_bytes(1.0, 1.0))
+            outsider.wait_status(lambda status: status["path"])
+        before = outsider.ask("@rpc/config").json()
+        rewritten(running, planner={"ants": "many"})
+        manager.wait("READY=1")
+        assert "planner.ants" in manager.wait("STATUS=", 5.0)
+        status = outsider.wait_status(lambda status: status["errors"]["total"])
+        assert status["errors"]["by_code"] == {"bad_configuration": 1}
+        assert outsider.ask("@rpc/config").json() == before
+        rewritten(running, planner={"ants": 200})
+        manager.wait("READY=1")
+        assert "refused" not in manager.wait("STATUS=", 5.0)
+
+
+def test_without_a_service_manager_a_closed_terminal_ends_it(tmp_path):
+    with daemon_process(tmp_path) as running:
+        with Outsider(running.endpoint) as outsider:
+            outsider.ask_status()
+        running.process.send_signal(signal.SIGHUP)
+        assert running.process.wait(10.0) == -signal.SIGHUP
+        running.process.returncode = 0
