@@ -36,6 +36,8 @@ build_version() {
         xargs -0 cp --parents --target-directory="$place/deploy")
     [[ $RECORDING ]] || rm -f "$place/deploy/$RECORDER"
     chmod -R u=rwX,go=rX "$place"
+    # A release folder may have come on a stick that knows no modes.
+    chmod a+x "$place/deploy/install.sh" "$place/deploy/uninstall.sh"
 }
 
 # The release's own pip; nobody's settings of pip decide what is installed here.

@@ -19,6 +19,10 @@ WATCHED = ("/etc", "/opt", "/usr/local", "/var/lib", "/var/cache", "/var/log", H
 OTHERS = ("/var/lib/systemd", "/var/log/journal", "/var/lib/private ", "/etc/.pwd.lock")
 
 
+# Compiled kernels and recordings.
+GROWING = ("/var/cache/private/fasaco-edge", "/var/log/private/fasaco-edge")
+
+
 class Robot(Lab):
     """A lab on which nothing is installed yet; releases lie in /srv, by version."""
 
@@ -44,6 +48,11 @@ class Robot(Lab):
         state = self.run("systemctl", "is-active", "fasaco-edge", check=False).stdout
         answer = self.run("fasaco-edge", "ask", "version", check=False).stdout
         return state == "active\n" and f"version: '{version}'" in answer
+
+    def settled(self) -> dict[str, str]:
+        """Return the files but those that come and go while it runs."""
+        files = self.files().items()
+        return {path: line for path, line in files if not path.startswith(GROWING)}
 
     def files(self) -> dict[str, str]:
         """Return every file of the folders watched: its kind, mode and, of a link, target."""
