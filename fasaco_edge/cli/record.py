@@ -12,6 +12,9 @@ from fasaco_edge.wire.schemas import POSE_STAMPED
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.daemon.ros_config import RosConfig
+    from fasaco_edge.recording.settings import RosInput
+    from fasaco_edge.wire.ros_keys import RosTopic
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
 
@@ -35,6 +38,12 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         help=f"type of poses that come without one: {', '.join(POSE_SCHEMAS)} "
         "(default: %(default)s)",
     )
+    parser.add_argument(
+        "--ros2",
+        type=ros_config,
+        metavar="JSON",
+        help="the block ros2 of the daemon's configuration: hear these topics, too",
+    )
     _add_room(parser)
     parser.add_argument(
         "--serve",
@@ -47,6 +56,21 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     )
     add_robot_on_bus(parser)
     parser.set_defaults(command=run)
+
+
+def ros_config(text: str) -> RosConfig:
+    """Read the block ``ros2`` of a configuration."""
+    import msgspec
+
+    from fasaco_edge.daemon.ros_config import RosConfig
+    from fasaco_edge.errors import BadConfiguration
+
+    try:
+        config = msgspec.json.decode(text, type=RosConfig)
+        config.check()
+    except (msgspec.DecodeError, BadConfiguration) as error:
+        raise argparse.ArgumentTypeError(f"ros2: {error}") from error
+    return config
 
 
 def address(text: str) -> tuple[str, int]:
@@ -94,13 +118,17 @@ def run(args: argparse.Namespace) -> int:
     """Record."""
     from fasaco_edge.recording.recorder import run_recorder
     from fasaco_edge.recording.settings import MEGABYTE, RecorderSettings
+    from fasaco_edge.wire.pose_decoding import DEFAULT_FRAMES
 
+    frames = args.ros2.frames if args.ros2 else None
     settings = RecorderSettings(
         out=args.out,
         robot=args.robot,
         base=args.base,
         bus=client_settings(args),
         pose_schema=args.pose_schema,
+        ros=_ros_inputs(args.ros2) if args.ros2 else (),
+        frames=(frames.map, frames.robot) if frames else DEFAULT_FRAMES,
         part_bytes=args.part_mb * MEGABYTE,
         part_s=60.0 * args.part_min,
         quota_bytes=args.quota_mb * MEGABYTE,
@@ -108,3 +136,17 @@ def run(args: argparse.Namespace) -> int:
         serve=args.serve,
     )
     return run_recorder(settings)
+
+
+def _ros_inputs(config: RosConfig) -> tuple[RosInput, ...]:
+    from fasaco_edge.recording.settings import RosInput
+
+    def key(topic: RosTopic) -> str:
+        is_bridge = config.kind == "bridge"
+        return topic.bridge_key if is_bridge else topic.rmw_key(config.domain, any_hash=True)
+
+    topics = {"map": config.map, "map_update": config.map_updates, **config.poses}
+    return tuple(
+        RosInput(name, key(topic), topic.schema, topic.latched, topic.depth)
+        for name, topic in topics.items()
+    )

@@ -15,8 +15,8 @@ from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, Publisher, Sample, Subscription
 from fasaco_edge.daemon.inbox import Received
 from fasaco_edge.daemon.ros_config import RosConfig
-from fasaco_edge.daemon.transforms import TransformTree
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, attachment, gid_of
+from fasaco_edge.wire.transforms import TransformTree
 
 
 class RosBridge:
