@@ -6,14 +6,13 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bus.session import BusSettings
-from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings
+from fasaco_edge.cli.arguments import add_robot_on_bus
 from fasaco_edge.wire.poses import POSE_SCHEMAS
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
-    from fasaco_edge.recording.settings import RecorderSettings
+    from fasaco_edge.daemon.ros_config import RosConfig
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
 
@@ -44,6 +43,12 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         help=f"type of poses that come without one: {', '.join(POSE_SCHEMAS)} "
         "(default: %(default)s)",
     )
+    parser.add_argument(
+        "--ros2",
+        type=ros_config,
+        metavar="JSON",
+        help="the block ros2 of the daemon's configuration: hear these topics, too",
+    )
     _add_room(parser)
     parser.add_argument(
         "--serve",
@@ -56,6 +61,21 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     )
     add_robot_on_bus(parser)
     parser.set_defaults(command=run)
+
+
+def ros_config(text: str) -> RosConfig:
+    """Read the block ``ros2`` of a configuration."""
+    import msgspec
+
+    from fasaco_edge.daemon.ros_config import RosConfig
+
+    try:
+        config = msgspec.json.decode(text, type=RosConfig)
+    except msgspec.DecodeError as error:
+        raise argparse.ArgumentTypeError(f"ros2: {error}") from error
+    for fault in config.faults():
+        raise argparse.ArgumentTypeError(f"ros2: {fault}")
+    return config
 
 
 def address(text: str) -> tuple[str, int]:
@@ -101,46 +121,7 @@ def _add_room(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record."""
+    from fasaco_edge.cli.recorder_settings import of_daemon, of_options
     from fasaco_edge.recording.recorder import run_recorder
 
-    settings = _settings(args) if args.config is None else _settings_of_daemon(args)
-    return run_recorder(settings)
-
-
-def _settings_of_daemon(args: argparse.Namespace) -> RecorderSettings:
-    from fasaco_edge.daemon.config import load_config
-    from fasaco_edge.daemon.endpoints import from_here
-    from fasaco_edge.recording.settings import MEGABYTE, RecorderSettings
-
-    config = load_config(args.config)
-    bus, room = config.bus, config.recording
-    endpoints = tuple(map(from_here, bus.listen or bus.connect))
-    return RecorderSettings(
-        out=args.out,
-        robot=config.robot.name,
-        base=bus.base,
-        bus=BusSettings("client", endpoints, secured=bus.security.of_client()),
-        pose_schema=config.pose.schema,
-        part_bytes=room.part_mb * MEGABYTE,
-        part_s=60.0 * room.part_min,
-        quota_bytes=room.quota_mb * MEGABYTE,
-        least_free_bytes=room.least_free_mb * MEGABYTE,
-        serve=args.serve,
-    )
-
-
-def _settings(args: argparse.Namespace) -> RecorderSettings:
-    from fasaco_edge.recording.settings import MEGABYTE, RecorderSettings
-
-    return RecorderSettings(
-        out=args.out,
-        robot=args.robot,
-        base=args.base,
-        bus=client_settings(args),
-        pose_schema=args.pose_schema,
-        part_bytes=args.part_mb * MEGABYTE,
-        part_s=60.0 * args.part_min,
-        quota_bytes=args.quota_mb * MEGABYTE,
-        least_free_bytes=args.least_free_mb * MEGABYTE,
-        serve=args.serve,
-    )
+    return run_recorder(of_options(args) if args.config is None else of_daemon(args))

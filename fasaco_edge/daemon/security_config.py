@@ -122,6 +122,9 @@ class SecurityConfig(Section, frozen=True):
         ]
         if ros is not None:
             grants.append(access.Grant("ros", self.roles.ros, "", rights=ros))
+            # A recorder hears what the daemon hears.
+            heard = access.Role(ros.told, listens=ros.speaks)
+            grants.append(access.Grant("ros", self.roles.recorder, "", of="recorder", rights=heard))
         part["access_control"] = access.access_control(grants, ATTRIBUTES[self.kind])
         return part | self.thinned(prefix)
 

@@ -10,6 +10,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.daemon.client_security import client_words
@@ -109,6 +111,8 @@ def _command(config: DaemonConfig, folder: Path) -> list[str]:
     connect += client_words(config.bus.security)
     robot = ["--robot", config.robot.name, "--base", config.bus.base]
     pose = ["--pose-schema", config.pose.schema]
+    if config.ros2:
+        pose += ["--ros2", msgspec.json.encode(config.ros2).decode()]
     program = [sys.executable, "-m", "fasaco_edge", "record"]
     parent = ["--with-parent", str(os.getpid())]
     return [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.sdk import rrb
+from fasaco_edge.recording.sdk import rr, rrb
 
 Bounds = tuple[float, float, float, float]
 
@@ -72,7 +72,15 @@ def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
 
 def _plot(name: str, origin: str, legend: rrb.PlotLegend, top: float = 0.0) -> rrb.TimeSeriesView:
     axis = rrb.ScalarAxis(range=(0.0, top)) if top else None
-    return rrb.TimeSeriesView(origin=f"/{origin}", name=name, axis_y=axis, plot_legend=legend)
+    # From beginning to end, whatever the mission's length: by itself it shows a minute.
+    whole = rrb.TimeAxis(
+        view_range=rr.TimeRange(
+            start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.infinite()
+        )
+    )
+    return rrb.TimeSeriesView(
+        origin=f"/{origin}", name=name, axis_x=whole, axis_y=axis, plot_legend=legend
+    )
 
 
 def _figures() -> rrb.Vertical:

@@ -20,13 +20,15 @@ from fasaco_edge.recording.journal import Journal
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.status import decode_json
 
-INPUTS: Final = ("map", "map_update", "pose", "command", "turns")
+INPUTS: Final = ("map", "map_update", "pose", "tf_static", "command", "turns")
 """Topics that are logged as they come: all that a mission hears, and when it took it."""
 # What is in force for no longer than it takes to hear it.
 PASSING: Final = ("pose", "command", "turns")
 PERIOD_NS = 900_000_000
 STATUS_PERIOD_NS = 15_000_000_000
 WAITING_BYTES = 4_000_000
+# Each node that has some tells them once.
+MOST_STATIC = 64
 # Updates since the last full map; with more of them a part begins without the map.
 IN_FORCE_BYTES = 8_000_000
 
@@ -119,10 +121,14 @@ def _path_digest(arrival: Arrival) -> Arrival:
 
 
 class _InForce:
-    """The newest map, what has changed of it since, and the newest of what else is latched."""
+    """The newest map, what has changed of it since, and the newest of what else is latched.
+
+    Static transforms come from several nodes, and all of them hold.
+    """
 
     def __init__(self) -> None:
         self._newest: dict[str, Numbered] = {}
+        self._static: dict[bytes, Numbered] = {}
         self._updates: list[Numbered] = []
         self._updates_bytes = 0
 
@@ -130,7 +136,11 @@ class _InForce:
         topic = numbered.arrival.topic
         if topic == "map":
             self._updates, self._updates_bytes = [], 0
-        if topic != "map_update":
+        if topic == "tf_static":
+            self._static[numbered.arrival.sample.payload] = numbered
+            while len(self._static) > MOST_STATIC:
+                del self._static[next(iter(self._static))]
+        elif topic != "map_update":
             self._newest[topic] = numbered
         elif "map" in self._newest:
             self._note_update(numbered)
@@ -145,4 +155,5 @@ class _InForce:
 
     def samples(self) -> list[Numbered]:
         newest = [numbered for topic, numbered in self._newest.items() if topic not in PASSING]
-        return sorted((*newest, *self._updates), key=lambda numbered: numbered.number)
+        held = (*newest, *self._static.values(), *self._updates)
+        return sorted(held, key=lambda numbered: numbered.number)

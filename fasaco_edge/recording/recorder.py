@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import chain, count
 from pathlib import Path
@@ -39,7 +40,7 @@ from fasaco_edge.recording.settings import RecorderSettings
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
-from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.pose_decoding import PoseDecoder
 from fasaco_edge.wire.status import decode_json, encode_json
 
 TAKE_TIMEOUT_S = 0.05
@@ -102,6 +103,7 @@ class Recorder:
             "map": self._read_map,
             "map_update": self._read_map_update,
             "pose": self._read_pose,
+            "tf_static": lambda sample: self._read_pose(sample, "tf_static"),
             "command": self._read_command,
             "turns": lambda _: None,  # for a replay, which reads the inputs
             "path": self._read_path,
@@ -109,6 +111,7 @@ class Recorder:
             "pheromone": self._read_pheromone,
             "status": self._read_status,
         }
+        self._poses = PoseDecoder(settings.pose_schema, settings.frames)
         self._messages = 0
         self._malformed = 0
         self._last_status_ns: int | None = None
@@ -119,9 +122,11 @@ class Recorder:
     def listen(self) -> None:
         """Subscribe to everything there is to record, and say that the recorder is there."""
         settings, keys = self._settings, self._settings.keys
-        self._subscribe("map", settings.map_key or keys.map, latched=True)
-        self._subscribe("map_update", settings.map_update_key or keys.map_update)
-        self._subscribe("pose", settings.pose_key or keys.pose)
+        self._subscribe("map", keys.map, latched=True)
+        self._subscribe("map_update", keys.map_update)
+        self._subscribe("pose", keys.pose)
+        for ros in settings.ros:
+            self._subscribe(ros.topic, ros.key, ros.latched, ros.depth, ros.schema)
         self._subscribe("command", keys.command)
         self._subscribe("path", keys.path, latched=True)
         self._subscribe("coverage", keys.coverage, latched=True)
@@ -164,11 +169,14 @@ class Recorder:
         """Log something that went wrong before the recording began."""
         self._scene.complain(entities.RECORDER_LOG, line)
 
-    def _subscribe(self, topic: str, key: str, latched: bool = False) -> None:
+    def _subscribe(
+        self, topic: str, key: str, latched: bool = False, depth: int = 1, schema: str = ""
+    ) -> None:
         def post(sample: Sample) -> None:
-            self._inbox.post(topic, sample)
+            # As the daemon has it: ROS names no type beside a sample.
+            self._inbox.post(topic, replace(sample, schema=schema) if schema else sample)
 
-        self._bus.subscribe(key, post, latched)
+        self._bus.subscribe(key, post, latched, depth)
 
     def _sync(self) -> None:
         now_ns = time.monotonic_ns()
@@ -194,9 +202,11 @@ class Recorder:
     def _read_map_update(self, sample: Sample) -> None:
         self._scene.add_map_update(decode_map_update(sample.payload))
 
-    def _read_pose(self, sample: Sample) -> None:
-        schema = sample.schema or self._settings.pose_schema
-        self._scene.add_pose(decode_pose(sample.payload, schema))
+    def _read_pose(self, sample: Sample, topic: str = "pose") -> None:
+        is_static = topic == "tf_static"
+        pose = self._poses.decode(sample.payload, sample.schema, is_static=is_static)
+        if pose is not None:
+            self._scene.add_pose(pose)
 
     def _read_command(self, sample: Sample) -> None:
         self._scene.add_command(decode_json(sample.payload))

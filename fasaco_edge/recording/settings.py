@@ -8,9 +8,29 @@ from pathlib import Path
 from fasaco_edge.bus.session import BusSettings
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.pose_decoding import DEFAULT_FRAMES
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
 MEGABYTE = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class RosInput:
+    """A topic of ROS 2 that the mission hears.
+
+    Attributes:
+        topic: what it is for the mission: "map", "map_update", "pose" or "tf_static".
+        key: Zenoh's; may hold wildcards.
+        schema: type of its messages, which ROS does not say.
+        latched: whether who joins late gets the last samples.
+        depth: how many.
+    """
+
+    topic: str
+    key: str
+    schema: str
+    latched: bool = False
+    depth: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,8 +42,8 @@ class RecorderSettings:
         robot: name of the robot.
         base: what all keys begin with.
         bus: how to join the bus.
-        map_key, map_update_key, pose_key: keys to listen on where they are not the native
-            ones; "" for native.
+        ros: topics of ROS 2 to listen to beside the native keys.
+        frames: the map's and the robot's, where poses come as transforms.
         pose_schema: message type of poses that come without one, as under ROS 2.
         part_bytes: a part larger than this is followed by the next.
         part_s: and so is one that is older [s]; 0 for never. What rerun keeps of each part until
@@ -42,9 +62,8 @@ class RecorderSettings:
     robot: str = "robot"
     base: str = "fasaco"
     bus: BusSettings = field(default_factory=BusSettings)
-    map_key: str = ""
-    map_update_key: str = ""
-    pose_key: str = ""
+    ros: tuple[RosInput, ...] = ()
+    frames: tuple[str, str] = DEFAULT_FRAMES
     pose_schema: str = POSE_STAMPED
     part_bytes: int = 64 * MEGABYTE
     part_s: float = 600.0

@@ -18,7 +18,7 @@ from fasaco_edge.mission.polygons import Polygon
 from fasaco_edge.recording.fields import Json, integer, number, section, text
 from fasaco_edge.review.plans import PlanLog
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
-from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.pose_decoding import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from fasaco_edge.wire.status import decode_json
 from fasaco_edge.wire.turns import decode_turns
@@ -134,11 +134,12 @@ class _Listener:
         self.story = story
         self._began_ns = began_ns
         self._now = 0.0
-        self._schema = POSE_STAMPED
+        self._poses = PoseDecoder(POSE_STAMPED)
         self._hear: dict[str, Callable[[Arrival], None]] = {
             "map": self._map,
             "map_update": self._map_update,
             "pose": self._pose,
+            "tf_static": self._pose,
             "command": self._command,
             "status": self._status,
             "turns": self._turns,
@@ -169,7 +170,11 @@ class _Listener:
         self.story.map_s.append(self._now)
 
     def _pose(self, arrival: Arrival) -> None:
-        pose = decode_pose(arrival.sample.payload, arrival.sample.schema or self._schema).pose
+        sample, is_static = arrival.sample, arrival.topic == "tf_static"
+        stamped = self._poses.decode(sample.payload, sample.schema, is_static=is_static)
+        if stamped is None:
+            return
+        pose = stamped.pose
         self.story.pose_s.append(self._now)
         self.story.poses.append((pose.x, pose.y, pose.yaw))
 
@@ -184,7 +189,10 @@ class _Listener:
         story.config = section(status, "config") or story.config
         story.version = text(status, "version") or story.version
         story.robot = text(status, "robot") or story.robot
-        self._schema = text(section(story.config, "pose"), "schema") or self._schema
+        self._poses.schema = text(section(story.config, "pose"), "schema") or self._poses.schema
+        frames = section(section(story.config, "ros2"), "frames")
+        if frames:
+            self._poses.follow((text(frames, "map"), text(frames, "robot")))
         zones = section(status, "mission").get("zones")
         by_code = section(section(status, "errors"), "by_code")
         story.statuses.append(

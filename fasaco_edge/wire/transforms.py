@@ -37,6 +37,10 @@ class TransformTree:
         self._links: dict[str, _Link] = {}
         self._told: StampedPose | None = None
 
+    def follow(self, map_frame: str, robot_frame: str) -> None:
+        """Want poses between other frames from now on; what is known of all of them stays."""
+        self._map_frame, self._robot_frame = map_frame, robot_frame
+
     def take(self, transforms: Iterable[Transform], *, is_static: bool) -> StampedPose | None:
         """Take transforms in; return the robot's pose if it is known and another than before.
 

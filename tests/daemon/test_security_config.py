@@ -9,6 +9,7 @@ import yaml
 
 from fasaco_edge.daemon.config import load_config
 from fasaco_edge.daemon.endpoints import from_here, is_local
+from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.errors import BadConfiguration, OpenToEveryone
 from tests.daemon.processes import PROGRAM
 
@@ -194,3 +195,19 @@ def test_a_role_for_ros_needs_topics(tmp_path):
             listen=["tcp/127.0.0.1:7447"],
             security={"kind": "user", "user": USER, "roles": {"ros": ["ros"]}},
         )
+
+
+def test_a_recorder_hears_the_topics_of_ros(tmp_path):
+    files = {name: tmp_path / USER[name] for name in ("password_file", "dictionary_file")}
+    for file in files.values():
+        file.write_text("robot:secret")
+    user = USER | {name: str(file) for name, file in files.items()}
+    roles = {"kind": "user", "user": user, "roles": {"recorder": ["black-box"]}}
+    config = load(tmp_path, listen=["tcp/127.0.0.1:7447"], security=roles)
+    ros = RosConfig(kind="bridge", namespace="/robot1")
+    rules = config.bus.settings("fasaco/@v1/robot", ros).secured["access_control"]["rules"]
+    heard = [rule for rule in rules if "robot1/map" in rule["key_exprs"]]
+    assert any("declare_subscriber" in rule["messages"] for rule in heard)
+    for rule in heard:
+        assert {"robot1/tf", "robot1/tf_static"} <= set(rule["key_exprs"])
+        assert "put" not in rule["messages"] or rule["flows"] == ["egress"]
