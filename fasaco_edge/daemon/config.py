@@ -25,6 +25,7 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.pose_decoding import PoseDecoder
 
 Metres = Annotated[float, Meta(gt=0, le=10)]
 Percent = Annotated[int, Meta(ge=0, le=100)]
@@ -117,6 +118,13 @@ class DaemonConfig(Section, frozen=True):
             BadConfiguration: a name does not fit into a key.
         """
         return Keys(robot=self.robot.name, base=self.bus.base)
+
+    def poses(self) -> PoseDecoder:
+        """Return what decodes poses, as they come by the native key or by ROS 2."""
+        frames = None
+        if self.ros2 and self.ros2.pose == "tf":
+            frames = (self.ros2.frames.map, self.ros2.frames.robot)
+        return PoseDecoder(self.pose.schema, frames)
 
 
 def load_config(path: Path | None) -> DaemonConfig:

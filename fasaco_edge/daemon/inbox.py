@@ -5,10 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.mailbox import Mailbox, Spacing
-from fasaco_edge.bus.session import Bus, Sample
+from fasaco_edge.bus.session import Bus, Sample, Subscription
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.events import (
     Event,
@@ -19,12 +18,7 @@ from fasaco_edge.mission.events import (
 )
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
-from fasaco_edge.wire.poses import decode_pose
-from fasaco_edge.wire.schemas import TF_MESSAGE
-from fasaco_edge.wire.tf import decode_transforms
-
-if TYPE_CHECKING:
-    from fasaco_edge.daemon.ros_bridge import RosBridge
+from fasaco_edge.wire.pose_decoding import PoseDecoder
 
 # From one map to the next that is taken in, at least [s]: a flood of maps, by mistake or malice,
 # must not take a core. No mapper is that fast.
@@ -57,22 +51,26 @@ def make_mailbox(map_spacing_s: float = MAP_SPACING_S) -> Mailbox[object]:
 
 
 class Inbox:
-    """Subscribes to what the mission needs, and decodes it."""
+    """Subscribes to what the mission needs, and decodes it.
+
+    Args:
+        bus, keys: where the native keys are heard.
+        mailbox: where all samples wait.
+        poses: decodes poses.
+        maps: other subscriptions that maps come by.
+    """
 
     def __init__(
         self,
         bus: Bus,
         keys: Keys,
         mailbox: Mailbox[object],
-        pose_schema: str,
-        ros: RosBridge | None = None,
+        poses: PoseDecoder,
+        maps: Sequence[Subscription] = (),
     ) -> None:
-        self._pose_schema = pose_schema
+        self._poses = poses
         self._asked_for_map_at = float("-inf")
-        self._transforms = ros.transforms if ros else None
-        self._maps = [bus.subscribe(keys.map, _poster(mailbox, "map"), latched=True)]
-        if ros is not None:
-            self._maps.append(ros.map)
+        self._maps = [bus.subscribe(keys.map, _poster(mailbox, "map"), latched=True), *maps]
         for kind, key in (("map_update", keys.map_update), ("pose", keys.pose)):
             bus.subscribe(key, _poster(mailbox, kind))
 
@@ -130,11 +128,8 @@ class Inbox:
         """Return the event in a sample; None for transforms that tell no new pose."""
         if kind == "map_update":
             return PatchReceived(decode_map_update(sample.payload))
-        schema = sample.schema or self._pose_schema
-        if self._transforms is None or schema != TF_MESSAGE:
-            return PoseReceived(decode_pose(sample.payload, schema))
-        transforms = decode_transforms(sample.payload)
-        pose = self._transforms.take(transforms, is_static=kind == "tf_static")
+        is_static = kind == "tf_static"
+        pose = self._poses.decode(sample.payload, sample.schema, is_static=is_static)
         return None if pose is None else PoseReceived(pose)
 
 

@@ -84,7 +84,7 @@ class Replay:
         self._run = run or RecordedRun()
         self._mailbox = make_mailbox(map_spacing_s=0.0)
         bus = SilentBus()
-        self._inbox = Inbox(bus, config.keys(), self._mailbox, config.pose.schema)
+        self._inbox = Inbox(bus, config.keys(), self._mailbox, config.poses())
         self._heard = {*bus.heard, COMMAND}
         self.mission, loader, planner = load_mission(config, self._mailbox)
         self.plans = ReplayPlanner(planner, self._run, config.planner.budget_s, work)

@@ -16,7 +16,6 @@ from fasaco_edge.bus.session import Bus, Publisher, Sample, Subscription
 from fasaco_edge.daemon.inbox import Received
 from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, attachment, gid_of
-from fasaco_edge.wire.transforms import TransformTree
 
 
 class RosBridge:
@@ -24,7 +23,6 @@ class RosBridge:
 
     Attributes:
         map: the map's subscription, to be renewed where the map is lacking.
-        transforms: what poses come from; None where they have a topic of their own.
         path, coverage: where to publish them.
     """
 
@@ -36,9 +34,6 @@ class RosBridge:
         self._endpoints = 0
         if config.kind == "rmw_zenoh":
             bus.token(self._node.token)
-        frames = config.frames
-        by_tf = config.pose == "tf"
-        self.transforms = TransformTree(frames.map, frames.robot) if by_tf else None
         self.map = self._subscribe("map", config.map)
         self._subscribe("map_update", config.map_updates)
         for kind, topic in config.poses.items():

@@ -98,7 +98,7 @@ def _serve(
     mailbox = make_mailbox()
     ros = RosBridge(bus, config.ros2, mailbox) if config.ros2 else None
     outbox = Outbox(bus, keys, ros)
-    inbox = Inbox(bus, keys, mailbox, config.pose.schema, ros)
+    inbox = Inbox(bus, keys, mailbox, config.poses(), [ros.map] if ros else [])
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
     commands = Commands(bus, keys, mailbox)
     turns = TurnLog(bus.publisher(keys.turns, qos=QOS["turns"]), config, ledger.restored)

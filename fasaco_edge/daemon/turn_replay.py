@@ -74,7 +74,7 @@ class TurnReplay:
     def __init__(self, config: DaemonConfig, record: TurnRecord) -> None:
         self._record = record
         mailbox = make_mailbox()
-        self._inbox = Inbox(SilentBus(), config.keys(), mailbox, config.pose.schema)
+        self._inbox = Inbox(SilentBus(), config.keys(), mailbox, config.poses())
         self.mission, loader, self._planner = load_mission(config, mailbox)
         cell_m, ledger = config.robot.tool_width_m, record.beginning.ledger
         disk = NoDisk(decode_ledger(ledger, cell_m) if ledger else None)

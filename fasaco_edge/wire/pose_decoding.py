@@ -16,18 +16,20 @@ class PoseDecoder:
 
     Args:
         schema: type of those that come without one.
-        frames: the map's and the robot's, for transforms.
+        frames: the map's and the robot's, for transforms; None where none are taken.
 
     Attributes:
         schema: as above; may be changed.
     """
 
-    def __init__(self, schema: str, frames: tuple[str, str] = DEFAULT_FRAMES) -> None:
+    def __init__(self, schema: str, frames: tuple[str, str] | None = DEFAULT_FRAMES) -> None:
         self.schema = schema
-        self._transforms = TransformTree(*frames)
+        self._transforms = TransformTree(*frames) if frames else None
 
     def follow(self, frames: tuple[str, str]) -> None:
         """Take poses out of the transforms between these frames from now on."""
+        if self._transforms is None:
+            self._transforms = TransformTree(*frames)
         self._transforms.follow(*frames)
 
     def decode(self, payload: bytes, schema: str, *, is_static: bool = False) -> StampedPose | None:
@@ -38,6 +40,6 @@ class PoseDecoder:
             TransformLoop: the frames hang on each other.
         """
         schema = schema or self.schema
-        if schema != TF_MESSAGE:
+        if self._transforms is None or schema != TF_MESSAGE:
             return decode_pose(payload, schema)
         return self._transforms.take(decode_transforms(payload), is_static=is_static)

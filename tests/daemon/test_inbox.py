@@ -14,6 +14,7 @@ from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.events import MapReceived, PatchesLost, PatchReceived, PoseReceived
 from fasaco_edge.mission.mission import Mission, MissionConfig
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.pose_decoding import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from tests.daemon.processes import free_endpoint
 from tests.daemon.rooms import (
@@ -34,7 +35,7 @@ class Arrivals:
 
     def __init__(self, bus):
         self.mailbox = make_mailbox(map_spacing_s=0.0)
-        self.inbox = Inbox(bus, Keys(), self.mailbox, POSE_STAMPED)
+        self.inbox = Inbox(bus, Keys(), self.mailbox, PoseDecoder(POSE_STAMPED, None))
         self.clock = 0.0
 
     def post(self, kind, payload):
