@@ -37,7 +37,7 @@ MISSION = """\
 cd /tmp && rm -rf state && exec 2>mission.log
 fasaco-edge run --state state & daemon=$!
 sleep 20
-fasaco-edge simulate office --speed 4 & robot=$!
+fasaco-edge simulate office --speed 4 >drove & robot=$!
 for turn in $(seq 120); do
     sleep 4
     fasaco-edge ask status --json --timeout 30 >asked && mv asked status
