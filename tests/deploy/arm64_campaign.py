@@ -27,7 +27,7 @@ PROGRAM = "/usr/local/bin/fasaco-edge"
 PLANS = {
     "colony alone": ("basement", "--no-local-search", "--ants", "60", "--turn-s", "1.5"),
     "local search": ("flat", "--budget", "1e5", "--ants", "40", "--turn-s", "1.5"),
-    "local search, larger": ("basement", "--budget", "1e5", "--ants", "5", "--turn-s", "1.5"),
+    "local search, larger": ("basement", "--budget", "1e5", "--ants", "8", "--turn-s", "1.5"),
     "spiral-stc": ("office", "--planner", "spiral-stc"),
 }
 # What the clock says of a plan.
