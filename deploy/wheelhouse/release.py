@@ -93,10 +93,8 @@ def _try_out(release: Path, target: Target) -> None:
     wheels = release / "wheels"
     for lock in sorted(wheels.glob("requirements*.txt")):
         with tempfile.TemporaryDirectory() as nowhere:
-            _pip(
-                "install", "--dry-run", "--ignore-installed", "--no-index", "--require-hashes",
-                "--find-links", wheels, "--target", nowhere, *_platform(target), "-r", lock,
-            )  # fmt: skip
+            folders = ("--no-index", "--find-links", wheels, "--dest", nowhere)
+            _pip("download", "--require-hashes", *folders, *_platform(target), "-r", lock)
         files = [line for line in lock.read_text("utf-8").splitlines() if "--hash" in line]
         print(f"{lock.name}: complete, {len(files)} wheels with their hashes")
     for file in sorted(wheels.glob("*.whl"), key=lambda file: -file.stat().st_size):

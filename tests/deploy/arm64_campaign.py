@@ -27,7 +27,7 @@ PROGRAM = "/usr/local/bin/fasaco-edge"
 PLANS = {
     "colony alone": ("basement", "--no-local-search", "--ants", "60", "--turn-s", "1.5"),
     "local search": ("flat", "--budget", "1e5", "--ants", "40", "--turn-s", "1.5"),
-    "local search, larger": ("basement", "--budget", "1e5", "--ants", "5", "--turn-s", "1.5"),
+    "local search, larger": ("basement", "--budget", "1e5", "--ants", "8", "--turn-s", "1.5"),
     "spiral-stc": ("office", "--planner", "spiral-stc"),
 }
 # What the clock says of a plan.
@@ -37,7 +37,7 @@ MISSION = """\
 cd /tmp && rm -rf state && exec 2>mission.log
 fasaco-edge run --state state & daemon=$!
 sleep 20
-fasaco-edge simulate office --speed 4 & robot=$!
+fasaco-edge simulate office --speed 4 >drove & robot=$!
 for turn in $(seq 120); do
     sleep 4
     fasaco-edge ask status --json --timeout 30 >asked && mv asked status
