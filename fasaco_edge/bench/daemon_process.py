@@ -18,8 +18,9 @@ from typing import Any, Self
 
 import yaml
 
+from fasaco_edge.bus.declared import Publisher
 from fasaco_edge.bus.qos import QOS
-from fasaco_edge.bus.session import Bus, BusSettings, Publisher, Sample, open_bus
+from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BusUnavailable, NotYet, ProcessEnded
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid

@@ -6,8 +6,9 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from fasaco_edge.bus.declared import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Spacing
-from fasaco_edge.bus.session import Bus, Sample, Subscription
+from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.events import (
     Event,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from fasaco_edge.bus.declared import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.bus.session import Bus, Subscription
+from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.ledger_writer import LedgerWriter
 from fasaco_edge.daemon.loading import Loader

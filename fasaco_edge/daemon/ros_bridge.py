@@ -10,9 +10,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from fasaco_edge.bus.declared import Publisher, Subscription
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.bus.qos import QOS
-from fasaco_edge.bus.session import Bus, Publisher, Sample, Subscription
+from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.daemon.inbox import Received
 from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, attachment, gid_of

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge import __version__
 from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.bus.declared import Publisher
 from fasaco_edge.bus.sample_codec import SampleEncoder
-from fasaco_edge.bus.session import Publisher, Sample
+from fasaco_edge.bus.session import Sample
 from fasaco_edge.daemon.about import config_document
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.decided import DecidedNews, cells_checksum, kernels_name

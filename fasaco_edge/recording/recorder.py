@@ -19,8 +19,9 @@ from pathlib import Path
 from types import FrameType
 
 from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.bus.declared import Publisher
 from fasaco_edge.bus.qos import QOS
-from fasaco_edge.bus.session import Bus, Publisher, Sample, open_bus
+from fasaco_edge.bus.session import Bus, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, FasacoError
 from fasaco_edge.process_memory import resident_mb, return_soon
 from fasaco_edge.recording import entities

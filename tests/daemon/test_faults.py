@@ -10,7 +10,7 @@ import pytest
 
 from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import BusSettings, open_bus
-from fasaco_edge.daemon.loop import ASK_FOR_MAP_S
+from fasaco_edge.daemon.inbox import ASK_FOR_MAP_S
 from fasaco_edge.errors import MalformedMessage
 from tests.daemon.fuzz_campaign import KINDS, run_campaign
 from tests.daemon.mutations import GOOD, REFUSES, mutant
