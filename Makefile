@@ -15,7 +15,8 @@ demo: $(STAMP)  ## watch a robot cover a building nobody mapped before
 test: $(STAMP)  ## all tests
 	# Compiles once what each test would wait for.
 	$(BIN)/fasaco-edge warmup
-	$(BIN)/python -m pytest $(ARGS)
+	# Most tests wait for processes and their timers: three at a time take half as long.
+	$(BIN)/python -m pytest -n 3 --dist loadfile $(ARGS)
 
 check: $(STAMP)  ## format, lint, types, import contracts
 	$(BIN)/ruff format --check .

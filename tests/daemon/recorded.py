@@ -142,10 +142,10 @@ class MappingRobot:
         time.sleep(0.8)
 
     def _is_time(self) -> bool:
-        """Tell whether the next command is due; a robot that has no path yet is not replanned."""
+        """Tell whether the next command is due; one that waits for its first path gets none."""
         if not self._commands or 1e-9 * self._world.stamp_ns < self._commands[0][0]:
             return False
-        return self._commands[0][1] != "replan" or self.status.get("state") == "covering"
+        return self._commands[0][1] == "resume" or self.status.get("state") == "covering"
 
     def _publish(self) -> None:
         emission = self._world.tick()
