@@ -1,6 +1,6 @@
 """Follow deploy/README.md in a lab, as a new user would, with the real wheels.
 
-    python -m tests.deploy.manual_campaign RELEASE
+    PYTHONPATH=deploy python -m tests.deploy.manual_campaign RELEASE
 
 RELEASE is a folder that `make wheelhouse` has made. Every command for the robot is run, in the
 manual's order, while a simulated robot covers a flat; what each took is printed. The kernels are
