@@ -9,14 +9,13 @@ require_python() {
         "name a newer one with --python"
     "$PYTHON" -c 'import venv' 2>/dev/null || fail $NOT_POSSIBLE \
         "$PYTHON cannot make virtual environments" "apt install python3-venv"
-    # The service sees no home folders, so its Python must not lie in one.
+    # What ProtectHome= and PrivateTmp= hide from the service: its Python must not lie there.
     local home
     home=$("$PYTHON" -c 'import os, sys; print(os.path.realpath(sys.base_prefix))')
-    case $home/ in
-    /root/* | /home/* | /tmp/*) fail $NOT_POSSIBLE \
-        "$PYTHON lies in $home, where a service cannot reach it" \
-        "use the system's: --python /usr/bin/python3" ;;
-    esac
+    if [[ $home/ =~ ^/(root|home|run/user|tmp)/ ]]; then
+        fail $NOT_POSSIBLE "$PYTHON lies in $home, where a service cannot reach it" \
+            "use the system's: --python /usr/bin/python3"
+    fi
 }
 
 require_systemd() {

@@ -74,7 +74,7 @@ def warm(lab: Lab, cache: str = "/var/cache/fasaco-edge/numba") -> None:
     name = lab.run(f"{HOME}/current/bin/python3", "-c", tell).stdout.strip()
     there = Path(name, _folder_of(f"{SOURCE}/fasaco_edge/kernels"))
     # For root, who runs robots and asks questions, they are kept elsewhere.
-    for home in (cache, "/root/.cache/fasaco-edge"):
+    for home in (cache, str(Path("~root").expanduser() / ".cache/fasaco-edge")):
         shutil.copytree(here, lab.root / home.lstrip("/") / there, dirs_exist_ok=True)
     # Finds all of them, and notes that the cache is complete.
     lab.run("env", f"NUMBA_CACHE_DIR={cache}", "fasaco-edge", "warmup")
