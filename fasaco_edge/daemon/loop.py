@@ -80,6 +80,7 @@ class Loop:
         """Turn until ``stop`` is set."""
         while not stop.is_set():
             items = self._mailbox.take(TICK_S)
+            taken = time.monotonic()
             if self._reload.asked.is_set() and not self._loading:
                 items = self._reload_config(items)
             started = time.monotonic()
@@ -102,7 +103,9 @@ class Loop:
             if self._commands.are_asked:
                 report = self._status.report(mission, self._assignment, self._loading)
                 self._commands.answer(report, is_kept=self._keeping.is_kept(time.monotonic()))
-            self._vitals.beat(self._worker, time.monotonic())
+            ended = time.monotonic()
+            self._vitals.beat(self._worker, ended)
+            self._status.turns.note(ended - taken)
 
     @property
     def _assignment(self) -> Assignment:

@@ -13,6 +13,7 @@ from fasaco_edge.daemon.about import config_document
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.faults import log_fault
 from fasaco_edge.daemon.mission_report import mission_report
+from fasaco_edge.daemon.vitals import TurnTimes
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.assignment import Assignment
 from fasaco_edge.process_memory import resident_mb, thread_count
@@ -73,6 +74,7 @@ class StatusBoard:
 
     def __init__(self, config: DaemonConfig) -> None:
         self.faults = Faults()
+        self.turns = TurnTimes()
         self.ingest_s: float | None = None
         self.plan_s: float | None = None
         self.map_to_path_s: float | None = None
@@ -143,6 +145,7 @@ class StatusBoard:
                 "plan": _ms(self.plan_s),
                 "map_to_path": _ms(self.map_to_path_s),
             },
+            "loop_ms": self.turns.document(),
             "errors": self.faults.document(),
             "ledger": self.ledger,
             "recorder": self.recorder,

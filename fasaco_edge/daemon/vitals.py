@@ -1,8 +1,9 @@
-"""What the loop tells the service manager: what it does, and that it gets on."""
+"""How the loop gets on: what the service manager is told, and how long the turns take."""
 
 from __future__ import annotations
 
 import logging
+import math
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.daemon.notify import ServiceManager
@@ -14,6 +15,46 @@ LOG = logging.getLogger(__name__)
 
 # Of the silence that is allowed: a turn may come late, and a word get lost.
 SHARE = 0.25
+
+# What comes in waits for the turn before: from so long a turn on it is late [s].
+LATE_S = 0.1
+# Durations are told to within 10 %: their logarithms, in buckets from this one up, the last for
+# all beyond 18 minutes. So the figures of a year take as much memory as those of a minute.
+LEAST_S, PER_DOUBLING, BUCKETS = 1e-6, 8, 8 * 30
+
+
+class TurnTimes:
+    """How long the turns of a loop took, since it began."""
+
+    def __init__(self) -> None:
+        self._counts = [0] * BUCKETS
+        self._turns = self._late = 0
+        self._longest_s = 0.0
+
+    def note(self, seconds: float) -> None:
+        """Count a turn."""
+        doublings = math.log2(max(seconds, LEAST_S) / LEAST_S)
+        self._counts[min(int(doublings * PER_DOUBLING), BUCKETS - 1)] += 1
+        self._turns += 1
+        self._late += seconds > LATE_S
+        self._longest_s = max(self._longest_s, seconds)
+
+    def document(self) -> dict[str, Any]:
+        """Return the figures as part of a status [ms]; null before the first turn."""
+        figures: dict[str, Any] = {"turns": self._turns, "late": self._late}
+        for name, share in (("p50", 0.5), ("p99", 0.99), ("p99_9", 0.999), ("max", 1.0)):
+            figures[name] = round(1e3 * self._within(share), 3) if self._turns else None
+        return figures
+
+    def _within(self, share: float) -> float:
+        """Return within how long this share of the turns was over [s]."""
+        missing = math.ceil(share * self._turns)
+        for bucket, count in enumerate(self._counts[:-1]):
+            missing -= count
+            if missing <= 0:
+                most_s = LEAST_S * math.exp2((bucket + 1) / PER_DOUBLING)
+                return min(most_s, self._longest_s)
+        return self._longest_s
 
 
 class Vitals:

@@ -168,7 +168,7 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     free_pixels = sum((row // 6, col // 6) not in fits for row, col in np.argwhere(pixels == FREE))
     assert set(status) == {
         *("robot", "version", "state", "reason", "uptime_s", "map", "pose", "coverage", "path"),
-        *("plan", "latency_ms", "errors", "ledger", "recorder", "rss_mb", "cpu_s"),
+        *("plan", "latency_ms", "loop_ms", "errors", "ledger", "recorder", "rss_mb", "cpu_s"),
         *("threads", "config", "mission"),
     }
     assert (status["robot"], status["state"], status["reason"]) == ("robot", "covering", "path 1")

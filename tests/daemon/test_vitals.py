@@ -1,4 +1,4 @@
-"""The watchdog is fed by progress, and by nothing else."""
+"""The watchdog is fed by progress, and by nothing else; how long turns take is told."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from fasaco_edge.daemon.vitals import Vitals, status_line
+from fasaco_edge.daemon.vitals import LATE_S, TurnTimes, Vitals, status_line
 from fasaco_edge.daemon.worker import PlanningWorker
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
@@ -114,3 +114,32 @@ def test_a_status_is_told_in_a_line():
     )
     waiting = {"state": "waiting", "reason": "no map", "coverage": None, "path": None, "ledger": {}}
     assert status_line(waiting) == "waiting: no map"
+
+
+def test_how_long_turns_take_is_told_to_within_ten_percent():
+    seconds = np.random.default_rng(1).lognormal(-7.0, 2.0, 20_000)
+    times = TurnTimes()
+    assert set(times.document().values()) == {0, None}
+    for each in seconds:
+        times.note(float(each))
+    told = times.document()
+    assert told["turns"] == len(seconds)
+    assert told["late"] == (seconds > LATE_S).sum() > 0
+    assert told["max"] == round(1e3 * seconds.max(), 3)
+    for name, share in (("p50", 0.5), ("p99", 0.99), ("p99_9", 0.999)):
+        true = 1e3 * np.quantile(seconds, share, method="inverted_cdf")
+        assert true <= told[name] + 0.001 <= 1.1 * true + 0.002
+
+
+def test_turns_beyond_every_bucket_are_told_too():
+    times = TurnTimes()
+    for seconds in (0.0, 1e-9, 1e7):
+        times.note(seconds)
+    assert times.document() == {
+        "turns": 3,
+        "late": 1,
+        "p50": 0.001,
+        "p99": 1e10,
+        "p99_9": 1e10,
+        "max": 1e10,
+    }
