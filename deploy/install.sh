@@ -1,9 +1,10 @@
-#!/usr/bin/env bash
+#!/bin/bash -p
 # Installs fasaco_edge as a service, or upgrades it; `install.sh --help` says how.
 set -euo pipefail
+PATH=/usr/sbin:/usr/bin:/sbin:/bin:/usr/local/bin
 
 PROGRAM=install.sh
-HERE=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
+HERE=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
 EXAMPLE=fasaco-edge.yaml
 # shellcheck source=deploy/steps/common.sh
 . "$HERE/steps/common.sh"
@@ -73,6 +74,8 @@ read_words() {
         esac
         shift
     done
+    WHEELS=$(from_caller "$WHEELS")
+    [[ $PYTHON != */* ]] || PYTHON=$(from_caller "$PYTHON")
 }
 
 install_version() {
@@ -171,7 +174,7 @@ main() {
     require_systemd
     # A robot may be driving: what is done here gives way to it.
     renice --priority 10 $$ >/dev/null 2>&1 || true
-    SCRATCH=$(mktemp --directory)
+    SCRATCH=$(mktemp --directory /tmp/fasaco-edge.XXXXXXXXXX)
     trap tidy EXIT
     trap 'exit 130' INT
     trap 'exit 143' TERM

@@ -1,9 +1,10 @@
-#!/usr/bin/env bash
+#!/bin/bash -p
 # Removes what install.sh has installed; `uninstall.sh --help` says how.
 set -euo pipefail
+PATH=/usr/sbin:/usr/bin:/sbin:/bin:/usr/local/bin
 
 PROGRAM=uninstall.sh
-HERE=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
+HERE=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
 # shellcheck source=deploy/steps/common.sh
 . "$HERE/steps/common.sh"
 

@@ -9,6 +9,21 @@ KERNELS=/var/cache/fasaco-edge/numba
 DAEMON=fasaco-edge.service
 RECORDER=fasaco-edge-recorder.service
 
+# What a caller's environment, folder and mode mask say does not count here: root runs this, and
+# anybody may have written what they point to. (Run by its own first line, bash takes neither
+# functions nor BASH_ENV from there.)
+CALLED_FROM=$PWD
+for name in $(compgen -e); do
+    [[ $name == SETTLE_S ]] || unset "$name" 2>/dev/null || true
+done
+unset name
+PATH=/usr/sbin:/usr/bin:/sbin:/bin:/usr/local/bin
+export PATH LC_ALL=C.UTF-8
+umask 022
+cd /
+# How long a service has to stay up to count as up [s].
+SETTLE_S=${SETTLE_S:-3}
+
 # Exit codes; --help explains them.
 FAILED=1 NOT_UNDERSTOOD=2 NOT_POSSIBLE=3 NOT_FIT=4 ROLLED_BACK=5
 
@@ -50,6 +65,11 @@ require_to_be_alone() {
     exec 9<"$PREFIX"
     flock --nonblock 9 || fail $NOT_POSSIBLE "another install.sh or uninstall.sh is at work" \
         "wait until it is done"
+}
+
+# from_caller PATH: the same, absolute, if it is relative to where this was called.
+from_caller() {
+    if [[ ! $1 || $1 == /* ]]; then echo "$1"; else echo "$CALLED_FROM/$1"; fi
 }
 
 systemd_runs() {

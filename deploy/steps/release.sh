@@ -1,17 +1,22 @@
 # What is to be installed, and whether it can be installed here.
 # shellcheck shell=bash disable=SC2034,SC2154
 
+# Python as root runs it: nothing of a user's, nor of the folder it is called in.
+python() {
+    "$PYTHON" -I "$@"
+}
+
 require_python() {
     "$PYTHON" -V >/dev/null 2>&1 || fail $NOT_POSSIBLE "there is no $PYTHON here" \
         "apt install python3 python3-venv, or name another with --python"
-    "$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || fail $NOT_POSSIBLE \
+    python -c 'import sys; sys.exit(sys.version_info < (3, 11))' || fail $NOT_POSSIBLE \
         "fasaco_edge needs Python 3.11 or newer, $PYTHON is $("$PYTHON" -V 2>&1)" \
         "name a newer one with --python"
-    "$PYTHON" -c 'import venv' 2>/dev/null || fail $NOT_POSSIBLE \
+    python -c 'import venv' 2>/dev/null || fail $NOT_POSSIBLE \
         "$PYTHON cannot make virtual environments" "apt install python3-venv"
     # What ProtectHome= and PrivateTmp= hide from the service: its Python must not lie there.
     local home
-    home=$("$PYTHON" -c 'import os, sys; print(os.path.realpath(sys.base_prefix))')
+    home=$(python -c 'import os, sys; print(os.path.realpath(sys.base_prefix))')
     if [[ $home/ =~ ^/(root|home|run/user|tmp)/ ]]; then
         fail $NOT_POSSIBLE "$PYTHON lies in $home, where a service cannot reach it" \
             "use the system's: --python /usr/bin/python3"
@@ -50,11 +55,11 @@ make_wheels() {
         exit 0
     fi
     say "downloading the wheels that this source tree needs"
-    "$PYTHON" -m venv "$SCRATCH/pip" >&2 || fail $NOT_POSSIBLE \
+    python -m venv "$SCRATCH/pip" >&2 || fail $NOT_POSSIBLE \
         "$PYTHON cannot make an environment with pip, see above" "apt install python3-venv"
     local with=()
     [[ $RECORDING ]] || with=(--without-recording)
-    PYTHONPATH=$HERE "$SCRATCH/pip/bin/python" -m wheelhouse --out "$SCRATCH" \
+    env --chdir="$HERE" "$SCRATCH/pip/bin/python" -E -s -m wheelhouse --out "$SCRATCH" \
         --python "$(python_version)" "${with[@]}" >"$SCRATCH/log" 2>&1 ||
         { tail -n 20 "$SCRATCH/log" >&2; fail $FAILED "the wheels could not be downloaded" \
             "without a network give a folder made by \`make wheelhouse\` with --wheels"; }
@@ -76,7 +81,7 @@ read_release() {
     [[ $VERSION =~ ^[0-9][0-9A-Za-z.+]*$ && $NEEDED_MB =~ ^[0-9]+$ ]] || fail $NOT_POSSIBLE \
         "$WHEELS/RELEASE is damaged" "copy the release folder again"
     local here
-    here=$("$PYTHON" -c 'import sysconfig; print(sysconfig.get_platform().removeprefix("linux-"))')
+    here=$(python -c 'import sysconfig; print(sysconfig.get_platform().removeprefix("linux-"))')
     [[ $here == "$ARCH" ]] || fail $NOT_POSSIBLE \
         "these wheels are for $ARCH, $PYTHON here is for $here" \
         "make wheelhouse ARCH=$here"
@@ -94,7 +99,7 @@ read_release() {
 
 require_libc() {
     local libc
-    libc=$("$PYTHON" -c 'import platform; print("".join(platform.libc_ver()))')
+    libc=$(python -c 'import platform; print("".join(platform.libc_ver()))')
     [[ $libc == glibc* && $(printf '%s\n' 2.28 "${libc#glibc}" | sort -V | head -n 1) == 2.28 ]] ||
         fail $NOT_POSSIBLE "the wheels need glibc 2.28 or newer, here is ${libc:-another C library}" \
             "use Debian 10, Ubuntu 20.04 or newer"
@@ -110,7 +115,7 @@ require_room() {
 }
 
 python_version() {
-    "$PYTHON" -c 'import sys; print(*sys.version_info[:2], sep=".")'
+    python -c 'import sys; print(*sys.version_info[:2], sep=".")'
 }
 
 # What makes two builds of the same version the same: wheels, deployed files, Python.

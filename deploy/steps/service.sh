@@ -1,9 +1,6 @@
 # Units, the switch from one version to another, and back.
 # shellcheck shell=bash disable=SC2154
 
-# How long a service has to stay up to count as up [s].
-SETTLE_S=${SETTLE_S:-3}
-
 # lay FILE PLACE: put a copy there in one go, unless it is there already.
 lay() {
     cmp --silent "$1" "$2" && return

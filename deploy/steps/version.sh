@@ -26,11 +26,13 @@ build_version() {
     BUILDING=$place
     rm -rf "$place"
     mkdir -p "$PREFIX"
-    "$PYTHON" -m venv --without-pip "$place"
-    "$PYTHON" -m zipfile --extract "$WHEELS"/pip-*.whl "$SCRATCH/pip"
+    python -m venv --without-pip "$place"
+    python -m zipfile --extract "$WHEELS"/pip-*.whl "$SCRATCH/pip"
     pip install --no-index --require-hashes --find-links "$WHEELS" --requirement "$LOCK" ||
         fail $FAILED "the wheels in $WHEELS could not be installed, see above" \
             "copy the release folder again: a file is missing or damaged"
+    # As root runs it, too: it imports nothing but what is installed here.
+    sed --in-place '1s/$/ -I/' "$place/bin/fasaco-edge"
     mkdir "$place/deploy"
     (cd "$HERE" && find . -path ./wheels -prune -o -path ./wheelhouse -prune -o -type f -print0 |
         xargs -0 cp --parents --target-directory="$place/deploy")
@@ -42,9 +44,8 @@ build_version() {
 
 # The release's own pip; nobody's settings of pip decide what is installed here.
 pip() {
-    PYTHONPATH=$SCRATCH/pip PIP_CONFIG_FILE=/dev/null \
-        "$PREFIX/$NAME/bin/python" -m pip --isolated --quiet --disable-pip-version-check \
-        "$@"
+    PIP_CONFIG_FILE=/dev/null "$PREFIX/$NAME/bin/python" -I "$SCRATCH/pip/pip" \
+        --isolated --quiet --disable-pip-version-check "$@"
 }
 
 # Run a program of the new version as the service's user, in the service's cache: only what that
@@ -54,8 +55,7 @@ as_service() {
         --property=DynamicUser=yes --property=User=fasaco-edge \
         --property=CacheDirectory=fasaco-edge --property=PrivateNetwork=yes \
         --property=ProtectHome=yes --property=Nice=10 --property=CPUWeight=20 \
-        --setenv=NUMBA_CACHE_DIR=$KERNELS --setenv=HOME=/nonexistent \
-        --setenv=PYTHONNOUSERSITE=1 -- "$@" </dev/null
+        --setenv=NUMBA_CACHE_DIR=$KERNELS --setenv=HOME=/nonexistent -- "$@" </dev/null
 }
 
 try_version() {

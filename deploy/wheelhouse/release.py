@@ -110,4 +110,6 @@ def _platform(target: Target) -> list[str]:
 
 def _pip(command: str, *words: str | Path) -> None:
     quiet = ["--quiet", "--disable-pip-version-check"]
-    subprocess.run([sys.executable, "-m", "pip", command, *quiet, *map(str, words)], check=True)
+    subprocess.run(
+        [sys.executable, "-I", "-m", "pip", command, *quiet, *map(str, words)], check=True
+    )

@@ -7,7 +7,6 @@ import queue
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 import time
 from collections import deque
@@ -21,6 +20,7 @@ import yaml
 from fasaco_edge.bus.declared import Publisher
 from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.child_process import python_program
 from fasaco_edge.errors import BusUnavailable, NotYet, ProcessEnded
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -35,7 +35,7 @@ START_TIMEOUT_S = 20.0
 PATH_TIMEOUT_S = 60.0
 STOP_TIMEOUT_S = 8.0
 LOOK_EVERY_S = 0.002
-PROGRAM = (sys.executable, "-m", "fasaco_edge")
+PROGRAM = python_program("fasaco_edge")
 
 
 def warm_kernels() -> None:

@@ -6,7 +6,6 @@ import argparse
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Generator, Sequence, Set
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from fasaco_edge.bench.daemon_process import DaemonProcess, warm_kernels
 from fasaco_edge.bench.machine import machine, peak_mb
 from fasaco_edge.bench.placement import cpu_seconds, place, weighed
 from fasaco_edge.bench.spread import percentile
+from fasaco_edge.child_process import python_program
 from fasaco_edge.errors import ProcessEnded
 
 # As the daemon's unit has it.
@@ -142,7 +142,7 @@ def _run(
 
 def _control_loop(length_s: float, cores: Set[int]) -> tuple[int, ...]:
     """Run a control loop in a process of its own; return how late each tick began [µs]."""
-    words = [sys.executable, "-m", "fasaco_edge.bench.control_loop", str(HZ), str(length_s)]
+    words = python_program("fasaco_edge.bench.control_loop", str(HZ), str(length_s))
     taskset = ["taskset", "--cpu-list", ",".join(map(str, sorted(cores)))]
     done = subprocess.run([*taskset, *words], capture_output=True, text=True, check=False)
     if done.returncode:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 import tempfile
 from collections.abc import Generator, Sequence
 from dataclasses import asdict, dataclass
@@ -15,9 +14,10 @@ import numpy as np
 from fasaco_edge.bench.benchmark import Say
 from fasaco_edge.bench.buildings import building
 from fasaco_edge.bench.scale_process import ScaleRun, ScaleTask
+from fasaco_edge.child_process import python_program
 from fasaco_edge.errors import BadConfiguration, ProcessEnded
 
-PROGRAM = (sys.executable, "-m", "fasaco_edge.bench.scale_process")
+PROGRAM = python_program("fasaco_edge.bench.scale_process")
 WARM_S = 0.1
 
 

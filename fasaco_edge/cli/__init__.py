@@ -40,6 +40,8 @@ COMMANDS = (
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the process's exit code."""
     words = sys.argv[1:] if argv is None else argv
+    # Whatever the caller's mask is: what is written here, no other user may change.
+    os.umask(os.umask(0o022) | 0o022)
     args = _parser().parse_args(with_negative_pairs(words))
     begin_logging(args.log_level)
     if args.with_parent is not None:

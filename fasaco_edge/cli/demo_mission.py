@@ -7,7 +7,6 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections import deque
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ import yaml
 
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.child_process import python_program
 from fasaco_edge.cli.demo_view import DemoView
 from fasaco_edge.errors import BusUnavailable, ProcessEnded
 from fasaco_edge.grid.map_files import find_map
@@ -122,7 +122,7 @@ class DemoMission:
         }
 
     def _spawn(self, name: str, words: list[str]) -> None:
-        program = [sys.executable, "-m", "fasaco_edge", *words]
+        program = python_program("fasaco_edge", *words)
         program += ["--with-parent", str(os.getpid())]
         with (self._out / f"{name}.log").open("wb") as log:
             process = subprocess.Popen(program, stdout=log, stderr=log)

@@ -13,12 +13,14 @@ import sys
 import threading
 import time
 
+from fasaco_edge.child_process import python_program
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.process_memory import resident_mb
 
 LOG = logging.getLogger(__name__)
 
+MODULE = "fasaco_edge.daemon.compiling"
 # Longer than any one stage takes on a small computer; asked for with each anew [s].
 STAGE_S = 600.0
 LOOK_S = 0.02
@@ -33,8 +35,7 @@ class KernelCompiler:
         self._manager = manager
         self._stages = 0
         self._started = time.monotonic()
-        program = [sys.executable, "-m", "fasaco_edge.daemon.compiling"]
-        self._process = subprocess.Popen(program, stdout=subprocess.PIPE)
+        self._process = subprocess.Popen(python_program(MODULE), stdout=subprocess.PIPE)
         threading.Thread(target=self._listen, name="compiler", daemon=True).start()
 
     def wait(self, stop: threading.Event) -> None:
@@ -87,7 +88,7 @@ def _begin_stage(stage: str) -> None:
     """
     print(stage, flush=True)
     if resident_mb() > MOST_MB and sys.argv[1:] != [stage]:
-        os.execv(sys.executable, [sys.executable, "-m", "fasaco_edge.daemon.compiling", stage])
+        os.execv(sys.executable, python_program(MODULE, stage))
 
 
 if __name__ == "__main__":

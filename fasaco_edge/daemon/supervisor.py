@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import msgspec
 
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, Sample
+from fasaco_edge.child_process import python_program
 from fasaco_edge.daemon.client_security import client_words
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.endpoints import from_here
@@ -113,7 +113,7 @@ def _command(config: DaemonConfig, folder: Path) -> list[str]:
     pose = ["--pose-schema", config.pose.schema]
     if config.ros2:
         pose += ["--ros2", msgspec.json.encode(config.ros2).decode()]
-    program = [sys.executable, "-m", "fasaco_edge", "record"]
+    program = python_program("fasaco_edge", "record")
     parent = ["--with-parent", str(os.getpid())]
     return [
         *program,

@@ -2,6 +2,7 @@
 
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -13,7 +14,18 @@ CACHE_FOLDER = cache_folder()
 if "numba" not in sys.modules:
     os.environ["NUMBA_CACHE_DIR"] = str(CACHE_FOLDER)
 
-import numba  # noqa: E402  (reads NUMBA_CACHE_DIR once, at import)
+# numba takes settings from .numba_config.yaml in the working folder, which may be anybody's: at
+# import, unless there is no reader of YAML, and before it compiles, unless no file has that name.
+warnings.filterwarnings("ignore", "A Numba config file is found")
+_yaml = sys.modules.get("yaml")
+sys.modules["yaml"] = None  # type: ignore[assignment]
+try:
+    import numba  # (reads NUMBA_CACHE_DIR once, at import)
+finally:
+    del sys.modules["yaml"]
+    if _yaml is not None:
+        sys.modules["yaml"] = _yaml
+numba.core.config._config_fname = os.devnull
 
 numba.config.CACHE_DIR = str(CACHE_FOLDER)  # where numba was imported before us
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import importlib.util
 import subprocess
-import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+from fasaco_edge.child_process import python_program
 from fasaco_edge.errors import MissingExtra, ProcessEnded
 from fasaco_edge.recording.whole import whole_part
 
 # Its server would be open to the whole network else, and refuse to start beside another viewer.
-VIEWER = (sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", "auto")
+VIEWER = python_program("rerun", "--bind", "127.0.0.1", "--port", "auto")
 
 
 def view(paths: Sequence[Path]) -> None:

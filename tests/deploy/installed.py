@@ -23,7 +23,7 @@ CHECKOUT = Path(__file__).parents[2]
 PACKAGES = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
 SOURCE = f"{HOME}/source"
 SCRIPT = f"""\
-#!{HOME}/current/bin/python3
+#!{HOME}/current/bin/python3 -I
 import sys
 from fasaco_edge.cli import main
 sys.exit(main())

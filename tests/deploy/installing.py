@@ -14,7 +14,7 @@ PREFIX = "/opt/fasaco-edge"
 CONFIG = "/etc/fasaco-edge/config.yaml"
 HOME = "/srv/home"
 # Where what is installed could leave something.
-WATCHED = ("/etc", "/opt", "/usr/local", "/var/lib", "/var/cache", "/var/log", HOME)
+WATCHED = ("/etc", "/opt", "/usr/local/bin", "/var/lib", "/var/cache", "/var/log", HOME)
 # systemd's own.
 OTHERS = ("/var/lib/systemd", "/var/log/journal", "/var/lib/private ", "/etc/.pwd.lock")
 
@@ -71,7 +71,7 @@ def bare_robot(folder: Path, folders: Mapping[str, Path]) -> Iterator[Robot]:
     with booted(folder, shown | releases.binds()) as lab:
         robot = Robot(lab.pid, lab.boot_s)
         # What this machine has of it already would be taken for ours.
-        robot.run("sh", "-c", f"rm -rf {PREFIX} /etc/fasaco-edge /var/*/private/fasaco-edge*")
+        robot.run("rm", "-rf", "/etc/fasaco-edge")
         robot.run("mkdir", HOME)
         robot.run("systemctl", "set-environment", "NUMBA_DISABLE_JIT=1")
         yield robot

@@ -1,8 +1,9 @@
 """A lab: a real systemd in namespaces of its own, over a throw-away overlay of this machine's root.
 
 It has process ids, mounts, network (``lo`` alone), host name and cgroups of its own. What is
-written inside lies in a tmpfs of its mount namespace, so its end leaves nothing behind; and it
-ends with the process that booted it, however that ends.
+written inside lies in a tmpfs of its mount namespace, so its end leaves nothing behind; what is
+installed on the machine meanwhile is not seen in /etc, /opt, /srv or /var; and it ends with the
+process that booted it, however that ends.
 """
 
 from __future__ import annotations

@@ -13,6 +13,10 @@ from pathlib import Path
 SYSTEMD = "/usr/lib/systemd/systemd"
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 DEVICES = ("null", "zero", "full", "random", "urandom", "tty")
+# What is changed on the machine while a lab runs, by whoever installs a package there, must not be
+# seen inside: of these it has a copy, of the others nothing but an empty folder.
+COPIED = ("etc", "usr/local/bin", "usr/local/sbin")
+EMPTY = ("opt", "srv", "var/cache", "var/lib", "var/log")
 # The machine's own; a lab has neither hardware nor users who log in.
 MASKED = (
     "systemd-udevd.service",
@@ -48,6 +52,7 @@ def main(orders: dict) -> None:
         made.mkdir()
     layers = f"lowerdir={orders['lower']},upperdir={upper},workdir={work}"
     mount("-t", "overlay", "overlay", "-o", layers, root)
+    own_folders(root, folder / "mnt" / "own")
     kernel_interfaces(root, orders["limits"])
     devices(root)
     for inside, outside in orders["binds"].items():
@@ -65,6 +70,19 @@ def main(orders: dict) -> None:
 def mount(*words: object) -> None:
     """Mount, or end with mount's own complaint."""
     subprocess.run(["mount", *map(str, words)], check=True)
+
+
+def own_folders(root: Path, place: Path) -> None:
+    """Put folders of the lab's own over those that programs write to on the machine."""
+    for name in (*COPIED, *EMPTY):
+        shown, own = root / name, place / name
+        if not shown.is_dir():
+            continue
+        own.mkdir(parents=True)
+        if name in COPIED:
+            # A file may go while this reads it.
+            subprocess.run(["cp", "--archive", f"{shown}/.", own], check=False)
+        mount("--bind", own, shown)
 
 
 def kernel_interfaces(root: Path, limits: list[str]) -> None:

@@ -128,6 +128,23 @@ def test_one_that_is_interrupted_leaves_nothing(robot):
     with subprocess.Popen(robot.words(INSTALL), stdout=subprocess.PIPE, text=True) as running:
         assert running.stdout.readline().startswith("build version 1.0")
         time.sleep(1.0)
-        robot.run("pkill", "--full", f"^bash {INSTALL}")
+        robot.run("pkill", "--full", f"^/bin/bash -p {INSTALL}")
     assert running.returncode == 143
     assert robot.files().keys() - before.keys() == set()
+
+
+def test_a_folder_that_somebody_has_prepared(robot):
+    """What lies where root calls it, or where the environment points, is never run."""
+    planted, mark = "/srv/planted", "/srv/planted/LOADED"
+    for name in ("venv", "sysconfig", "platform", "zipfile", "sitecustomize", "os"):
+        robot.write(f"{planted}/{name}.py", f"open({mark!r}, 'a').write({name!r})\n")
+    robot.write(f"{planted}/env.sh", f"echo env.sh >>{mark}\n")
+    told = [f"{name}={planted}" for name in ("PYTHONPATH", "PYTHONHOME", "HOME", "TMPDIR")]
+    told += [f"BASH_ENV={planted}/env.sh", f"PYTHONSTARTUP={planted}/os.py", f"CDPATH={planted}"]
+    folder = ("env", f"--chdir={planted}", *told)
+    steps = robot.run(*folder, INSTALL, "--dry-run").stdout
+    assert "would build version 1.0" in steps
+    robot.run(*folder, f"/srv/{HERE}/uninstall.sh", "--dry-run")
+    # A path is still as the caller means it.
+    assert "/srv/planted/wheels is no folder" in refused(robot, *folder, INSTALL, "--wheels=wheels")
+    assert robot.run("ls", mark, check=False).stdout == ""

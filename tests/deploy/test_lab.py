@@ -70,3 +70,16 @@ def test_nothing_is_left_of_a_lab(tmp_path):
     assert cgroups() == before
     assert not is_running(int((tmp_path / "pid").read_text()))
     assert str(tmp_path) not in Path("/proc/mounts").read_text()
+
+
+def test_what_is_installed_on_the_machine_meanwhile_is_not_seen(lab):
+    names = ("/etc", "/opt", "/usr/local/bin", "/var/lib", "/var/cache", "/var/log")
+    marks = [Path(folder, f"fasaco-edge-lab-{os.getpid()}") for folder in names]
+    try:
+        for mark in marks:
+            mark.write_text("of the machine")
+        seen = lab.run("ls", *map(str, marks), check=False).stdout
+    finally:
+        for mark in marks:
+            mark.unlink(missing_ok=True)
+    assert seen == ""
