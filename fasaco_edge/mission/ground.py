@@ -115,9 +115,17 @@ class Ground:
         window = Window.around(_around(rewired, common), _around(came, mine), _around(went, theirs))
         return replace(change, window=window)
 
-    def legal_steps(self, cells: NDArray[np.int32]) -> int:
-        """Return how many leading steps of a walk, int32 (n, 2), are legal here."""
-        window, steps = self.lattice.window, self.lattice.steps
+    def holding(self, cells: NDArray[np.int32]) -> int:
+        """Return how many leading cells of a walk, int32 (n, 2), can be driven here.
+
+        None where the first one is not coverable: nobody may be sent there.
+        """
+        if not len(cells):
+            return 0
+        lattice, first = self.lattice, (int(cells[0, 0]), int(cells[0, 1]))
+        if not lattice.contains(first) or lattice.states[lattice.local(first)] != COVERABLE:
+            return 0
+        window, steps = lattice.window, lattice.steps
         rows, cols = cells[:-1, 0] - window.row0, cells[:-1, 1] - window.col0
         inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
         allowed = np.zeros(len(rows), np.uint8)
@@ -128,7 +136,7 @@ class Ground:
         for direction, (row_step, col_step) in enumerate(zip(ROW_STEP, COL_STEP, strict=True)):
             heading = (row_moves == row_step) & (col_moves == col_step)
             legal |= heading & (allowed >> direction & 1).astype(bool)
-        return int(np.argmin(legal)) if not legal.all() else len(legal)
+        return 1 + int(np.argmin(legal)) if not legal.all() else len(cells)
 
     def way(self, start: Cell, goal: Cell) -> NDArray[np.int32]:
         """Return a shortest walk, int32 (n, 2); empty where there is none."""

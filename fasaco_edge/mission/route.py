@@ -117,7 +117,7 @@ class Route:
         if attempt is not None:
             return self._take_better(attempt, event, ground)
         cells = self._from_here(event.path.cells, cell, ground)
-        if not len(cells) or ground.legal_steps(cells) < len(cells) - 1:
+        if not len(cells) or ground.holding(cells) < len(cells):
             self.outdated += 1
             self.want(self.wanted or "the map changed while planning", asked.changed)
             return None
@@ -133,7 +133,7 @@ class Route:
         if attempt.revision != self.revision:
             return None
         cells = attempt.joined(self.path, event.path.cells)
-        if cells is None or ground.legal_steps(cells) < len(cells) - 1:
+        if cells is None or ground.holding(cells) < len(cells):
             return None
         return self.publish(cells, "better further on", event)
 
@@ -174,15 +174,18 @@ class Route:
         return self.publish(np.empty((0, 2), np.int32), reason)
 
     def cut_off(self) -> PathUpdate | None:
-        """Shorten a path that a new map blocks, at once; a new plan follows."""
+        """Shorten a path that a new map blocks, at once; a new plan follows.
+
+        Nothing is left of it where the robot's own cell on it is blocked, or is no more.
+        """
         ground = self._site.ground
         if ground is None or ground is self._checked_on:
             return None
         self._checked_on = ground
         ahead = self.path.ahead
-        legal = ground.legal_steps(ahead) if len(ahead) else 0
-        if legal >= len(ahead) - 1:
+        holding = ground.holding(ahead)
+        if holding == len(ahead):
             return None
-        row, col = ahead[legal + 1]
+        row, col = ahead[holding]
         self.wanted = f"path blocked at cell ({row}, {col})"
-        return self.publish(ahead[: legal + 1], self.wanted, changed=self._changed)
+        return self.publish(ahead[:holding], self.wanted, changed=self._changed)

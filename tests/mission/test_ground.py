@@ -199,7 +199,7 @@ def test_a_change_says_what_it_is(change, text):
 
 @settings(max_examples=100, deadline=None)
 @given(problems(max_side=5), st.lists(st.integers(0, 3), max_size=12), st.integers(0, 12))
-def test_legal_steps_are_counted_up_to_the_first_illegal_one(given_ground, headings, jump_at):
+def test_cells_hold_up_to_the_first_illegal_step(given_ground, headings, jump_at):
     lattice, start = given_ground
     walk = [start]
     for index, heading in enumerate(headings):
@@ -211,14 +211,16 @@ def test_legal_steps_are_counted_up_to_the_first_illegal_one(given_ground, headi
         there in around.get(here, {}).values()
         for here, there in itertools.pairwise(map(lattice.local, walk))
     ]
-    expected = legal.index(False) if False in legal else len(legal)
-    assert Ground.around(lattice, start).legal_steps(path(*walk)) == expected
+    expected = 1 + legal.index(False) if False in legal else len(walk)
+    assert Ground.around(lattice, start).holding(path(*walk)) == expected
 
 
-def test_no_path_has_no_legal_steps():
-    room = ground("..")
-    assert room.legal_steps(path()) == 0
-    assert room.legal_steps(path((7, 7))) == 0
+def test_a_walk_that_begins_where_nobody_can_be_does_not_hold():
+    room = ground("..#")
+    assert room.holding(path()) == 0
+    assert room.holding(path((0, 1))) == 1
+    for nowhere in ((7, 7), (0, 2), (-1, 1)):
+        assert room.holding(path(nowhere)) == room.holding(path(nowhere, (0, 1))) == 0
 
 
 def test_the_way_is_in_cells_of_the_map_frame():

@@ -110,6 +110,24 @@ def test_a_path_cut_off_says_where():
     assert drive.updates[-1].changed == Window(0, 4, 1, 8)
 
 
+@pytest.mark.parametrize(
+    ("events", "goes_on_at"),
+    [
+        ([MapReceived(building("#......."))], (0, 1)),
+        ([MapReceived(building(".......", at=(0, 1)))], (0, 1)),
+        ([MapReceived(building("....", at=(40, 40))), pose_at(40, 41)], (40, 41)),
+    ],
+    ids=["blocked", "beyond the map", "carried elsewhere"],
+)
+def test_nobody_is_sent_to_a_cell_that_is_none_any_more(events, goes_on_at):
+    drive = started("........")
+    decision = drive.tell(*events)
+    assert decision.path.reason == "path blocked at cell (0, 0)"
+    assert len(decision.path.cells) == 0
+    drive.plan()
+    assert tuple(drive.updates[-1].cells[0]) == goes_on_at
+
+
 def test_plans_that_lead_to_no_path_are_counted():
     drive = started("........")
     drive.command("replan")
