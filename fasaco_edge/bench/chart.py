@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.palette import Colour
+from fasaco_edge.text import one_line
 
 # Okabe and Ito's colours, which all eyes tell apart, without the yellow: it is lost on white.
 COLOURS: tuple[Colour, ...] = (
@@ -31,6 +32,8 @@ DOT_PX, LINE_PX, GOAL_PX = 3.0, 2, 13
 BAND_SHARE = 0.22
 OVERSAMPLING = 3
 MOST_TICKS = 6
+# Of one text [characters].
+MOST_SAID = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +144,7 @@ class _Pen:
         self._draw = draw
 
     def text(self, x: float, y: float, text: str, size: int, colour: Colour, anchor: str) -> None:
+        text = one_line(text, MOST_SAID)
         font = ImageFont.load_default(size * OVERSAMPLING)
         self._draw.text((x * OVERSAMPLING, y * OVERSAMPLING), text, colour, font, anchor=anchor)
 

@@ -29,6 +29,7 @@ from fasaco_edge.cli import (
 from fasaco_edge.cli.arguments import with_negative_pairs
 from fasaco_edge.cli.logs import begin_logging, say_why
 from fasaco_edge.cli.parent import end_with_parent
+from fasaco_edge.cli.streams import clean_streams
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
 COMMANDS = (
@@ -42,6 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else argv
     # Whatever the caller's mask is: what is written here, no other user may change.
     os.umask(os.umask(0o022) | 0o022)
+    clean_streams()
     args = _parser().parse_args(with_negative_pairs(words))
     begin_logging(args.log_level)
     if args.with_parent is not None:

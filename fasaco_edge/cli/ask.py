@@ -52,11 +52,11 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Ask, and show the answer."""
-    from fasaco_edge.cli.ask_view import print_json, show
+    from fasaco_edge.cli.ask_view import print_answer, show
 
     reply = asking.ask(args, args.question, ";".join(args.param))
     if args.json:
-        print_json(reply)
+        print_answer(reply)
     else:
         show(args.question, reply)
     return exits.OK

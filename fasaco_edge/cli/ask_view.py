@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
 import yaml
-from rich.markup import escape
 
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.cli import mission_view
+from fasaco_edge.cli.streams import print_json
 from fasaco_edge.cli.terminal import figures, out
 from fasaco_edge.wire import coverage, schemas
 from fasaco_edge.wire.maps import decode_occupancy_grid
@@ -19,21 +18,21 @@ from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.status import decode_json
 
 
-def print_json(reply: Reply) -> None:
-    """Print what came if it is JSON, else the figures of the message."""
-    print(json.dumps(_figures(reply)) if reply.schema else reply.payload.decode())
+def print_answer(reply: Reply) -> None:
+    """Print what came if it is JSON, escapes and all, else the figures of the message."""
+    print_json(_figures(reply) if reply.schema else decode_json(reply.payload))
 
 
 def show(name: str, reply: Reply) -> None:
     """Print the answer to question ``name``."""
     if reply.schema:
-        rows = [(title, escape(str(value))) for title, value in _figures(reply).items()]
+        rows = [(title, str(value)) for title, value in _figures(reply).items()]
         out().print(figures(rows))
     elif name in ("status", "mission"):
         mission_view.show(decode_json(reply.payload))
     else:
         document = decode_json(reply.payload)
-        print(yaml.safe_dump(document, sort_keys=False, allow_unicode=True), end="")
+        print(yaml.safe_dump(document, sort_keys=False), end="")
 
 
 def _figures(reply: Reply) -> dict[str, Any]:

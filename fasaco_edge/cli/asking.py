@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings, seconds
 from fasaco_edge.cli.nobody import NobodyAnswersError
+from fasaco_edge.cli.streams import print_json
 from fasaco_edge.errors import FasacoError
+from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.queries import Reply
@@ -19,7 +21,9 @@ class RefusedError(FasacoError):
     """The daemon's answer is an error."""
 
     def __init__(self, answer: dict[str, Any]) -> None:
-        super().__init__(str(answer.get("message")), hint=str(answer.get("hint", "")))
+        super().__init__(
+            one_line(str(answer.get("message"))), hint=one_line(str(answer.get("hint", "")))
+        )
         self.code = str(answer.get("code"))
 
 
@@ -58,6 +62,6 @@ def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: byte
     reply = replies[0]
     if reply.is_error:
         if args.json:
-            print(reply.payload.decode())
+            print_json(decode_json(reply.payload))
         raise RefusedError(decode_json(reply.payload))
     return reply

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import textwrap
 from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.bench.table import BENCHMARKS
 from fasaco_edge.cli import exits
+from fasaco_edge.cli.streams import print_json
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         goals = [goal.document() for goal in report.goals]
         document = {"benchmark": args.benchmark.name, **report.figures, "goals": goals}
-        print(json.dumps({**document, "interrupted": interrupted}))
+        print_json({**document, "interrupted": interrupted})
     else:
         _print(report, interrupted)
     for file in args.benchmark.write(args, samples):
@@ -105,31 +105,35 @@ def _measure(benchmark: Benchmark[Any], args: argparse.Namespace) -> tuple[list[
 
 
 def _print(report: Report, interrupted: bool) -> None:
-    from rich.markup import escape
-
     from fasaco_edge.cli import terminal
 
     console = terminal.out()
     for shown in report.tables:
-        table = _table(escape(shown.title))
+        table = _table(shown.title)
         for index, column in enumerate(shown.header):
             if index:
-                table.add_column(escape(column), justify="right", overflow="fold")
+                table.add_column(column, justify="right", overflow="fold")
             else:
-                table.add_column(escape(column), style="cyan", overflow="fold")
+                table.add_column(column, style="cyan", overflow="fold")
         for row in shown.rows:
-            table.add_row(*map(escape, row))
+            table.add_row(*row)
         console.print(table)
     if report.goals:
         console.print(_goals(report))
     for remark in report.remarks:
-        console.print(remark, style="dim", markup=False)
+        console.print(remark, style="dim")
     if interrupted:
         console.print("interrupted: these are the measurements made until then", style="yellow")
 
 
 def _goals(report: Report) -> Table:
-    verdicts = {True: "[green]met[/]", False: "[red]missed[/]", None: "not measured"}
+    from rich.text import Text
+
+    verdicts: dict[bool | None, Text | str] = {
+        True: Text("met", "green"),
+        False: Text("missed", "red"),
+        None: "not measured",
+    }
     table = _table("goals")
     for column in ("", "measured", "goal", ""):
         table.add_column(column, justify="left" if column == "" else "right")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fasaco_edge.cli import exits
+from fasaco_edge.cli.streams import print_json
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     config, found = inspect_config(args.file)
     faults = sorted(found, key=lambda fault: fault.line or 0)
     if args.json:
-        print(json.dumps(_document(args, config, faults)))
+        print_json(_document(args, config, faults))
     elif config is None:
         _print(args.file, faults)
     elif args.show:
@@ -101,6 +101,6 @@ def _print(file: Path, faults: list[Fault]) -> None:
     console = out()
     for fault in faults:
         where = f"{file}:{fault.line}" if fault.line else str(file)
-        console.print(f"{where}: {fault.error}", markup=False, soft_wrap=True)
+        console.print(f"{where}: {fault.error}", soft_wrap=True)
         if fault.error.hint != BadConfiguration.hint:
-            console.print(f"  -> {fault.error.hint}", markup=False, soft_wrap=True)
+            console.print(f"  -> {fault.error.hint}", soft_wrap=True)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.cli.demo_mission import Ending
+from fasaco_edge.cli.streams import print_json
 from fasaco_edge.drawing import draw_mission
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.grid.geometry import Pose2D
@@ -68,11 +69,11 @@ def print_summary(summary: dict[str, Any], *, as_json: bool) -> None:
     from fasaco_edge.cli import terminal
 
     if as_json:
-        print(json.dumps(summary))
+        print_json(summary)
         return
     console = terminal.out()
     ending = "every reachable cell is covered" if summary["complete"] else "NOT ALL WAS COVERED"
-    console.print(f"[bold]{summary['map']}: {ending}[/bold]")
+    console.print(f"{summary['map']}: {ending}", style="bold")
     console.print(terminal.figures(_rows(summary)))
     for file in (*summary["recording"], summary["picture"]):
         console.print(file, soft_wrap=True)

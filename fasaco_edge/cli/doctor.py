@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import threading
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fasaco_edge.cli import exits
+from fasaco_edge.cli.streams import print_json
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
     found = list(findings(args.config, recordings=args.recordings))
     if args.json:
-        print(json.dumps(_document(found)))
+        print_json(_document(found))
     else:
         _print(found)
     failed = any(finding.level is Level.FAIL for _, finding in found)
@@ -102,7 +102,7 @@ def _document(found: list[tuple[str, Finding]]) -> dict[str, object]:
 
 
 def _print(found: list[tuple[str, Finding]]) -> None:
-    from rich.markup import escape
+    from rich.text import Text
 
     from fasaco_edge.cli.terminal import out
 
@@ -110,9 +110,9 @@ def _print(found: list[tuple[str, Finding]]) -> None:
     wide = max(len(name) for name, _ in found)
     indent = " " * (wide + 8)
     for name, finding in found:
-        level = f"[{COLOURS[finding.level]}]{finding.level:<4}[/]"
-        console.print(f"{level}  {name:<{wide}}  {escape(finding.found)}", soft_wrap=True)
+        level = Text(f"{finding.level:<4}", COLOURS[finding.level])
+        console.print(level, f" {name:<{wide}}  {finding.found}", soft_wrap=True)
         for line in finding.details:
-            console.print(f"{indent}{line}", style="dim", markup=False, soft_wrap=True)
+            console.print(f"{indent}{line}", style="dim", soft_wrap=True)
         if finding.to_do:
-            console.print(f"{indent}-> {finding.to_do}", markup=False, soft_wrap=True)
+            console.print(f"{indent}-> {finding.to_do}", soft_wrap=True)

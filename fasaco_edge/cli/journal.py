@@ -12,6 +12,8 @@ import socket
 import sys
 from collections.abc import Mapping
 
+from fasaco_edge.text import one_line
+
 SOCKET = "/run/systemd/journal/socket"
 IDENTIFIER = "fasaco-edge"
 # A datagram has to fit into the socket's buffer; who says more than that, says less.
@@ -72,7 +74,7 @@ def fields_of(record: logging.LogRecord, message: str) -> dict[str, str]:
     }
     for name in EXTRA:
         if (value := getattr(record, name, None)) is not None:
-            fields[f"FASACO_{name.upper()}"] = str(value)
+            fields[f"FASACO_{name.upper()}"] = one_line(str(value))
     if event := fields.get("FASACO_EVENT"):
         fields["MESSAGE_ID"] = message_id(event)
     return fields

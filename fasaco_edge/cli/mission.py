@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.cli import exits
 from fasaco_edge.cli.asking import add_question, ask
+from fasaco_edge.cli.streams import print_json
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
@@ -109,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
         asked["order"] = _order(args)
     reply = ask(args, "mission", payload=encode_json(asked))
     if args.json:
-        print(reply.payload.decode())
+        print_json(decode_json(reply.payload))
     else:
         show(decode_json(reply.payload))
     return exits.OK

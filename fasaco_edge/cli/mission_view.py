@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from fasaco_edge.cli.terminal import figures, out
@@ -23,12 +22,11 @@ def show(report: dict[str, Any]) -> None:
 
 
 def _rows(report: dict[str, Any], mission: dict[str, Any]) -> list[tuple[str, str]]:
-    # Square brackets in names are no mark-up.
-    rows = [(name, escape(report[name])) for name in ("robot", "state", "reason")]
+    rows = [(name, str(report[name])) for name in ("robot", "state", "reason")]
     if mission["ordered"] is not None:
         began = "begun by itself" if mission["ordered"] == "itself" else "as ordered"
         stage = phrases.stage(*(mission[name] for name in ("stage", "zone", "pass", "passes")))
-        rows.append(("mission", f"{escape(stage)}, {began}"))
+        rows.append(("mission", f"{stage}, {began}"))
     if coverage := report["coverage"]:
         cells = coverage["covered"], coverage["coverable"]
         told = phrases.covered(coverage["fraction"], *cells, coverage["covered_m2"])
@@ -45,7 +43,7 @@ def _zones(zones: list[dict[str, Any]]) -> Table:
     table = Table("zone", "pass", "covered", title="Zones", title_justify="left")
     for zone in zones:
         counts = (zone[name] for name in ("pass", "passes", "covered", "cells"))
-        table.add_row(escape(zone["name"]), *phrases.zone_progress(*counts))
+        table.add_row(str(zone["name"]), *phrases.zone_progress(*counts))
     return table
 
 
@@ -53,7 +51,7 @@ def _unreached(unreached: dict[str, Any]) -> Table:
     table = Table("cells", "m2", "at", "why", title="Not reached", title_justify="left")
     for area in unreached["areas"]:
         place = f"({area['x']:.2f}, {area['y']:.2f}) m"
-        table.add_row(str(area["cells"]), f"{area['m2']:.2f}", place, escape(area["reason"]))
+        table.add_row(str(area["cells"]), f"{area['m2']:.2f}", place, str(area["reason"]))
     if unreached["areas_left_out"]:
         table.caption = f"and {unreached['areas_left_out']} smaller areas"
     return table

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from fasaco_edge.errors import FasacoError
+from fasaco_edge.text import one_line
 
 
 class NobodyAnswersError(FasacoError):
@@ -13,7 +14,7 @@ class NobodyAnswersError(FasacoError):
     code = "nobody_answers"
 
     def __init__(self, prefix: str, robots: Collection[str]) -> None:
-        names = ", ".join(sorted(robots))
+        names = one_line(", ".join(sorted(robots)))
         there = f"there are {names}: give one as --robot" if names else "there is none"
         super().__init__(
             f"no daemon answers at {prefix}",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from fasaco_edge.cli.streams import print_json
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.lattice import CoverageLattice
@@ -86,7 +87,7 @@ def print_figures(args: argparse.Namespace, figures: dict[str, Any]) -> None:
     from fasaco_edge.cli import terminal
 
     if args.json:
-        print(json.dumps(figures))
+        print_json(figures)
         return
     rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
     terminal.out().print(terminal.figures(rows))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from fasaco_edge.cli.streams import print_json
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
@@ -98,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
     summary |= turn_summary(replay, record)
     code = 0 if summary["equal"] in (True, None) else 1
     if args.json:
-        print(json.dumps({"decisions": [_document(step) for step in steps], "summary": summary}))
+        print_json({"decisions": [_document(step) for step in steps], "summary": summary})
         return code
     rows = [*_rows(summary), *turn_rows(summary)]
     console = terminal.out()

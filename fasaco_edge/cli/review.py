@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from fasaco_edge.cli.streams import print_json
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
@@ -69,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     other = _read(args.against, "the other one") if args.against else None
     told = document(review)
     if args.json:
-        print(json.dumps(side_by_side(told, document(other)) if other else told))
+        print_json(side_by_side(told, document(other)) if other else told)
     elif other:
         print_comparison(told, document(other))
     else:

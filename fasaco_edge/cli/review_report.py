@@ -35,14 +35,14 @@ MOST_TROUBLES = 12
 
 def print_review(review: Review, told: dict[str, Any]) -> None:
     """Print all of a review; ``told`` is its document."""
+    from rich.text import Text
+
     console = terminal.out()
     colour = {True: "green", False: "red", None: "yellow"}[told["complete"]]
-    console.print(
-        f"[bold]{_shown(told['recording'])}: [{colour}]{_shown(ending(told))}[/{colour}][/bold]"
-    )
-    console.print(terminal.figures(_all_shown(card_rows(told))))
+    console.print(f"{told['recording']}:", Text(ending(told), colour), style="bold")
+    console.print(terminal.figures(card_rows(told)))
     _print_curve(console, review)
-    console.print(terminal.figures(_all_shown(figure_rows(told))))
+    console.print(terminal.figures(figure_rows(told)))
     _print_table(
         console,
         "Why replans came",
@@ -105,14 +105,16 @@ def print_comparison(told: dict[str, Any], other: dict[str, Any]) -> None:
 
 
 def _print_curve(console: Console, review: Review) -> None:
+    from rich.text import Text
+
     at_s, shares = covered_share(review)
     if not len(at_s):
         return
     lines = curve(at_s, shares, review.duration_s, PLOT_WIDTH, PLOT_HEIGHT)
     labels = ["100 %", *[""] * (PLOT_HEIGHT - 2), "0 %"]
-    console.print("[bold]Coverage over time[/bold], of the cells coverable at the end")
+    console.print(Text("Coverage over time", "bold"), "of the cells coverable at the end")
     for label, line in zip(labels, lines, strict=True):
-        console.print(f"{label:>6} [cyan]{line}[/cyan]")
+        console.print(f"{label:>6}", Text(line, "cyan"))
     end = clock(review.duration_s)
     console.print(f"{'':>6} 0:00{end:>{PLOT_WIDTH - 4}}")
 
@@ -121,15 +123,15 @@ def _print_remarks(console: Console, told: dict[str, Any]) -> None:
     for part in told["files"]:
         if part["torn_bytes"]:
             console.print(
-                _shown(f"{part['path']}: torn, its last {part['torn_bytes']} bytes are lost"),
+                f"{part['path']}: torn, its last {part['torn_bytes']} bytes are lost",
                 soft_wrap=True,
             )
     for remark in told["remarks"]:
-        console.print(_shown(f"recorder: {remark}"), soft_wrap=True)
+        console.print(f"recorder: {remark}", soft_wrap=True)
     for topic, count in told["unreadable"].items():
-        console.print(_shown(f"{count} samples of {topic} cannot be read"))
+        console.print(f"{count} samples of {topic} cannot be read")
     for names, why in told["not_recorded"].items():
-        console.print(_shown(f"not known: {names}: {why}"), soft_wrap=True)
+        console.print(f"not known: {names}: {why}", soft_wrap=True)
 
 
 def _print_table(
@@ -143,20 +145,7 @@ def _print_table(
     table: Table = Table(title=title, title_justify="left", title_style="bold")
     for index, column in enumerate(columns):
         last = index == len(columns) - 1 and index > 1
-        table.add_column(
-            _shown(column), overflow="fold", justify="left" if last or not index else "right"
-        )
+        table.add_column(column, overflow="fold", justify="left" if last or not index else "right")
     for row in rows:
-        table.add_row(*(_shown(cell) for cell in row))
+        table.add_row(*row)
     console.print(table)
-
-
-def _shown(text: str) -> str:
-    """Return a text out of a recording so that the terminal shows it, and does nothing else."""
-    from rich.markup import escape
-
-    return escape("".join(letter if letter.isprintable() else "?" for letter in text))
-
-
-def _all_shown(rows: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
-    return [(name, _shown(value)) for name, value in rows]

@@ -86,13 +86,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _report(progress: Progress) -> None:
     """Overwrite one line of a terminal; say nothing into a file."""
-    import sys
+    from fasaco_edge.cli.terminal import err
 
-    if sys.stderr.isatty():
+    console = err()
+    if console.is_terminal:
         pose = progress.pose
-        print(
+        # Past what keeps others from controlling the terminal.
+        console.file.write(
             f"\r{progress.sim_s:8.1f} s  x {progress.speed:5.1f}  ({pose.x:7.2f}, {pose.y:7.2f}) m"
-            f"  {progress.distance_m:7.1f} m driven  {progress.collisions} collisions ",
-            end="",
-            file=sys.stderr,
+            f"  {progress.distance_m:7.1f} m driven  {progress.collisions} collisions "
         )

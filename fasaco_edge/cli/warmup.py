@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from typing import TYPE_CHECKING
 
 from fasaco_edge.cli import exits
+from fasaco_edge.cli.streams import print_json
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
             "removed": removed,
             "freed_mb": freed_mb,
         }
-        print(json.dumps(document))
+        print_json(document)
     elif missing:
         # After a run that compiled them: a folder that cannot be written, say.
         err().print(f"kernels not ready: {missing}; in {folder}", soft_wrap=True)

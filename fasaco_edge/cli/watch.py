@@ -112,4 +112,5 @@ def _once(args: argparse.Namespace, feed: Feed, known: Known, console: Console) 
     # The prompt takes a line.
     width, height = console.width, console.height - 1
     for line in Page(console).lines(known, time.time(), width, height):
-        print(line.rstrip())
+        # Its colours have to go through; its texts are clean.
+        console.file.write(f"{line.rstrip()}\n")

@@ -8,11 +8,15 @@ import socket
 import time
 from collections.abc import MutableMapping
 
+from fasaco_edge.text import one_line
+
 LOG = logging.getLogger(__name__)
 
 # A manager that is busy, as at a boot, is waited for with what it is told only once [s]; nothing
 # else may hold the loop up.
 PATIENCE_S = 1.0
+# `systemctl status` shows one line [characters].
+MOST_SAID = 500
 
 
 class ServiceManager:
@@ -40,7 +44,7 @@ class ServiceManager:
 
     def status(self, text: str) -> None:
         """Say in one line what the service does."""
-        if text != self._status and self._send("STATUS=" + text.replace("\n", " ")):
+        if text != self._status and self._send("STATUS=" + one_line(text, MOST_SAID)):
             self._status = text
 
     def alive(self) -> None:

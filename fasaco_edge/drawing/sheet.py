@@ -13,6 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.palette import Colour
+from fasaco_edge.text import one_line
 
 MARGIN = 28
 MIN_WIDTH = 640
@@ -22,6 +23,8 @@ FOOT_PX = 34
 BAR_PX = (220, 10)
 SYMBOL_PX = 16
 OVERSAMPLING = 4
+# Of one line of a caption [characters].
+MOST_SAID = 400
 
 # Pillow's own font knows little beyond ASCII; it needs no file, so it stays.
 IN_FONT = frozenset("·°±…“”‘’")
@@ -148,7 +151,7 @@ def _drawable(text: str) -> str:
     """Return ``text`` in letters the font has: m² becomes m2, é becomes e."""
     decomposed = "".join(
         letter if letter in IN_FONT else unicodedata.normalize("NFKD", letter)
-        for letter in text.translate(SPELT_OUT)
+        for letter in one_line(text, MOST_SAID).translate(SPELT_OUT)
     )
     return "".join(
         letter if letter.isascii() or letter in IN_FONT else "?"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 from fasaco_edge.recording.fields import Json
+from fasaco_edge.text import one_line
 
 # Settings that say most about a run come first, the others by name.
 FIRST = ("planner", "cell_m", "robot_radius_m", "seed")
@@ -16,6 +18,9 @@ HEAD = (
     ("tool_width_m", "cells of", " m"),
     ("radius_m", "radius", " m"),
 )
+
+# Of Markdown: what ends a cell, or makes links, pictures and HTML.
+MARK_UP = re.compile(r"[\\`\[\]<>!|]")
 
 LEGEND = """\
 - **Map** white free, black occupied, grey unknown
@@ -78,14 +83,16 @@ class RunDescription:
             least, most = self.trail_range
             rows.append(("pheromone", f"{least:.3g} to {most:.3g}, log scale"))
         rows += sorted(flat_settings(self.config), key=_rank)
-        table = "\n".join(f"| {name} | {_cell(value)} |" for name, value in rows)
+        table = "\n".join(f"| {_cell(name)} | {_cell(value)} |" for name, value in rows)
         return f"{self._head()}\n\n{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"
 
     def _head(self) -> str:
         """Return in a line what is asked for first."""
         told = {name.rpartition(".")[2]: value for name, value in flat_settings(self.config)}
-        facts = [f"{text} {told[name]}{unit}" for name, text, unit in HEAD if name in told]
-        return ", ".join([f"**{self.robot}**", f"version {self.version or 'unknown'}", *facts])
+        facts = [f"{text} {_cell(told[name])}{unit}" for name, text, unit in HEAD if name in told]
+        return ", ".join(
+            [f"**{_cell(self.robot)}**", f"version {_cell(self.version or 'unknown')}", *facts]
+        )
 
 
 def flat_settings(config: Json, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -105,4 +112,5 @@ def _rank(setting: tuple[str, Any]) -> tuple[int, str]:
 
 
 def _cell(value: object) -> str:
-    return str(value).replace("|", "\\|").replace("\n", " ")
+    """Return a value as Markdown shows it: no link, no picture, no HTML, no further cell."""
+    return MARK_UP.sub(r"\\\g<0>", one_line(str(value)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ from numpy.typing import NDArray
 
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.series import covered_share
+from fasaco_edge.text import one_line
 
+FORMULA = re.compile(r"[=@]|[+-](?![\d.]+(e[+-]?\d+)?\Z)")
 PATH_COLUMNS = (
     *("at_s", "revision", "steps", "planner", "plan_ms", "lower_bound_steps", "gap", "cost_s"),
     *("x_min", "y_min", "x_max", "y_max", "reason"),
@@ -91,7 +94,16 @@ def _write(file: Path, names: Sequence[str], rows: Iterable[Sequence[object]]) -
     with file.open("w", encoding="utf-8", newline="") as target:
         writer = csv.writer(target)
         writer.writerow(names)
-        writer.writerows(rows)
+        writer.writerows([_cell(value) for value in row] for row in rows)
+
+
+def _cell(value: object) -> object:
+    """Return a value as a table's program shows it, and does not reckon with it.
+
+    What begins like a formula is one to such a program, unless it is a number.
+    """
+    text = one_line(value) if isinstance(value, str) else value
+    return f"'{text}" if isinstance(text, str) and FORMULA.match(text) else text
 
 
 def _write_arrays(review: Review, file: Path) -> None:

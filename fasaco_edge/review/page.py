@@ -1,11 +1,13 @@
-"""A review as a page: one file, no script, nothing from the net; light and dark."""
+"""A review as a page: one file, no script, nothing from the net; light and dark.
+
+It is built of elements, in which all that is not mark-up of ours is escaped (``text.html``).
+"""
 
 from __future__ import annotations
 
 import base64
 import io
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
 from typing import Any
 
 from fasaco_edge.bench.chart import COLOURS, Panel
@@ -28,9 +30,12 @@ from fasaco_edge.review.rows import (
 )
 from fasaco_edge.review.style import STYLE
 from fasaco_edge.review.svg import svg_of
+from fasaco_edge.text import Html, element, html
 
 MAP_ROOM = (1000, 700)
 KINDS = {True: "good", False: "bad", None: "open"}
+# What a browser may do with it: show pictures that are in it, and its own style.
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 INTRODUCTION = (
     "A robot was to pass over every place it can reach, on a map that grows while it drives. "
     "The ground is divided into square cells as wide as its tool; a cell is covered when the "
@@ -62,10 +67,14 @@ def page_of(review: Review, other: Review | None = None) -> str:
     told = [document(each) for each in reviews]
     title = " against ".join(document["recording"] for document in told)
     kind = "Review of a recorded mission" if other is None else "Two recorded missions compared"
-    body = [
-        f"<header><p class=kind>{kind}</p><h1>{escape(title)}</h1>",
-        *(_verdict(document, index, len(told)) for index, document in enumerate(told)),
-        f"<p class=lead>{INTRODUCTION}</p></header>",
+    body = html(
+        element(
+            "header",
+            element("p", kind, class_="kind"),
+            element("h1", title),
+            *(_verdict(document, index, len(told)) for index, document in enumerate(told)),
+            element("p", INTRODUCTION, class_="lead"),
+        ),
         *(_tiles(told[0]) if other is None else ()),
         _maps(reviews, told),
         _section("Over time", *_charts(reviews, told)),
@@ -76,31 +85,35 @@ def page_of(review: Review, other: Review | None = None) -> str:
             for each, document in zip(reviews, told, strict=True)
         ),
         _section("What the words mean", _table(("", ""), GLOSSARY.items(), "plain")),
-        "<footer>Written by <code>fasaco-edge review</code>. "
-        "All times count from the beginning of the recording.</footer>",
-    ]
+        element(
+            "footer",
+            "Written by ",
+            element("code", "fasaco-edge review"),
+            ". All times count from the beginning of the recording.",
+        ),
+    )
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n'
-        f"<title>{escape(title)}</title>\n<style>{STYLE}</style></head>\n"
-        f"<body><main>{''.join(body)}</main></body></html>\n"
+        f"{element('title', title)}\n<style>{STYLE}</style></head>\n"
+        f"<body>{element('main', body)}</body></html>\n"
     )
 
 
-def _verdict(told: Mapping[str, Any], index: int, of: int) -> str:
-    kind, text = KINDS[told["complete"]], ending(told)
-    who = f"{_mark(index)}{escape(told['recording'])}: " if of > 1 else ""
-    return f"<p class='verdict {kind}'>{who}{text}</p>"
+def _verdict(told: Mapping[str, Any], index: int, of: int) -> Html:
+    who = (_mark(index), f"{told['recording']}: ") if of > 1 else ()
+    return element("p", *who, ending(told), class_=f"verdict {KINDS[told['complete']]}")
 
 
-def _mark(index: int) -> str:
+def _mark(index: int) -> Html:
     """Return a dot in the colour of a run's curves."""
     red, green, blue = COLOURS[index]
-    return f"<i class=dot style='background:rgb({red},{green},{blue})'></i>"
+    return element("i", class_="dot", style=f"background:rgb({red},{green},{blue})")
 
 
-def _tiles(told: Mapping[str, Any]) -> list[str]:
+def _tiles(told: Mapping[str, Any]) -> list[Html]:
     covered, coverable = told["covered_cells"], told["coverable_cells"]
     share = f"{100 * covered / coverable:.1f} %" if covered is not None and coverable else "-"
     tiles = [
@@ -112,34 +125,34 @@ def _tiles(told: Mapping[str, Any]) -> list[str]:
         (amount(told["replan_ms_max"], "ms"), "the slowest replan"),
         (amount(told["faults"], ""), "messages refused"),
     ]
-    cells = "".join(f"<div><b>{escape(v)}</b><span>{escape(n)}</span></div>" for v, n in tiles)
-    return [f"<div class=tiles>{cells}</div>"]
+    cells = (element("div", element("b", v), element("span", n)) for v, n in tiles)
+    return [element("div", *cells, class_="tiles")]
 
 
-def _maps(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> str:
+def _maps(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> Html:
     figures = []
     for review, its_figures in zip(reviews, told, strict=True):
         picture = draw_map(review, MAP_ROOM)
         card = _table(("", ""), card_rows(its_figures), "plain")
         if picture is None:
-            figures.append(f"<figure><p>no map was recorded</p>{card}</figure>")
+            figures.append(element("figure", element("p", "no map was recorded"), card))
             continue
         buffer = io.BytesIO()
         picture.save(buffer, "PNG", optimize=True)
         content = base64.b64encode(buffer.getvalue()).decode()
         text = "map, covered cells and the way of the robot"
-        image = f'<img alt="{text}" src="data:image/png;base64,{content}">'
-        figures.append(f"<figure>{image}{card}</figure>")
+        image = Html(f'<img alt="{text}" src="data:image/png;base64,{content}">')
+        figures.append(element("figure", image, card))
     kind = "maps two" if len(figures) > 1 else "maps"
-    return _section("The map in the end", f"<div class='{kind}'>{''.join(figures)}</div>")
+    return _section("The map in the end", element("div", *figures, class_=kind))
 
 
-def _charts(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> list[str]:
+def _charts(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> list[Html]:
     labels = [document["recording"] for document in told]
-    key = ""
+    key = Html()
     if len(reviews) > 1:
-        marks = (f"{_mark(index)}{escape(label)}" for index, label in enumerate(labels))
-        key = f"<p class=key>{' &nbsp; '.join(marks)}</p>"
+        marks = (html(_mark(index), label) for index, label in enumerate(labels))
+        key = element("p", Html(" &nbsp; ".join(marks)), class_="key")
     charts = [
         _chart(coverage_panel(reviews, labels), 300),
         _chart(replan_panel(reviews, labels), 260),
@@ -148,34 +161,32 @@ def _charts(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> lis
         panel = state_panel(review)
         name = f" ({label})" if len(reviews) > 1 else ""
         charts.append(_chart(panel, 66 + 30 * len(panel.y.ticks), name))
-    return [key, f"<div class=charts>{''.join(charts)}</div>"]
+    return [key, element("div", *charts, class_="charts")]
 
 
-def _chart(panel: Panel, height: int, name: str = "") -> str:
-    caption = f"<p>{escape(panel.caption)}</p>" if panel.caption else ""
-    return (
-        f"<figure class=chart><h3>{escape(panel.title + name)}</h3>{caption}"
-        f"{svg_of(panel, height)}</figure>"
-    )
+def _chart(panel: Panel, height: int, name: str = "") -> Html:
+    caption = (element("p", panel.caption),) if panel.caption else ()
+    title = element("h3", panel.title + name)
+    return element("figure", title, *caption, svg_of(panel, height), class_="chart")
 
 
-def _figures(told: Sequence[Mapping[str, Any]]) -> list[str]:
+def _figures(told: Sequence[Mapping[str, Any]]) -> list[Html]:
     if len(told) == 1:
         return [_table(("", ""), figure_rows(told[0]))]
     names = tuple(document["recording"] for document in told)
     return [_table(("", *names, "first less second"), compared_rows(told[0], told[1]))]
 
 
-def _reasons(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> list[str]:
+def _reasons(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> list[Html]:
     counts = [document["replans_by_reason"] for document in told]
     kinds = dict.fromkeys(kind for count in counts for kind in count)
     if not kinds:
-        return ["<p>There were none.</p>"]
+        return [element("p", "There were none.")]
     if len(told) == 1:
         slowest = replan_rows(reviews[0].replans.slowest_first(MOST_REPLANS))
         return [
             _table(("why it came", *REASONS[1:]), reason_rows(told[0])),
-            "<p>The slowest ones:</p>",
+            element("p", "The slowest ones:"),
             _table(REPLANS, slowest, "told"),
         ]
     names = tuple(document["recording"] for document in told)
@@ -183,7 +194,7 @@ def _reasons(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> li
     return [_table(("why it came", *names), rows)]
 
 
-def _stories(review: Review, told: Mapping[str, Any], of: int) -> str:
+def _stories(review: Review, told: Mapping[str, Any], of: int) -> Html:
     """Return what stands out in one run."""
     moments = [(m.what, amount(m.value, m.unit), clock(m.at_s), m.note) for m in review.moments]
     found = [(s.name, clock(s.begin_s), f"{s.seconds:.1f} s", s.reason) for s in troubles(review)]
@@ -202,28 +213,24 @@ def _stories(review: Review, told: Mapping[str, Any], of: int) -> str:
         *(f"not known: {names}: {why}" for names, why in told["not_recorded"].items()),
     ]
     parts = [_table(("worst moments", "how much", "at", "what else is known"), moments, "told")]
-    none = "<p>It was never degraded, blocked or silent, and the recorder could always write.</p>"
-    parts.append(_table(("trouble", "at", "for", "why"), found, "told") if found else none)
-    none = "<p>No message was refused.</p>"
-    parts.append(_table(("refused messages", "how many"), faults) if faults else none)
+    none = "It was never degraded, blocked or silent, and the recorder could always write."
+    titles = ("trouble", "at", "for", "why")
+    parts.append(_table(titles, found, "told") if found else element("p", none))
+    none = "No message was refused."
+    parts.append(_table(("refused messages", "how many"), faults) if faults else element("p", none))
     if remarks:
-        parts.append(f"<ul>{''.join(f'<li>{escape(remark)}</li>' for remark in remarks)}</ul>")
+        parts.append(element("ul", *(element("li", remark) for remark in remarks)))
     name = f" in {told['recording']}" if of > 1 else ""
     return _section(f"What stands out{name}", *parts)
 
 
-def _section(title: str, *parts: str) -> str:
-    return f"<section><h2>{escape(title)}</h2>{''.join(parts)}</section>"
+def _section(title: str, *parts: Html) -> Html:
+    return element("section", element("h2", title), *parts)
 
 
-def _table(names: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "numbers") -> str:
+def _table(names: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "numbers") -> Html:
     """Return a table: of "numbers", "plain" of text, "told" where the last column is text."""
-    head = "".join(f"<th>{escape(name)}</th>" for name in names)
-    lines = "".join(
-        "<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows
-    )
-    return (
-        f"<div class=wide><table class={kind}>"
-        + (f"<thead><tr>{head}</tr></thead>" if any(names) else "")
-        + f"<tbody>{lines}</tbody></table></div>"
-    )
+    head = element("tr", *(element("th", name) for name in names))
+    lines = (element("tr", *(element("td", cell) for cell in row)) for row in rows)
+    parts = (*((element("thead", head),) if any(names) else ()), element("tbody", *lines))
+    return element("div", element("table", *parts, class_=kind), class_="wide")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 from rich.text import Text
 
+from fasaco_edge.text import one_line
 from fasaco_edge.watching import phrases
 from fasaco_edge.watching.ink import Ink
 from fasaco_edge.watching.report import Coverage, Mission, PathReport, Recorder, Report
@@ -39,10 +40,10 @@ def figures(report: Report, width: int, ink: Ink) -> Table:
 
 
 def _rows(report: Report, width: int, ink: Ink) -> list[Row]:
-    state = Text(phrases.printable(report.state), f"bold {state_colour(report.state)}")
+    state = Text(one_line(report.state), f"bold {state_colour(report.state)}")
     # A path's number is told with the path.
     if report.path is None or report.reason != f"path {report.path.revision}":
-        state.append(f": {phrases.printable(report.reason)}", "not bold")
+        state.append(f": {one_line(report.reason)}", "not bold")
     rows: list[Row] = [("state", state)]
     if report.coverage is not None:
         rows += _coverage(
@@ -89,7 +90,7 @@ def _mission(mission: Mission) -> list[Row]:
     for zone in mission.zones:
         at, covered = phrases.zone_progress(zone.turn, zone.passes, zone.covered, zone.cells)
         told = f"pass {at}, {covered}" if zone.turn else at
-        rows.append((phrases.printable(zone.name), _text(told)))
+        rows.append((one_line(zone.name), _text(told)))
     more = []
     if mission.keep_out:
         more.append(f"keep-out zones: {mission.keep_out}")
@@ -148,4 +149,4 @@ def _cells(count: int) -> str:
 
 
 def _text(told: str, style: str = "") -> Text:
-    return Text(phrases.printable(told), style)
+    return Text(one_line(told), style)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from fasaco_edge.watching.phrases import printable
+from fasaco_edge.text import one_line
 from fasaco_edge.watching.report import Report
 
 KEPT = 200
@@ -32,7 +32,7 @@ class Journal:
 
     def add(self, at_s: float, text: str, tone: str = PLAIN) -> None:
         """Note what happened at ``at_s``, since the epoch [s]."""
-        self.entries.append(Entry(at_s, printable(text), tone))
+        self.entries.append(Entry(at_s, one_line(text), tone))
         self.count += 1
 
     def since(self, count: int) -> list[Entry]:

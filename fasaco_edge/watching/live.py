@@ -12,12 +12,13 @@ from types import FrameType
 from rich.console import Console
 
 from fasaco_edge.bus.session import Sample
+from fasaco_edge.text import json_line, one_line
 from fasaco_edge.watching import phrases
 from fasaco_edge.watching.feed import Feed
 from fasaco_edge.watching.known import Known
 from fasaco_edge.watching.page import Page
 from fasaco_edge.watching.screen import Screen
-from fasaco_edge.wire.status import decode_json, encode_json
+from fasaco_edge.wire.status import decode_json
 
 # At most ten pages a second, and only where something changed or the clock did [s].
 FRAME_S = 0.1
@@ -109,7 +110,7 @@ def status_line(known: Known, now: float) -> str:
     """Return how it stands, in a line."""
     report = known.report
     if known.trouble:
-        return f"waiting for the bus at {phrases.printable(known.trouble)}"
+        return f"waiting for the bus at {one_line(known.trouble)}"
     if known.gone_since is not None:
         return "waiting for the daemon to come back"
     if not known.is_here:
@@ -133,7 +134,7 @@ def status_line(known: Known, now: float) -> str:
 
 def print_json(payload: bytes) -> None:
     """Print a JSON object as one line, however it came."""
-    print(encode_json(decode_json(payload)).decode(), flush=True)
+    print(json_line(decode_json(payload)), flush=True)
 
 
 @contextmanager

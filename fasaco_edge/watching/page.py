@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from rich.console import Console, RenderableType
 from rich.text import Text
 
+from fasaco_edge.text import one_line
 from fasaco_edge.watching import journal, picture
 from fasaco_edge.watching.figures import figures, state_colour
 from fasaco_edge.watching.ink import Ink
 from fasaco_edge.watching.journal import Entry
 from fasaco_edge.watching.known import Known
-from fasaco_edge.watching.phrases import age, percent, printable
+from fasaco_edge.watching.phrases import age, percent
 from fasaco_edge.watching.picturing import Picturing
 from fasaco_edge.watching.report import Report
 
@@ -141,20 +142,20 @@ def headline(known: Known, now: float) -> Text:
     line = Text().append(f" {known.robot} ", "bold reverse").append("  ")
     report, silent = known.report, known.silent_s(now)
     if known.trouble:
-        line.append(f"waiting for the bus at {printable(known.trouble)}", "red")
+        line.append(f"waiting for the bus at {one_line(known.trouble)}", "red")
     elif known.gone_since is not None:
         gone = age(now - known.gone_since)
         line.append(f"the daemon is gone for {gone}; waiting for it to come back", "bold red")
     elif not known.is_here:
         others = ", ".join(sorted(known.robots - {known.robot}))
         line.append("waiting for a daemon of that name", "yellow")
-        line.append(f"; on this bus: {printable(others)}" if others else "")
+        line.append(f"; on this bus: {one_line(others)}" if others else "")
     elif report is None:
         line.append("the daemon has said nothing yet", "yellow")
     elif silent:
         line.append(f"silent for {age(silent)}", "bold red")
     else:
-        line.append(printable(report.state).upper(), f"bold {state_colour(report.state)}")
+        line.append(one_line(report.state).upper(), f"bold {state_colour(report.state)}")
         if report.coverage is not None:
             line.append(f"  {percent(report.coverage.fraction)} covered")
         if report.path is not None:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-
-def printable(text: str) -> str:
-    """Return a text off the bus without what would control a terminal."""
-    return "".join(mark if mark.isprintable() else "\N{REPLACEMENT CHARACTER}" for mark in text)
+from fasaco_edge.text import one_line
 
 
 def covered(fraction: float, covered: int, coverable: int, covered_m2: float) -> str:
@@ -24,8 +21,8 @@ def stage(stage: str | None, zone: str | None, turn: int | None, passes: int | N
     if stage is None:
         return "no order"
     if stage != "covering":
-        return printable(stage)
-    what = f"zone {printable(zone)}" if zone else "everything reachable"
+        return one_line(stage)
+    what = f"zone {one_line(zone)}" if zone else "everything reachable"
     return f"{what}, pass {turn} of {passes}"
 
 
@@ -40,7 +37,7 @@ def figures(
 ) -> str:
     """Return state and progress in a line."""
     return (
-        f"{printable(state)}: {covered}/{coverable} cells, path {revision} ({steps} steps to go), "
+        f"{one_line(state)}: {covered}/{coverable} cells, path {revision} ({steps} steps to go), "
         f"{plans} plans, last {plan_ms:.0f} ms"
     )
 

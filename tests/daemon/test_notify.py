@@ -42,7 +42,7 @@ def test_a_status_is_one_line_and_told_once(listening):
     manager = ServiceManager({"NOTIFY_SOCKET": name})
     for text in ("two\nlines", "two\nlines", "another"):
         manager.status(text)
-    assert [heard.recv(4096) for _ in range(2)] == [b"STATUS=two lines", b"STATUS=another"]
+    assert [heard.recv(4096) for _ in range(2)] == [rb"STATUS=two\nlines", b"STATUS=another"]
 
 
 def test_reloading_says_when(listening):

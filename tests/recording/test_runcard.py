@@ -24,7 +24,13 @@ def test_settings_that_matter_come_first():
 
 def test_a_value_cannot_break_the_table():
     card = RunDescription("r2", "now", "1.0", {"planner": "a|b\nc"}).markdown()
-    assert "| planner | a\\|b c |" in card.splitlines()
+    assert r"| planner | a\|b\\nc |" in card.splitlines()
+
+
+def test_a_value_is_no_link_and_no_picture():
+    card = RunDescription("[a](file:b)", "now", "![](c)", {"planner": "<img src=d>\x1b"}).markdown()
+    assert r"**\[a\](file:b)**, version \!\[\](c)" in card
+    assert r"| planner | \<img src=d\>\\x1b |" in card.splitlines()
 
 
 def test_properties_are_text():

@@ -26,7 +26,7 @@ from fasaco_edge.review.review import CoverageCounts, review_of
 from tests.cli.commands import fasaco_edge
 from tests.review.test_parts import run_told
 
-VOID = ("meta", "img", "line", "circle", "polyline")
+VOID = ("meta", "img")
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,8 @@ def test_the_page_needs_nothing_else(review):
     assert "link" not in page.names
     (picture,) = page.links
     assert picture.startswith("data:image/png;base64,")
-    assert "http" not in re.sub(r"data:image/png[^\"]*", "", text)
+    assert "://" not in re.sub(r"data:image/png[^\"]*", "", text)
+    assert "default-src 'none'" in text
     assert "prefers-color-scheme: dark" in text
     assert page.names.count("svg") == 3
 
@@ -155,7 +156,26 @@ def test_texts_of_a_recording_do_nothing_to_a_terminal(review, capsys):
     out = capsys.readouterr().out
     assert "\x1b" not in out
     assert "[/red]" in out
-    assert "[/]?[2J" in out
+    assert r"[/]\x1b[2J" in out
+
+
+def test_texts_of_a_recording_are_no_mark_up_on_the_page(review):
+    evil = "<script>alert(1)</script>'\"\x1b"
+    states = (*review.states[:-1], replace(review.states[-1], name=evil, reason=evil))
+    text = page_of(replace(review, states=states))
+    page = Page(text)
+    assert "script" not in page.names
+    assert f"when the mission was {evil[:-1]}\\x1b" in page.text
+    assert "\x1b" not in text
+
+
+def test_what_begins_like_a_formula_is_text_to_a_table(review, tmp_path):
+    names = ("=1+1", "+1+1", "-1+1", "@sum", "-1.5e-3", "a\nb", "ok")
+    states = tuple(Span(name, 0, 1, name) for name in names)
+    export(replace(review, states=states), tmp_path)
+    with (tmp_path / "states.csv").open(encoding="utf-8", newline="") as file:
+        told = [row["state"] for row in csv.DictReader(file)]
+    assert told == ["'=1+1", "'+1+1", "'-1+1", "'@sum", "-1.5e-3", "a\\nb", "ok"]
 
 
 def test_the_command_writes_them(parts, tmp_path):

@@ -1,0 +1,47 @@
+"""Standard output and error as a command writes to them: nothing in them controls a terminal.
+
+Whatever is printed goes through here, a traceback and a mistake on the command line, too; tables
+and progress bars, which have escapes of their own, through ``cli.terminal``.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from typing import Any, TextIO, cast
+
+from fasaco_edge.text import json_line, lines
+
+
+class CleanStream:
+    """A text stream that shows what would control a terminal; line ends and tabs are meant."""
+
+    def __init__(self, stream: TextIO) -> None:
+        # By this name rich finds the stream itself: its own escapes have to go through.
+        self.rich_proxied_file = stream
+
+    def write(self, text: str) -> int:
+        """Write; return how much of ``text`` that was, all of it."""
+        self.rich_proxied_file.write(lines(text))
+        return len(text)
+
+    def writelines(self, texts: Iterable[str]) -> None:
+        """Write one after the other."""
+        for text in texts:
+            self.write(text)
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever the stream has
+        return getattr(self.rich_proxied_file, name)
+
+
+def clean_streams() -> None:
+    """Let all that this process prints go out clean, from now on."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is not None and not isinstance(stream, CleanStream):
+            setattr(sys, name, cast("TextIO", CleanStream(stream)))
+
+
+def print_json(document: object) -> None:
+    """Print a document as one line of JSON, whose own escapes are all that is needed."""
+    print(json_line(document))

@@ -1,0 +1,88 @@
+"""Text that came from elsewhere, made fit to be shown: in a terminal or a log, and on a page.
+
+A name, a reason or a message off the bus, out of a file or a recording may hold what a terminal
+obeys (escapes, C0 and C1 controls), what turns a line about or hides in it (overrides, joiners,
+fillers), line ends that feign another line, and mark-up. Whoever writes to people writes through
+here: ``cli.terminal`` and ``cli.logs``, ``daemon.notify``, ``drawing``, ``review.page``.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import reprlib
+from html import escape
+
+MOST = 2_000
+"""What is shown of a text at most [characters]; it goes on where nobody reads any more."""
+
+# What a terminal obeys, or nobody sees: controls, line and paragraph separators, overrides and
+# isolates, joiners, fillers, tags, lone surrogates. By code point, so that no Python's own
+# Unicode tables decide.
+_HIDDEN = (
+    "\x00-\x1f\x7f-\x9f\xad\u034f\u061c\u115f\u1160\u17b4\u17b5\u180b-\u180f\u200b-\u200f"
+    "\u2028-\u202e\u2060-\u206f\u3164\ufe00-\ufe0f\ufeff\uffa0\ufff0-\uffff\ud800-\udfff"
+    "\U0001bca0-\U0001bca3\U0001d173-\U0001d17a\U000e0000-\U000e0fff"
+)
+_IN_A_LINE = re.compile(f"[{_HIDDEN}]")
+_IN_LINES = re.compile(rf"(?![\n\t])[{_HIDDEN}]")
+
+_SHOWN = reprlib.Repr()
+_SHOWN.maxstring = _SHOWN.maxother = _SHOWN.maxlong = 200
+_SHOWN.maxlist = _SHOWN.maxdict = 10
+_SHOWN.maxlevel = 3
+
+
+def one_line(text: str, most: int = MOST) -> str:
+    r"""Return a text as one line that shows all it holds and does nothing: ESC becomes ``\x1b``."""
+    return _IN_A_LINE.sub(_visible, _bounded(text, most))
+
+
+def lines(text: str, most: int | None = None) -> str:
+    """Return the same of a text whose line ends and tabs are meant; None for any length."""
+    return _IN_LINES.sub(_visible, text if most is None else _bounded(text, most))
+
+
+def shown(value: object) -> str:
+    """Return a value as it was written, unless somebody wrote a book, or one that holds itself."""
+    try:
+        return one_line(_SHOWN.repr(value))
+    except (ValueError, RecursionError):  # an integer of thousands of digits; a tree of as many
+        return f"a {type(value).__name__} too large to be shown"
+
+
+def json_line(document: object) -> str:
+    """Return a document as JSON in one line of ASCII, which shows all and does nothing, too."""
+    # JSON lets DEL stand as it is; outside of strings there is none.
+    return json.dumps(document).replace("\x7f", "\\u007f")
+
+
+class Html(str):
+    """Mark-up of ours: what is not of this type is text, and is escaped."""
+
+    __slots__ = ()
+
+
+def html(*parts: object, most: int = MOST) -> Html:
+    """Return parts as they are to stand on a page or in an SVG: text escaped, quotes too."""
+    return Html("".join(part if isinstance(part, Html) else _escaped(part, most) for part in parts))
+
+
+def element(name: str, *parts: object, **attributes: object) -> Html:
+    """Return an element; ``class_`` stands for ``class``, and ``_`` in a name for ``-``."""
+    told = "".join(
+        f' {key.rstrip("_").replace("_", "-")}="{html(value)}"' for key, value in attributes.items()
+    )
+    return Html(f"<{name}{told}>{html(*parts)}</{name}>")
+
+
+def _escaped(part: object, most: int) -> str:
+    return escape(one_line(str(part), most), quote=True)
+
+
+def _bounded(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[:most]}… ({len(text) - most} more)"
+
+
+def _visible(match: re.Match[str]) -> str:
+    return ascii(match[0])[1:-1]

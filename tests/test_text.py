@@ -1,0 +1,82 @@
+"""Text from elsewhere shows all it holds, and does nothing."""
+
+from __future__ import annotations
+
+import json
+import unicodedata
+
+import pytest
+
+from fasaco_edge.text import MOST, Html, element, html, json_line, lines, one_line, shown
+
+# What a terminal obeys or nobody sees, by Unicode's own tables. Signs that Arabic, Syriac and
+# Kaithi numbers begin with are of a category with them, and seen.
+SEEN = {0x600, 0x601, 0x602, 0x603, 0x604, 0x605, 0x6DD, 0x70F, 0x890, 0x891, 0x8E2}
+SEEN |= {0x110BD, 0x110CD} | set(range(0x13430, 0x13440))
+HIDDEN = [
+    chr(code)
+    for code in range(0x110000)
+    if unicodedata.category(chr(code)) in ("Cc", "Cf", "Cs", "Zl", "Zp") and code not in SEEN
+]
+
+
+@pytest.mark.parametrize(
+    ("text", "seen"),
+    [
+        ("\x1b]0;title\x07", r"\x1b]0;title\x07"),
+        ("\x9b31m", r"\x9b31m"),
+        ("\x7f\x00", r"\x7f\x00"),
+        ("a\nERROR b\r\tc", r"a\nERROR b\r\tc"),
+        ("\u202egnp.exe", r"\u202egnp.exe"),
+        ("a\u200bb\u2028c\u2029", r"a\u200bb\u2028c\u2029"),
+        ("\udc9b", r"\udc9b"),
+        ("\U000e0041", r"\U000e0041"),
+        ("Küche 厨房 \N{BROOM} [red]", "Küche 厨房 \N{BROOM} [red]"),
+    ],
+)
+def test_what_would_do_something_is_seen(text, seen):
+    assert one_line(text) == seen
+
+
+def test_all_that_unicode_hides_is_seen():
+    for mark in HIDDEN:
+        assert one_line(mark).isprintable()
+        assert one_line(mark).isascii()
+    assert lines("".join(HIDDEN)).replace("\n", "").replace("\t", "").isprintable()
+
+
+def test_line_ends_and_tabs_stay_where_they_are_meant():
+    assert lines("a\n\tb\x1b") == "a\n\tb\\x1b"
+
+
+def test_a_text_is_shown_up_to_a_length():
+    assert one_line("x" * 10**6) == f"{'x' * MOST}… ({10**6 - MOST} more)"
+    assert lines("x" * 30, 10) == "x" * 10 + "… (20 more)"
+    assert lines("x" * 10**6) == "x" * 10**6
+
+
+def test_a_value_is_shown_however_large_it_is():
+    ring: list[object] = []
+    ring.append(ring)
+    for value in (ring, 10**5000, ["lol"] * 10**6, {"a": "\x1b" * 10**6}, "\u202e"):
+        assert len(shown(value)) < 1000
+        assert one_line(shown(value)) == shown(value)
+
+
+def test_on_a_page_text_is_no_mark_up():
+    text = "<script>'\"&\x1b\n"
+    assert html(text) == r"&lt;script&gt;&#x27;&quot;&amp;\x1b\n"
+    assert html(Html("<b>"), text) == "<b>" + html(text)
+    assert element("p", text, class_=text, aria_label=1) == (
+        f'<p class="{html(text)}" aria-label="1">{html(text)}</p>'
+    )
+
+
+def test_json_has_escapes_of_its_own():
+    # Two halves of a pair beside each other would be one sign.
+    text = "-".join(HIDDEN)
+    document = {text: [text, 1.5, None]}
+    line = json_line(document)
+    assert line.isascii()
+    assert line.isprintable()
+    assert json.loads(line) == document
