@@ -17,7 +17,7 @@ from typing import Any, Self
 
 import yaml
 
-from fasaco_edge.bus.declared import Publisher
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.child_process import python_program

@@ -15,14 +15,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from importlib import metadata
 from typing import Any, Self
 
 import zenoh
 
-from fasaco_edge.bus.declared import Publisher, Subscription, declare_subscriber
 from fasaco_edge.bus.encodings import JSON, schema_of
+from fasaco_edge.bus.latched import Asker, LatchedSubscription, Subscription
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.qos import VOLATILE, Qos
 from fasaco_edge.bus.queries import Question, Reply, Request, reply_of, request_of, send
 from fasaco_edge.bus.session_config import session_config
@@ -70,6 +70,7 @@ class Bus:
         # What others hold, too: nothing of Zenoh's may be left to the last garbage collection,
         # in which its threads and the interpreter may wait for each other for ever.
         self._lent: list[Publisher | Subscription] = []
+        self._asker = Asker()
 
     def __enter__(self) -> Self:
         return self
@@ -111,8 +112,10 @@ class Bus:
         def receive(sample: zenoh.Sample) -> None:
             callback(_sample(sample))
 
-        subscription = Subscription(
-            partial(declare_subscriber, self._session, key, receive, history if latched else 0)
+        subscription = (
+            LatchedSubscription(self._session, key, receive, history, self._asker)
+            if latched
+            else Subscription(self._session.declare_subscriber(key, receive))
         )
         self._lent.append(subscription)
         return subscription
@@ -176,6 +179,7 @@ class Bus:
 
     def close(self) -> None:
         """End the session; a process that does not close it may hang at exit."""
+        self._asker.close()
         self._declared.clear()
         for lent in self._lent:
             lent.release()

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from fasaco_edge.bus.declared import Subscription
+from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Spacing
 from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.errors import FasacoError
@@ -81,7 +81,7 @@ class Inbox:
             return
         self._asked_for_map_at = now
         for subscription in self._maps:
-            subscription.renew()
+            subscription.ask()
 
     def decode(
         self, items: Sequence[tuple[str, object]], patches_lost: int

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fasaco_edge.bus.declared import Subscription
+from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.config import DaemonConfig
@@ -28,7 +28,7 @@ class SilentBus(Bus):
     ) -> Subscription:
         """Note the key's topic."""
         self.heard.add(key.rpartition("/")[2])
-        return Subscription(lambda: None)
+        return Subscription(None)
 
 
 class NoDisk(LedgerWriter):

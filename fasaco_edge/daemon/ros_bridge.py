@@ -10,8 +10,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from fasaco_edge.bus.declared import Publisher, Subscription
+from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.daemon.inbox import Received
@@ -23,7 +24,7 @@ class RosBridge:
     """The subscribers and publishers of the daemon under ROS 2.
 
     Attributes:
-        map: the map's subscription, to be renewed where the map is lacking.
+        map: the map's subscription, to ask where the map is lacking.
         path, coverage: where to publish them.
     """
 

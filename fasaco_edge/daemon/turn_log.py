@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge import __version__
 from fasaco_edge.bus.arrival import Arrival
-from fasaco_edge.bus.declared import Publisher
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.sample_codec import SampleEncoder
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.daemon.about import config_document

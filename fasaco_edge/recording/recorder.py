@@ -19,7 +19,7 @@ from pathlib import Path
 from types import FrameType
 
 from fasaco_edge.bus.arrival import Arrival
-from fasaco_edge.bus.declared import Publisher
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, FasacoError

@@ -1,9 +1,7 @@
-"""What a session declares on a key: a publisher, with its quality of service, or a subscriber."""
+"""A publisher on a key, with its quality of service."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from datetime import timedelta
 from typing import Any
 
 import zenoh
@@ -11,9 +9,6 @@ import zenoh.ext
 
 from fasaco_edge.bus.encodings import encoding_of
 from fasaco_edge.bus.qos import Qos
-
-# So often who listens to a latched key asks its publishers whether it missed the last sample.
-ASK_PERIOD: Any = timedelta(seconds=1)  # a float by the stubs
 
 
 class Publisher:
@@ -56,36 +51,3 @@ class Publisher:
         """Tell whether any subscriber matches the key."""
         status: Any = self._plain.matching_status  # a bool by the stubs, an object in fact
         return bool(status.matching)
-
-
-class Subscription:
-    """A subscriber that can be declared anew."""
-
-    def __init__(self, declare: Callable[[], object]) -> None:
-        self._declare = declare
-        self._subscriber: Any = declare()
-
-    def renew(self) -> None:
-        """Declare it anew: a latched one receives the newest sample again."""
-        self._subscriber.undeclare()
-        self._subscriber = self._declare()
-
-    def release(self) -> None:
-        """Let go of what Zenoh has given."""
-        del self._subscriber, self._declare
-
-
-def declare_subscriber(
-    session: zenoh.Session, key: str, receive: Callable[[zenoh.Sample], None], history: int
-) -> object:
-    """Declare a subscriber; with ``history`` a latched one, which gets so many samples first."""
-    if not history:
-        return session.declare_subscriber(key, receive)
-    return zenoh.ext.declare_advanced_subscriber(
-        session,
-        key,
-        receive,
-        history=zenoh.ext.HistoryConfig(max_samples=history, detect_late_publishers=True),
-        recovery=zenoh.ext.RecoveryConfig(periodic_queries=ASK_PERIOD, heartbeat=None),
-        subscriber_detection=True,
-    )

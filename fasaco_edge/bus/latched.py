@@ -1,0 +1,289 @@
+"""A subscriber of a latched key: the newest samples first, and the last one even if it was lost.
+
+Zenoh's advanced subscriber (1.10) does that, too, but asks whoever ever published there once a
+second, for as long as the session lives: publishers that are gone, and on behalf of subscribers
+that were undeclared. This one asks those publishers that are there, which it knows by their
+tokens, each at most once a second, and no more than so many of them: the questions that are open,
+and what is remembered, have a bound, whoever comes and goes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import zenoh
+
+# So often a publisher is asked whether its last sample was lost [s].
+ASK_PERIOD_S = 1.0
+# A large map on a slow link takes its time [s]; nobody is asked anew meanwhile.
+ANSWER_S = 10.0
+# Publishers of one key that are asked; what more of them publish is heard all the same.
+MOST_PUBLISHERS = 16
+# Of so many publishers it is remembered what they said last.
+MOST_REMEMBERED = 64
+_SEQUENCE_NUMBERS = 1 << 32
+
+Receive = Callable[[zenoh.Sample], None]
+
+
+class Subscription:
+    """A subscriber; of what was said before it, it knows nothing."""
+
+    def __init__(self, subscriber: object) -> None:
+        self._subscriber = subscriber
+
+    def ask(self) -> None:
+        """Ask for what is kept for late joiners: nothing here."""
+
+    def release(self) -> None:
+        """Let go of what Zenoh has given."""
+        del self._subscriber
+
+
+@dataclass(slots=True)
+class _Publisher:
+    """A publisher that is there.
+
+    Attributes:
+        key: where its cache is asked.
+        ask_at: when to ask it next, by the monotonic clock [s].
+        is_asked: whether an answer may still come.
+    """
+
+    key: str
+    ask_at: float
+    is_asked: bool = False
+
+
+class LatchedSubscription(Subscription):
+    """A subscriber that hears the last ``depth`` samples of each publisher, also of later ones.
+
+    Of one publisher the samples come in order, none twice, save where ``ask`` asks for them again.
+    """
+
+    def __init__(
+        self, session: zenoh.Session, key: str, receive: Receive, depth: int, asker: Asker
+    ) -> None:
+        self._session = session
+        self._receive = receive
+        self._depth = depth
+        self._asker = asker
+        self._key = zenoh.KeyExpr(key)
+        self._caches = f"{key}/@adv/**"
+        # Reentrant: a cache of the same session answers on the thread that asks.
+        self._lock = threading.RLock()
+        self._there: dict[str, _Publisher] = {}
+        # By publisher, the number or time of what was heard of it last.
+        self._last = OrderedDict[str, int]()
+        # Where several samples count, they wait for those before them, which were asked for.
+        self._held: list[tuple[str, int, zenoh.Sample]] = []
+        self._open = 0
+        self._wants_all = True
+        super().__init__(session.declare_subscriber(key, self._hear))
+        self._tokens = session.liveliness().declare_subscriber(
+            f"{key}/@adv/pub/**",
+            zenoh.handlers.Callback(self._note, indirect=False),
+            history=True,
+        )
+        asker.add(self)
+
+    def ask(self) -> None:
+        """Ask every publisher for its last samples, those heard already among them."""
+        with self._lock:
+            self._wants_all = True
+        self._asker.wake()
+
+    def release(self) -> None:
+        """Let go of what Zenoh has given."""
+        super().release()
+        del self._tokens
+
+    def ask_who_is_due(self, now: float) -> float:
+        """Ask, on the asker's thread; return when there is more to ask [s, monotonic]."""
+        questions: list[tuple[str, _Publisher | None]] = []
+        with self._lock:
+            if self._wants_all:
+                self._wants_all = False
+                questions.append((f"{self._caches}?_max={self._depth}", None))
+            for name, publisher in self._there.items():
+                if questions:
+                    # It is asked with all the others.
+                    publisher.ask_at = now + ASK_PERIOD_S
+                elif now >= publisher.ask_at and not publisher.is_asked:
+                    publisher.ask_at, publisher.is_asked = now + ASK_PERIOD_S, True
+                    questions.append((f"{publisher.key}?{self._missing(name)}", publisher))
+            again = bool(questions) and questions[0][1] is None
+            self._open += len(questions)
+            next_at = min((p.ask_at for p in self._there.values()), default=float("inf"))
+        for selector, asked in questions:
+            self._put(selector, asked, again=again)
+        return next_at
+
+    def _missing(self, name: str) -> str:
+        """Return what to ask a publisher for: what came after the last that was heard of it."""
+        last = self._last.get(name)
+        if last is None or name.endswith("/uhlc"):
+            return f"_max={self._depth}"
+        return f"_sn={(last + 1) % _SEQUENCE_NUMBERS}.."
+
+    def _put(self, selector: str, publisher: _Publisher | None, *, again: bool) -> None:
+        def take(reply: zenoh.Reply) -> None:
+            if reply.ok is not None and self._key.intersects(reply.ok.key_expr):
+                self._take(reply.ok, again=again)
+
+        def end() -> None:
+            with self._lock:
+                self._open -= 1
+                if publisher is not None:
+                    publisher.is_asked = False
+                if not self._open:
+                    self._deliver_held()
+
+        with contextlib.suppress(zenoh.ZError):  # a session that ends asks nobody
+            self._session.get(
+                selector,
+                zenoh.handlers.Callback(take, end, indirect=False),
+                timeout=ANSWER_S,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                accept_replies=zenoh.ReplyKeyExpr.ANY,
+            )
+
+    def _note(self, token: zenoh.Sample) -> None:
+        """Note a publisher's token, on a Zenoh thread."""
+        key = str(token.key_expr)
+        name = "/".join(key.rpartition("/@adv/pub/")[2].split("/")[:2])
+        with self._lock:
+            if token.kind == zenoh.SampleKind.DELETE:
+                # One that comes back under its name may count from 0 again.
+                self._there.pop(name, None)
+                self._last.pop(name, None)
+                return
+            if name in self._there or len(self._there) >= MOST_PUBLISHERS:
+                return
+            # Those that were there before answer the first question, and are not asked twice.
+            waits_s = ASK_PERIOD_S if self._wants_all or self._open else 0.0
+            self._there[name] = _Publisher(key, time.monotonic() + waits_s)
+        self._asker.wake()
+
+    def _hear(self, sample: zenoh.Sample) -> None:
+        """Take what is published, on a Zenoh thread."""
+        name, mark = _origin(sample)
+        with self._lock:
+            if not name or not (sample.source_info or name in self._last or name in self._there):
+                self._receive(sample)  # of a publisher that keeps nothing
+                return
+            last = self._last.get(name)
+            is_gap = name in self._there and _leaves_gap(name, mark, last)
+            if self._depth > 1 and (self._open or is_gap):
+                self._hold(name, mark, sample)
+            elif _is_newer(mark, last):
+                self._deliver(name, mark, sample)
+
+    def _take(self, sample: zenoh.Sample, *, again: bool) -> None:
+        """Take an answer; ``again``: also one that was heard already, if nothing came after it."""
+        name, mark = _origin(sample)
+        with self._lock:
+            last = self._last.get(name)
+            if self._depth > 1:
+                self._hold(name, mark, sample)
+            elif _is_newer(mark, last) or (again and mark == last):
+                self._deliver(name, mark, sample)
+
+    def _hold(self, name: str, mark: int, sample: zenoh.Sample) -> None:
+        self._held.append((name, mark, sample))
+        if len(self._held) > MOST_PUBLISHERS * self._depth:
+            self._deliver_held()
+        elif not self._open and name in self._there:
+            self._there[name].ask_at = 0.0
+            self._asker.wake()
+
+    def _deliver_held(self) -> None:
+        held, self._held = sorted(self._held, key=lambda one: one[:2]), []
+        for name, mark, sample in held:
+            if _is_newer(mark, self._last.get(name)):
+                self._deliver(name, mark, sample)
+
+    def _deliver(self, name: str, mark: int, sample: zenoh.Sample) -> None:
+        self._last[name] = mark
+        self._last.move_to_end(name)
+        if len(self._last) > MOST_REMEMBERED:
+            self._last.popitem(last=False)
+        self._receive(sample)
+
+
+class Asker:
+    """The thread a session's latched subscriptions ask on: Zenoh's own must not call Zenoh."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._subscriptions: list[LatchedSubscription] = []
+        self._is_woken = False
+        self._is_ending = False
+        self._thread: threading.Thread | None = None
+
+    def add(self, subscription: LatchedSubscription) -> None:
+        """Let a subscription ask; the first starts the thread."""
+        with self._changed:
+            self._subscriptions.append(subscription)
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._run, name="late-joiner", daemon=True)
+                self._thread.start()
+        self.wake()
+
+    def wake(self) -> None:
+        """Look at once who is to be asked; safe from any thread."""
+        with self._changed:
+            self._is_woken = True
+            self._changed.notify()
+
+    def close(self) -> None:
+        """End the thread."""
+        with self._changed:
+            self._is_ending = True
+            self._changed.notify()
+        if self._thread is not None:
+            self._thread.join()
+        self._subscriptions.clear()
+
+    def _run(self) -> None:
+        next_at = float("inf")
+        while True:
+            with self._changed:
+                if not (self._is_woken or self._is_ending):
+                    waits_s = next_at - time.monotonic()
+                    # A moment more gathers what is due then: one wake-up for all.
+                    self._changed.wait(None if waits_s == float("inf") else max(waits_s, 0.05))
+                if self._is_ending:
+                    return
+                self._is_woken = False
+                subscriptions = list(self._subscriptions)
+            now = time.monotonic()
+            next_at = min((one.ask_who_is_due(now) for one in subscriptions), default=float("inf"))
+
+
+def _origin(sample: zenoh.Sample) -> tuple[str, int]:
+    """Return who published a sample, as in its token, and the number or time it bears."""
+    info, stamp = sample.source_info, sample.timestamp
+    if info is not None:
+        return f"{info.source_id.zid}/{info.source_id.eid}", int(info.source_sn)
+    if stamp is not None:
+        ticks, _, clock = str(stamp).partition("/")
+        return f"{clock}/uhlc", int(ticks)
+    return "", 0
+
+
+def _is_newer(mark: int, last: int | None) -> bool:
+    """Tell whether a sample comes after the last one; numbers begin anew behind the largest."""
+    if last is None or last >= _SEQUENCE_NUMBERS:
+        return last is None or mark > last
+    return 0 < (mark - last) % _SEQUENCE_NUMBERS < _SEQUENCE_NUMBERS // 2
+
+
+def _leaves_gap(name: str, mark: int, last: int | None) -> bool:
+    """Tell whether samples before this one are missing."""
+    return last is not None and not name.endswith("/uhlc") and _is_newer(mark, last + 1)

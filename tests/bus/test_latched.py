@@ -1,0 +1,203 @@
+"""Who comes late hears what was said last, and what that costs does not grow with who has gone."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from contextlib import contextmanager
+from queue import Queue
+
+import pytest
+import zenoh
+import zenoh.ext
+
+from fasaco_edge.bus import latched
+from fasaco_edge.bus.qos import QOS
+from fasaco_edge.bus.session import BusSettings, open_bus
+from tests.daemon.outsider import open_client
+from tests.daemon.processes import free_endpoint
+from tests.daemon.router import router_process
+
+KEY = "test/@v1/key"
+TIMEOUT_S = 20.0
+
+
+@pytest.fixture
+def endpoint():
+    return free_endpoint()
+
+
+@pytest.fixture
+def bus(endpoint):
+    with open_bus(BusSettings("peer", (), (endpoint,))) as session:
+        yield session
+
+
+@contextmanager
+def publishing(endpoint, numbered=True, cache=1, key=KEY):
+    """A session of somebody's that publishes latched, as rmw_zenoh or our mapper does."""
+    text = {"mode": "client", "connect": {"endpoints": [endpoint]}}
+    text["timestamping"] = {"enabled": True}
+    counting = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=None)
+    with zenoh.open(zenoh.Config.from_json5(json.dumps(text))) as session:
+        yield zenoh.ext.declare_advanced_publisher(
+            session,
+            key,
+            cache=zenoh.ext.CacheConfig(max_samples=cache),
+            sample_miss_detection=counting if numbered else None,
+            publisher_detection=True,
+        )
+
+
+class Spy:
+    """Counts what publishers of the key are asked."""
+
+    def __init__(self, session):
+        self._asked, self._lock = [], threading.Lock()
+        callback = zenoh.handlers.Callback(self._take, indirect=False)
+        self._queryable = session.declare_queryable(f"{KEY}/@adv/**", callback)
+
+    def _take(self, query):
+        with self._lock:
+            self._asked.append((time.monotonic(), str(query.selector)))
+        query.drop()
+
+    def asked(self):
+        with self._lock:
+            return list(self._asked)
+
+    def in_rounds(self, rounds, wanted=1):
+        """Questions of ``rounds`` periods, which begin once ``wanted`` were asked."""
+        begun = len(self.asked())
+        deadline = time.monotonic() + TIMEOUT_S
+        while len(self.asked()) < begun + wanted and time.monotonic() < deadline:
+            time.sleep(0.01)
+        began = time.monotonic()
+        time.sleep(rounds * latched.ASK_PERIOD_S)
+        return [selector for at, selector in self.asked() if at >= began]
+
+
+def until(holds):
+    deadline = time.monotonic() + TIMEOUT_S
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def taken(samples, count):
+    return [samples.get(timeout=TIMEOUT_S).payload for _ in range(count)]
+
+
+def test_publishers_that_are_gone_are_asked_no_more(bus, endpoint):
+    samples = Queue()
+    bus.subscribe(KEY, samples.put, latched=True)
+    client = open_client(endpoint)
+    spy = Spy(client)
+    for number in range(8):
+        with publishing(endpoint) as publisher:
+            publisher.put(b"%d" % number)
+            assert taken(samples, 1) == [b"%d" % number]
+    with publishing(endpoint) as publisher:
+        publisher.put(b"last")
+        assert taken(samples, 1) == [b"last"]
+        questions = spy.in_rounds(3)
+        # One a second for the one that is there; nine without this.
+        assert 1 <= len(questions) <= 4, questions
+        assert {str(publisher.id.zid) in question for question in questions} == {True}
+    client.close()
+
+
+def test_to_ask_for_the_newest_leaves_no_questioner_behind(bus, endpoint):
+    samples = Queue()
+    subscription = bus.subscribe(KEY, samples.put, latched=True)
+    client = open_client(endpoint)
+    with publishing(endpoint) as publisher:
+        publisher.put(b"newest")
+        assert taken(samples, 1) == [b"newest"]
+        spy = Spy(client)
+        threads = threading.active_count()
+        for _ in range(10):
+            subscription.ask()
+            assert taken(samples, 1) == [b"newest"]  # although it was heard before
+        assert threading.active_count() <= threads + 1
+        assert len(spy.in_rounds(3)) <= 4
+    assert samples.empty()
+    client.close()
+
+
+@pytest.mark.parametrize("numbered", [True, False])
+def test_late_publishers_are_heard_once(bus, endpoint, numbered):
+    """One that published before it could be heard, and one after: in order, none twice."""
+    samples = Queue()
+    with publishing(endpoint, numbered) as early:
+        early.put(b"old")
+        early.put(b"before")
+        bus.subscribe(KEY, samples.put, latched=True)
+        assert taken(samples, 1) == [b"before"]
+        with publishing(endpoint, numbered) as late:
+            late.put(b"late")
+            assert taken(samples, 1) == [b"late"]
+            early.put(b"after")
+            assert taken(samples, 1) == [b"after"]
+        time.sleep(1.5 * latched.ASK_PERIOD_S)
+    assert samples.empty()
+
+
+def test_where_several_samples_count_they_come_in_order(bus, endpoint):
+    samples, stop = Queue(), threading.Event()
+    with publishing(endpoint, cache=100) as publisher:
+
+        def publish():
+            for number in range(2000):
+                publisher.put(b"%d" % number)
+                if stop.wait(0.0005):
+                    return
+
+        thread = threading.Thread(target=publish)
+        thread.start()
+        time.sleep(0.1)
+        bus.subscribe(KEY, samples.put, latched=True, history=100)
+        thread.join()
+        heard = [int(payload) for payload in taken(samples, 1)]
+        while heard[-1] < 1999:
+            heard += [int(payload) for payload in taken(samples, 1)]
+    assert heard == list(range(heard[0], 2000))
+
+
+def test_a_flood_of_publishers_is_not_asked(bus, endpoint):
+    samples = Queue()
+    with publishing(endpoint) as honest:
+        honest.put(b"one")
+        subscription = bus.subscribe(KEY, samples.put, latched=True)
+        assert taken(samples, 1) == [b"one"]
+        client = open_client(endpoint)
+        spy = Spy(client)
+        tokens = [
+            client.liveliness().declare_token(f"{KEY}/@adv/pub/{number:x}/1/_")
+            for number in range(1, 301)
+        ]
+        until(lambda: len(subscription._there) == latched.MOST_PUBLISHERS)
+        questions = spy.in_rounds(2, wanted=2 * latched.MOST_PUBLISHERS)
+        assert len(questions) <= 3 * latched.MOST_PUBLISHERS
+        honest.put(b"two")
+        assert taken(samples, 1) == [b"two"]
+        assert tokens
+        client.close()
+
+
+def test_after_the_router_was_started_again_the_newest_is_there(endpoint):
+    samples = Queue()
+    with router_process(endpoint) as router:
+        settings = BusSettings("client", (endpoint,))
+        with open_bus(settings) as bus, open_bus(settings) as other:
+            bus.subscribe(KEY, samples.put, latched=True)
+            publisher = other.publisher(KEY, qos=QOS["map"])
+            publisher.put(b"before")
+            assert taken(samples, 1) == [b"before"]
+            router.kill()
+            router.wait()
+            publisher.put(b"into the void")
+            with router_process(endpoint):
+                while taken(samples, 1) != [b"into the void"]:
+                    pass
