@@ -552,3 +552,49 @@ def _circuit(
         else:
             circuit.append(stack.pop()[0])
     return circuit[::-1]
+
+
+def areas(kinds: NDArray[np.uint8]) -> list[tuple[int, frozenset[Cell]]]:
+    """Return all connected areas of a grid as (kind, cells), in the order their first cells come.
+
+    One cell after the other floods its area.
+    """
+    seen: set[Cell] = set()
+    found = []
+    for start in map(tuple, np.argwhere(kinds).tolist()):
+        if start in seen:
+            continue
+        area, waiting = {start}, [start]
+        while waiting:
+            row, col = waiting.pop()
+            for up, right in DIRECTIONS:
+                there = row + up, col + right
+                inside = 0 <= there[0] < kinds.shape[0] and 0 <= there[1] < kinds.shape[1]
+                if inside and there not in area and kinds[there] == kinds[row, col]:
+                    area.add(there)
+                    waiting.append(there)
+        found.append((int(kinds[start]), frozenset(area)))
+        seen |= area
+    return found
+
+
+def inner_cell(area: frozenset[Cell]) -> Cell:
+    """Return the middle of an area's first longest run in a row."""
+    runs = []
+    for row, col in sorted(area):
+        if runs and runs[-1][0] == row and runs[-1][2] == col:
+            runs[-1][2] = col + 1
+        else:
+            runs.append([row, col, col + 1])
+    row, first, last = max(runs, key=lambda run: run[2] - run[1])
+    return row, (first + last - 1) // 2
+
+
+def cell_beside(area: frozenset[Cell], allowed: set[Cell]) -> Cell:
+    """Return the middle one of the allowed cells beside an area, (-1, -1) where there is none.
+
+    Nor is there any beside an area without a square of two by two cells.
+    """
+    square = any({(r + 1, c), (r, c + 1), (r + 1, c + 1)} <= area for r, c in area)
+    beside = sorted({(r + up, c + right) for r, c in area for up, right in DIRECTIONS} & allowed)
+    return beside[len(beside) // 2] if square and beside else (-1, -1)

@@ -9,9 +9,6 @@ from fasaco_edge.mission.assignment import Assignment
 if TYPE_CHECKING:
     from fasaco_edge.mission.mission import Mission
 
-# So many areas are listed, the largest first; the others are counted.
-MOST_AREAS = 20
-
 
 def mission_report(mission: Mission | None, assignment: Assignment) -> dict[str, Any]:
     """Return this part of the status."""
@@ -55,11 +52,12 @@ def _zones(mission: Mission | None, assignment: Assignment) -> list[dict[str, An
 
 
 def _unreached(mission: Mission | None) -> dict[str, Any]:
-    areas = mission.unreached() if mission else []
-    cell_m = mission.lattice.cell_m if mission and mission.lattice else 0.0
+    if mission is None or mission.lattice is None:
+        return {"cells": 0, "m2": 0.0, "areas": [], "areas_left_out": 0}
+    found, cell_m = mission.unreached(), mission.lattice.cell_m
     return {
-        "cells": sum(area.cells for area in areas),
-        "m2": round(sum(area.cells for area in areas) * cell_m**2, 3),
+        "cells": found.cells,
+        "m2": round(found.cells * cell_m**2, 3),
         "areas": [
             {
                 "cells": area.cells,
@@ -67,9 +65,9 @@ def _unreached(mission: Mission | None) -> dict[str, Any]:
                 **_centre(area.cell, cell_m),
                 "reason": area.reason,
             }
-            for area in areas[:MOST_AREAS]
+            for area in found.areas
         ],
-        "areas_left_out": max(len(areas) - MOST_AREAS, 0),
+        "areas_left_out": found.areas_left_out,
     }
 
 

@@ -16,7 +16,7 @@ from fasaco_edge.mission.logbook import Logbook
 from fasaco_edge.mission.lookout import Lookout
 from fasaco_edge.mission.progress import MOST_TRIES, LeftOver
 from fasaco_edge.mission.site import Site
-from fasaco_edge.mission.unreached import UnreachedArea
+from fasaco_edge.mission.unreached import Unreached
 from fasaco_edge.mission.zones import in_zones
 from fasaco_edge.planners.problem import CoverageProblem
 
@@ -199,15 +199,15 @@ class Agenda:
 
     def waits_for(self) -> str:
         """Return in words what the robot waits for before it tries again."""
-        cells, config = sum(area.cells for area in self.unreached()), self._config
+        cells, config = self.unreached().cells, self._config
         return (
             f"{cells} {'cell' if cells == 1 else 'cells'} not reached: tried again after "
             f"{config.retry_s:g} s ({self.assignment.tries + 1} of {config.retries})"
         )
 
-    def unreached(self) -> list[UnreachedArea]:
-        """Return what of the order stays uncovered as things are, the largest areas first."""
-        return self._leftovers.areas(self.assignment)
+    def unreached(self) -> Unreached:
+        """Return what of the order stays uncovered as things are."""
+        return self._leftovers.unreached(self.assignment)
 
     def _begin_try(self, cell: Cell) -> str:
         memory = self._memory

@@ -8,7 +8,7 @@ from fasaco_edge.mission.ground import Ground
 from fasaco_edge.mission.logbook import Logbook
 from fasaco_edge.mission.order import MissionOrder
 from fasaco_edge.mission.site import Site
-from fasaco_edge.mission.unreached import Sighted, Situation, UnreachedArea, viewpoints
+from fasaco_edge.mission.unreached import Sighted, Situation, Unreached, viewpoints
 from fasaco_edge.mission.zones import in_zones
 
 
@@ -25,7 +25,7 @@ class Leftovers:
         self._log = log
         self._sighted: Sighted | None = None
         self._seen: Ground | None = None
-        self._areas: tuple[object, list[UnreachedArea]] = (None, [])
+        self._found: tuple[object, Unreached] = (None, Unreached())
 
     def begin_anew(self) -> None:
         """Begin with another order."""
@@ -39,19 +39,19 @@ class Leftovers:
             self._sighted = before.and_now(ground) if before else Sighted.of(ground)
             self._seen = ground
 
-    def areas(self, assignment: Assignment) -> list[UnreachedArea]:
-        """Return what is not reached, the largest areas first.
+    def unreached(self, assignment: Assignment) -> Unreached:
+        """Return what is not reached.
 
         While the robot stands where it cannot be, what was so before is all there is to say.
         """
         ground = self._site.ground
         if assignment.order is None:
-            return []
+            return Unreached()
         key = (ground, self._log.ledger.total, assignment)
-        if ground is not None and key != self._areas[0]:
+        if ground is not None and key != self._found[0]:
             given_up = assignment.stage is not Stage.COVERING
-            self._areas = key, self._situation(assignment.order, ground, given_up).areas()
-        return self._areas[1]
+            self._found = key, self._situation(assignment.order, ground, given_up).unreached()
+        return self._found[1]
 
     def viewpoints(self, order: MissionOrder, ground: Ground) -> set[Cell]:
         """Return the cells (row, col) to look at areas from that were closed."""

@@ -22,7 +22,7 @@ from fasaco_edge.mission.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.parts import Parts
 from fasaco_edge.mission.pilot import Pilot
 from fasaco_edge.mission.progress import Coverage, DrivenPath
-from fasaco_edge.mission.unreached import UnreachedArea
+from fasaco_edge.mission.unreached import Unreached
 from fasaco_edge.mission.zone_progress import ZoneProgress, zone_progress
 
 __all__ = ["Mission", "MissionConfig"]
@@ -88,8 +88,8 @@ class Mission:
         """Return how far the mission is; None before there is a map."""
         return self._parts.site.coverage(self.ledger)
 
-    def unreached(self) -> list[UnreachedArea]:
-        """Return what of the order stays uncovered as things are, the largest areas first."""
+    def unreached(self) -> Unreached:
+        """Return what of the order stays uncovered as things are."""
         return self._parts.agenda.unreached()
 
     def zone_progress(self) -> list[ZoneProgress]:

@@ -10,8 +10,13 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell, CoverageLattice
-from fasaco_edge.mission.connected import connected_areas
+from fasaco_edge.kernels.areas import cells_beside, find_areas
 from fasaco_edge.mission.ground import Ground
+
+# So many areas are named, the largest first; the others are counted.
+MOST_AREAS = 20
+# A robot drives by so many in the end, and no more.
+MOST_VIEWPOINTS = 256
 
 
 class Cause(IntEnum):
@@ -47,6 +52,21 @@ class UnreachedArea:
     cells: int
     cell: Cell
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Unreached:
+    """What stays uncovered.
+
+    Attributes:
+        areas: the largest of them, the largest first; at most MOST_AREAS.
+        cells: how many cells all areas have.
+        areas_left_out: how many more areas there are.
+    """
+
+    areas: tuple[UnreachedArea, ...] = ()
+    cells: int = 0
+    areas_left_out: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,16 +118,20 @@ class Situation:
     given_up: bool
     tries: int
 
-    def areas(self) -> list[UnreachedArea]:
-        """Return what stays uncovered, the largest areas first."""
+    def unreached(self) -> Unreached:
+        """Return what stays uncovered."""
         window = self.ground.lattice.window
-        found = []
-        for area in connected_areas(self._causes()):
-            row, col = area.inner_cell
-            reason = REASONS.get(Cause(area.kind), f"left over after {self.tries} tries")
+        areas = find_areas(self._causes())
+        largest = np.argsort(-areas.cells, kind="stable")[:MOST_AREAS]
+        named = []
+        for area in largest.tolist():
+            row, col = areas.inner[area].tolist()
+            cause = Cause(int(areas.kinds[area]))
+            reason = REASONS.get(cause, f"left over after {self.tries} tries")
             cell = row + window.row0, col + window.col0
-            found.append(UnreachedArea(area.cells, cell, reason))
-        return found
+            named.append(UnreachedArea(int(areas.cells[area]), cell, reason))
+        cells = int(areas.cells.sum(dtype=np.int64))
+        return Unreached(tuple(named), cells, len(areas.cells) - len(named))
 
     def closed(self) -> NDArray[np.bool_]:
         """Return the uncovered cells that could be reached once, bool (rows, cols)."""
@@ -144,35 +168,10 @@ def viewpoints(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -> list[
 
     An area without a square of two by two cells is left out: rows of cells along the walls
     come and go with a map's noise, and nobody wants a robot to drive along all of them again.
+    Of very many the largest are looked at.
     """
-    found = []
-    block = closed[:-1, :-1] & closed[1:, :-1] & closed[:-1, 1:] & closed[1:, 1:]
-    if not block.any():
-        return []
-    for area in connected_areas(closed.astype(np.uint8)):
-        rows = [row for row, _, _ in area.runs]
-        window = Window(
-            min(rows),
-            min(first for _, first, _ in area.runs),
-            max(rows) + 1,
-            max(last for _, _, last in area.runs),
-        )
-        mask = np.zeros((window.rows + 2, window.cols + 2), bool)
-        for row, first, last in area.runs:
-            mask[row - window.row0 + 1, first - window.col0 + 1 : last - window.col0 + 1] = True
-        if not (mask[:-1, :-1] & mask[1:, :-1] & mask[:-1, 1:] & mask[1:, 1:]).any():
-            continue
-        beside = mask.copy()
-        beside[1:] |= mask[:-1]
-        beside[:-1] |= mask[1:]
-        beside[:, 1:] |= mask[:, :-1]
-        beside[:, :-1] |= mask[:, 1:]
-        around = Window(window.row0 - 1, window.col0 - 1, window.row1 + 1, window.col1 + 1)
-        inside = around.intersection(Window(0, 0, *closed.shape))
-        assert inside is not None
-        whole = Window(0, 0, *closed.shape)
-        cells = np.argwhere(beside[inside.slices_in(around)] & reachable[inside.slices_in(whole)])
-        if len(cells):
-            row, col = cells[len(cells) // 2].tolist()
-            found.append((row + inside.row0, col + inside.col0))
-    return found
+    areas = find_areas(closed.view(np.uint8))
+    beside = cells_beside(areas, reachable)
+    seen = np.flatnonzero(beside[:, 0] >= 0)
+    largest = seen[np.argsort(-areas.cells[seen], kind="stable")][:MOST_VIEWPOINTS]
+    return [(row, col) for row, col in beside[largest].tolist()]

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-import numpy as np
-
-from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.assignment import Assignment, Stage
 from fasaco_edge.mission.ground import Ground
 from fasaco_edge.mission.ledger import CoverageLedger
-from fasaco_edge.mission.polygons import Polygon, bounds, cells_inside
+from fasaco_edge.mission.zones import counts_in
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,31 +36,23 @@ def zone_progress(
     order = assignment.order
     if order is None:
         return []
+    polygons = tuple(zone.polygon for zone in order.zones if zone.polygon)
+    cells = covered = [0] * len(polygons)
+    if ground is not None and polygons:
+        lattice, reachable = ground.lattice, ground.reachable
+        visited = reachable & (ledger.visits(lattice.window) > 0)
+        cells = counts_in(polygons, lattice.window, lattice.cell_m, reachable)
+        covered = counts_in(polygons, lattice.window, lattice.cell_m, visited)
     found = []
-    for index, zone in enumerate(order.zones):
-        if zone.polygon is None:
-            continue
+    # Either all zones have polygons, or there is but one, without: for everything.
+    for index, counted in enumerate(zip(cells, covered, strict=True)):
+        zone = order.zones[index]
         if assignment.stage is not Stage.COVERING or index < assignment.zone:
             begun = zone.passes
         elif index > assignment.zone:
             begun = 0
         else:
             begun = assignment.turn if assignment.begun else assignment.turn - 1
-        cells, covered = _counts(zone.polygon, ground, ledger)
-        found.append(ZoneProgress(zone.name, zone.passes, begun, cells, covered if begun else 0))
+        reached, done = counted
+        found.append(ZoneProgress(zone.name, zone.passes, begun, reached, done if begun else 0))
     return found
-
-
-def _counts(polygon: Polygon, ground: Ground | None, ledger: CoverageLedger) -> tuple[int, int]:
-    if ground is None:
-        return 0, 0
-    lattice = ground.lattice
-    x0, y0, x1, y1 = (value / lattice.cell_m for value in bounds(polygon))
-    around = Window(math.floor(y0), math.floor(x0), math.ceil(y1), math.ceil(x1))
-    window = around.intersection(lattice.window)
-    if window is None:
-        return 0, 0
-    inside = cells_inside(polygon, window, lattice.cell_m)
-    inside &= ground.reachable[window.slices_in(lattice.window)]
-    covered = inside & (ledger.visits(window) > 0)
-    return int(np.count_nonzero(inside)), int(np.count_nonzero(covered))

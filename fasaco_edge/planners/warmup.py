@@ -11,9 +11,11 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
+from fasaco_edge.kernels.areas import cells_beside, find_areas
 from fasaco_edge.kernels.changes import Box
 from fasaco_edge.kernels.free_pixels import tally_free
 from fasaco_edge.kernels.jit import note_all_compiled
+from fasaco_edge.kernels.polygons import add_near, count_in, turn_inside
 from fasaco_edge.kernels.reach import update_reach
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.colony import ColonyConfig
@@ -26,10 +28,10 @@ from fasaco_edge.planners.repair import repaired
 from fasaco_edge.planners.table import PLANNERS
 from fasaco_edge.planners.work import SearchProgress
 
-LATTICE, CHANGES, REACH = "lattice", "changes of the map", "reachability"
+LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
 WALKS, BOUND = "shortest walks", "lower bound"
 LOCAL_SEARCH, REPAIR = "local search", "repair"
-STAGES = (LATTICE, CHANGES, REACH, WALKS, BOUND, LOCAL_SEARCH, REPAIR, *PLANNERS)
+STAGES = (LATTICE, CHANGES, REACH, AREAS, WALKS, BOUND, LOCAL_SEARCH, REPAIR, *PLANNERS)
 
 
 def warm_up(report: Callable[[str], None] | None = None) -> None:
@@ -51,6 +53,8 @@ def _stages() -> Iterator[str]:
     _take_changes_in(grid, lattice, footprint)
     yield REACH
     problem = CoverageProblem.of(lattice, (0, 0))
+    yield AREAS
+    _take_areas(lattice)
     yield WALKS
     walk_figures(lattice, np.array([[0, 0], [0, 1]], np.int32))
     yield BOUND
@@ -76,6 +80,15 @@ def _take_changes_in(grid: OccupancyGrid, lattice: CoverageLattice, footprint: F
     raster, _ = grid.geometry.on_raster()
     place, counts = placement_on(raster, footprint.cell_m), np.zeros((4, 5), np.int32)
     tally_free(pixels_of(grid), pixels_of(grown), Box(0, 0, 4, 5), 25, place, counts, 0, 0)
+
+
+def _take_areas(lattice: CoverageLattice) -> None:
+    cells = np.zeros(lattice.states.shape, np.bool_)
+    cells_beside(find_areas(lattice.states.copy()), cells)
+    corners = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])
+    turn_inside(corners, 0, 0, 1.0, cells)
+    add_near(corners, 0, 0, 1.0, 0.5, np.zeros((4, 5), np.int32))
+    count_in(np.packbits(cells)[np.newaxis], np.packbits(cells))
 
 
 def _after_a_kick(progress: SearchProgress) -> bool:

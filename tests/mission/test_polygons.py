@@ -8,10 +8,8 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.kernels.directions import COL_STEP, ROW_STEP
-from fasaco_edge.mission.connected import connected_areas
-from fasaco_edge.mission.polygons import cells_inside, cells_near, flaw
-from fasaco_edge.mission.zones import without
+from fasaco_edge.mission.polygons import flaw
+from fasaco_edge.mission.zones import cells_inside, cells_near, counts_in, without
 from tests import naive
 
 CELL_M = 0.3
@@ -185,39 +183,9 @@ def test_steps_to_cells_taken_away_are_gone():
     assert free.states.all()
 
 
-def flood(kinds):
-    """All connected areas, one cell after the other: (kind, cells)."""
-    seen, found = set(), []
-    for start in np.argwhere(kinds).tolist():
-        waiting = [tuple(start)] if tuple(start) not in seen else []
-        area = set(waiting)
-        while waiting:
-            row, col = waiting.pop()
-            for direction in range(4):
-                there = row + ROW_STEP[direction], col + COL_STEP[direction]
-                inside = 0 <= there[0] < kinds.shape[0] and 0 <= there[1] < kinds.shape[1]
-                if inside and there not in area and kinds[there] == kinds[row, col]:
-                    area.add(there)
-                    waiting.append(there)
-        if area:
-            found.append((int(kinds[tuple(start)]), frozenset(area)))
-        seen |= area
-    return found
-
-
-@settings(max_examples=150, deadline=None)
-@given(st.integers(0, 8), st.integers(0, 8), st.integers(0, 2**32), st.integers(2, 4))
-def test_connected_areas_are_those_a_flood_finds(rows, cols, seed, kinds):
-    grid = np.random.default_rng(seed).integers(0, kinds, (rows, cols)).astype(np.uint8)
-    areas = connected_areas(grid)
-    as_sets = {
-        (area.kind, frozenset((row, col) for row, a, b in area.runs for col in range(a, b)))
-        for area in areas
-    }
-    assert as_sets == set(flood(grid))
-    assert len(areas) == len(as_sets)
-    for area in areas:
-        assert area.cells == sum(b - a for _, a, b in area.runs)
-        assert any(row == area.inner_cell[0] and a <= area.inner_cell[1] < b
-                   for row, a, b in area.runs)  # fmt: skip
-    assert [area.cells for area in areas] == sorted((a.cells for a in areas), reverse=True)
+@settings(max_examples=100, deadline=None)
+@given(st.lists(polygons, max_size=4).map(tuple), st.integers(0, 2**32))
+def test_cells_in_many_polygons_are_counted_as_in_each(zones, seed):
+    marked = np.random.default_rng(seed).random((WINDOW.rows, WINDOW.cols)) < 0.5
+    expected = [int((cells_inside(zone, WINDOW, CELL_M) & marked).sum()) for zone in zones]
+    assert counts_in(zones, WINDOW, CELL_M, marked) == expected
