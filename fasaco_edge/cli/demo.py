@@ -63,7 +63,8 @@ def run(args: argparse.Namespace) -> int:
         raise BadConfiguration(f"--speed must be above 0, got {args.speed}")
     out: Path = args.out or Path("runs") / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
     with writing(out):
-        out.mkdir(parents=True, exist_ok=True)
+        # Of the folder that nobody named, nobody else can have made one beforehand.
+        out.mkdir(parents=True, exist_ok=args.out is not None)
     seconds = compile_kernels()
     err().print(f"kernels ready ({seconds:.1f} s); results go to {out}")
     with DemoMission(args, out) as mission:

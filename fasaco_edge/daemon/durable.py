@@ -6,6 +6,8 @@ import errno
 import os
 from pathlib import Path
 
+from fasaco_edge.own_files import open_own
+
 
 def write_through(path: Path, payload: bytes) -> None:
     """Write a file; its bytes are on the disk when this returns.
@@ -13,7 +15,7 @@ def write_through(path: Path, payload: bytes) -> None:
     Raises:
         OSError: that failed.
     """
-    with path.open("wb") as file:
+    with open(path, "wb", opener=open_own) as file:
         file.write(payload)
         file.flush()
         os.fsync(file.fileno())

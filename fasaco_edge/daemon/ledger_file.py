@@ -19,6 +19,7 @@ from fasaco_edge.daemon.durable import make_folder, sync_folder, write_through
 from fasaco_edge.daemon.ledger_codec import LedgerFileError, decode_ledger, encode_ledger
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.ledger import LedgerMismatchError, LedgerSnapshot
+from fasaco_edge.own_files import open_own
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +126,7 @@ class LedgerFile:
     def _take_lock(self) -> None:
         make_folder(self.path.parent)
         # Not open for writing: that would keep the disk from turning read-only.
-        lock = os.open(f"{self.path}.lock", os.O_RDONLY | os.O_CREAT, 0o644)
+        lock = open_own(f"{self.path}.lock", os.O_RDONLY)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:

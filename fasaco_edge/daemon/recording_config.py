@@ -19,8 +19,8 @@ class RecordingConfig(Section, frozen=True):
 
     part_mb: Annotated[int, Meta(ge=1, le=100_000)] = 64
     part_min: Annotated[float, Meta(ge=0, le=10_000)] = 10.0
-    quota_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 0
-    least_free_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 50
+    quota_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 2000
+    least_free_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 200
 
     def words(self) -> list[str]:
         """Return these as options of ``fasaco-edge record``."""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fasaco_edge.own_files import open_own
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.repair import repair_recording
 from fasaco_edge.recording.sdk import rr
@@ -51,7 +52,8 @@ class Part:
         try:
             # Without a blueprint: one given here is written before the call returns, which
             # on a stalled disk is never.
-            self.stream.set_sinks(rr.FileSink(str(path)))
+            # By its descriptor: what has that name may be another file by now.
+            self.stream.set_sinks(rr.FileSink(f"/proc/self/fd/{self._lock}"))
         except RuntimeError as error:
             os.close(self._lock)
             raise OSError(str(error)) from error
@@ -103,7 +105,8 @@ class Part:
     def cut(self) -> None:
         """Cut a broken part again: rerun may write to it long after it has given up on it."""
         if self.path.is_file() and self.path.stat().st_size > self._flushed_bytes:
-            os.truncate(self.path, self._flushed_bytes)
+            with open(self.path, "r+b", opener=open_own) as file:
+                file.truncate(self._flushed_bytes)
             repair_recording(self.path)
 
     def _has_writer(self) -> bool:
@@ -121,6 +124,6 @@ def _is_same_file(descriptor: int, file: os.stat_result) -> bool:
 
 
 def _locked(path: Path) -> int:
-    lock = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_NONBLOCK | os.O_CLOEXEC, 0o644)
+    lock = open_own(path, os.O_RDONLY | os.O_NONBLOCK)
     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     return lock

@@ -1,7 +1,9 @@
-"""Room for what comes: of a robot's recordings the oldest parts go.
+"""The recordings of a folder: what the next run is called, which part is older, which ones go.
 
-Only parts that a recorder of this robot has named are touched, only where no recorder writes
-them, and nothing else that lies in the folder.
+A run has a number one above the highest there is, before anything else in its name: clocks go
+backward, on a computer without a battery for its clock at each start, and numbers do not. Only
+parts that a recorder of this robot has named are deleted, only where no recorder writes them, and
+nothing else that lies in the folder.
 """
 
 from __future__ import annotations
@@ -10,7 +12,27 @@ import fcntl
 import os
 import re
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
+
+from fasaco_edge.errors import BadConfiguration
+
+NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
+TIME = "%Y%m%dT%H%M%SZ"
+
+
+def next_run(folder: Path, robot: str, began: datetime) -> str:
+    """Return what a run of ``robot`` that begins now is called: it is younger than all there are.
+
+    Raises:
+        BadConfiguration: the folder cannot be read.
+    """
+    try:
+        names = os.listdir(folder) if folder.is_dir() else []
+    except OSError as error:
+        raise BadConfiguration(f"cannot record into {folder}: {error}") from error
+    runs = [int(match[1]) for match in map(NUMBERED.fullmatch, names) if match]
+    return f"run{max(runs, default=0) + 1:05}-{began:{TIME}}-{robot}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +50,9 @@ class Quota:
         """
         if not self.most_bytes:
             return []
-        parts = sorted(self._parts(folder))
-        total, deleted = sum(size for _, _, size in parts), []
-        for _, path, size in parts:
+        parts = oldest_first(folder, self.robot)
+        total, deleted = sum(size for _, size in parts), []
+        for path, size in parts:
             if total + coming <= self.most_bytes:
                 break
             if _delete(path):
@@ -38,21 +60,52 @@ class Quota:
                 total -= size
         return deleted
 
-    def _parts(self, folder: Path) -> list[tuple[tuple[str, int, int], Path, int]]:
-        """Return of each part its age, run by run, its path and its size [bytes]."""
-        named = re.compile(rf"(\d{{8}}T\d{{6}}Z)-{re.escape(self.robot)}(?:-(\d+))?-part(\d+)\.rrd")
-        found = []
-        for path in folder.iterdir():
-            match = named.fullmatch(path.name)
-            if match and path.is_file() and not path.is_symlink():
-                age = match[1], int(match[2] or 1), int(match[3])
-                found.append((age, path, path.stat().st_size))
-        return found
+
+def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
+    """Return the parts of a robot's recordings, each with its size [bytes], the oldest first.
+
+    Runs without a number, as they were called once, are older than those with one. Among
+    themselves they are as old as what was written to them last: by its file's time, or by the name
+    where that is later, as that of a copy may be.
+
+    Raises:
+        OSError: the folder cannot be read.
+    """
+    named = re.compile(
+        # Only where there was no number, a second run within a second was told by one behind.
+        r"(?P<run>(?:run(?P<order>\d{5,9})-)?(?P<when>\d{8}T\d{6}Z)-"
+        rf"{re.escape(robot)}(?(order)|(?:-(?P<again>\d+))?))-part(?P<number>\d+)\.rrd"
+    )
+    found, last = [], dict[str, float]()
+    for path in folder.iterdir():
+        match = named.fullmatch(path.name)
+        if match and path.is_file() and not path.is_symlink():
+            status = path.stat()
+            found.append((match, path, status.st_size))
+            written = max(_time(match["when"]), status.st_mtime)
+            last[match["run"]] = max(last.get(match["run"], 0.0), written)
+
+    def age(part: tuple[re.Match[str], Path, int]) -> tuple[int, float, int, int]:
+        match, _, _ = part
+        number = int(match["number"])
+        if match["order"]:
+            return int(match["order"]), 0.0, 1, number
+        return 0, last[match["run"]], int(match["again"] or 1), number
+
+    return [(path, size) for _, path, size in sorted(found, key=age)]
+
+
+def _time(when: str) -> float:
+    """Return the time in a name [s]; 0 where there is no such day."""
+    try:
+        return datetime.strptime(when, TIME).replace(tzinfo=UTC).timestamp()
+    except ValueError:
+        return 0.0
 
 
 def _delete(path: Path) -> bool:
     """Delete a part; False where somebody writes it: they hold a lock on it."""
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         path.unlink()

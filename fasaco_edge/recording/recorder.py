@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
-from itertools import chain, count
 from pathlib import Path
 from types import FrameType
 
@@ -31,7 +30,7 @@ from fasaco_edge.recording.inbox import Inbox
 from fasaco_edge.recording.input_log import InputLog
 from fasaco_edge.recording.journal import Journal
 from fasaco_edge.recording.live import serve_live
-from fasaco_edge.recording.quota import Quota
+from fasaco_edge.recording.quota import Quota, next_run
 from fasaco_edge.recording.repair import repair_folder
 from fasaco_edge.recording.report import RecorderReport
 from fasaco_edge.recording.room import Room
@@ -89,7 +88,7 @@ class Recorder:
         self._clock = RunClock()
         began_ns = self._clock.now_ns()
         began = datetime.fromtimestamp(began_ns / 1e9, UTC)
-        name = _unused_name(settings.out, f"{began:%Y%m%dT%H%M%SZ}-{settings.robot}")
+        name = next_run(settings.out, settings.robot, began)
         quota = Quota(settings.robot, settings.quota_bytes)
         room = Room(settings.part_bytes, settings.least_free_bytes, settings.part_s, quota)
         self._journal = Journal(settings.out, name, room, build_blueprint(None))
@@ -252,12 +251,6 @@ class Recorder:
         )
         self._scene.add_report(self._report)
         self._reporter.put(encode_json(self._report))
-
-
-def _unused_name(folder: Path, stem: str) -> str:
-    """Return ``stem``, numbered where a recorder began in the same second."""
-    names = chain([stem], (f"{stem}-{number}" for number in count(2)))
-    return next(name for name in names if not any(folder.glob(f"{name}-part*.rrd")))
 
 
 def _repaired(folder: Path) -> list[str]:

@@ -80,7 +80,7 @@ def repair_recording(path: Path) -> Repair | None:
     A recording whose writer lives is left alone: it holds a lock on the file. So is one
     with a footer, and a file that is no recording.
     """
-    with path.open("r+b") as recording:
+    with open(path, "r+b", opener=_open_no_link) as recording:
         try:
             fcntl.flock(recording, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -92,7 +92,13 @@ def repair_recording(path: Path) -> Repair | None:
     return Repair(path, scan.torn_bytes)
 
 
+def _open_no_link(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_CLOEXEC)
+
+
 def repair_folder(folder: Path) -> list[Repair]:
     """Cut every torn recording in ``folder``; return what was cut, in order of name."""
-    paths = sorted(path for path in folder.glob("*.rrd") if path.is_file())
+    paths = sorted(
+        path for path in folder.glob("*.rrd") if path.is_file() and not path.is_symlink()
+    )
     return [repair for path in paths if (repair := repair_recording(path)) is not None]

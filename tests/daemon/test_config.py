@@ -332,7 +332,8 @@ def test_the_recorder_gets_its_room_from_the_configuration(tmp_path):
 
     file = tmp_path / "config.yaml"
     file.write_text("recording: {part_mb: 10, part_min: 2.5, quota_mb: 100, least_free_mb: 7}")
-    words = _command(load_config(file), tmp_path)[3:]
+    command = _command(load_config(file), tmp_path)
+    words = command[command.index("record") :]
     told = _parser().parse_args(words)
     assert (told.part_mb, told.part_min, told.quota_mb, told.least_free_mb) == (10, 2.5, 100, 7)
     file.write_text("recording: {part_mb: 60, quota_mb: 100}")

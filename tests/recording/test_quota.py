@@ -1,0 +1,84 @@
+"""Which recording is older, whatever the clock said; and which ones go."""
+
+from __future__ import annotations
+
+import os
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.recording.quota import Quota, next_run, oldest_first
+
+AT_BOOT, LAST_WEEK, NEXT_YEAR = (
+    datetime(year, month, 20, 10, tzinfo=UTC) for year, month in ((1970, 1), (2026, 11), (2027, 11))
+)
+
+
+def run(folder: Path, began: datetime, robot: str = "maja", parts: int = 1) -> list[str]:
+    """Write parts of 10 bytes as a recorder that begins then; return their names."""
+    names = [f"{next_run(folder, robot, began)}-part{number + 1}.rrd" for number in range(parts)]
+    for name in names:
+        (folder / name).write_bytes(bytes(10))
+        # Whoever writes stamps the file by the same clock.
+        os.utime(folder / name, (began.timestamp(), began.timestamp()))
+    return names
+
+
+def order(folder: Path, robot: str = "maja") -> list[str]:
+    return [path.name for path, _ in oldest_first(folder, robot)]
+
+
+def test_a_clock_that_goes_back_makes_no_newer_part_go(tmp_path):
+    runs = [run(tmp_path, began, parts=2) for began in (LAST_WEEK, AT_BOOT, NEXT_YEAR, LAST_WEEK)]
+    assert order(tmp_path) == [name for names in runs for name in names]
+    assert sorted(order(tmp_path)) == order(tmp_path), "nor does a listing show it elsewhere"
+    deleted = Quota("maja", 30).keep(tmp_path)
+    assert [path.name for path in deleted] == runs[0] + runs[1] + runs[2][:1]
+
+
+def test_runs_that_begin_in_the_same_second_do_not_meet(tmp_path):
+    names = [run(tmp_path, AT_BOOT)[0] for _ in range(12)]
+    assert len(set(names)) == 12
+    assert order(tmp_path) == names
+
+
+def test_runs_without_a_number_are_older_than_those_with_one(tmp_path):
+    old = [
+        "20261120T100000Z-maja-part2.rrd",
+        "20261120T100000Z-maja-part10.rrd",
+        "20261120T100000Z-maja-2-part1.rrd",
+        # Written after those, by a clock that had gone back.
+        "20261101T000012Z-maja-part1.rrd",
+    ]
+    for second, name in enumerate(old):
+        (tmp_path / name).write_bytes(bytes(10))
+        at = LAST_WEEK.timestamp() + (3600 if second == 3 else second)
+        os.utime(tmp_path / name, (at, at))
+    new = run(tmp_path, AT_BOOT)
+    assert order(tmp_path) == [*old, *new]
+
+
+def test_another_robots_recordings_and_links_are_left_alone(tmp_path):
+    others = [run(tmp_path, LAST_WEEK, robot)[0] for robot in ("maja-2", "my-maja", "maja2")]
+    outside = tmp_path / "outside"
+    outside.write_bytes(bytes(10))
+    link = tmp_path / "run00001-20261120T100000Z-maja-part1.rrd"
+    link.symlink_to(outside)
+    mine = run(tmp_path, LAST_WEEK)
+    assert order(tmp_path) == mine
+    assert [path.name for path in Quota("maja", 5).keep(tmp_path)] == mine
+    assert outside.exists()
+    assert all((tmp_path / name).exists() for name in others)
+
+
+def test_a_folder_that_is_not_there_yet_and_one_that_cannot_be_read(tmp_path, monkeypatch):
+    assert next_run(tmp_path / "none", "maja", LAST_WEEK) == "run00001-20261120T100000Z-maja"
+
+    def refuse(_folder: object) -> list[str]:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(os, "listdir", refuse)
+    with pytest.raises(BadConfiguration, match="cannot record into"):
+        next_run(tmp_path, "maja", LAST_WEEK)
