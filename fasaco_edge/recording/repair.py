@@ -20,6 +20,10 @@ HEADER_BYTES = 12
 FRAME = struct.Struct("<QQ")
 FOOTER_KIND = 0
 LAST_KIND = 3
+# A loss of power leaves zeros in place of what was not written yet, in a file of full size. Of its
+# own a frame ends with a zero now and then, and what follows the footer with three.
+MOST_ZEROS = 3
+_BLOCK = 65536
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +59,10 @@ class Repair:
 def scan_recording(recording: BinaryIO) -> Scan | None:
     """Walk the frames of ``recording``; None where it does not even begin as one."""
     total = os.fstat(recording.fileno()).st_size
+    solid = min(_end_of_data(recording, total) + MOST_ZEROS, total)
     recording.seek(0)
     header = recording.read(HEADER_BYTES)
-    if len(header) < HEADER_BYTES or not header.startswith(MAGIC):
+    if len(header) < HEADER_BYTES or not header.startswith(MAGIC) or solid < HEADER_BYTES:
         return None
     end, frames, has_footer = HEADER_BYTES, 0, False
     while not has_footer:
@@ -66,12 +71,25 @@ def scan_recording(recording: BinaryIO) -> Scan | None:
         if len(head) < FRAME.size:
             break
         kind, length = FRAME.unpack(head)
-        if kind > LAST_KIND or end + FRAME.size + length > total:
+        if kind > LAST_KIND or end + FRAME.size + length > solid:
             break
+        if kind == FOOTER_KIND and solid < total:
+            break  # what follows it, to find it by, is zeros
         end += FRAME.size + length
         frames += 1
         has_footer = kind == FOOTER_KIND
     return Scan(frames, end, total, has_footer)
+
+
+def _end_of_data(recording: BinaryIO, total: int) -> int:
+    """Return where the zeros begin that a file ends with [bytes]."""
+    while total:
+        start = max(total - _BLOCK, 0)
+        recording.seek(start)
+        if solid := recording.read(total - start).rstrip(b"\0"):
+            return start + len(solid)
+        total = start
+    return 0
 
 
 def repair_recording(path: Path) -> Repair | None:

@@ -13,19 +13,20 @@ from hypothesis import strategies as st
 
 from fasaco_edge.recording.repair import (
     HEADER_BYTES,
+    MOST_ZEROS,
     repair_folder,
     repair_recording,
     scan_recording,
 )
 
-HEADER = b"RRF2" + bytes(HEADER_BYTES - 4)
+HEADER = b"RRF2".ljust(HEADER_BYTES - 2, b"\1") + bytes(2)
 
 
 def frame(kind: int, body: bytes) -> bytes:
     return struct.pack("<QQ", kind, len(body)) + body
 
 
-FRAMES = [frame(1, b"store"), frame(2, b"x" * 40), frame(2, b""), frame(3, b"blueprint")]
+FRAMES = [frame(1, b"store"), frame(2, b"x" * 40), frame(2, b"y"), frame(3, b"blueprint")]
 WHOLE = HEADER + b"".join(FRAMES)
 ENDS = [HEADER_BYTES + sum(map(len, FRAMES[:count])) for count in range(len(FRAMES) + 1)]
 
@@ -44,6 +45,27 @@ def test_a_cut_leaves_the_frames_before_it(tmp_path_factory, size):
     assert path.read_bytes() == WHOLE[:kept]
     assert (repair.cut_bytes if repair else 0) == size - kept
     assert repair_recording(path) is None
+
+
+@given(st.integers(HEADER_BYTES, len(WHOLE)), st.integers(16, 200_000))
+def test_zeros_in_place_of_what_was_not_written_are_cut_with_the_frame_they_are_in(
+    tmp_path_factory, size, zeros
+):
+    """A loss of power leaves them; read as a frame, zeros would be an empty footer."""
+    content = WHOLE[:size] + bytes(zeros)
+    path = written(tmp_path_factory.mktemp("cut"), content)
+    assert repair_recording(path) is not None
+    solid = len(WHOLE[:size].rstrip(b"\0")) + MOST_ZEROS
+    assert path.read_bytes() == content[: max(end for end in ENDS if end <= solid)]
+
+
+@pytest.mark.parametrize("kept", [0, 4, 9])
+def test_a_footer_that_is_followed_by_zeros_is_cut(tmp_path, kept):
+    pointer = b"pointer to the footer"
+    content = WHOLE + frame(0, b"footer") + pointer[:kept].ljust(len(pointer) + kept, b"\0")
+    path = written(tmp_path, content)
+    assert repair_recording(path) is not None
+    assert path.read_bytes() == WHOLE
 
 
 @pytest.mark.parametrize("content", [b"", b"RRF", b"hello, this is a text of some length"])
