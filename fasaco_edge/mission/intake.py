@@ -70,7 +70,7 @@ class Intake:
             parts.take_order(parts.agenda.assignment.elsewhere(str(misfit)))
         parts.survey()
         if misfit is not None:
-            parts.route.wanted = parts.log.opening
+            parts.route.want(parts.log.opening)
             raise misfit
 
     def _take_pose(self, stamped: StampedPose) -> None:
@@ -87,7 +87,7 @@ class Intake:
         if astray or site.ground is None or not site.ground.holds(cell):
             parts.survey()
         if again:
-            route.wanted = f"map and pose moved: {again} cells to be covered again"
+            route.want(f"map and pose moved: {again} cells to be covered again")
         parts.agenda.pass_by(cell)
         route.path = route.path.driven_to(cell, parts.log.ledger.has_visited)
 
@@ -131,7 +131,7 @@ class Intake:
         elif after.paused and not before.paused:
             parts.route.disown()
         elif before.paused and not after.paused:
-            parts.route.wanted = "resumed"
+            parts.route.want("resumed")
         parts.agenda.assignment = after
 
     def _replan(self) -> int:

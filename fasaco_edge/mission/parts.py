@@ -60,6 +60,6 @@ class Parts:
         self.agenda.see()
         if before is None:
             again = "robot is on coverable ground again"
-            route.wanted = again if route.revision else self.log.opening
+            route.want(again if route.revision else self.log.opening)
         elif change := ground.change_since(before):
             route.want(str(change), change.window)

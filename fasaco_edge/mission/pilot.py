@@ -54,7 +54,7 @@ class Pilot:
         update = route.cut_off()
         self._look_for_stray(cell)
         if reason := agenda.begin(cell, parts.now):
-            route.wanted = reason
+            route.want(reason)
         if route.wanted and route.asked is None:
             return Decision(path=update) if self._too_soon() else self._ask(cell, update)
         if agenda.assignment.stage is Stage.RETURNING and cell == agenda.assignment.home:
@@ -133,7 +133,7 @@ class Pilot:
             if doubted and list(cell) in path.ahead[:2].tolist():
                 watch.doubt = ""  # it only flickered
             elif waited and parts.now - watch.doubt_since >= PATIENCE_S:
-                route.wanted = watch.doubt
+                route.want(watch.doubt)
             return
         last = tuple(path.cells[-1].tolist()) if len(path.cells) else None
         if (
@@ -142,9 +142,9 @@ class Pilot:
             if parts.agenda.gives_up():
                 parts.agenda.go_on(parts.now)
             else:
-                route.wanted = "cells left over"
+                route.want("cells left over")
         elif waited and path.is_far(cell):
-            route.wanted = "robot left the path"
+            route.want("robot left the path")
 
     def _stands_at(self, last: Cell | None, path: DrivenPath) -> bool:
         """Tell whether the robot stands in the last cell of a path it did not drive all along.
@@ -164,13 +164,14 @@ class Pilot:
                 problem = agenda.problem(cell, route.kept)
             except NothingToCover:
                 if reason := agenda.seek(cell):
-                    route.wanted = reason
+                    route.want(reason)
                     continue
                 agenda.go_on(parts.now)
                 if agenda.waiting or agenda.assignment.stage is Stage.OVER:
                     route.want_none()
                     return self._settle(update)
-                route.wanted = agenda.begin(cell, parts.now) or route.wanted
+                if reason := agenda.begin(cell, parts.now):
+                    route.want(reason)
                 continue
             request = route.ask(problem)
             parts.watch.plan_asked(request.number)

@@ -45,8 +45,9 @@ class Route:
         self._disowned = False
         # Why a plan is wanted that keeps nothing of the path; "" where none is.
         self._anew = ""
-        # What has changed since the last plan was asked for.
+        # What has changed since the last plan was asked for, and whether that is why one is wanted.
         self._changed: Window | None = None
+        self._is_by_map = False
         self._checked_on: Ground | None = None
         self._attempt: Attempt | None = None
 
@@ -62,7 +63,7 @@ class Route:
     def ask(self, problem: CoverageProblem) -> PlanRequest:
         """Ask for the plan that is wanted."""
         reason = self._anew or self.wanted
-        changed = None if self._anew else self._changed
+        changed = self._changed if self._is_by_map and not self._anew else None
         self.asked = PlanRequest(self._number, problem, reason, changed)
         self.want_none()
         return self.asked
@@ -75,10 +76,11 @@ class Route:
         self.asked = PlanRequest(self._number, self._attempt.problem, "spare time")
         return self.asked
 
-    def want(self, reason: str, changed: Window | None) -> None:
-        """Want a plan because the cells in a window have changed."""
+    def want(self, reason: str, changed: Window | None = None) -> None:
+        """Want a plan: because the cells in a window have changed, or for another reason."""
         self.wanted = reason
         self._changed = Window.around(self._changed, changed)
+        self._is_by_map = changed is not None
 
     def want_none(self) -> None:
         """Want no plan any more."""
@@ -119,7 +121,9 @@ class Route:
         cells = self._from_here(event.path.cells, cell, ground)
         if not len(cells) or ground.holding(cells) < len(cells):
             self.outdated += 1
-            self.want(self.wanted or "the map changed while planning", asked.changed)
+            self._changed = Window.around(self._changed, asked.changed)
+            if not self.wanted:
+                self.want("the map changed while planning", asked.changed)
             return None
         if np.array_equal(cells, self.path.ahead):
             # Nothing to change: whoever drives it need not hear of it again.
@@ -187,5 +191,5 @@ class Route:
         if holding == len(ahead):
             return None
         row, col = ahead[holding]
-        self.wanted = f"path blocked at cell ({row}, {col})"
+        self.want(f"path blocked at cell ({row}, {col})", self._changed)
         return self.publish(ahead[:holding], self.wanted, changed=self._changed)

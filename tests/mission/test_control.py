@@ -234,7 +234,9 @@ def test_paused_it_stands_and_still_counts_what_it_passes_over():
     drive.cell = (row + 1, col)
     # A map that changes is taken in, and planned on when it goes on.
     assert drive.tell(patch("#", at=(5, 7))).plan is None
-    assert drive.command("resume").plan.reason == "resumed"
+    plan = drive.command("resume").plan
+    # The command is the reason: the window of a change belongs to plans for a changed map.
+    assert (plan.reason, plan.changed) == ("resumed", None)
     drive.finish()
     assert drive.visited == cells(0, 0, 6, 8) - {(5, 7)}
 
