@@ -197,7 +197,7 @@ def test_a_bridge_whose_program_ends_ends_too(tmp_path: Path) -> None:
             assert bridge.stdout is not None
             assert bridge.stdout.readline().startswith(b"json ")
             bridge.stdout.close()
-            assert bridge.wait(20) == 0
+            assert bridge.wait(120) == 0
             assert bridge.stderr.read() == b""  # type: ignore[union-attr]
 
 
@@ -215,5 +215,7 @@ def listen(client: Path, endpoint: str) -> dict[str, dict[str, Any]]:
                 said |= dict.fromkeys(heard, heard)
         finally:
             bridge.send_signal(signal.SIGINT)
+        # To its end: closed before, the client would be told that nobody reads (SIGPIPE).
+        reading.communicate()
     assert (bridge.returncode, reading.returncode) == (0, 0)
     return said
