@@ -10,7 +10,7 @@ from pathlib import Path
 
 import fasaco_edge as package
 
-TIMEOUT_S = 90.0
+TIMEOUT_S = 400.0
 PROGRAM = (sys.executable, "-m", "fasaco_edge")
 # Found from any folder, installed or not.
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(package.__file__).parents[1])}

@@ -18,7 +18,6 @@ from tests.daemon.processes import is_running
 CELL_M, RADIUS_M = 0.3, 0.18
 
 
-@pytest.mark.timeout(200)
 def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path):
     pytest.importorskip("rerun")
     out = tmp_path / "demo"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from pathlib import Path
 
 import pytest
@@ -48,9 +47,7 @@ def tls(files, **more):
 
 
 def test_without_a_file_everything_is_as_it_should_be():
-    began = time.monotonic()
     ended = fasaco_edge("doctor")
-    assert time.monotonic() - began < 10.0  # 1.1 s where nothing else is at work
     assert ended.code == 0
     assert "tcp/127.0.0.1:7447: from this computer, by anybody there" in ended.out
     named = dict(

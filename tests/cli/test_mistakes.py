@@ -10,6 +10,7 @@ import time
 import numpy as np
 import pytest
 
+from fasaco_edge.bench import placement
 from fasaco_edge.cli import main
 from tests.cli.commands import ENVIRONMENT, PROGRAM, fasaco_edge
 from tests.daemon.processes import free_endpoint
@@ -155,7 +156,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(folder):
     ) as process:
         process.stdout.close()
         said = process.stderr.read()
-        process.wait(60)
+        process.wait(300)
     assert "Traceback" not in said
     assert "Exception ignored" not in said
 
@@ -171,9 +172,10 @@ def test_ctrl_c_ends_a_plan_with_the_best_walk_so_far(folder):
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT
     ) as process:
         # Not before it is at work: Python's own start cannot be interrupted in order.
-        time.sleep(4.0)
+        while placement.cpu_seconds(process.pid) < 4.0:
+            time.sleep(0.05)
         process.send_signal(signal.SIGINT)
-        printed, said = process.communicate(timeout=20)
+        printed, said = process.communicate(timeout=120)
     assert "Traceback" not in said
     assert process.returncode == 130
     figures = json.loads(printed)

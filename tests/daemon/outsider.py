@@ -12,7 +12,8 @@ from typing import Any, Self
 import zenoh
 import zenoh.ext
 
-TIMEOUT_S = 40.0
+# Nothing takes so long but on a machine that is busy with much else [s].
+TIMEOUT_S = 150.0
 
 MAP = "nav_msgs/msg/OccupancyGrid"
 MAP_UPDATE = "map_msgs/msg/OccupancyGridUpdate"
@@ -100,7 +101,7 @@ class Outsider:
             f"{self.prefix}/{name}", payload, encoding=encoding, congestion_control=block
         )
 
-    def get(self, name: str, timeout_s: float = 5.0) -> list[zenoh.Reply]:
+    def get(self, name: str, timeout_s: float = 60.0) -> list[zenoh.Reply]:
         """Ask; return all answers."""
         return list(self.session.get(f"{self.prefix}/{name}", timeout=timeout_s))
 

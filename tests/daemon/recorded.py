@@ -39,7 +39,7 @@ CRATE_S = (8.0, 25.0)
 COMMANDS = ((14.0, "pause"), (16.0, "resume"), (19.0, "replan"))
 # Simulated seconds per second.
 SPEED = 16.0
-TIMEOUT_S = 60.0
+TIMEOUT_S = 250.0
 SIMULATION = SimulationConfig(
     robot_radius_m=0.18, range_m=1.2, map_chunk_m=1.5, map_hz=1.0, pose_hz=4.0
 )

@@ -28,7 +28,9 @@ def command(outsider: Outsider, name: str, order: dict[str, Any] | None = None) 
 
 
 def ask(outsider: Outsider, payload: bytes | None) -> dict[str, Any]:
-    (reply,) = outsider.session.get(f"{outsider.prefix}/@rpc/mission", payload=payload, timeout=10)
+    (reply,) = outsider.session.get(
+        f"{outsider.prefix}/@rpc/mission", payload=payload, timeout=60.0
+    )
     answer = reply.ok or reply.err
     assert "json" in str(answer.encoding)
     document: dict[str, Any] = json.loads(answer.payload.to_bytes())

@@ -276,7 +276,7 @@ def test_the_command_ends_with_ex_config(tmp_path, text, said):
         check=False,
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=150,
     )
     assert ended.returncode == 78
     assert said in ended.stderr

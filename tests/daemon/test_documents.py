@@ -20,7 +20,7 @@ CLIENT = PROTOCOL / "examples" / "client.py"
 
 def say(outsider, name, payload=None):
     """Ask, and return the document that comes back, checked."""
-    (reply,) = outsider.session.get(f"{outsider.prefix}/@rpc/{name}", payload=payload, timeout=10)
+    (reply,) = outsider.session.get(f"{outsider.prefix}/@rpc/{name}", payload=payload, timeout=60.0)
     answer = reply.ok or reply.err
     document = json.loads(answer.payload.to_bytes())
     schemas = {query["name"]: query["json"] for query in load("keys.yaml")["queries"]}
@@ -83,7 +83,7 @@ def test_the_example_gets_a_path_over_every_cell(tmp_path):
             heard = [client.stdout.readline()]
             while not (heard[-1].startswith("path") or not heard[-1]):
                 heard.append(client.stdout.readline())
-            rest, _ = client.communicate(input="", timeout=10)
+            rest, _ = client.communicate(input="", timeout=60.0)
         assert client.returncode == 0
         said, *points = heard[-1].split("; ")[0], *heard[-1].split("; ")[3:]
         assert said == "path"

@@ -24,7 +24,7 @@ ANTS = {"local_search": False, "ants": 24, "velocities": "8,4,1", "budget_s": 2.
 
 
 def get(outsider: Outsider, name: str, payload: bytes | None = None) -> list[zenoh.Reply]:
-    return list(outsider.session.get(f"{outsider.prefix}/{name}", payload=payload, timeout=5.0))
+    return list(outsider.session.get(f"{outsider.prefix}/{name}", payload=payload, timeout=60.0))
 
 
 def error(outsider: Outsider, name: str, payload: bytes | None = None) -> dict[str, Any]:

@@ -22,9 +22,6 @@ from tests.daemon import scenarios
 from tests.daemon.recorded import record_mission
 from tests.daemon.scenarios import left, places, played
 
-# Where the kernels have to be compiled first.
-pytestmark = pytest.mark.timeout(300)
-
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):

@@ -79,7 +79,7 @@ def test_a_mapper_is_heard_by_its_own_robot_alone(office, voice):
 
 def test_an_operator_commands_both(office):
     for seat in office:
-        (reply,) = seat.session.get(f"{seat.prefix}/@rpc/mission", payload=PAUSE, timeout=10.0)
+        (reply,) = seat.session.get(f"{seat.prefix}/@rpc/mission", payload=PAUSE, timeout=60.0)
         assert reply.ok is not None
 
 

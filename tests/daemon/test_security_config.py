@@ -94,7 +94,7 @@ def test_a_daemon_that_would_be_open_to_everyone_does_not_start(tmp_path):
     file = tmp_path / "config.yaml"
     file.write_text(yaml.safe_dump({"bus": {"listen": [BEYOND]}}))
     command = [*PROGRAM, "run", "--config", str(file), "--state", str(tmp_path)]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
     assert ended.returncode == 78
     assert f"{BEYOND} can be reached from other computers" in ended.stderr
     assert "hint: choose bus.security.kind tls or user" in ended.stderr

@@ -92,14 +92,17 @@ def test_ready_means_that_the_token_stands_and_a_plan_needs_no_compiler(tmp_path
 
 def test_the_watchdog_is_fed_until_the_process_stands_still(tmp_path):
     with service(tmp_path) as (running, manager):
-        fed = manager.count("WATCHDOG=1", 2.0)
-        assert 5 <= fed <= 9, "four times in a second"
+        began = time.monotonic()
+        for _ in range(5):
+            manager.wait("WATCHDOG=1")
+        assert time.monotonic() - began > 0.8, "four times in a second, no more"
         os.kill(running.pid, signal.SIGSTOP)
         time.sleep(0.3)
         assert manager.count("WATCHDOG=1", 1.0) == 0
         os.kill(running.pid, signal.SIGCONT)
-        time.sleep(0.5)
-        assert manager.count("WATCHDOG=1", 1.0) > 0
+        before = manager.said.count("WATCHDOG=1")
+        while manager.said.count("WATCHDOG=1") == before:
+            manager.wait("WATCHDOG=1")
 
 
 def rewritten(running: Daemon, **sections) -> None:
@@ -170,5 +173,5 @@ def test_without_a_service_manager_a_closed_terminal_ends_it(tmp_path):
         with Outsider(running.endpoint) as outsider:
             outsider.ask_status()
         running.process.send_signal(signal.SIGHUP)
-        assert running.process.wait(10.0) == -signal.SIGHUP
+        assert running.process.wait(60.0) == -signal.SIGHUP
         running.process.returncode = 0

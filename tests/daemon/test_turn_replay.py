@@ -20,9 +20,6 @@ from tests.daemon.recorded import record_mission
 from tests.daemon.scenarios import changed, places, without
 from tests.wire.schemas import check
 
-# Where the kernels have to be compiled first.
-pytestmark = pytest.mark.timeout(300)
-
 # What stands before the pixels of a map update is shorter.
 HEADER_BYTES = 100
 

@@ -178,7 +178,7 @@ def test_twin_without_the_compiler_finds_the_same_paths(capsys):
         capture_output=True,
         text=True,
         check=False,
-        timeout=100,
+        timeout=400,
     )
     assert twin.stderr == ""
     print_twin_paths()

@@ -25,7 +25,7 @@ told = json.loads(sys.argv[1])
 bus = BusSettings(connect=(told.pop("endpoint"),))
 sys.exit(run_recorder(RecorderSettings(pathlib.Path(told.pop("out")), bus=bus, **told)))
 """
-TIMEOUT_S = 20.0
+TIMEOUT_S = 120.0
 
 
 @dataclass

@@ -31,7 +31,7 @@ def shot(tmp_path_factory):
             time.sleep(0.02)
         path = Path(recorder.written(150)["file"])
         recorder.process.terminate()
-        recorder.process.wait(10)
+        recorder.process.wait(60)
     with viewer.headless_viewer() as client:
         return viewer.shoot(client, [path], 1.0)
 

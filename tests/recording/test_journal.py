@@ -154,7 +154,7 @@ def test_a_stalled_disk_is_told_and_taken_up_again(tmp_path):
     assert not journal.close()
     drained = threading.Thread(target=drain, args=(pipe, tmp_path / "copy.rrd"))
     drained.start()
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while journal.state is JournalState.STALLED and time.monotonic() < deadline:
         journal.sync(clock.tick())
     assert journal.state is JournalState.RECORDING

@@ -62,7 +62,7 @@ def recorded(tmp_path_factory):
         report = recorder.wait_until(lambda report: report["malformed"] > 0)
         assert bus.alive(f"{Keys().recorder}/alive")
         recorder.process.send_signal(signal.SIGTERM)
-        exit_code = recorder.process.wait(10)
+        exit_code = recorder.process.wait(60)
     path = Path(report["file"])
     return Recorded(path, mission, read_summary(path), report, exit_code)
 
@@ -76,7 +76,7 @@ def test_everything_on_the_bus_becomes_an_entity(recorded):
     assert {entities.MAP, entities.TRAIL, f"{entities.LATENCY}/plan"} <= set(rows)
     assert rows[entities.MAP_CHANGE] == 1
     assert recorded.summary.timelines == (entities.ITER, entities.REPLAN, entities.WALL)
-    assert 0.9 * FRAMES * FRAME_S < recorded.summary.duration_s < 30
+    assert 0.9 * FRAMES * FRAME_S < recorded.summary.duration_s < 300
 
 
 def test_what_the_mission_hears_is_there_byte_for_byte(recorded):
@@ -235,7 +235,7 @@ def test_killed_and_torn_recordings_read_after_the_next_start(tmp_path):
             # What is latched is there at once, though nobody publishes any more.
             second = Path(recorder.written(3)["file"])
             recorder.process.terminate()
-            recorder.process.wait(10)
+            recorder.process.wait(60)
     lines = read_column(second, entities.RECORDER_LOG, "TextLog:text").values
     assert any(killed.name in line and "torn" in line for (line,) in lines)
     assert {entities.MAP, entities.PATH} <= set(read_summary(second).rows)
@@ -274,7 +274,7 @@ def test_a_full_disk_is_told_and_recording_goes_on_when_there_is_room(tiny_disk)
         assert again["lost"] > 0
         play(mission, 5)
         recorder.process.terminate()
-        assert recorder.process.wait(10) == 0
+        assert recorder.process.wait(60) == 0
         first, second = sorted(tiny_disk.glob("*.rrd"))
         assert read_summary(first).rows[entities.ROBOT] > 0
         summary = read_summary(second)

@@ -24,7 +24,7 @@ from rerun.experimental import ViewerClient
 DRIVERS = Path("/usr/share/vulkan/icd.d")
 WINDOW = (1280, 720)
 TIMELINE = "wall"
-START_TIMEOUT_S = 30.0
+START_TIMEOUT_S = 120.0
 # Software rendering takes a few frames to settle after a jump in time [s].
 SETTLE_S = 1.5
 

@@ -76,7 +76,7 @@ def run_told(folder, *, faults, silent=0, killed=False):
                 recorder.process.kill()
             else:
                 recorder.process.terminate()
-            recorder.process.wait(20)
+            recorder.process.wait(120)
     return sorted(folder.glob("*.rrd"))
 
 

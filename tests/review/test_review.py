@@ -20,9 +20,6 @@ from tests.daemon.recorded import record_mission
 from tests.daemon.rooms import TOOL_M
 from tests.review.naive import nearest_rank, passed_cells, quarter_turns
 
-# Where the kernels have to be compiled first.
-pytestmark = pytest.mark.timeout(300)
-
 BROKEN_POSES = 3
 
 

@@ -83,7 +83,7 @@ def planner():
     planner.bus.close()
 
 
-def until(condition, timeout_s=20.0):
+def until(condition, timeout_s=120.0):
     ends = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < ends, "nothing happened in time"
@@ -108,7 +108,7 @@ def test_a_robot_in_another_process_maps_and_drives_until_told_to_end(planner):
         planner.send(path)
         until(lambda: np.hypot(*(end - (planner.pose().pose.x, planner.pose().pose.y))) < 2e-3)
         robot.send_signal(signal.SIGTERM)
-        output, _ = robot.communicate(timeout=20)
+        output, _ = robot.communicate(timeout=120)
     finally:
         robot.kill()
         robot.wait()
@@ -140,7 +140,7 @@ def test_bad_paths_cost_only_themselves(planner):
         return bool(reports) and reports[-1].refused_paths == count
 
     stage = [next(stages)]
-    ends = time.monotonic() + 20
+    ends = time.monotonic() + 120
 
     def finished():
         reached, act = stage[0]
