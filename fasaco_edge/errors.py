@@ -147,6 +147,15 @@ class BusUnavailable(FasacoError):
     hint = "start the daemon or router first, or check the endpoint"
 
 
+class ClockBeforeCertificate(BusUnavailable):
+    """By this computer's clock a certificate is not valid yet."""
+
+    code = "clock_before_certificate"
+    hint = (
+        "is the clock set? `date -u`; timedatectl set-ntp true, or wait until the network is there"
+    )
+
+
 class MissingExtra(FasacoError):
     """An optional part of the package is not installed."""
 

@@ -99,4 +99,5 @@ def client_settings(args: argparse.Namespace) -> BusSettings:
     from fasaco_edge.daemon.client_security import read_client_security
 
     security = read_client_security(args.security, connect)
+    security.warn_of_clock()
     return BusSettings("client", connect, secured=security.of_client())

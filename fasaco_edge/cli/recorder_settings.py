@@ -40,6 +40,7 @@ def of_daemon(args: argparse.Namespace) -> RecorderSettings:
     """
     config = load_config(args.config)
     bus, room = config.bus, config.recording
+    bus.security.warn_of_clock()
     endpoints = tuple(map(from_here, bus.listen or bus.connect))
     return RecorderSettings(
         out=args.out,

@@ -95,12 +95,11 @@ def _leave(code: int) -> NoReturn:
 
 
 def _once(args: argparse.Namespace, feed: Feed, known: Known, console: Console) -> None:
-    import time
-
     from fasaco_edge.cli.nobody import NobodyAnswersError
     from fasaco_edge.errors import BusUnavailable
     from fasaco_edge.watching.live import look_once, print_json
     from fasaco_edge.watching.page import Page
+    from fasaco_edge.watching.phrases import steady_now
 
     if not look_once(feed, known, args.timeout):
         if known.trouble:
@@ -111,6 +110,6 @@ def _once(args: argparse.Namespace, feed: Feed, known: Known, console: Console) 
         return
     # The prompt takes a line.
     width, height = console.width, console.height - 1
-    for line in Page(console).lines(known, time.time(), width, height):
+    for line in Page(console).lines(known, steady_now(), width, height):
         # Its colours have to go through; its texts are clean.
         console.file.write(f"{line.rstrip()}\n")

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import contextlib
 import ssl
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
 from fasaco_edge.daemon.security_config import TlsConfig
-from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
 
 ROUND_TRIPS = 8
+# X509_V_FLAG_NO_CHECK_TIME, for which ssl has no name.
+NO_CHECK_TIME = 0x20_0000
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +28,13 @@ class Certificate:
     Attributes:
         name: its common name, by which roles are given.
         hosts: the names and addresses by which others may connect to it.
+        begins: when it and its CA are valid.
         ends: when it or its CA ends, whichever is first.
     """
 
     name: str
     hosts: tuple[str, ...]
+    begins: datetime
     ends: datetime
 
 
@@ -42,13 +47,14 @@ def read_certificate(files: TlsConfig, *, listens: bool = True) -> Certificate:
 
     Raises:
         BadConfiguration: a file cannot be read, has ended, or does not fit the others.
+        ClockBeforeCertificate: by this computer's clock it is not valid yet.
     """
     try:
         listening, connecting = _context(files, server=True), _context(files, server=False)
         if not listens:
             connecting.verify_mode = ssl.CERT_NONE
         said = _shaken_hands(listening, connecting)
-        ends = [said["notAfter"], *(ca["notAfter"] for ca in listening.get_ca_certs())]
+        chain = [said, *listening.get_ca_certs()]
     except ssl.SSLCertVerificationError as error:
         raise BadConfiguration(f"{files.certificate}: {error.verify_message}") from error
     except ssl.SSLError as error:
@@ -60,18 +66,34 @@ def read_certificate(files: TlsConfig, *, listens: bool = True) -> Certificate:
         raise BadConfiguration(
             f"{error.filename or files.certificate}: {error.strerror}"
         ) from error
+    begins, ends = max(_times(chain, "notBefore")), min(_times(chain, "notAfter"))
+    now = datetime.now(UTC)
+    if now < begins:
+        raise ClockBeforeCertificate(
+            f"the clock says {now:%Y-%m-%d %H:%M} UTC, which is before the beginning of "
+            f"{files.certificate}, {begins:%Y-%m-%d %H:%M}: nobody can be connected with by it"
+        )
+    if now > ends:
+        raise BadConfiguration(f"{files.certificate}: certificate has expired, {ends:%Y-%m-%d}")
     names = [value for part in said["subject"] for key, value in part if key == "commonName"]
     return Certificate(
         name=names[-1] if names else "",
         hosts=tuple(value for _, value in said.get("subjectAltName", ())),
-        ends=min(datetime.fromtimestamp(ssl.cert_time_to_seconds(end), UTC) for end in ends),
+        begins=begins,
+        ends=ends,
     )
+
+
+def _times(chain: Sequence[Mapping[str, Any]], name: str) -> list[datetime]:
+    return [datetime.fromtimestamp(ssl.cert_time_to_seconds(one[name]), UTC) for one in chain]
 
 
 def _context(files: TlsConfig, *, server: bool) -> ssl.SSLContext:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER if server else ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname = False
     context.verify_mode = ssl.CERT_REQUIRED
+    # Whether it is valid by now is told apart from whether it fits.
+    context.verify_flags |= NO_CHECK_TIME
     # A key that needs a password must not make us ask for it.
     context.load_cert_chain(files.certificate, files.private_key, password=lambda: "")
     context.load_verify_locations(files.root_ca)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import logging
+import os
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,8 +14,10 @@ from msgspec import Meta
 from fasaco_edge.bus import access
 from fasaco_edge.daemon.endpoints import UNIX, is_local, protocol_of
 from fasaco_edge.daemon.section import Section
-from fasaco_edge.errors import BadConfiguration, OpenToEveryone
+from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate, OpenToEveryone
 from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_JSON_BYTES
+
+LOG = logging.getLogger(__name__)
 
 # Beside its cells a map holds some numbers and the name of a frame, a path's attachment less still.
 HEADER_BYTES = 1024
@@ -75,6 +80,26 @@ class SecurityConfig(Section, frozen=True):
     def names(self) -> dict[str, tuple[str, ...]]:
         """Return who has each role."""
         return {role: getattr(self.roles, role) for role in self.roles.__struct_fields__}
+
+    def warn_of_clock(self) -> None:
+        """Log where nobody can be connected with because the clock is before the certificate.
+
+        Certificates are looked into, which takes memory and time, only where the clock is before
+        the time at which they, or this program, were written.
+        """
+        if self.kind != "tls":
+            return
+        try:
+            written = [os.stat(path).st_mtime for _, path in files(self)]
+            if time.time() >= max(*written, Path(__file__).stat().st_mtime):
+                return
+            from fasaco_edge.daemon.certificates import read_certificate  # noqa: PLC0415
+
+            read_certificate(self.tls)
+        except ClockBeforeCertificate as error:
+            LOG.warning("%s; %s", error, error.hint, extra={"event": "clock"})
+        except (OSError, BadConfiguration):
+            return  # whoever opens the session tells that
 
     def of_client(self) -> dict[str, Any]:
         """Return what a session needs to show who it is, as a part of Zenoh's configuration.

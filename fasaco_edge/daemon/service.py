@@ -76,6 +76,7 @@ def run_daemon(
         ledger = open_ledger(folder, robot.name, robot.tool_width_m, fresh=fresh)
         if compiler is not None:
             compiler.wait(stop)
+        config.bus.security.warn_of_clock()
         with open_bus(config.bus.settings(config.keys().prefix, config.ros2 or None)) as bus:
             _serve(config, bus, ledger, record_to, stop, started, manager, reload)
     finally:

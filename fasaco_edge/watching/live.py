@@ -40,7 +40,7 @@ class Told:
 def take(feed: Feed, known: Known, timeout_s: float) -> list[tuple[str, object]]:
     """Take in what came; wait up to ``timeout_s`` [s] for it. Return it as well."""
     items = feed.take(timeout_s)
-    now = time.time()
+    now = phrases.steady_now()
     for topic, item in items:
         known.take(topic, item, now)
     known.trouble = feed.trouble
@@ -57,10 +57,11 @@ def watch_on_screen(feed: Feed, known: Known, console: Console) -> None:
     with told_to_end() as told, Screen(sys.stdout) as screen:
         while not told.to_end:
             came = take(feed, known, 0.0)
-            key = (int(time.time()), screen.size(), known.trouble)
+            now = phrases.steady_now()
+            key = (int(now), screen.size(), known.trouble)
             if came or key != shown_at:
                 shown_at, size = key, key[1]
-                screen.show(page.lines(known, time.time(), *size), size)
+                screen.show(page.lines(known, now, *size), size)
             if "q" in screen.keys(FRAME_S).lower():
                 return
 
@@ -68,11 +69,11 @@ def watch_on_screen(feed: Feed, known: Known, console: Console) -> None:
 def watch_in_lines(feed: Feed, known: Known) -> None:
     """Print what happens, and once a second how it stands, until a signal asks for the end."""
     # What is there already comes within the first second.
-    told_entries, said, next_line_at = 0, "", time.time() + LINE_EVERY_S
+    told_entries, said, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
     with told_to_end() as told:
         while not told.to_end:
             take(feed, known, FRAME_S)
-            now = time.time()
+            now = phrases.steady_now()
             for entry in known.journal.since(told_entries):
                 _print_line(entry.at_s, entry.text)
             told_entries = known.journal.count
@@ -155,6 +156,5 @@ def _is_whole(known: Known) -> bool:
 
 
 def _print_line(at_s: float, text: str) -> None:
-    clock = time.strftime("%H:%M:%S", time.localtime(at_s))
-    sys.stdout.write(f"{clock}  {text}\n")
+    sys.stdout.write(f"{phrases.clock(at_s)}  {text}\n")
     sys.stdout.flush()

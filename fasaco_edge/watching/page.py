@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -15,7 +14,7 @@ from fasaco_edge.watching.figures import figures, state_colour
 from fasaco_edge.watching.ink import Ink
 from fasaco_edge.watching.journal import Entry
 from fasaco_edge.watching.known import Known
-from fasaco_edge.watching.phrases import age, percent
+from fasaco_edge.watching.phrases import age, clock, percent
 from fasaco_edge.watching.picturing import Picturing
 from fasaco_edge.watching.report import Report
 
@@ -160,13 +159,13 @@ def headline(known: Known, now: float) -> Text:
             line.append(f"  {percent(report.coverage.fraction)} covered")
         if report.path is not None:
             line.append(f"  path {report.path.revision}")
-    clock = time.strftime("%H:%M:%S", time.localtime(now))
-    return _on_a_line(line.append(f"   {clock}   q quits", FAINT))
+    return _on_a_line(line.append(f"   {clock(now)}   q quits", FAINT))
 
 
 def _entry(entry: Entry) -> Text:
-    clock = time.strftime("%H:%M:%S", time.localtime(entry.at_s))
-    return _on_a_line(Text().append(f"{clock} ", FAINT).append(entry.text, TONES[entry.tone]))
+    return _on_a_line(
+        Text().append(f"{clock(entry.at_s)} ", FAINT).append(entry.text, TONES[entry.tone])
+    )
 
 
 def _on_a_line(text: Text) -> Text:

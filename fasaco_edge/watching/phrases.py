@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import time
+
 from fasaco_edge.text import one_line
+
+# Of the wall clock to the one that nobody sets, as it was when this began [s].
+_OFFSET_S = time.time() - time.monotonic()
 
 
 def covered(fraction: float, covered: int, coverable: int, covered_m2: float) -> str:
@@ -40,6 +45,17 @@ def figures(
         f"{one_line(state)}: {covered}/{coverable} cells, path {revision} ({steps} steps to go), "
         f"{plans} plans, last {plan_ms:.0f} ms"
     )
+
+
+def steady_now() -> float:
+    """Return the time since the epoch [s] by a clock that nobody sets while this process runs."""
+    return _OFFSET_S + time.monotonic()
+
+
+def clock(at_s: float) -> str:
+    """Return a steady time as the wall clock tells it that is there by now."""
+    wall_s = time.time() - (steady_now() - at_s)
+    return time.strftime("%H:%M:%S", time.localtime(round(wall_s, 3)))
 
 
 def age(seconds: float) -> str:

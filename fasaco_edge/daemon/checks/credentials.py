@@ -9,7 +9,7 @@ from pathlib import Path
 from fasaco_edge.daemon.certificates import read_certificate
 from fasaco_edge.daemon.checks.finding import Finding, Level, Patient, worst
 from fasaco_edge.daemon.config import BusConfig
-from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
 
 SOON = timedelta(days=30)
 SECRETS = {
@@ -30,8 +30,9 @@ def identity(patient: Patient) -> Finding:
         if security.kind == "user":
             return _login(bus)
         certificate = read_certificate(security.tls, listens=listens)
-    except BadConfiguration as error:
-        return Finding(Level.FAIL, str(error), HOW_TO)
+    except (BadConfiguration, ClockBeforeCertificate) as error:
+        to_do = error.hint if isinstance(error, ClockBeforeCertificate) else HOW_TO
+        return Finding(Level.FAIL, str(error), to_do)
     left = certificate.ends - datetime.now(UTC)
     details = [_recording(bus, certificate.name)]
     if listens:
