@@ -146,20 +146,19 @@ def _order(args: argparse.Namespace) -> dict[str, Any]:
 def _read(path: Path) -> object:
     import json
 
-    import yaml
-
     from fasaco_edge.mission.order import OrderError
+    from fasaco_edge.plain_yaml import load, read_bounded
 
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_bounded(path)
         # YAML 1.1 would take 1e3 for a text.
-        return json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
+        return json.loads(text) if path.suffix == ".json" else load(text)
     except OSError as error:
         raise OrderError(str(error.strerror), hint="name a file that can be read") from error
     except RecursionError as error:
         raise OrderError("nested too deeply") from error
-    except (yaml.YAMLError, ValueError) as error:
-        raise OrderError(f"neither YAML nor JSON: {error}") from error
+    except ValueError as error:
+        raise OrderError(f"neither plain YAML nor JSON: {error}") from error
 
 
 def _zone(text: str) -> dict[str, Any]:

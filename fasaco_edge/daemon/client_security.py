@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
-import yaml
 
 from fasaco_edge.daemon.security_config import SecurityConfig, security_faults
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.plain_yaml import load, read_bounded
 
 
 def read_client_security(words: str, connect: Sequence[str]) -> SecurityConfig:
@@ -19,13 +19,13 @@ def read_client_security(words: str, connect: Sequence[str]) -> SecurityConfig:
         BadConfiguration: it cannot be read, is incomplete, or does not fit the endpoints.
     """
     try:
-        text = words if words.startswith("{") else Path(words).read_text(encoding="utf-8")
-        security = msgspec.convert(yaml.safe_load(text) or {}, SecurityConfig)
+        text = words if words.startswith("{") else read_bounded(Path(words))
+        security = msgspec.convert(load(text) or {}, SecurityConfig)
         for fault in security_faults(security, (), connect):
             raise fault
     except OSError as error:
         raise BadConfiguration(f"--security: {words}: {error.strerror}") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+    except ValueError as error:
         raise BadConfiguration(f"--security: {error}") from error
     except BadConfiguration as error:
         raise BadConfiguration(f"--security, --connect: {error}", hint=error.hint) from error

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import reprlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -13,12 +12,7 @@ import msgspec
 
 from fasaco_edge.daemon.section import Section
 from fasaco_edge.errors import BadConfiguration
-
-# A value is shown as it was written, unless somebody wrote a book, or one that holds itself.
-_SHOWN = reprlib.Repr()
-_SHOWN.maxstring = _SHOWN.maxother = _SHOWN.maxlong = 200
-_SHOWN.maxlist = _SHOWN.maxdict = 10
-_SHOWN.maxlevel = 3
+from fasaco_edge.text import shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,11 +44,10 @@ def section_faults(
     root = root or kind
     fields = {field.encode_name: field for field in msgspec.structs.fields(kind)}
     if not isinstance(document, dict):
-        yield _fault(key, f"{key or 'the file'}: expected object, got {_SHOWN.repr(document)}")
+        yield _fault(key, f"{key or 'the file'}: expected object, got {shown(document)}")
         return
     if any(not isinstance(name, str) for name in document):
-        shown = _SHOWN.repr(document)
-        yield _fault(key, f"{key or 'the file'}: expected str as key, got {shown}")
+        yield _fault(key, f"{key or 'the file'}: expected str as key, got {shown(document)}")
     for name, value in document.items():
         if not isinstance(name, str):
             continue
@@ -94,7 +87,7 @@ def _value_fault(kind: object, value: object, key: str) -> Fault | None:
         expected = _choices(kind) or what[0].lower() + what[1:].partition(", got")[0]
         if expected == "expected str":
             expected += ", in quotes"  # YAML 1.1 takes 8:1 for a number
-        return _fault(key + at, f"{key}{at}: {expected}, got {_SHOWN.repr(value)}")
+        return _fault(key + at, f"{key}{at}: {expected}, got {shown(value)}")
     return None
 
 

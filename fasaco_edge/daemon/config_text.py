@@ -10,6 +10,7 @@ import yaml
 
 from fasaco_edge.daemon.config_faults import Fault
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.plain_yaml import PlainYamlError, compose, read_bounded
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,18 +43,14 @@ def read_text(path: Path) -> ConfigText:
         BadConfiguration: it cannot be read, or is no YAML; without the name of the file.
     """
     try:
-        loader = yaml.SafeLoader(path.read_text(encoding="utf-8"))
-        node = loader.get_single_node()
-        document = loader.construct_document(node) if node is not None else {}
+        node, document = compose(read_bounded(path))
     except OSError as error:
         raise BadConfiguration(str(error.strerror)) from error
-    except RecursionError as error:
-        raise BadConfiguration("not YAML: nested too deeply") from error
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, no such date
-        raise BadConfiguration(f"not YAML: {error}") from error
+    except PlainYamlError as error:
+        raise BadConfiguration(f"not plain YAML: {error}") from error
     lines: dict[str, int] = {}
     twice = []
-    for key, line in _keys(node, "", set()):
+    for key, line in _keys(node, ""):
         if key in lines:
             said = f"{key}: stands twice, in line {lines[key]} and in line {line}"
             twice.append(Fault(key, BadConfiguration(said), line))
@@ -61,18 +58,15 @@ def read_text(path: Path) -> ConfigText:
     return ConfigText(document if document is not None else {}, lines, tuple(twice))
 
 
-def _keys(node: yaml.Node | None, before: str, seen: set[int]) -> Iterator[tuple[str, int]]:
-    """Yield each key and its line; of what an alias repeats, the keys of the first place."""
-    if node is None or id(node) in seen:
-        return
-    seen.add(id(node))
+def _keys(node: yaml.Node | None, before: str) -> Iterator[tuple[str, int]]:
+    """Yield each key and its line."""
     if isinstance(node, yaml.MappingNode):
         for name, value in node.value:
             key = f"{before}.{name.value}" if before else str(name.value)
             yield key, name.start_mark.line + 1
-            yield from _keys(value, key, seen)
+            yield from _keys(value, key)
     elif isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
             key = f"{before}[{index}]"
             yield key, item.start_mark.line + 1
-            yield from _keys(item, key, seen)
+            yield from _keys(item, key)

@@ -9,6 +9,13 @@ from dataclasses import dataclass
 # pixels stays on its raster, also where its origin is rounded to float32.
 RASTER_STEPS = 2048
 
+# So far from the frame's origin a map may lie, and all that is said of it [m]: UTM northings go
+# up to 10,000 km. ``protocol/limits.yaml`` has the same number.
+FARTHEST_M = 2e7
+
+# Edge of a pixel [m]; the same holds there.
+MIN_RESOLUTION_M, MAX_RESOLUTION_M = 1e-4, 100.0
+
 
 @dataclass(frozen=True, slots=True)
 class Pose2D:

@@ -20,10 +20,18 @@ import yaml
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import MapFileError
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.geometry import (
+    FARTHEST_M,
+    MAX_RESOLUTION_M,
+    MIN_RESOLUTION_M,
+    GridGeometry,
+    Pose2D,
+)
 from fasaco_edge.grid.map_image import MapImage, check_size, read_image
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from fasaco_edge.plain_yaml import PlainYamlError, load, read_bounded
 from fasaco_edge.resources import folder
+from fasaco_edge.text import shown
 
 MODES = ("trinary", "scale", "raw")
 
@@ -168,9 +176,9 @@ def _index() -> dict[str, dict[str, Any]]:
 
 def _load_yaml(path: Path) -> dict[str, Any]:
     try:
-        loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
-        raise MapFileError(f"{path}: not readable as YAML: {error}") from error
+        loaded = load(read_bounded(path))
+    except (OSError, PlainYamlError) as error:
+        raise MapFileError(f"{path}: not readable as plain YAML: {error}") from error
     if not isinstance(loaded, dict):
         raise MapFileError(f"{path}: expected a mapping of keys, got {type(loaded).__name__}")
     return loaded
@@ -185,8 +193,9 @@ def _read_yaml(path: Path) -> _MapYaml:
     if free_thresh >= occupied_thresh:
         raise keys.error("free_thresh", f"less than occupied_thresh, {occupied_thresh}")
     resolution = keys.number("resolution")
-    if resolution <= 0:
-        raise keys.error("resolution", "more than 0 [m/pixel]")
+    if not MIN_RESOLUTION_M <= resolution <= MAX_RESOLUTION_M:
+        limits = f"{MIN_RESOLUTION_M:g} to {MAX_RESOLUTION_M:g} [m/pixel]"
+        raise keys.error("resolution", f"a number from {limits}")
     return _MapYaml(
         keys.image(), keys.mode(), resolution, keys.origin(), keys.negate(), free_thresh,
         occupied_thresh,
@@ -199,7 +208,7 @@ class _YamlKeys:
     values: dict[str, Any]
 
     def error(self, key: str, expected: str) -> MapFileError:
-        got = f"got {self.values[key]!r}" if key in self.values else "the key is missing"
+        got = f"got {shown(self.values[key])}" if key in self.values else "the key is missing"
         return MapFileError(f"{self.path}: {key} must be {expected}; {got}")
 
     def number(self, key: str) -> float:
@@ -222,7 +231,10 @@ class _YamlKeys:
         origin = self.values.get("origin")
         if not isinstance(origin, list) or len(origin) != 3:
             raise self.error("origin", expected)
-        return Pose2D(*(self._finite("origin", value, expected) for value in origin))
+        x, y, yaw = (self._finite("origin", value, expected) for value in origin)
+        if max(abs(x), abs(y), abs(yaw)) > FARTHEST_M:
+            raise self.error("origin", f"{expected}, each within {FARTHEST_M:g} of 0")
+        return Pose2D(x, y, yaw)
 
     def mode(self) -> str:
         mode = self.values.get("mode", MODES[0])

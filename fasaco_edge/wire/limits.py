@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from fasaco_edge.grid import geometry
+
 MAX_MESSAGE_BYTES: Final = 64 * 1024 * 1024
 """Longest message of any kind; the session refuses longer ones (``bus.session``)."""
 
@@ -13,8 +15,8 @@ MAX_STRING_BYTES: Final = 256
 MAX_COORDINATE_M: Final = 1e6
 """Largest magnitude of a position's x, y or z [m]."""
 
-MIN_RESOLUTION_M: Final = 1e-4
-MAX_RESOLUTION_M: Final = 100.0
+MIN_RESOLUTION_M: Final = geometry.MIN_RESOLUTION_M
+MAX_RESOLUTION_M: Final = geometry.MAX_RESOLUTION_M
 """Edge of a grid's pixel [m]."""
 
 QUATERNION_TOLERANCE: Final = 0.01

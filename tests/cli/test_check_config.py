@@ -92,13 +92,13 @@ def test_what_does_not_go_together_is_told_at_once(check):
 @pytest.mark.parametrize(
     ("text", "line", "said"),
     [
-        ("a: [", None, "not YAML"),
-        ("a: &a {b: *a}", 1, "unknown key a; there are robot, bus"),
-        ("robot: &r {name: *r}", 1, "robot.name: expected str, in quotes, got {'name': {"),
+        ("a: [", None, "not plain YAML"),
+        ("a: &a {b: *a}", None, "not plain YAML: line 1: *a stands for nothing, or for itself"),
+        ("x: &r {name: r2}\nrobot: *r", 1, "unknown key x; there are robot, bus"),
         ("[1, 2]", None, "the file: expected object, got [1, 2]"),
         ("robot: {name: " + "x" * 9999 + "/}", 1, "robot.name: robot must be chunks"),
     ],
-    ids=["no YAML", "in itself", "in itself, a known key", "a list", "a book"],
+    ids=["no YAML", "in itself", "an alias", "a list", "a book"],
 )
 def test_files_that_are_no_configuration(check, text, line, said):
     code, told = check(text)
@@ -115,7 +115,7 @@ def test_a_document_that_grows_as_it_is_read_is_refused_in_a_few_words(check):
     )
     code, told = check(text + "robot: {name: *a11}\n")
     assert code == 78
-    assert len(json.dumps(told)) < 10_000
+    assert told["faults"][0]["said"].endswith("more than 50000 values, aliases written out")
 
 
 def test_what_is_in_order_is_shown_as_it_is_in_force(check, capsys):

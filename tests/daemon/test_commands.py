@@ -289,7 +289,7 @@ def begin_idle(outsider: Outsider) -> None:
     [
         (("start", "--order", "missing.yaml"), "missing.yaml: No such file or directory"),
         (("start", "--order", "order.yaml"), "order.yaml: zones[0]: missing member polygon"),
-        (("start", "--order", "order.json"), "order.json: neither YAML nor JSON"),
+        (("start", "--order", "order.json"), "order.json: neither plain YAML nor JSON"),
         (("start", "--order", "order.yaml", "--passes", "2"), "--order says it all, got --passe"),
         (("start", "--passes", "0"), "passes: expected int >= 1, got 0"),
         (("start", "--zone", "a:0,0;1,1;1,0;0,1"), "zones[0].polygon crosses or touches itself"),

@@ -135,12 +135,12 @@ def test_every_section_is_read(load):
         ("[1, 2]", "the file: expected object, got [1, 2]"),
         ("robot: {1: 2}", "robot: expected str as key, got {1: 2}"),
         ("1: 2", "the file: expected str as key, got {1: 2}"),
-        ("robot: {name: [unclosed", "not YAML"),
-        ("robot:\n\tname: x", "not YAML"),
-        ("robot: 2020-13-45", "not YAML: month must be in 1..12"),
-        ("[" * 5000, "not YAML: nested too deeply"),
-        ("--- {}\n--- {}", "not YAML"),
-        ("!!python/object/apply:os.getcwd []", "not YAML"),
+        ("robot: {name: [unclosed", "not plain YAML"),
+        ("robot:\n\tname: x", "not plain YAML"),
+        ("robot: 2020-13-45", "not plain YAML: month must be in 1..12"),
+        ("[" * 5000, "not plain YAML: line 1: nested deeper than 32 levels"),
+        ("--- {}\n--- {}", "not plain YAML"),
+        ("!!python/object/apply:os.getcwd []", "not plain YAML"),
     ],
 )
 def test_what_is_wrong_is_named(load, tmp_path, text, said):
@@ -174,7 +174,7 @@ def test_unreadable_files_are_named(tmp_path):
         load_config(tmp_path)
     binary = tmp_path / "binary.yaml"
     binary.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(BadConfiguration, match="not YAML"):
+    with pytest.raises(BadConfiguration, match="not plain YAML"):
         load_config(binary)
 
 

@@ -1,0 +1,111 @@
+"""Plain YAML: a document that somebody wrote, of bounded size and depth.
+
+Aliases count as what they stand for: 500 bytes of them can stand for gigabytes. Tags, which make
+other things of a text than it says, are refused.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+MOST_BYTES = 1_048_576
+MOST_VALUES = 50_000
+MOST_DEPTH = 32
+# Of an integer: nobody writes longer ones, and Python refuses to show those of 4300 digits.
+MOST_DIGITS = 100
+
+
+class PlainYamlError(ValueError):
+    """A file is no plain YAML; the text says where, not in which file."""
+
+
+def read_bounded(path: Path) -> str:
+    """Return the text of a file, also of a pipe.
+
+    Raises:
+        OSError: it cannot be read.
+        PlainYamlError: it is longer than ``MOST_BYTES``, or no UTF-8.
+    """
+    with path.open("rb") as file:
+        content = file.read(MOST_BYTES + 1)
+    if len(content) > MOST_BYTES:
+        raise PlainYamlError(f"more than {MOST_BYTES} bytes")
+    try:
+        return content.decode()
+    except UnicodeDecodeError as error:
+        raise PlainYamlError(str(error)) from error
+
+
+def load(text: str) -> Any:  # noqa: ANN401 - whatever the document is
+    """Return the plain values of a document; None for an empty one.
+
+    Raises:
+        PlainYamlError: it is none, or not plain.
+    """
+    return compose(text)[1]
+
+
+def compose(text: str) -> tuple[yaml.Node | None, Any]:
+    """Return a document as its nodes, which know their lines, and as plain values.
+
+    Raises:
+        PlainYamlError: it is none, or not plain.
+    """
+    try:
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        return node, None if node is None else loader.construct_document(node)
+    except PlainYamlError:
+        raise
+    except RecursionError as error:
+        raise PlainYamlError("nested too deeply") from error
+    # No UTF-8, no such date, a number in base 60 that no float holds.
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        raise PlainYamlError(str(error)) from error
+
+
+class _Loader(yaml.SafeLoader):
+    """Counts values while they are read, before anything is made of them."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._values = self._depth = self._deepest = 0
+        # What an alias stands for: how many values, how many levels.
+        self._sizes: dict[str, tuple[int, int]] = {}
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        event = self.peek_event()  # type: ignore[no-untyped-call]
+        where, anchor = f"line {event.start_mark.line + 1}", getattr(event, "anchor", None)
+        values, levels = 1, 1
+        if isinstance(event, yaml.AliasEvent):
+            if anchor not in self._sizes:
+                raise PlainYamlError(f"{where}: *{anchor} stands for nothing, or for itself")
+            values, levels = self._sizes[anchor]
+        elif event.tag is not None:
+            raise PlainYamlError(f"{where}: a tag, {event.tag}: write the value alone")
+        began, outer_deepest = self._values, self._deepest
+        self._values += values
+        self._deepest = self._depth + levels
+        if self._values > MOST_VALUES:
+            raise PlainYamlError(f"{where}: more than {MOST_VALUES} values, aliases written out")
+        if self._deepest > MOST_DEPTH:
+            raise PlainYamlError(f"{where}: nested deeper than {MOST_DEPTH} levels")
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        if anchor is not None and not isinstance(event, yaml.AliasEvent):
+            self._sizes[anchor] = self._values - began, self._deepest - self._depth
+        self._deepest = max(self._deepest, outer_deepest)
+        return node
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        if len(node.value) > MOST_DIGITS:
+            line = node.start_mark.line + 1
+            raise PlainYamlError(f"line {line}: an integer of more than {MOST_DIGITS} digits")
+        return super().construct_yaml_int(node)
+
+
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
