@@ -46,6 +46,34 @@ class MapTooLarge(FasacoError):
     hint = "check the map's resolution and origin; larger cells or map.max_lattice_cells may help"
 
 
+class MapTooFar(FasacoError):
+    """The lattice over a map reaches beyond what the protocol's messages can tell."""
+
+    code = "map_too_far"
+    hint = "check the map's origin; give maps in a frame whose origin is nearer"
+
+
+class NotPublished(FasacoError):
+    """A message could not be made or sent; those before and after it are not touched."""
+
+    code = "not_published"
+    hint = "the message is left out, all else goes on; report it with the log"
+
+
+class PlanFailed(FasacoError):
+    """The planner broke on a problem, which it never should."""
+
+    code = "plan_failed"
+    hint = "it is tried again with the next map, or after a while; report it with the log"
+
+
+class MissionBroke(FasacoError):
+    """The mission met something that it never should."""
+
+    code = "mission_broke"
+    hint = "it begins again from the ledger; report it with the log"
+
+
 class MapFileError(FasacoError):
     """A map file is missing or cannot be read as a map."""
 

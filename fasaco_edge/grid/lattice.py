@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import MapTooLarge
-from fasaco_edge.grid.geometry import GridGeometry, Raster, Window
+from fasaco_edge.errors import MapTooFar, MapTooLarge
+from fasaco_edge.grid.geometry import FARTHEST_M, GridGeometry, Raster, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.classification import Cells, classify_cells
 from fasaco_edge.kernels.directions import EAST, NORTH, SOUTH, WEST
@@ -27,6 +27,9 @@ __all__ = ["BLOCKED", "COVERABLE", "UNKNOWN", "Cell", "CoverageLattice", "Footpr
 Cell = tuple[int, int]
 
 MAX_LATTICE_CELLS = 4_000_000
+
+# Indices of cells are int32, and sums of two of them, too.
+MOST_INDEX = 2**30
 
 # A robot exactly as wide as a corridor fits; float32 resolutions on the wire
 # must not decide otherwise.
@@ -87,6 +90,7 @@ class CoverageLattice:
 
         Raises:
             MapTooLarge: it would have more than ``max_cells`` cells.
+            MapTooFar: it would reach too far from 0, see ``lattice_window``.
         """
         window = lattice_window(grid.geometry, footprint.cell_m, max_cells)
         shape = window.rows, window.cols
@@ -138,8 +142,12 @@ class CoverageLattice:
 def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Window:
     """Return which cells of the unbounded lattice, ``cell_m`` [m] wide, a map reaches into.
 
+    What can be said of no cell is refused with the map: cells have int32 indices, and all that
+    is published of them lies within ``FARTHEST_M`` of 0.
+
     Raises:
         MapTooLarge: they are more than ``max_cells``.
+        MapTooFar: they reach too far from 0.
     """
     x0, y0, x1, y1 = geometry.bounds()
     rows, cols = (y1 - y0) / cell_m + 2, (x1 - x0) / cell_m + 2
@@ -149,12 +157,21 @@ def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Win
             f"a lattice of {rows:.0f} x {cols:.0f} cells of {cell_m} m over a map of "
             f"{x1 - x0:.0f} x {y1 - y0:.0f} m exceeds {max_cells} cells"
         )
-    return Window(
+    window = Window(
         math.floor(y0 / cell_m),
         math.floor(x0 / cell_m),
         math.ceil(y1 / cell_m),
         math.ceil(x1 / cell_m),
     )
+    farthest = min(FARTHEST_M, MOST_INDEX * cell_m)
+    edges = [index * cell_m for index in (window.col0, window.row0, window.col1, window.row1)]
+    if max(abs(edge) for edge in edges) > farthest:
+        west, south, east, north = edges
+        raise MapTooFar(
+            f"a lattice from ({west:.2f}, {south:.2f}) to ({east:.2f}, {north:.2f}) m, of cells of "
+            f"{cell_m} m, reaches beyond {farthest:.0f} m from 0"
+        )
+    return window
 
 
 def pixels_of(grid: OccupancyGrid) -> Pixels:

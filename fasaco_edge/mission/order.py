@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from fasaco_edge.errors import FasacoError
+from fasaco_edge.grid.geometry import FARTHEST_M
 from fasaco_edge.mission.polygons import Polygon, flaw
 
 # What an order may hold at most: it is kept with the ledger, written once a second.
@@ -15,7 +16,6 @@ MOST_POINTS = 1_000
 MOST_POINTS_IN_ALL = 5_000
 MOST_PASSES = 100
 LONGEST_NAME = 64
-FARTHEST_M = 1e6
 
 
 class OrderError(FasacoError):

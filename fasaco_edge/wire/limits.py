@@ -12,7 +12,7 @@ MAX_MESSAGE_BYTES: Final = 64 * 1024 * 1024
 MAX_STRING_BYTES: Final = 256
 """Longest string, in UTF-8, without its NUL."""
 
-MAX_COORDINATE_M: Final = 1e6
+MAX_COORDINATE_M: Final = geometry.FARTHEST_M
 """Largest magnitude of a position's x, y or z [m]."""
 
 MIN_RESOLUTION_M: Final = geometry.MIN_RESOLUTION_M

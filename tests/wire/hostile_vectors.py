@@ -149,8 +149,8 @@ def _hostile_grids() -> list[Vector]:
         ),
         (
             "grid_origin_far",
-            _at(good, ORIGIN_AT + 8, _float64(1.1e6)),
-            "beyond 1000 km",
+            _at(good, ORIGIN_AT + 8, _float64(2.1e7)),
+            "beyond 20,000 km",
             "info.origin.position.y",
         ),
         (
@@ -182,7 +182,7 @@ def _hostile_poses() -> list[Vector]:
     cases = [
         ("pose_x_nan", 0, np.nan, "not a number", "pose.position.x"),
         ("pose_y_infinite", 1, -np.inf, "infinite", "pose.position.y"),
-        ("pose_z_far", 2, 1e300, "beyond 1000 km", "pose.position.z"),
+        ("pose_z_far", 2, 1e300, "beyond 20,000 km", "pose.position.z"),
         ("pose_turn_nan", 4, np.nan, "not a number", "pose.orientation"),
         ("pose_turn_overflows", 5, 1e300, "its square is infinite", "pose.orientation"),
         ("pose_turn_too_long", 6, 1.2, "the norm is not 1", "pose.orientation"),
@@ -213,7 +213,7 @@ def _hostile_tf() -> list[Vector]:
         ("nanosec", _at(good, 12, _uint32(10**9)), "a full second in nanosec", "stamp.nanosec"),
         ("cut", good[:-1], "the last byte is missing", "transforms[1].transform"),
         ("x_nan", _at(good, x_at, _float64(np.nan)), "not a number", "translation.x"),
-        ("y_far", _at(good, x_at + 8, _float64(1e300)), "beyond 1000 km", "translation.y"),
+        ("y_far", _at(good, x_at + 8, _float64(1e300)), "beyond 20,000 km", "translation.y"),
         ("turn_nan", _at(good, turn_at, _float64(np.nan)), "not a number", "norm of rotation"),
         ("turn_infinite", _at(good, turn_at, _float64(-np.inf)), "infinite", "norm of rotation"),
         ("turn_of_zeros", _at(good, turn_at, bytes(32)), "no quaternion", "norm of rotation"),

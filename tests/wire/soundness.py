@@ -57,7 +57,7 @@ def check_sound(message: Any) -> None:
     if isinstance(message, tuple):
         for transform in message:
             place = transform.planar()
-            assert max(abs(place.x), abs(place.y)) <= 1e6
+            assert max(abs(place.x), abs(place.y)) <= 2e7
             assert abs(place.yaw) <= np.pi
             assert max(len(transform.frame.encode()), len(transform.child.encode())) <= 256
         return
@@ -72,7 +72,7 @@ def check_sound(message: Any) -> None:
         assert all(map(math.isfinite, (geometry.origin.x, geometry.origin.y, geometry.origin.yaw)))
     pose = getattr(message, "pose", None)
     if pose is not None:
-        assert max(abs(pose.x), abs(pose.y)) <= 1e6
+        assert max(abs(pose.x), abs(pose.y)) <= 2e7
         assert abs(pose.yaw) <= np.pi
     if hasattr(message, "xy"):
         assert np.isfinite(message.xy).all()

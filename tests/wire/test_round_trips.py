@@ -30,7 +30,7 @@ from fasaco_edge.wire.poses import (
 )
 from tests.wire import oracle
 
-coordinates = st.floats(-1e6, 1e6)
+coordinates = st.floats(-2e7, 2e7)
 yaws = st.floats(-math.pi, math.pi)
 poses = st.builds(Pose2D, coordinates, coordinates, yaws)
 stamps = st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1)
@@ -160,7 +160,7 @@ def plain_grid(**changes: Any) -> OccupancyGrid:
         ({"stamp_ns": 2**31 * 10**9}, "header.stamp.sec"),
         ({"resolution": math.nan}, "info.resolution"),
         ({"resolution": 0.0}, "info.resolution"),
-        ({"origin": Pose2D(0.0, 2e6)}, "info.origin.position.y"),
+        ({"origin": Pose2D(0.0, 2.1e7)}, "info.origin.position.y"),
         ({"origin": Pose2D(0.0, 0.0, math.inf)}, "info.origin.orientation"),
         ({"cells": np.zeros((0, 3), np.int8)}, "length of data"),
         ({"cells": np.full((1, 1), 101, np.int8)}, "data at row 0, column 0"),

@@ -15,6 +15,7 @@ from fasaco_edge.daemon.commands import REPLAN_PERIOD_S
 from fasaco_edge.daemon.inbox import QUEUES
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission import order
+from fasaco_edge.mission.ledger import MOST_TILES
 from fasaco_edge.wire import limits
 from fasaco_edge.wire.keys import RPC_NAMES, Keys
 from tests.wire import readme_tables
@@ -108,6 +109,7 @@ def test_limits_are_those_of_the_code():
         **{name: value for name, value in upper(order).items() if isinstance(value, int | float)},
         **{f"queue_{name}": length for name, length in QUEUES.items()},
         "replan_period_s": REPLAN_PERIOD_S,
+        "most_ledger_tiles": MOST_TILES,
     }
     assert session_config.MAX_MESSAGE_BYTES == limits.MAX_MESSAGE_BYTES
     named = {name for entry in load("keys.yaml")["keys"] for name in entry["limits"]}

@@ -88,7 +88,7 @@ def test_what_lies_beside_the_chain_may_be_anything(tree):
     [
         (math.nan, 0),
         (math.inf, 1),
-        (2e6, 2),
+        (2.1e7, 2),
         (math.nan, 3),
         (0.3, 4),  # with a norm of 1.04
         (math.inf, 6),

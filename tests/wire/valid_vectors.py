@@ -43,7 +43,7 @@ def _stamped(frame: str = "map") -> dict[str, Any]:
 
 
 def _valid_grids() -> list[Vector]:
-    one, cell = GridGeometry(1, 1, 100.0, Pose2D(1e6, -1e6)), np.array([[-1]], np.int8)
+    one, cell = GridGeometry(1, 1, 100.0, Pose2D(2e7, -2e7)), np.array([[-1]], np.int8)
     schema, update = schemas.OCCUPANCY_GRID, schemas.OCCUPANCY_GRID_UPDATE
     grid = oracle.to_bytes(schema, oracle.occupancy_grid("map", STAMP_NS, GEOMETRY, CELLS, ORIGIN))
     facts = {**_stamped(), **placed(GEOMETRY), "cells": CELLS.tolist()}
