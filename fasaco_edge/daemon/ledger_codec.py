@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.mission.ledger import TILE, LedgerMismatchError, LedgerSnapshot
+from fasaco_edge.mission.ledger import MOST_TILES, TILE, LedgerMismatchError, LedgerSnapshot
 
 MAGIC = b"FASACOLG"
 VERSION = 1
@@ -39,6 +39,9 @@ _ENVELOPE = struct.Struct("<8sIIQ")
 _CHECKED = struct.Struct("<IQ")
 _HEAD = struct.Struct("<dQIII")
 _CELL_BYTES, _TILE_BYTES = 16, 2 * TILE * TILE
+# What a ledger holds beside its tiles is small: frame, cells under the tool, the order.
+MOST_BYTES = MOST_TILES * (_TILE_BYTES + _CELL_BYTES) + 2_000_000
+"""Of a body, and of a file, which is smaller; longer ones are not read."""
 # Mostly zeros and ones: the fastest level takes a hundredth of the size.
 _LEVEL = 1
 
@@ -68,8 +71,8 @@ def encode_ledger(snapshot: LedgerSnapshot) -> bytes:
     return _ENVELOPE.pack(MAGIC, VERSION, _checksum(VERSION, body), len(body)) + body
 
 
-def decode_ledger(payload: bytes, cell_m: float) -> LedgerSnapshot:
-    """Return the ledger in the bytes of a file.
+def decode_ledger(payload: bytes, cell_m: float | None) -> LedgerSnapshot:
+    """Return the ledger in the bytes of a file; ``cell_m``: edge its cells have to have, or None.
 
     Raises:
         LedgerFileError: they are not what was once written.
@@ -92,10 +95,10 @@ def decode_ledger(payload: bytes, cell_m: float) -> LedgerSnapshot:
             "name back",
         )
     try:
-        snapshot = _decode_body(zlib.decompress(body))
+        snapshot = _decode_body(_inflated(body))
     except (zlib.error, struct.error, ValueError) as error:
         raise LedgerFileError(f"malformed: {error}") from error
-    if snapshot.cell_m != cell_m:
+    if cell_m is not None and snapshot.cell_m != cell_m:
         raise LedgerMismatchError(
             f"the ledger's cells are {snapshot.cell_m} m wide, the configuration's {cell_m} m",
             hint=f"to go on with it, set robot.tool_width_m to {snapshot.cell_m}, and give the "
@@ -104,8 +107,20 @@ def decode_ledger(payload: bytes, cell_m: float) -> LedgerSnapshot:
     return snapshot
 
 
+def _inflated(body: bytes) -> bytes:
+    inflater = zlib.decompressobj()
+    plain = inflater.decompress(body, MOST_BYTES)
+    if inflater.unconsumed_tail:
+        raise ValueError(f"over {MOST_BYTES} bytes")
+    if not inflater.eof or inflater.unused_data:
+        raise ValueError("no whole stream")
+    return plain
+
+
 def _decode_body(plain: bytes) -> LedgerSnapshot:
     cell_m, total, frame_bytes, cell_count, tile_count = _HEAD.unpack_from(plain)
+    if tile_count > MOST_TILES:
+        raise ValueError(f"{tile_count} tiles, {MOST_TILES} are read at most")
     frame_end = _HEAD.size + frame_bytes
     cells_end = frame_end + _CELL_BYTES * cell_count
     places_end = cells_end + _CELL_BYTES * tile_count

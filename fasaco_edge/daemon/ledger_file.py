@@ -3,7 +3,8 @@
 ``<robot>.ledger`` is the newest, ``<robot>.ledger.previous`` the one before. A new one is
 written to ``<robot>.ledger.new`` and on to the disk itself; only then the names move on: at
 every moment a whole ledger stands under one of them, and ``load`` finds the newest. What
-cannot be used is kept aside under another name, never deleted.
+cannot be used is kept aside under another name, which says why: of each kind the newest few, and
+the largest. What has no covered cell is not worth keeping.
 """
 
 from __future__ import annotations
@@ -11,15 +12,24 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+import re
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from fasaco_edge.daemon.durable import make_folder, sync_folder, write_through
-from fasaco_edge.daemon.ledger_codec import LedgerFileError, decode_ledger, encode_ledger
+from fasaco_edge.daemon.ledger_codec import (
+    MOST_BYTES,
+    LedgerFileError,
+    decode_ledger,
+    encode_ledger,
+)
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.ledger import LedgerMismatchError, LedgerSnapshot
 from fasaco_edge.own_files import open_own
+
+# So many files of each kind are kept aside, and the largest.
+KEPT_ASIDE = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,10 +195,13 @@ class LedgerFile:
         kept = []
         while self._unwanted:
             path, why = self._unwanted[-1]
-            if path.exists():
+            if path.exists() and _is_empty(path):
+                path.unlink()
+            elif path.exists():
                 aside = _free_name(path, why)
                 path.rename(aside)
                 kept.append(aside.name)
+                _prune(path, why, aside)
             self._unwanted.pop()
         if kept:
             # Else they may be back under their old names after a loss of power.
@@ -211,7 +224,33 @@ def _read(path: Path) -> bytes:
     # Anything but a plain file might keep the reader waiting.
     if path.exists() and not path.is_file():
         raise LedgerFileError("no plain file")
-    return path.read_bytes()
+    with path.open("rb") as file:
+        payload = file.read(MOST_BYTES + 1)
+    if len(payload) > MOST_BYTES:
+        raise LedgerFileError(f"over {MOST_BYTES} bytes")
+    return payload
+
+
+def _is_empty(path: Path) -> bool:
+    """Tell whether a ledger can be read, and has no covered cell."""
+    with contextlib.suppress(OSError, FasacoError):
+        return not decode_ledger(_read(path), None).cells
+    return False
+
+
+def _prune(path: Path, why: str, newest: Path) -> None:
+    """Delete what was kept of the same kind, but the newest few and the largest."""
+    form = re.compile(re.escape(f"{path.name}.{why}-") + r"(\w+Z)(?:-(\d+))?")
+    found = [
+        (match[1], int(match[2] or 1), other)
+        for other in path.parent.iterdir()
+        if (match := form.fullmatch(other.name)) and other != newest
+    ]
+    older = [other for *_, other in sorted(found)]
+    largest = max([*older, newest], key=lambda other: other.stat().st_size)
+    for other in older[: 1 - KEPT_ASIDE]:
+        if other != largest:
+            other.unlink()
 
 
 def _free_name(path: Path, why: str) -> Path:

@@ -24,7 +24,20 @@ JUMP_CELLS = 2.0
 
 TILE = 64
 
+# So many tiles a ledger holds at most, twice what the largest lattice takes: each takes 8 kB, and
+# as much again as it was when it was last written. ``protocol/limits.yaml`` has the same number.
+MOST_TILES = 2048
+# Where there would be more the farthest go, this many at once.
+DROPPED_TILES = MOST_TILES // 16
+
 Tiles = Mapping["Cell", NDArray[np.uint16]]
+
+
+class LedgerFullError(FasacoError):
+    """A ledger holds as much as it may: what lay farthest from the robot is to be covered again."""
+
+    code = "ledger_full"
+    hint = "look for poses or maps that jump; begin anew (`mission reset`) in another building"
 
 
 class LedgerMismatchError(FasacoError):
@@ -72,11 +85,14 @@ class CoverageLedger:
     A cell is visited when the tool, a disc as wide as a cell, passes over its
     centre. Coming back after having left counts as another visit; ``total`` counts
     all of them. ``frame`` names the frame of the poses, "" as long as none is known.
+    ``dropped`` counts the tiles that had to go so that no more than ``MOST_TILES`` are held: those
+    farthest from the robot at that moment.
     """
 
     def __init__(self, cell_m: float, frame: str = "") -> None:
         self.frame = frame
         self.total = 0
+        self.dropped = 0
         self._cell_m = cell_m
         # By tile, so that a map that jumps far away costs nothing in between.
         self._tiles: dict[Cell, NDArray[np.uint16]] = {}
@@ -161,9 +177,26 @@ class CoverageLedger:
         row, col = cell
         self.total += 1
         place = (row // TILE, col // TILE)
+        tile = self._tiles.get(place)
+        if tile is None:
+            self._make_room(place)
+            tile = self._tiles[place] = np.zeros((TILE, TILE), np.uint16)
         self._changed.add(place)
-        tile = self._tiles.setdefault(place, np.zeros((TILE, TILE), np.uint16))
         tile[row % TILE, col % TILE] = min(int(tile[row % TILE, col % TILE]) + 1, 65535)
+
+    def _make_room(self, place: Cell) -> None:
+        """Drop the tiles farthest from ``place`` where there is no room for another."""
+        if len(self._tiles) < MOST_TILES:
+            return
+
+        def distance(other: Cell) -> tuple[int, Cell]:
+            return max(abs(other[0] - place[0]), abs(other[1] - place[1])), other
+
+        for far in sorted(self._tiles, key=distance)[-DROPPED_TILES:]:
+            del self._tiles[far]
+            self._frozen.pop(far, None)
+            self._changed.discard(far)
+        self.dropped += DROPPED_TILES
 
     def _swept(self, start: Pose2D, end: Pose2D) -> frozenset[Cell]:
         """Return the cells whose centre is within half a cell of the segment."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import tracemalloc
 import zlib
 
 import numpy as np
@@ -10,8 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.daemon.ledger_codec import LedgerFileError, decode_ledger, encode_ledger
-from fasaco_edge.mission.ledger import LedgerMismatchError
+from fasaco_edge.daemon.ledger_codec import (
+    MOST_BYTES,
+    LedgerFileError,
+    decode_ledger,
+    encode_ledger,
+)
+from fasaco_edge.mission.ledger import MOST_TILES, LedgerMismatchError
 from tests.daemon.ledgers import CELL_M, contents, driven, lane
 
 CELLS = st.tuples(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
@@ -144,3 +150,26 @@ def test_other_cells_are_named_with_what_to_do():
 def test_cells_that_differ_by_a_hair_are_told_apart():
     with pytest.raises(LedgerMismatchError, match=r"are 0\.3 m .* 0\.30000000000000004 m"):
         decode_ledger(encode_ledger(lane(3)), 0.1 + 0.2)
+
+
+def bomb(tiles):
+    """A file whose tiles take a thousand times its size."""
+    head = struct.pack("<dQIII", CELL_M, 1, 3, 0, tiles) + b"map"
+    places = np.array([(0, number) for number in range(tiles)], "<i8").tobytes()
+    return enveloped(zlib.compress(head + places + bytes(8192 * tiles), 9))
+
+
+def test_a_ledger_of_as_many_tiles_as_there_may_be_is_read():
+    assert len(decode_ledger(bomb(MOST_TILES), CELL_M).tiles) == MOST_TILES
+
+
+@pytest.mark.parametrize("tiles", [MOST_TILES + 1, MOST_TILES + 1000, 30_000])
+def test_what_would_take_too_much_memory_is_not_read(tiles):
+    payload = bomb(tiles)
+    tracemalloc.start()
+    try:
+        with pytest.raises(LedgerFileError, match="malformed: "):
+            decode_ledger(payload, CELL_M)
+        assert tracemalloc.get_traced_memory()[1] < 3 * MOST_BYTES
+    finally:
+        tracemalloc.stop()

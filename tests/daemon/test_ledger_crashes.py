@@ -17,6 +17,7 @@ from typing import Any
 
 import pytest
 
+from fasaco_edge.daemon import durable
 from fasaco_edge.daemon.ledger_codec import encode_ledger
 from fasaco_edge.daemon.ledger_file import LedgerFile
 from tests.daemon.ledgers import CELL_M, NAMES, contents, lane, load, names
@@ -43,8 +44,9 @@ def deaths(monkeypatch: pytest.MonkeyPatch, at: int) -> None:
 
     for name in ("fsync", "replace"):
         monkeypatch.setattr(os, name, dying(getattr(os, name)))
-    for name in ("open", "rename", "unlink"):
+    for name in ("rename", "unlink"):
         monkeypatch.setattr(Path, name, dying(getattr(Path, name)))
+    monkeypatch.setattr(durable, "open_own", dying(durable.open_own))
 
 
 @pytest.mark.parametrize("at", range(6))

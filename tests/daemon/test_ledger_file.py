@@ -10,10 +10,24 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.daemon.ledger_codec import LedgerFileError, encode_ledger
-from fasaco_edge.daemon.ledger_file import LedgerFile
+from fasaco_edge.daemon.ledger_codec import (
+    MOST_BYTES,
+    LedgerFileError,
+    decode_ledger,
+    encode_ledger,
+)
+from fasaco_edge.daemon.ledger_file import KEPT_ASIDE, LedgerFile
 from fasaco_edge.mission.ledger import LedgerMismatchError
-from tests.daemon.ledgers import CELL_M, NAMES, contents, driven, lane, load, names
+from tests.daemon.ledgers import (
+    CELL_M,
+    NAMES,
+    contents,
+    driven,
+    lane,
+    load,
+    names,
+    visits_of,
+)
 from tests.daemon.test_ledger_codec import enveloped
 
 
@@ -225,3 +239,46 @@ def test_a_disk_without_locks_is_written_all_the_same(tmp_path, monkeypatch):
     file.lock()
     file.write(lane(1))
     assert contents(load(tmp_path).ledger) == contents(lane(1))
+
+
+def test_a_file_too_large_is_not_read_but_kept(written):
+    newest = written / NAMES[0]
+    with newest.open("ab") as file:
+        file.truncate(10**9)
+    found = load(written)
+    assert contents(found.ledger) == contents(lane(3))
+    assert f"robot.ledger: over {MOST_BYTES} bytes" in str(found.fault)
+    (aside,) = set(names(written)) - set(NAMES)
+    assert (written / aside).stat().st_size == 10**9
+
+
+def test_of_what_is_kept_aside_the_newest_few_and_the_largest_stay(tmp_path):
+    """As two hundred resets make them, the first of a whole day's work."""
+    file = LedgerFile(tmp_path, "robot")
+    for length in [400, *[3 + number % 3 for number in range(30)], 20]:
+        file.write(lane(length))
+        file.set_aside("reset")
+    kept = [
+        len(visits_of(decode_ledger(path.read_bytes(), CELL_M)))
+        for path in sorted(tmp_path.glob("*.reset-*"))
+    ]
+    assert len(kept) == KEPT_ASIDE + 1
+    assert {400, 20} <= set(kept)
+    assert names(tmp_path) == sorted(path.name for path in tmp_path.glob("*.reset-*"))
+
+
+def test_what_is_kept_for_another_reason_is_left_alone(tmp_path):
+    file = LedgerFile(tmp_path, "robot")
+    for why in ("mismatch", "broken", *["reset"] * 10):
+        file.write(lane(5))
+        file.set_aside(why)
+    kept = names(tmp_path)
+    assert sum("mismatch" in name for name in kept) == sum("broken" in name for name in kept) == 1
+
+
+def test_an_empty_ledger_is_not_kept(tmp_path):
+    file = LedgerFile(tmp_path, "robot")
+    for length in (3, 0, 0):
+        file.write(lane(length))
+    assert file.set_aside("reset") == []
+    assert names(tmp_path) == []

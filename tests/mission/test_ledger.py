@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.mission.events import MapReceived
-from fasaco_edge.mission.ledger import JUMP_CELLS, CoverageLedger
+from fasaco_edge.mission.ledger import DROPPED_TILES, JUMP_CELLS, MOST_TILES, TILE, CoverageLedger
 from tests.mission.world import Drive, building, pose_at
 
 CELL = 0.25
@@ -236,3 +236,26 @@ def test_a_robot_that_stood_still_visits_nothing_anew():
     restored = CoverageLedger.restored(ledger.snapshot())
     assert restored.record(Pose2D(0.6 * CELL, 0.5 * CELL)) == set()
     assert restored.total == 1
+
+
+def test_poses_that_jump_all_over_the_world_take_a_bounded_ledger():
+    """A tile for each pose, as thin maps far away make them; then the robot is at home again."""
+    ledger = CoverageLedger(CELL)
+    here = Pose2D(0.5 * CELL, 0.5 * CELL)
+    for number in range(2 * MOST_TILES):
+        row, col = divmod(number, 100)
+        ledger.record(Pose2D((col * TILE + 0.5) * CELL, ((row + 200) * TILE + 0.5) * CELL))
+    ledger.record(here)
+    assert len(ledger.snapshot().tiles) <= MOST_TILES
+    assert len(ledger.snapshot().tiles) > MOST_TILES - 2 * DROPPED_TILES
+    assert ledger.dropped > 0
+    assert ledger.has_visited((0, 0))
+    assert set(ledger.snapshot().tiles) == set(CoverageLedger.restored(ledger.snapshot())._tiles)
+
+
+def test_what_is_nearest_to_the_robot_stays():
+    ledger = CoverageLedger(CELL)
+    for number in range(MOST_TILES + 1):
+        ledger.record(Pose2D((number * TILE + 0.5) * CELL, 0.5 * CELL))
+    kept = sorted(col for _, col in ledger.snapshot().tiles)
+    assert kept == list(range(DROPPED_TILES, MOST_TILES + 1))
