@@ -36,7 +36,7 @@ class Keeping:
 
     def restore(self, mission: Mission, assignment: Assignment) -> None:
         """Let a mission go on where the one before ended."""
-        if self._before.tiles:
+        if self._before.cells:
             mission.resume(self._before)
         mission.assign(assignment)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, cast
 
 from fasaco_edge.bus.mailbox import Mailbox
@@ -23,15 +25,27 @@ from fasaco_edge.daemon.status import StatusBoard, path_note
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.daemon.turn_log import TurnLog, TurnNote
 from fasaco_edge.daemon.vitals import Vitals
-from fasaco_edge.errors import BadConfiguration, FasacoError, PatchWithoutBase
+from fasaco_edge.errors import BadConfiguration, FasacoError, MissionBroke, PatchWithoutBase
 from fasaco_edge.mission.assignment import Assignment
-from fasaco_edge.mission.events import Decision, Event, PathUpdate, PlanReady
+from fasaco_edge.mission.events import (
+    Answer,
+    CommandReceived,
+    Decision,
+    Event,
+    PathUpdate,
+    PlanBroken,
+    PlanReady,
+)
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.worker import Observed, PlanningWorker
     from fasaco_edge.mission.mission import Mission
 
+LOG = logging.getLogger(__name__)
+
 TICK_S = 0.1
+# A mission that breaks again within so long broke on the map it has [s].
+SOON_S = 60.0
 
 
 class Loop:
@@ -73,6 +87,8 @@ class Loop:
         self._worker: PlanningWorker | None = None
         self._maps = MapClock()
         self._coverage = CoverageNews(outbox)
+        self._gate = outbox.gate
+        self._broke_at = float("-inf")
         if self._keeping.fault is not None:
             self._status.faults.count([self._keeping.fault])
 
@@ -95,14 +111,19 @@ class Loop:
             else:
                 decision = Decision(answers=tuple(self._beginning.obey(commands)))
             answers = decision.answers
-            self._turns.note(TurnNote(started, items, lost, commands, decision), mission)
+            note = TurnNote(started, items, lost, commands, decision)
+            if not self._gate.let_out("turns", partial(self._turns.note, note, self._mission)):
+                self._turns.end("a batch could not be published")
             self._outbox.commands(commands, answers)
-            self._keeping.keep(mission, self._assignment, started)
-            self._publish_status(started)
+            self._keeping.keep(self._mission, self._assignment, started)
+            self._gate.let_out("status", partial(self._publish_status, started))
             self._commands.note(answers, started)
             if self._commands.are_asked:
-                report = self._status.report(mission, self._assignment, self._loading)
-                self._commands.answer(report, is_kept=self._keeping.is_kept(time.monotonic()))
+                report = self._status.report(self._mission, self._assignment, self._loading)
+                is_kept = self._keeping.is_kept(time.monotonic())
+                self._gate.let_out(
+                    "@rpc/mission", partial(self._commands.answer, report, is_kept=is_kept)
+                )
             ended = time.monotonic()
             self._vitals.beat(self._worker, ended)
             self._status.turns.note(ended - taken)
@@ -129,7 +150,7 @@ class Loop:
             self._vitals.remark = ""
             if config != self.config:
                 self._go_on_with(config)
-                items = [(kind, item) for kind, item in items if not isinstance(item, PlanReady)]
+                items = [(kind, item) for kind, item in items if kind != "plan"]
         self._reload.done()
         return items
 
@@ -137,12 +158,15 @@ class Loop:
         """Let another mission go on from the ledger, as after a restart."""
         self.config = config
         self._status.show(config)
-        self._turns.end("the configuration has changed")
-        held = self._beginning.held
+        held = heard_of(self._mission) if self._mission is not None else self._beginning.held
+        self._begin_again("the configuration has changed", held)
+
+    def _begin_again(self, why: str, held: Sequence[Event]) -> None:
+        """Let another mission go on from the ledger, with what is to be heard first."""
+        self._turns.end(why)
         if self._mission is not None and self._worker is not None:
             self._worker.disown()
             self._keeping.take_back(self._mission)
-            held = heard_of(self._mission)
         self._mission = self._worker = None
         self._maps = MapClock()
         self._beginning = Beginning(self._keeping, self._load, held)
@@ -155,26 +179,51 @@ class Loop:
         if loaded is None:
             return None
         self._mission, self._worker = loaded
+        self._status.waits = "no map yet"
         events[:] = self._beginning.held
         return self._mission
 
     def _turn(self, mission: Mission, events: list[Event], started: float) -> Decision:
         """Step the mission, do what it decides, and return that."""
         maps = mission.map_revision
-        decision = mission.step(events, started)
+        try:
+            decision = mission.step(events, started)
+        except Exception as error:
+            return self._break_off(mission, events, error)
         if mission.map_revision > maps:
             self._status.ingest_s = time.monotonic() - started
             if decision.plan is not None or mission.wants_plan:
                 self._maps.call_for_plan()
         if mission.wants_plan and mission.is_improving and self._worker is not None:
             self._worker.interrupt()  # what is needed comes before what is only better
-        try:
-            self._perform(mission, decision)
-            self._coverage.publish(mission, started)
-        except FasacoError as error:
-            # What cannot be said in the protocol's limits costs this message alone.
-            self._status.faults.count([error])
+        self._perform(mission, decision)
+        self._gate.let_out("coverage", partial(self._coverage.publish, mission, started))
         return decision
+
+    def _break_off(self, mission: Mission, events: list[Event], error: Exception) -> Decision:
+        """Stop the robot, and let another mission go on from the ledger.
+
+        To end here would help nobody: a latched map comes again after a restart. It gets a
+        second chance; a mission that breaks soon again goes on without it, with the next one.
+        """
+        LOG.exception("mission", extra={"event": "mission_broke"})
+        fault = MissionBroke(f"the mission broke off: {type(error).__name__}: {error}")
+        self._status.faults.count([fault])
+        now, broke_at = time.monotonic(), self._broke_at
+        self._broke_at = now
+        held = heard_of(mission) if now - broke_at > SOON_S else []
+        self._status.waits = f"{fault}: waits for another map"
+        if mission.grid is not None and mission.lattice is not None and len(mission.path.cells):
+            stop = PathUpdate(mission.revision + 1, mission.path.cells[:0], str(fault))
+            self._publish_path(mission, stop)
+        self._begin_again("the mission broke off", held)
+        return Decision(
+            answers=tuple(
+                Answer(event.number, fault)
+                for event in events
+                if isinstance(event, CommandReceived)
+            )
+        )
 
     def announce(self) -> None:
         """Publish a first status, so that who asks gets one from the beginning."""
@@ -182,7 +231,7 @@ class Loop:
 
     def close(self, timeout_s: float) -> None:
         """Hand over what turn log and ledger hold, and end the planning thread."""
-        self._turns.publish()
+        self._gate.let_out("turns", self._turns.publish)
         self._keeping.keep(self._mission, self._assignment, float("inf"))
         if self._worker is not None:
             self._worker.close(timeout_s)
@@ -240,6 +289,7 @@ class Loop:
             self._status.recorder = self._recorder.poll(now)
         self._status.ledger = self._ledger.document(now)
         self._status.faults.count(self._ledger.take_faults(), is_logged=True)
+        self._status.faults.count(self._gate.take_faults(), is_logged=True)
         document = self._status.due(self._mission, self._assignment, self._loading, now)
         if document is not None:
             self._outbox.status(document)
@@ -247,4 +297,4 @@ class Loop:
 
 
 def _plans(items: list[tuple[str, object]]) -> list[Event]:
-    return [item for _, item in items if isinstance(item, PlanReady)]
+    return [item for _, item in items if isinstance(item, PlanReady | PlanBroken)]

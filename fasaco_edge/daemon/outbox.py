@@ -1,9 +1,10 @@
-"""What goes out: path, coverage, pheromone, status."""
+"""What goes out: path, coverage, pheromone, status; each through the gate, which may refuse it."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.answers import LastSamples
+from fasaco_edge.daemon.faults import Gate
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.events import Answer, CommandReceived
@@ -29,9 +31,14 @@ if TYPE_CHECKING:
 
 
 class Outbox:
-    """The publishers of a daemon; what they have said last is kept for who asks later."""
+    """The publishers of a daemon; what they have said last is kept for who asks later.
+
+    Attributes:
+        gate: all that is published passes it.
+    """
 
     def __init__(self, bus: Bus, keys: Keys, ros: RosBridge | None = None) -> None:
+        self.gate = Gate()
         self._ros = ros
         self._last = LastSamples(bus, keys)
         self._path = bus.publisher(keys.path, schemas.PATH, QOS["path"])
@@ -47,7 +54,17 @@ class Outbox:
         stamp_ns: int,
         about: dict[str, Any],
     ) -> None:
-        """Publish a path through ``xy`` [m], float64 (n, 2), facing along the way."""
+        """Publish a path through ``xy`` [m], float64 (n, 2), facing along the way.
+
+        Where it cannot be told an empty one is: the robot must not go on along the one before.
+        """
+        if not self.gate.let_out("path", lambda: self._say_path(xy, frame, stamp_ns, about)):
+            nothing = about | {"steps": 0}
+            self.gate.let_out("path", lambda: self._say_path(xy[:0], frame, stamp_ns, nothing))
+
+    def _say_path(
+        self, xy: NDArray[np.float64], frame: str, stamp_ns: int, about: dict[str, Any]
+    ) -> None:
         payload = encode_path(xy, headings(xy), frame, stamp_ns)
         attachment = encode_json(about)
         self._last.keep("path", Reply(payload, schemas.PATH, attachment))
@@ -57,6 +74,9 @@ class Outbox:
 
     def status(self, document: dict[str, Any]) -> None:
         """Publish the status."""
+        self.gate.let_out("status", lambda: self._say_status(document))
+
+    def _say_status(self, document: dict[str, Any]) -> None:
         payload = encode_json(document)
         self._last.keep("status", Reply(payload))
         self._status.put(payload)
@@ -66,10 +86,16 @@ class Outbox:
         refused = {answer.number for answer in answers if answer.error is not None}
         for asked in commands:
             if asked.number not in refused:
-                self._command.put(encode_json(command_document(asked.command, asked.order)))
+                self.gate.let_out("command", partial(self._say_command, asked))
+
+    def _say_command(self, asked: CommandReceived) -> None:
+        self._command.put(encode_json(command_document(asked.command, asked.order)))
 
     def coverage(self, grid: OccupancyGrid) -> None:
         """Publish the coverage, a grid on the lattice."""
+        self.gate.let_out("coverage", lambda: self._say_coverage(grid))
+
+    def _say_coverage(self, grid: OccupancyGrid) -> None:
         payload = encode_occupancy_grid(grid)
         self._last.keep("coverage", Reply(payload, schemas.OCCUPANCY_GRID))
         self._coverage.put(payload)
@@ -78,6 +104,9 @@ class Outbox:
 
     def pheromone(self, seen: Observed, frame: str) -> None:
         """Keep the pheromone field, and publish it if anyone listens."""
+        self.gate.let_out("pheromone", lambda: self._say_pheromone(seen, frame))
+
+    def _say_pheromone(self, seen: Observed, frame: str) -> None:
         payload = encode_pheromone(seen.snapshot, frame, time.time_ns())
         reply = Reply(payload, schemas.PHEROMONE_GRID)
         self._last.keep_trail(seen.plan, seen.snapshot.cohort, reply)

@@ -81,6 +81,7 @@ class StatusBoard:
         self.recorder: dict[str, Any] | None = None
         self.ledger: dict[str, Any] = {}
         self.path: PathUpdate | None = None
+        self.waits = "no map yet"
         self._config = config
         self.show(config)
         self._started = time.monotonic()
@@ -95,7 +96,7 @@ class StatusBoard:
         self, mission: Mission | None, assignment: Assignment, loading: str, now: float
     ) -> dict[str, Any] | None:
         """Return the status if it changed or a second has passed, else None."""
-        state, reason = _state(mission, assignment, loading)
+        state, reason = self._state(mission, assignment, loading)
         recorder = (self.recorder or {}).get("state")
         revision = self.path and self.path.revision
         key = (state, reason, revision, recorder, self.ledger.get("fault"), assignment)
@@ -117,7 +118,7 @@ class StatusBoard:
         self, mission: Mission | None, assignment: Assignment, loading: str
     ) -> dict[str, Any]:
         """Return what the answer to a command says."""
-        state, reason = _state(mission, assignment, loading)
+        state, reason = self._state(mission, assignment, loading)
         return {
             "robot": self._config.robot.name,
             "state": state,
@@ -125,6 +126,17 @@ class StatusBoard:
             "coverage": _coverage(mission),
             "mission": mission_report(mission, assignment),
         }
+
+    def _state(
+        self, mission: Mission | None, assignment: Assignment, loading: str
+    ) -> tuple[str, str]:
+        if mission is not None:
+            return str(mission.state), mission.reason
+        if assignment.order is None:
+            return "idle", assignment.why
+        if assignment.paused:
+            return "paused", "paused by command"
+        return ("loading", loading) if loading else ("waiting for map", self.waits)
 
     def _document(self, mission: Mission | None, now: float) -> dict[str, Any]:
         return {
@@ -212,16 +224,6 @@ def changed_document(window: Window | None, cell_m: float) -> dict[str, float] |
     return {name: round(edge * cell_m, 3) for name, edge in zip(names, edges, strict=True)}
 
 
-def _state(mission: Mission | None, assignment: Assignment, loading: str) -> tuple[str, str]:
-    if mission is not None:
-        return str(mission.state), mission.reason
-    if assignment.order is None:
-        return "idle", assignment.why
-    if assignment.paused:
-        return "paused", "paused by command"
-    return ("loading", loading) if loading else ("waiting for map", "no map yet")
-
-
 def _map(mission: Mission | None) -> dict[str, Any] | None:
     if mission is None or mission.grid is None:
         return None
@@ -232,6 +234,7 @@ def _map(mission: Mission | None) -> dict[str, Any] | None:
         "resolution_m": geometry.resolution,
         "revision": mission.map_revision,
         "stamp_ns": mission.grid.stamp_ns,
+        "frame": mission.grid.frame,
     }
 
 

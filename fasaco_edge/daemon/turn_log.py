@@ -23,7 +23,7 @@ from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.decided import DecidedNews, cells_checksum, kernels_name
 from fasaco_edge.daemon.inbox import Received
 from fasaco_edge.daemon.ledger_codec import encode_ledger
-from fasaco_edge.mission.events import CommandReceived, Decision, PlanReady
+from fasaco_edge.mission.events import CommandReceived, Decision, PlanBroken, PlanReady
 from fasaco_edge.mission.ledger import LedgerSnapshot
 from fasaco_edge.mission.order_document import command_document
 from fasaco_edge.wire.turns import (
@@ -103,6 +103,9 @@ class TurnLog:
             self._taken(kind, item) for kind, item in turn.items if isinstance(item, Received)
         ]
         plans = [item for _, item in turn.items if isinstance(item, PlanReady)]
+        if any(isinstance(item, PlanBroken) for _, item in turn.items):
+            self.end("a plan broke, which no replay repeats")
+            return
         decided = self._news.of(turn.decision, mission)
         is_empty = not (samples or plans or turn.commands or turn.patches_lost or decided)
         if is_empty and mission is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -9,11 +10,14 @@ from dataclasses import dataclass
 from functools import partial
 
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.mission.events import PlanReady, PlanRequest
+from fasaco_edge.errors import PlanFailed
+from fasaco_edge.mission.events import PlanBroken, PlanReady, PlanRequest
 from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.planners.planner import CoveragePlanner
 from fasaco_edge.planners.stopping import AnyOf, Interrupt, Noted, TimeBudget
 from fasaco_edge.planners.work import SearchProgress
+
+LOG = logging.getLogger(__name__)
 
 # An attempt to make a path better takes so long [s].
 SPARE_S = 0.05
@@ -86,8 +90,15 @@ class PlanningWorker:
             return
         budget_s = SPARE_S if request.problem.only_better else self._budget_s
         stop = Noted(AnyOf(self._count, TimeBudget(budget_s), Interrupt(self._interrupt)))
-        # Costs some percent of a full plan, and a repair nothing.
-        path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))
+        try:
+            # Costs some percent of a full plan, and a repair nothing.
+            path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))
+        except Exception as error:
+            # The same map comes again after a restart: to end with it helps nobody.
+            LOG.exception("plan %d", request.number, extra={"event": "plan_failed"})
+            why = f"plan {request.number} failed: {type(error).__name__}: {error}"
+            self._post("plan", PlanBroken(request.number, PlanFailed(why)))
+            return
         seconds = time.monotonic() - started
         if self._stopping.is_set():
             return

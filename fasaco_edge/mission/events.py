@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.errors import FasacoError, PlanFailed
 from fasaco_edge.grid.geometry import StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.order import EVERYTHING_ONCE, MissionOrder
@@ -62,6 +62,14 @@ class PlanReady:
 
 
 @dataclass(frozen=True, slots=True)
+class PlanBroken:
+    """The planner broke on request ``number``; ``why`` says how."""
+
+    number: int
+    why: PlanFailed
+
+
+@dataclass(frozen=True, slots=True)
 class CommandReceived:
     """Somebody commands; ``order`` is what ``start`` is to start."""
 
@@ -70,7 +78,15 @@ class CommandReceived:
     order: MissionOrder = EVERYTHING_ONCE
 
 
-Event = MapReceived | PatchReceived | PatchesLost | PoseReceived | PlanReady | CommandReceived
+Event = (
+    MapReceived
+    | PatchReceived
+    | PatchesLost
+    | PoseReceived
+    | PlanReady
+    | PlanBroken
+    | CommandReceived
+)
 
 
 @dataclass(frozen=True, slots=True)

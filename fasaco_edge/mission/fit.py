@@ -136,10 +136,8 @@ class ResumedLedger:
         """Forget what ``ledger`` has forgotten too: see there."""
         self._since.forget(inside)
 
-    def verdict(self, lattice: CoverageLattice, frame: str) -> Verdict:
-        """Judge by a map in ``frame``."""
-        if self.before.frame != frame:
-            return Verdict.OTHER
+    def verdict(self, lattice: CoverageLattice) -> Verdict:
+        """Judge by a map in its frame."""
         return Fit.of(self.before, lattice).verdict
 
     def since(self, frame: str) -> CoverageLedger:
@@ -147,11 +145,8 @@ class ResumedLedger:
         self._since.frame = frame
         return self._since
 
-    def mismatch(self, frame: str) -> LedgerMismatchError:
+    def mismatch(self) -> LedgerMismatchError:
         """Return what there is to say then."""
-        cells, was = self.before.cells, self.before.frame
-        if was != frame:
-            why = f"lies in frame {was!r}, the map in {frame!r}"
-        else:
-            why = "is of another building than the map"
-        return LedgerMismatchError(f"the ledger of {cells} covered cells {why}")
+        return LedgerMismatchError(
+            f"the ledger of {self.before.cells} covered cells is of another building than the map"
+        )

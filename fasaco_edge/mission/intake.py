@@ -13,9 +13,11 @@ from fasaco_edge.mission.events import (
     PatchesLost,
     PatchReceived,
     PathUpdate,
+    PlanBroken,
     PlanReady,
     PoseReceived,
 )
+from fasaco_edge.mission.ledger import LedgerMismatchError
 from fasaco_edge.mission.parts import Parts
 
 
@@ -25,11 +27,15 @@ class Intake:
     Attributes:
         answers: to the commands taken so far.
         forgotten: whether one of them was to forget what is covered.
+        stopped: an empty path that is due unless a later one follows; None for none.
+        faults: what went wrong with events that were taken all the same.
     """
 
     def __init__(self, parts: Parts) -> None:
         self.answers: list[Answer] = []
         self.forgotten = False
+        self.stopped: PathUpdate | None = None
+        self.faults: list[FasacoError] = []
         self._parts = parts
 
     def take(self, event: Event) -> PathUpdate | None:
@@ -40,7 +46,8 @@ class Intake:
         """
         match event:
             case MapReceived(grid):
-                self._parts.site.take_map(grid)
+                if self._parts.site.take_map(grid):
+                    self._begin_in(grid.frame)
                 self._look_at_map()
             case PatchReceived(patch):
                 self._parts.site.take_patch(patch)
@@ -51,6 +58,10 @@ class Intake:
                 self._take_pose(pose)
             case PlanReady():
                 return self._take_plan(event)
+            case PlanBroken():
+                self._parts.route.give_up(event)
+                self._parts.spare.rest(self._parts.now)
+                raise event.why
             case CommandReceived():
                 self._obey(event)
         return None
@@ -61,11 +72,16 @@ class Intake:
         assert site.free is not None
         assert site.grid is not None
         parts.watch.map_came(parts.now)
+        parts.route.mend()
         if site.map_moved and site.pose is not None:
             parts.log.part(site.pose.pose)
         else:
             self._record()  # the pose may have come before the map
-        misfit = parts.log.check(site.free, site.grid.frame)
+        self._go_on_after(parts.log.check(site.free, site.grid.frame))
+
+    def _go_on_after(self, misfit: LedgerMismatchError | None) -> None:
+        """Find out what can be reached; begin anew where the ledger is of another place."""
+        parts = self._parts
         if misfit is not None:
             parts.take_order(parts.agenda.assignment.elsewhere(str(misfit)))
         parts.survey()
@@ -73,8 +89,30 @@ class Intake:
             parts.route.want(parts.log.opening)
             raise misfit
 
+    def _begin_in(self, frame: str) -> None:
+        """Let a frame count; raise LedgerMismatchError where there is progress in another."""
+        parts = self._parts
+        is_other_map = parts.site.turn()
+        misfit = parts.log.move_to(frame)
+        if is_other_map or misfit is not None:
+            self._leave(f"map and poses are in frame {frame!r} now")
+            parts.watch.map_came(parts.now)
+        if misfit is not None:
+            self._record()
+        if is_other_map or misfit is not None:
+            self._go_on_after(misfit)
+
+    def _leave(self, why: str) -> None:
+        """Stop the robot: its path leads through another map."""
+        self.stopped = self._parts.route.stop(why) or self.stopped
+        self._parts.route.disown()
+        self._parts.route.mend()
+        self._parts.watch.forget_pose()
+
     def _take_pose(self, stamped: StampedPose) -> None:
         parts, site, route = self._parts, self._parts.site, self._parts.route
+        if site.frames.hear_pose(stamped, parts.now):
+            self._begin_in(stamped.frame)
         site.take_pose(stamped)
         astray = parts.watch.pose_came(stamped.pose, parts.now)
         if astray:
@@ -98,7 +136,9 @@ class Intake:
             return
         pose = stamped.pose
         if lattice.contains(lattice.cell_at(pose.x, pose.y)):
-            self._parts.log.record(pose)
+            full = self._parts.log.record(pose)
+            if full is not None:
+                self.faults.append(full)
 
     def _take_plan(self, event: PlanReady) -> PathUpdate | None:
         route, watch = self._parts.route, self._parts.watch
@@ -123,8 +163,7 @@ class Intake:
             return
         self.answers.append(Answer(event.number, plan=plan))
         if event.command == "reset":
-            parts.log.begin_anew()
-            self.forgotten = True
+            self._reset()
         if after.order is not before.order:
             parts.take_order(after)
             parts.survey()
@@ -133,6 +172,18 @@ class Intake:
         elif before.paused and not after.paused:
             parts.route.want("resumed")
         parts.agenda.assignment = after
+
+    def _reset(self) -> None:
+        """Forget what is covered but where the tool is now, and which frame counts."""
+        parts, site = self._parts, self._parts.site
+        self.forgotten = True
+        site.frames.forget()
+        if site.turn():
+            self._leave("reset")
+            parts.watch.map_came(parts.now)
+        parts.log.begin_anew(site.frames.counts)
+        parts.route.mend()
+        self._record()
 
     def _replan(self) -> int:
         """Want a full new plan, and return its number; CommandError where there is none to make."""

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.fit import ResumedLedger, Verdict
-from fasaco_edge.mission.ledger import CoverageLedger, LedgerMismatchError, LedgerSnapshot
+from fasaco_edge.mission.ledger import (
+    DROPPED_TILES,
+    MOST_TILES,
+    TILE,
+    CoverageLedger,
+    LedgerFullError,
+    LedgerMismatchError,
+    LedgerSnapshot,
+)
 from fasaco_edge.mission.loop_closure import Motion, doubtful
 
 
@@ -23,6 +31,7 @@ class Logbook:
     """
 
     def __init__(self, cell_m: float) -> None:
+        self._cell_m = cell_m
         self.ledger = CoverageLedger(cell_m)
         self.opening = "first plan"
         self._resumed: ResumedLedger | None = None
@@ -35,11 +44,18 @@ class Logbook:
         self.ledger = self._resumed.ledger
         self.opening = f"first plan, {before.cells} cells were covered before"
 
-    def record(self, pose: Pose2D) -> None:
-        """Note that the robot drove on to ``pose``."""
+    def record(self, pose: Pose2D) -> LedgerFullError | None:
+        """Note that the robot drove on to ``pose``; return what to say where there was no room."""
+        before = self.ledger.dropped
         self.ledger.record(pose)
         if self._resumed is not None:
             self._resumed.record(pose)
+        if self.ledger.dropped == before:
+            return None
+        return LedgerFullError(
+            f"the ledger holds {MOST_TILES} tiles of {TILE} x {TILE} cells at most: the "
+            f"{DROPPED_TILES} farthest from the robot were dropped"
+        )
 
     def lift(self) -> None:
         """Note that nobody knows how the robot gets to its next pose."""
@@ -69,22 +85,36 @@ class Logbook:
         if self._resumed is not None:
             self._resumed.forget(inside)
 
-    def begin_anew(self) -> None:
-        """Forget all there is, but where the tool is now."""
-        self.forget(lambda window: np.ones((window.rows, window.cols), bool))
-        self._resumed = None
+    def move_to(self, frame: str) -> LedgerMismatchError | None:
+        """Lie in ``frame`` from now on; where it lay in another begin anew, and say so."""
+        was = self.ledger.frame
+        if was in ("", frame):
+            self.ledger.frame = frame
+            return None
+        cells = self.ledger.snapshot().cells
+        self.ledger, self._resumed = CoverageLedger(self._cell_m, frame), None
+        self._parted_at = None
+        misfit = LedgerMismatchError(
+            f"the ledger of {cells} covered cells lies in frame {was!r}, the map in {frame!r}"
+        )
+        self.opening = f"{misfit}: begun anew"
+        return misfit
+
+    def begin_anew(self, frame: str) -> None:
+        """Forget all there is; ``frame`` is that of the poses, "" where none counts."""
+        self.ledger, self._resumed = CoverageLedger(self._cell_m, frame), None
+        self._parted_at = None
         self.opening = "first plan"
 
     def check(self, lattice: CoverageLattice, frame: str) -> LedgerMismatchError | None:
         """Begin anew where a map shows the ledger to be of another building; return what to say."""
-        self.ledger.frame = self.ledger.frame or frame
         resumed = self._resumed
-        verdict = resumed.verdict(lattice, frame) if resumed else Verdict.OPEN
+        verdict = resumed.verdict(lattice) if resumed else Verdict.OPEN
         if resumed is None or verdict is Verdict.OPEN:
             return None
         self._resumed = None
         if verdict is Verdict.SAME:
             return None
-        self.ledger, misfit = resumed.since(frame), resumed.mismatch(frame)
+        self.ledger, misfit = resumed.since(frame), resumed.mismatch()
         self.opening = f"{misfit}: begun anew"
         return misfit

@@ -50,6 +50,7 @@ class Mission:
         the restart still counts then.
         """
         self._parts.log.resume(before)
+        self._parts.site.frames.counts = before.frame
 
     def assign(self, assignment: Assignment) -> None:
         """Go on with an assignment from before a restart; to be called before the first step."""
@@ -75,11 +76,12 @@ class Mission:
                 # Its traceback would hold the map until garbage is collected.
                 faults.append(error.with_traceback(None))
         decision = self._pilot.decide()
+        paths = [update for update in (intake.stopped, path, decision.path) if update is not None]
         self.state, self.reason = self._pilot.told()
         return replace(
             decision,
-            path=decision.path or path,
-            faults=tuple(faults),
+            path=max(paths, key=lambda update: update.revision, default=None),
+            faults=(*faults, *intake.faults),
             answers=tuple(intake.answers),
             forgotten=intake.forgotten,
         )

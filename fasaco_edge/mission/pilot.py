@@ -35,7 +35,8 @@ class Pilot:
         """Return the state and its reason, as people are to hear it."""
         trouble = self._parts.watch.trouble(self._parts.now)
         if trouble and self._state in DRIVING:
-            return State.DEGRADED, trouble
+            lost = self._parts.watch.pose_lost(self._parts.now)
+            return State.DEGRADED, trouble + (self._parts.site.elsewhere() if lost else "")
         return self._state, self._reason
 
     def decide(self) -> Decision:
@@ -56,6 +57,8 @@ class Pilot:
         if reason := agenda.begin(cell, parts.now):
             route.want(reason)
         if route.wanted and route.asked is None:
+            if why := route.broken_for(parts.now):
+                return self._rest(State.BLOCKED, why)
             return Decision(path=update) if self._too_soon() else self._ask(cell, update)
         if agenda.assignment.stage is Stage.RETURNING and cell == agenda.assignment.home:
             agenda.go_on(parts.now)
@@ -88,9 +91,9 @@ class Pilot:
         if assignment.stage is Stage.OVER and not assignment.standing:
             return State.DONE, agenda.ending
         if site.lattice is None:
-            return State.WAITING_FOR_MAP, "no map yet"
+            return State.WAITING_FOR_MAP, site.without_map()
         if site.pose is None:
-            return State.WAITING_FOR_POSE, "no pose yet"
+            return State.WAITING_FOR_POSE, site.without_pose()
         return None
 
     def _rest(self, state: State, reason: str) -> Decision:

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.agenda import Agenda
-from fasaco_edge.mission.events import PathUpdate, PlanReady, PlanRequest
+from fasaco_edge.mission.events import PathUpdate, PlanBroken, PlanReady, PlanRequest
 from fasaco_edge.mission.ground import Ground
 from fasaco_edge.mission.progress import DrivenPath
 from fasaco_edge.mission.site import Site
-from fasaco_edge.mission.spare_time import Attempt
+from fasaco_edge.mission.spare_time import BROKEN_S, Attempt
 from fasaco_edge.planners.problem import CoverageProblem
 
 
@@ -50,6 +50,8 @@ class Route:
         self._is_by_map = False
         self._checked_on: Ground | None = None
         self._attempt: Attempt | None = None
+        # How the last plan broke, and when [s]; "" where it did not.
+        self._broken = "", 0.0
 
     @property
     def is_improving(self) -> bool:
@@ -76,6 +78,32 @@ class Route:
         self.asked = PlanRequest(self._number, self._attempt.problem, "spare time")
         return self.asked
 
+    def give_up(self, event: PlanBroken) -> None:
+        """Take note that the plan under way broke: the same problem would break it again."""
+        asked = self.asked
+        if asked is None or asked.number != event.number:
+            return
+        is_improving, disowned = self.is_improving, self._disowned
+        self.asked = self._attempt = None
+        self._disowned = False
+        self.plans += not is_improving
+        self.attempts += is_improving
+        if not is_improving and not disowned:
+            self.outdated += 1
+            self.want(self.wanted or asked.reason, asked.changed)
+            self._broken = str(event.why), self.now
+
+    def broken_for(self, now: float) -> str:
+        """Return why no plan is asked for as yet; "" where one may be."""
+        why, since = self._broken
+        if why and now - since < BROKEN_S:
+            return f"{why}; tried again with the next map, or after {BROKEN_S:g} s"
+        return ""
+
+    def mend(self) -> None:
+        """Let a plan be asked for although the last one broke: the problem is another."""
+        self._broken = "", 0.0
+
     def want(self, reason: str, changed: Window | None = None) -> None:
         """Want a plan: because the cells in a window have changed, or for another reason."""
         self.wanted = reason
@@ -90,6 +118,7 @@ class Route:
     def want_anew(self, reason: str) -> int:
         """Want a plan that keeps nothing of the path; return which of the plans it will be."""
         self.wanted = self._anew = reason
+        self.mend()
         return self.plans + (1 if self.asked is None or self.is_improving else 2)
 
     @property
@@ -100,6 +129,7 @@ class Route:
     def disown(self) -> None:
         """Want no plan any more; what comes back of the one under way is for another order."""
         self.want_none()
+        self.mend()
         self._disowned = self.asked is not None
 
     def take_plan(self, event: PlanReady) -> PathUpdate | None:

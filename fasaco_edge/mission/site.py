@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from fasaco_edge.errors import PatchWithoutBase, WrongFrame
+from fasaco_edge.errors import MapTooFar, MapTooLarge, PatchWithoutBase, WrongFrame
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import StampedPose, Window
-from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
+from fasaco_edge.grid.lattice import (
+    COVERABLE,
+    UNKNOWN,
+    Cell,
+    CoverageLattice,
+    lattice_window,
+)
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.frames import Frames
 from fasaco_edge.mission.free_area import FreeArea
 from fasaco_edge.mission.ground import Ground, anchor_cell
 from fasaco_edge.mission.ledger import CoverageLedger
@@ -29,6 +36,7 @@ class Site:
         pose: the newest pose in the map's frame; before there is a map in any frame.
         map_moved: whether the newest map shows the walls elsewhere: a loop closure.
         ground: what can be reached, as of the last ``survey``; None where the robot stands ill.
+        frames: which frame counts, and what was heard in another.
     """
 
     def __init__(self, config: MissionConfig) -> None:
@@ -39,32 +47,65 @@ class Site:
         self.pose: StampedPose | None = None
         self.ground: Ground | None = None
         self.map_moved = False
+        self.frames = Frames()
         self._config = config
         self._change: LatticeChange | None = None
         self._keep_out: tuple[Polygon, ...] = ()
         self._patches_lost = False
+        # Why the newest map was not taken; "" where it was.
+        self._refused = ""
         self._free_area = FreeArea(config.footprint.free_at_most)
 
-    def take_map(self, grid: OccupancyGrid) -> None:
-        """Take a full map in.
+    def take_map(self, grid: OccupancyGrid) -> bool:
+        """Take a full map in; return whether its frame counts from now on, and did not before.
 
         Raises:
-            WrongFrame: the map before lay in another frame.
+            WrongFrame: another frame counts.
             MapTooLarge: its lattice would be too large.
+            MapTooFar: its lattice would reach too far from 0.
         """
-        self._patches_lost = False
-        self._take_map(grid)
+        if self.frames.counts not in ("", grid.frame):
+            # It may be wanted later, if it is one that can be taken at all.
+            lattice_window(
+                grid.geometry, self._config.footprint.cell_m, self._config.max_lattice_cells
+            )
+            self.frames.hear_map(grid)
+            self.frames.refuse_map(grid)
+        try:
+            self._take_map(grid)
+        except (MapTooLarge, MapTooFar) as error:
+            self._refused = str(error)
+            raise
+        self._patches_lost, self._refused = False, ""
+        return self.frames.hear_map(grid)
+
+    def turn(self) -> bool:
+        """Go on with map and pose of the frame that counts; return whether it is another map."""
+        grid = self.frames.newest_map
+        is_other = grid is not None and (self.grid is None or self.grid.frame != grid.frame)
+        if grid is not None and is_other:
+            self._patches_lost = False
+            self._take_map(grid)
+        if grid is not None and (self.pose is None or self.pose.frame != grid.frame):
+            self.pose = self.frames.pose_in(grid.frame)
+        return is_other
 
     def take_patch(self, patch: MapPatch) -> None:
         """Take a map update in.
 
         Raises:
             PatchWithoutBase: it does not fit the map there is.
+            WrongFrame: it fits one that does not count.
         """
+        if self.frames.hear_patch(patch):
+            raise WrongFrame(
+                f"map update in frame {patch.frame!r}, the mission's is {self.frames.counts!r}"
+            )
         if self.grid is None or self._patches_lost:
             why = "updates before it were lost" if self._patches_lost else "there is no map yet"
             raise PatchWithoutBase(f"map update refused: {why}")
         self._take_map(self.grid.patched(patch), patch.window)
+        self.frames.hear_map(self.grid)
 
     def lose_patches(self, count: int) -> None:
         """Note that updates were lost; always raises PatchWithoutBase, which says so."""
@@ -72,24 +113,25 @@ class Site:
         raise PatchWithoutBase(f"{count} map updates were lost")
 
     def _take_map(self, grid: OccupancyGrid, within: Window | None = None) -> None:
-        if self.grid is not None and grid.frame != self.grid.frame:
-            raise WrongFrame(f"map in frame {grid.frame!r}, the mission's is {self.grid.frame!r}")
         config = self._config
         footprint, most = config.footprint, config.max_lattice_cells
-        if self.grid is None or self.free is None:
+        is_first = self.grid is None or self.grid.frame != grid.frame
+        if self.grid is None or self.free is None or is_first:
             change = LatticeChange.first(grid, footprint, most)
         else:
             maps = self.grid, grid
             change = LatticeChange.between(maps, self.free, footprint, most, within)
         self.map_moved = has_moved(change)
         before, self.grid = self.lattice, grid
+        if is_first:
+            before = self.ground = None
         if change.after is not self.free:
             self.free, self.lattice = change.after, self._without_kept_out(change.after)
             # Without the same cells as before: no others have changed.
             self._change = LatticeChange(before, self.lattice, change.cells)
         self.map_revision += 1
         if self.pose is not None and self.pose.frame != grid.frame:
-            self.pose = None
+            self.pose = self.frames.pose_in(grid.frame)
 
     def keep_out(self, polygons: tuple[Polygon, ...]) -> None:
         """Keep out of these polygons (x, y) [m] from now on, and of no others."""
@@ -107,11 +149,27 @@ class Site:
         """Take a pose in.
 
         Raises:
-            WrongFrame: it is not in the map's frame.
+            WrongFrame: it is not in the map's frame, or not in the one that counts.
         """
         if self.grid is not None and pose.frame != self.grid.frame:
             raise WrongFrame(f"pose in frame {pose.frame!r}, map in {self.grid.frame!r}")
+        if self.frames.counts not in ("", pose.frame):
+            raise WrongFrame(f"pose in frame {pose.frame!r}, progress in {self.frames.counts!r}")
         self.pose = pose
+
+    def without_map(self) -> str:
+        """Return why there is no map."""
+        why = self.frames.without_map()
+        return f"{why}: the last one was refused: {self._refused}" if self._refused else why
+
+    def without_pose(self) -> str:
+        """Return why there is no pose, or none any more."""
+        return self.frames.without_pose(self.grid.frame) if self.grid is not None else "no pose yet"
+
+    def elsewhere(self) -> str:
+        """Return that poses come in another frame than the map, to be added; "" where none do."""
+        strange = self.grid is not None and self.frames.last_pose_frame not in ("", self.grid.frame)
+        return f"; {self.without_pose()}" if strange else ""
 
     def cell(self) -> Cell | None:
         """Return the coverable cell the robot is in, or next to."""

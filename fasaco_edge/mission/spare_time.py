@@ -21,6 +21,8 @@ MOST_VAIN = 4
 # Where there is nothing to attempt it is asked again so late [s]: to find that out takes a look
 # at the whole lattice, and the answer rarely changes from one pose to the next.
 SKIPPED_S = 1.0
+# After a plan that broke [s].
+BROKEN_S = 30.0
 
 
 class SpareTime:
@@ -45,6 +47,10 @@ class SpareTime:
         self._revision = revision
         share = self._share / 2**self._vain
         self._resting_until = now + seconds * (1.0 / share - 1.0)
+
+    def rest(self, now: float) -> None:
+        """Note that a plan broke at ``now`` [s]."""
+        self._resting_until = max(self._resting_until, now + BROKEN_S)
 
     def skip(self, now: float) -> None:
         """Note that there was nothing to attempt at ``now`` [s]."""

@@ -48,6 +48,10 @@ class Watch:
             self.doubt = f"the pose {how if lost else f'jumped {distance:.2f} m'}"
         return jumped or lost
 
+    def forget_pose(self) -> None:
+        """Forget the last pose: the next one is in another frame."""
+        self._pose, self.doubt = None, ""
+
     def plan_asked(self, number: int) -> None:
         """Note that plan ``number`` is made from where the robot is now."""
         self._answered_by = number

@@ -193,19 +193,6 @@ def test_what_was_covered_since_the_restart_counts_in_the_other_building_too():
     again.finish()
 
 
-def test_another_frame_is_another_building():
-    first = started(*HALL, cell=(1, 1))
-    for _ in range(5):
-        first.go()
-    hall = building(*HALL, frame="odom")
-    again = resumed(after(first), (1, 1), MapReceived(hall), pose_at(1, 1, frame="odom"))
-    (fault,) = again.decisions[-1].faults
-    assert isinstance(fault, LedgerMismatchError)
-    assert "lies in frame 'map', the map in 'odom'" in str(fault)
-    assert again.visited == {(1, 1)}
-    assert again.mission.ledger.frame == "odom"
-
-
 def test_new_furniture_does_not_cost_the_ledger():
     first = started(*HALL, cell=(1, 1))
     first.finish()

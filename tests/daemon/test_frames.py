@@ -1,0 +1,69 @@
+"""A frame counts by map and pose together: the daemon's part, with progress on disk."""
+
+from __future__ import annotations
+
+import json
+import time
+
+from tests.daemon.hall import HALL, begin, drive, lanes
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import daemon_process
+from tests.daemon.rooms import map_bytes, pose_bytes
+
+
+def command(client, name):
+    (reply,) = client.session.get(
+        f"{client.prefix}/@rpc/mission", payload=json.dumps({"command": name}).encode(), timeout=5.0
+    )
+    return json.loads(reply.ok.payload.to_bytes())
+
+
+def aside(folder):
+    return sorted(path.name for path in (folder / "state").glob("*.mismatch-*"))
+
+
+def test_one_map_in_a_wrong_frame_after_a_restart_costs_nothing(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+        begin(client)
+        drive(client, lanes(30))
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+        client.put("map", map_bytes(HALL, frame="odom"))
+        status = client.wait_status(lambda status: status["errors"]["total"])
+        assert status["reason"].startswith("no map in frame 'map' yet")
+        status = begin(client, at=29)
+        assert status["coverage"]["covered"] == 30
+        assert status["map"]["frame"] == "map"
+        assert status["ledger"]["fault"] is None
+    assert aside(tmp_path) == []
+
+
+def test_map_and_poses_in_another_frame_for_long_are_another_building(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+        begin(client)
+        drive(client, lanes(30))
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+        client.put("map", map_bytes(HALL, frame="odom"))
+        deadline = time.monotonic() + 60.0
+        while client.ask_status()["state"] != "covering":
+            assert time.monotonic() < deadline
+            client.put("pose", pose_bytes(0.45, 0.45, frame="odom"))
+            time.sleep(0.1)
+        status = client.ask_status()
+        assert status["errors"]["by_code"]["ledger_mismatch"] == 1
+        assert "lies in frame 'map', the map in 'odom'" in status["ledger"]["fault"]
+        assert status["coverage"]["covered"] == 1
+    assert aside(tmp_path) != []
+
+
+def test_a_reset_lets_another_frame_count_at_once(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+        begin(client)
+        drive(client, lanes(30))
+        client.put("map", map_bytes(HALL, frame="odom"))
+        client.put("pose", pose_bytes(0.45, 0.45, frame="odom"))
+        client.wait_status(lambda status: status["errors"]["by_code"].get("wrong_frame") == 2)
+        assert command(client, "reset")["state"] == "idle"
+        client.put("pose", pose_bytes(0.45, 0.45, frame="odom"))
+        client.wait_status(lambda status: status["map"]["frame"] == "odom")
+        command(client, "start")
+        client.wait_status(lambda status: status["state"] == "covering")

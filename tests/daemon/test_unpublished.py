@@ -1,0 +1,114 @@
+"""What cannot be told, planned or understood costs itself alone: the daemon goes on."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import pytest
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from tests.daemon import processes
+from tests.daemon.breaking import MISSION_M, PHEROMONE_M, PLANNER_M
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import daemon_process
+from tests.daemon.rooms import map_bytes, pose_bytes, room
+from tests.wire import oracle
+
+# A robot that stands says so from time to time; so long is a cycle of the daemon's and more [s].
+POSE_S = 0.1
+
+
+def far_map(x, y):
+    """A room with its corner at (x, y) [m]."""
+    pixels = room(3.0, 3.0)
+    message = oracle.occupancy_grid(
+        "map", 1, GridGeometry(*pixels.shape, 0.05, Pose2D(x, y)), pixels
+    )
+    return oracle.to_bytes("nav_msgs/msg/OccupancyGrid", message)
+
+
+def stand(client, holds, x=0.75, y=0.75):
+    """Say where the robot stands until the status is as it should be."""
+    deadline = time.monotonic() + 60.0
+    while not holds(status := client.ask_status()):
+        assert time.monotonic() < deadline, status
+        client.put("pose", pose_bytes(x, y))
+        time.sleep(POSE_S)
+    return status
+
+
+@pytest.fixture
+def breaking(tmp_path, monkeypatch):
+    program = (sys.executable, "-m", "tests.daemon.breaking")
+    monkeypatch.setattr(processes, "PROGRAM", program)
+    # Pheromone is of full plans by the colony alone.
+    with (
+        daemon_process(tmp_path, planner={"local_search": False}) as running,
+        Outsider(running.endpoint) as client,
+    ):
+        yield running, client
+        # Told by its exit otherwise: a traceback is in the log here.
+        running.kill()
+
+
+@pytest.mark.parametrize("corner", [(-2e7, 0.0), (2e7, 2e7), (0.0, 2e7 - 1.0)])
+def test_a_map_that_nothing_could_be_told_of_is_refused(tmp_path, corner):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+        client.put("map", far_map(*corner))
+        place = [min(max(at + 1.0, -2e7), 2e7) for at in corner]
+        status = stand(client, lambda status: status["errors"]["total"], *place)
+        assert set(status["errors"]["by_code"]) <= {"map_too_far", "wrong_frame"}
+        assert "beyond 20000000 m from 0" in status["errors"]["last"]
+        assert status["state"] == "waiting for map"
+        assert "reaches beyond 20000000 m from 0" in status["reason"]
+        client.put("map", map_bytes(room(3.0, 3.0)))
+        stand(client, lambda status: status["state"] == "covering")
+
+
+@pytest.mark.parametrize(
+    "corner", [(-2e7 + 1.2, 0.0), (500_000.0, 9_999_990.0), (2e7 - 6.0, -2e7 + 0.3)]
+)
+def test_a_map_at_the_limit_is_covered(tmp_path, corner):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+        ears = [client.listen(name) for name in ("path", "coverage", "pheromone")]
+        client.put("map", far_map(*corner))
+        x, y = corner[0] + 1.05, corner[1] + 1.05
+        status = stand(client, lambda status: status["state"] == "covering", x, y)
+        assert status["errors"]["total"] == 0
+        assert status["coverage"]["coverable"] >= 49
+        for ear in ears[:2]:
+            ear.wait(lambda heard: True)
+
+
+def test_a_planner_that_breaks_costs_this_map_alone(breaking):
+    running, client = breaking
+    client.put("map", map_bytes(room(PLANNER_M, 3.0)))
+    status = stand(client, lambda status: status["state"] == "blocked")
+    assert status["reason"].startswith("plan 1 failed: IndexError: index 7 is out of bounds; tried")
+    assert status["errors"]["by_code"] == {"plan_failed": 1}
+    client.put("map", map_bytes(room(3.0, 3.0)))
+    stand(client, lambda status: status["state"] == "covering")
+    assert running.log_text().count("Traceback") == 1
+
+
+def test_a_message_that_cannot_be_made_costs_this_message_alone(breaking):
+    running, client = breaking
+    client.put("map", map_bytes(room(PHEROMONE_M, 3.0)))
+    status = stand(client, lambda status: "not_published" in status["errors"]["by_code"])
+    assert status["errors"]["last"].startswith("pheromone was not published: ")
+    stand(client, lambda status: status["state"] == "covering")
+    assert running.log_text().count("pheromone was not published") == 1
+
+
+def test_a_map_that_breaks_the_mission_is_given_up_for_the_next(breaking):
+    running, client = breaking
+    client.put("map", map_bytes(room(MISSION_M, 3.0)))
+    status = stand(client, lambda status: status["errors"]["by_code"].get("mission_broke") == 2)
+    status = stand(client, lambda status: status["state"] == "waiting for map")
+    assert status["reason"] == (
+        "the mission broke off: ZeroDivisionError: division by zero: waits for another map"
+    )
+    client.put("map", map_bytes(room(3.0, 3.0)))
+    stand(client, lambda status: status["state"] == "covering")
+    assert running.process.poll() is None

@@ -1,0 +1,171 @@
+"""Which frame counts, and that no single message in a wrong one ever decides it."""
+
+import pytest
+
+from fasaco_edge.errors import WrongFrame
+from fasaco_edge.mission.events import MapReceived
+from fasaco_edge.mission.frames import PATIENCE_S
+from fasaco_edge.mission.ledger import LedgerMismatchError
+from fasaco_edge.mission.progress import State
+from tests.mission.world import Drive, building, patch, pose_at, started
+
+HALL = ("########", *("#......#",) * 4, "########")
+MAP, ODOM = MapReceived(building(*HALL)), MapReceived(building(*HALL, frame="odom"))
+HERE, THERE = pose_at(1, 1), pose_at(1, 1, frame="odom")
+
+
+def restarted(first, *events):
+    """A mission that goes on from what another one covered."""
+    drive = Drive((1, 1))
+    drive.mission.resume(first.mission.snapshot())
+    drive.tell(*events)
+    return drive
+
+
+@pytest.fixture
+def driven():
+    drive = started(*HALL, cell=(1, 1))
+    for _ in range(6):
+        drive.go()
+    return drive
+
+
+def told_for(drive, seconds, *events):
+    """Tell the same again and again; return all faults."""
+    ends, faults = drive.now + seconds, []
+    while drive.now < ends:
+        faults += drive.tell(*events, after=1.0).faults
+    return faults
+
+
+def test_one_map_in_another_frame_costs_nothing(driven):
+    """As it comes from a tf prefix, or from SLAM that was started with other parameters."""
+    again = restarted(driven, ODOM)
+    assert again.mission.state is State.WAITING_FOR_MAP
+    assert again.mission.reason == (
+        "no map in frame 'map' yet, that of the progress kept: the newest is in 'odom'"
+    )
+    decision = again.tell(MAP, HERE)
+    assert decision.faults == ()
+    assert again.visited == driven.visited
+    assert again.mission.ledger.frame == "map"
+
+
+@pytest.mark.parametrize("first", [(ODOM,), (ODOM, HERE), (HERE, ODOM)])
+def test_map_and_pose_decide_not_who_came_first(first):
+    drive = Drive((1, 1))
+    drive.tell(*first)
+    assert drive.request is None
+    assert drive.tell(MAP, HERE).faults == ()
+    assert drive.request is not None
+    assert (drive.mission.grid.frame, drive.mission.pose.frame) == ("map", "map")
+    assert isinstance(drive.tell(ODOM).faults[0], WrongFrame)
+
+
+def test_a_map_that_another_has_replaced_counts_if_the_poses_are_in_its_frame():
+    drive = Drive((1, 1))
+    drive.tell(MAP)
+    drive.tell(ODOM)
+    assert drive.mission.grid.frame == "odom", "as long as nobody knows"
+    drive.tell(HERE)
+    assert drive.mission.grid.frame == "map"
+    assert drive.request is not None
+
+
+def test_the_state_says_which_frame_is_where():
+    drive = Drive((1, 1))
+    drive.tell(ODOM, HERE)
+    assert drive.mission.state is State.WAITING_FOR_POSE
+    assert drive.mission.reason == "poses arrive in frame 'map', the map is in 'odom'"
+
+
+def test_progress_is_set_aside_only_once_it_is_certain(driven):
+    again = restarted(driven, ODOM, THERE)
+    faults = told_for(again, PATIENCE_S - 1.5, ODOM, THERE)
+    assert {type(fault) for fault in faults} == {WrongFrame}
+    assert again.mission.snapshot().cells == driven.mission.snapshot().cells
+    assert "counts once map and poses have come in it for 10 s" in again.mission.reason
+    mismatch = [
+        fault
+        for fault in told_for(again, 3.0, ODOM, THERE)
+        if isinstance(fault, LedgerMismatchError)
+    ]
+    cells = driven.mission.snapshot().cells
+    assert [str(fault) for fault in mismatch] == [
+        f"the ledger of {cells} covered cells lies in frame 'map', the map in 'odom'"
+    ]
+    assert again.visited == {(1, 1)}
+    assert again.mission.ledger.frame == "odom"
+    assert again.request is not None
+
+
+def test_a_pose_in_the_frame_that_counts_keeps_it(driven):
+    for _ in range(8):
+        told_for(driven, PATIENCE_S - 2.0, ODOM, THERE)
+        driven.tell(pose_at(*driven.cell))
+    assert driven.mission.grid.frame == "map"
+    driven.finish()
+
+
+def test_a_pose_in_the_frame_of_the_progress_keeps_it_without_a_map(driven):
+    again = restarted(driven, ODOM)
+    told_for(again, 2.0 * PATIENCE_S, THERE, HERE)
+    assert again.mission.snapshot().cells == driven.mission.snapshot().cells
+
+
+def test_single_poses_far_apart_are_no_stream(driven):
+    again = restarted(driven, ODOM)
+    for _ in range(4):
+        again.tell(THERE, after=PATIENCE_S + 1.0)
+    assert again.mission.snapshot().cells == driven.mission.snapshot().cells
+
+
+def test_a_mapper_that_begins_anew_in_another_frame_takes_over(driven):
+    """And the robot does not drive on along a path that leads through another map."""
+    walked = driven.walk
+    assert walked
+    told_for(driven, PATIENCE_S + 2.0, ODOM, THERE)
+    assert any(not len(update.cells) for update in driven.updates)
+    assert driven.mission.grid.frame == "odom"
+    assert driven.mission.ledger.frame == "odom"
+    driven.cell = (1, 1)
+    driven.plan()
+    driven.finish()
+
+
+@pytest.mark.parametrize("wedge", [(ODOM,), (ODOM, THERE), (ODOM, HERE), (MAP, THERE)])
+def test_a_reset_gets_out_of_every_state(driven, wedge):
+    again = restarted(driven, *wedge)
+    again.command("reset")
+    assert again.mission.snapshot().cells <= 1
+    again.command("start")
+    again.tell(MAP, HERE)
+    assert again.tell(HERE).faults == ()
+    assert (again.mission.grid.frame, again.mission.pose.frame) == ("map", "map")
+
+
+def test_after_a_reset_the_map_need_not_come_again(driven):
+    again = restarted(driven, ODOM, THERE)
+    again.command("reset")
+    assert again.mission.grid.frame == "odom"
+    again.command("start")
+    assert again.request is not None, "nor the pose: the robot stands"
+    assert again.mission.ledger.frame == "odom"
+
+
+def test_updates_go_to_the_map_of_their_frame(driven):
+    again = restarted(driven, ODOM)
+    (fault,) = again.tell(patch("#", at=(2, 2), frame="odom")).faults
+    assert isinstance(fault, WrongFrame)
+    told_for(again, PATIENCE_S + 2.0, THERE)
+    assert again.mission.coverage().coverable == 23
+
+
+def test_frames_without_end_are_not_all_held():
+    drive = started(*HALL, cell=(1, 1))
+    for number in range(50):
+        name = f"f{number}"
+        drive.tell(MapReceived(building(*HALL, frame=name)), pose_at(1, 1, frame=name))
+    frames = drive.mission._parts.site.frames
+    assert len(frames._maps) == len(frames._poses) == 2
+    drive.finish()
