@@ -1,0 +1,339 @@
+"""Senseless events into a mission within this process: as a daemon's loop would, without a bus.
+
+Payloads are decoded, the mission steps, a real planner plans for a counted number of questions, all
+that would be published is encoded, and what would be kept is written and read again. After each
+turn hold what has to: the lattice that was kept up to date is the one that is made afresh, a walk
+is legal on it, counts add up. The same events make the same turns.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.daemon.ledger_codec import decode_ledger, encode_ledger
+from fasaco_edge.daemon.mission_report import mission_report
+from fasaco_edge.daemon.outbox import headings
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+from fasaco_edge.mission.assignment import Assignment
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.events import (
+    CommandReceived,
+    Decision,
+    MapReceived,
+    PatchesLost,
+    PatchReceived,
+    PlanReady,
+    PlanRequest,
+    PoseReceived,
+)
+from fasaco_edge.mission.mission import Mission
+from fasaco_edge.mission.order_document import read_command
+from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.stopping import Noted
+from fasaco_edge.planners.table import planner_of
+from fasaco_edge.planners.work import SearchProgress
+from fasaco_edge.wire.coverage import coverage_grid
+from fasaco_edge.wire.maps import (
+    decode_map_update,
+    decode_occupancy_grid,
+    encode_occupancy_grid,
+)
+from fasaco_edge.wire.paths import decode_path, encode_path
+from fasaco_edge.wire.pheromone import encode_pheromone
+from fasaco_edge.wire.pose_decoding import PoseDecoder
+from fasaco_edge.wire.schemas import TF_MESSAGE
+from fasaco_edge.wire.status import encode_json
+from tests.campaigns import raw_messages
+from tests.campaigns.senseless import Event, pixels_of
+
+MOST_CELLS = 20_000
+# A mission that is kept is read again once in so many turns; a lattice made afresh more often.
+KEPT_EVERY, FRESH_EVERY = 40, 5
+HONEST_TURNS = 6
+
+
+class BrokenInvariantError(AssertionError):
+    """What has to hold in every state does not."""
+
+
+class MissionTrial:
+    """A mission that is told events.
+
+    Attributes:
+        counts: of what happened, by name; codes of faults among them.
+        slowest_s: the longest turns, each with what it took in.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self.counts = Counter[str]()
+        self.slowest_s: list[tuple[float, str]] = []
+        self._rng = random.Random(seed)
+        self._now = 0.0
+        self._commands = 0
+        self._turns = 0
+        self._batch: list[Any] = []
+        self._size = 1
+        self._begin({}, None)
+
+    def perform(self, event: Event) -> None:
+        """Take an event, and turn when there are enough of them.
+
+        Raises:
+            Exception: what no message may lead to.
+        """
+        match event["do"]:
+            case "wait":
+                self._now += event["s"]
+                self._turn()
+            case "checkpoint":
+                self._check_recovery(event["map"])
+            case "restart":
+                self._turn()
+                self._begin(event["sections"], None if event["fresh"] else self._mission)
+            case "reload":
+                self._turn()
+                self._begin(event["sections"], self._mission, keeps_site=True)
+            case "drive":
+                self._drive(event)
+            case name:
+                self._take(name, event)
+        if len(self._batch) >= self._size:
+            self._turn()
+
+    def close(self) -> None:
+        """Turn once more."""
+        self._turn()
+
+    def _begin(self, sections: Event, before: Mission | None, *, keeps_site: bool = False) -> None:
+        if not keeps_site:
+            self._robot = sections.get("robot", {})
+        known = {key: value for key, value in sections.items() if key != "ros2"}
+        known["robot"] = self._robot | known.get("robot", {}) if keeps_site else self._robot
+        config = msgspec.convert(known, DaemonConfig)
+        robot, planner, patience = config.robot, config.planner, config.mission
+        self._footprint = Footprint(
+            robot.tool_width_m,
+            robot.radius_m,
+            config.map.free_at_most,
+            config.map.occupied_at_least,
+        )
+        self._planner = planner_of(planner.name, planner.colony(), 1, planner.local_search)
+        mission = Mission(
+            MissionConfig(
+                self._footprint,
+                MOST_CELLS,
+                robot.cost(),
+                retries=patience.retries,
+                retry_s=patience.retry_s,
+                lost_pose_s=patience.lost_pose_s,
+                stale_map_s=patience.stale_map_s,
+                spare_share=0.05 if isinstance(self._planner, NearOptimal) else 0.0,
+            )
+        )
+        self._poses = PoseDecoder(config.pose.schema)
+        self._asked: PlanRequest | None = None
+        if before is not None:
+            kept = before.snapshot()
+            snapshot = decode_ledger(encode_ledger(kept), kept.cell_m)
+            if snapshot.cell_m == robot.tool_width_m:
+                if snapshot.tiles:
+                    mission.resume(snapshot)
+                mission.assign(Assignment.of_note(snapshot.note))
+            if keeps_site and before.grid is not None:
+                self._batch.append(MapReceived(before.grid))
+        self._mission = mission
+        self.counts["missions"] += 1
+
+    def _drive(self, event: Event) -> None:
+        path, lattice = self._mission.path, self._mission.lattice
+        if lattice is None or path is None or not len(path.ahead):
+            return
+        x, y = lattice.centres(path.ahead[: self._rng.choice([1, 2, 2, 3])])[-1].tolist()
+        pose = {"type": "PoseStamped", "frame": self._mission.grid.frame, "stamp": 1, "yaw": 0.0}
+        self._take("pose", pose | {"x": x + event["off"], "y": y})
+
+    def _take(self, name: str, event: Event) -> None:
+        """Decode a message; one that is refused is counted."""
+        try:
+            match name:
+                case "map":
+                    payload = raw_messages.occupancy_grid(event, pixels_of(event))
+                    self._batch.append(MapReceived(decode_occupancy_grid(payload)))
+                case "update":
+                    self._batch.append(PatchReceived(decode_map_update(raw_messages.update(event))))
+                case "pose":
+                    schema = raw_messages.POSE_SCHEMAS[event["type"]]
+                    pose = self._poses.decode(raw_messages.pose(event), schema)
+                    self._batch.append(PoseReceived(pose))
+                case "tf":
+                    payload = raw_messages.transform(event)
+                    told = self._poses.decode(payload, TF_MESSAGE, is_static=event["static"])
+                    self._batch += [] if told is None else [PoseReceived(told)]
+                case "command":
+                    self._commands += 1
+                    command, order = read_command(event["document"])
+                    if command != "status":
+                        self._batch.append(CommandReceived(self._commands, command, order))
+                case "publisher":
+                    self._batch.append(PatchesLost(2))
+        except FasacoError as error:
+            self.counts[f"refused: {error.code}"] += 1
+
+    def _turn(self) -> None:
+        """Let the mission step, as the daemon's loop does, and check what has to hold."""
+        events, self._batch = self._batch, []
+        self._size = self._rng.choice([0, 1, 1, 2, 5, 20])
+        self._now += self._rng.choice([0.0, 0.02, 0.1, 0.1, 0.6])
+        if self._asked is not None and self._rng.random() < 0.7:
+            events.append(self._plan(self._asked))
+            self._asked = None
+        started = time.thread_time()
+        decision = self._mission.step(events, self._now)
+        took_s = time.thread_time() - started
+        self._asked = decision.plan or self._asked
+        self._note_slow(took_s, events)
+        self._turns += 1
+        for fault in decision.faults:
+            self.counts[f"fault: {fault.code}"] += 1
+        self._publish(decision)
+        self._check()
+
+    def _plan(self, request: PlanRequest) -> PlanReady:
+        """Plan for a counted number of questions, so that the same events lead to the same path."""
+        asked, patience = 0, self._rng.choice([1, 1, 8])
+
+        def stop(progress: SearchProgress) -> bool:
+            nonlocal asked
+            asked += 1
+            return asked >= patience
+
+        seen: list[ColonySnapshot] = []
+        noted = Noted(stop)
+        path = self._planner.plan(request.problem, noted, seen.append)
+        if seen:
+            self._say("pheromone", lambda: encode_pheromone(seen[0], "map", 1))
+        self.counts["plans"] += 1
+        return PlanReady(request.number, path, 0.01, tuple(noted.stops))
+
+    def _publish(self, decision: Decision) -> None:
+        """Encode all that the daemon would say; a limit may refuse it, nothing else may happen."""
+        mission = self._mission
+        lattice, grid = mission.lattice, mission.grid
+        update = decision.path
+        if update is not None:
+            assert lattice is not None
+            self._check_walk(update.cells)
+            xy = lattice.centres(update.cells)
+            payload = self._say(
+                "path", lambda: encode_path(xy, headings(xy), grid.frame, grid.stamp_ns)
+            )
+            if payload is not None:
+                decode_path(payload)
+            self.counts["paths"] += 1
+        if lattice is not None and self._turns % FRESH_EVERY == 0:
+            visits = mission.ledger.visits(lattice.window)
+            values = (lattice.window, lattice.cell_m, lattice.states, visits)
+            self._say(
+                "coverage",
+                lambda: encode_occupancy_grid(coverage_grid(*values, grid.frame, grid.stamp_ns)),
+            )
+        report = encode_json({"report": mission_report(mission, mission.assignment)})
+        json.loads(report)
+
+    def _say(self, what: str, encode: Callable[[], bytes]) -> bytes | None:
+        try:
+            return encode()
+        except FasacoError as error:
+            self.counts[f"unsaid {what}: {error.code}"] += 1
+        return None
+
+    def _check(self) -> None:
+        mission = self._mission
+        coverage = mission.coverage()
+        if coverage is not None:
+            counts = (0, coverage.recovered, coverage.covered, coverage.coverable)
+            _hold(list(counts) == sorted(counts), f"coverage {coverage}")
+        if self._turns % KEPT_EVERY == 0:
+            self._check_kept()
+        if self._turns % FRESH_EVERY == 0:
+            self._check_lattice()
+
+    def _check_kept(self) -> None:
+        """Check that what is kept is read as it was."""
+        snapshot = self._mission.snapshot()
+        again = decode_ledger(encode_ledger(snapshot), snapshot.cell_m)
+        _hold(again.total == snapshot.total and again.frame == snapshot.frame, "ledger's head")
+        _hold(again.under_tool == frozenset(snapshot.under_tool), "cells under the tool")
+        _hold(set(again.tiles) == set(snapshot.tiles), "tiles")
+        for place, tile in snapshot.tiles.items():
+            _hold(bool((again.tiles[place] == tile).all()), f"tile {place}")
+        _hold(Assignment.of_note(again.note).note() == snapshot.note, "note")
+        self.counts["ledgers read again"] += 1
+        self.counts["largest ledger [tiles]"] = max(
+            self.counts["largest ledger [tiles]"], len(snapshot.tiles)
+        )
+
+    def _check_lattice(self) -> None:
+        """Check that the lattice is, bit for bit, the one that the newest map has."""
+        mission, order = self._mission, self._mission.assignment.order
+        if mission.grid is None or mission.lattice is None or (order and order.keep_out):
+            return
+        fresh = CoverageLattice.from_map(mission.grid, self._footprint, MOST_CELLS)
+        geometry = mission.grid.geometry
+        _hold(fresh.window == mission.lattice.window, f"window over {geometry}")
+        _hold(np.array_equal(fresh.states, mission.lattice.states), f"states over {geometry}")
+        _hold(np.array_equal(fresh.steps, mission.lattice.steps), f"steps over {geometry}")
+        self.counts["lattices made afresh"] += 1
+
+    def _check_walk(self, cells: np.ndarray[Any, Any]) -> None:
+        """Check that a walk is over coverable cells, by steps that the lattice allows."""
+        lattice = self._mission.lattice
+        assert lattice is not None
+        for cell in cells.tolist():
+            _hold(lattice.contains(tuple(cell)), f"path leaves the lattice at {cell}")
+        local = cells - np.array([lattice.window.row0, lattice.window.col0])
+        _hold(bool(lattice.coverable[local[:, 0], local[:, 1]].all()), "path on other ground")
+        apart = np.abs(np.diff(cells, axis=0)).sum(axis=1)
+        _hold(bool((apart == 1).all()), "path not connected")
+
+    def _check_recovery(self, event: Event) -> None:
+        """Give an honest map and honest poses, as a robot would that begins anew."""
+        self._turn()
+        # Whatever was ordered, however it stands: now everything is.
+        for command in ("reset", "start"):
+            self._take("command", {"document": {"command": command}})
+        self._take("map", event)
+        for turn in range(HONEST_TURNS):
+            pose = {"type": "PoseStamped", "frame": event["frame"], "stamp": 1, "yaw": 0.0}
+            self._take("pose", pose | {"x": 1.0 + 0.01 * turn, "y": 1.0})
+            self._turn()
+            self._now += 0.2
+        grid = self._mission.grid
+        known = grid is not None and grid.stamp_ns == event["stamp"]
+        _hold(known, f"an honest map was not taken: {self._mission.reason}")
+        state = str(self._mission.state)
+        settled = state in ("planning", "covering", "done", "blocked", "degraded")
+        _hold(settled, f"{state} after an honest map and pose: {self._mission.reason}")
+        self.counts["honest again"] += 1
+
+    def _note_slow(self, took_s: float, events: list[Any]) -> None:
+        names = ", ".join(sorted({type(event).__name__ for event in events})) or "nothing"
+        geometry = self._mission.grid and self._mission.grid.geometry
+        self.slowest_s.append((took_s, f"{names}; map {geometry}"))
+        self.slowest_s = sorted(self.slowest_s, reverse=True)[:5]
+
+
+def _hold(holds: bool, what: str) -> None:
+    if not holds:
+        raise BrokenInvariantError(what)
