@@ -1,0 +1,371 @@
+"""Cut the power at every write of a first start and a mission, and start again.
+
+    python -m tests.campaigns.power_cut --cuts 2000
+
+A real daemon with its recorder is watched while its robot drives, is told to begin anew, and while
+it is started again; and the compiler, while it fills an empty cache. From each call that changed a
+file, what a loss of power may leave is rebuilt: what was synchronised is there, of the rest the
+bytes may be whole, those from before, none, zeros or half, the names moved or not. On each of these
+a real daemon is started as a service starts it. It has to become ready without help; to know all
+that was on the disk and nothing else, or say that it does not; and what is left of recordings has
+to be readable, once a recorder has looked it through.
+
+Exit code 1 where one of these does not hold; the folder of each such cut is kept, and the command
+that starts a daemon on it again is printed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import yaml
+
+from fasaco_edge.daemon.ledger_codec import LedgerFileError, decode_ledger
+from fasaco_edge.daemon.ledger_file import LedgerFile
+from fasaco_edge.errors import UnreadableRecording
+from fasaco_edge.recording.reading import read_summary
+from fasaco_edge.recording.repair import repair_folder, scan_recording
+from tests.campaigns.file_calls import Call, Kind, Watch, why_not
+from tests.campaigns.power_states import Cut, Disk, Spread, cuts_of
+from tests.campaigns.services import service, show
+from tests.daemon.ledgers import CELL_M, Cell, contents
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import ENVIRONMENT, PROGRAM, free_endpoint
+from tests.daemon.roaming import entries, roaming_robot
+from tests.daemon.test_commands import command
+
+# At so small a distance from the border of "under the tool", rounding may decide.
+DOUBT_M = 0.01
+MOST_LOST_S = 1.0
+STATE, RECORDINGS, CACHE = "state", "recordings", "cache"
+MISSION, FIRST_START = "mission", "first-start"
+# Of the cuts, so many are of a first start: to compile a kernel again takes seconds.
+FIRST_SHARE = 0.15
+Completed = subprocess.CompletedProcess[str]
+NEW = "robot.ledger.new"
+MISSION_S = 5.0
+
+
+@dataclass(frozen=True)
+class Written:
+    """A ledger as it went to the disk, or that there is to be none any more.
+
+    Attributes:
+        begun, done: the number of the call with which it was begun, and after which it is there.
+        holds: what it holds.
+    """
+
+    begun: int
+    done: float
+    holds: object
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What a run has done to files.
+
+    Attributes:
+        root: the folder they lie in.
+        calls: in order.
+        driven: when the tool first passed over each cell that the daemon has heard of [s].
+        touched: cells that it may have passed over.
+    """
+
+    root: Path
+    calls: list[Call]
+    driven: dict[Cell, float]
+    touched: set[Cell]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a cut; ``wrong`` is "" where all was well."""
+
+    part: str
+    cut: str
+    wrong: str
+    seconds: float
+    is_torn: bool
+    fault: str
+    kept: str = ""
+
+
+def watched_mission(folder: Path, seconds: float = MISSION_S) -> Trace:
+    """Let a robot drive, begin anew, and go on after a restart; write down what is written."""
+    root = folder / "robot"
+    root.mkdir()
+    with roaming_robot("basement") as (robot, endpoint), Watch([root], is_logged=True) as watch:
+        words = ["--state", str(root / STATE), "--record", str(root / RECORDINGS)]
+        began_s = time.monotonic()
+        for order in ("reset", "pause"):
+            with service(folder, _run(folder, endpoint, *words), watch.environment) as daemon:
+                assert daemon.wait_ready(), daemon.said()
+                with Outsider(endpoint) as outsider:
+                    outsider.wait_status(lambda status: bool(status["coverage"]))
+                    time.sleep(seconds)
+                    assert "code" not in command(outsider, order), order
+                    command(outsider, "start")
+                    time.sleep(0.3 * seconds)
+                assert daemon.stop() == 0, daemon.said()
+        trail = robot.trail.between(began_s, time.monotonic())
+        driven = entries([point for point in trail if point[3]], DOUBT_M)
+        return Trace(root, watch.calls(), driven, set(entries(trail, -DOUBT_M)))
+
+
+def _run(folder: Path, connect: str, *words: str) -> list[str]:
+    """Return the words that start a daemon without a listener of its own."""
+    config = folder / "config.yaml"
+    bus = {"mode": "client", "listen": [], "connect": [connect]} if connect else {}
+    sections = {"bus": bus or {"listen": [free_endpoint()]}, "mission": {"lost_pose_s": 0.0}}
+    config.write_text(yaml.safe_dump(sections))
+    return ["run", "--config", str(config), *words]
+
+
+def ledgers_of(trace: Trace) -> list[Written]:
+    """Return what was to be on the disk, in order; nothing comes first."""
+    history = [Written(0, 0, contents(None))]
+    begun, holds, waiting = 0, contents(None), False
+    newest = b""
+    for number, call in enumerate(trace.calls, 1):
+        name = Path(call.path).name
+        if call.kind is Kind.OPEN and name == NEW:
+            begun, newest = number, b""
+        elif call.kind is Kind.WRITE and name == NEW:
+            newest += call.data
+        elif call.kind is Kind.RENAME and name == NEW and call.second.endswith(".ledger"):
+            holds, waiting = contents(decode_ledger(newest, CELL_M)), True
+        elif call.kind is Kind.RENAME and ".ledger.reset" in call.second and not waiting:
+            begun, holds, waiting = number, contents(None), True
+        elif call.kind is Kind.SYNC and waiting and name == STATE:
+            history.append(Written(begun, number, holds))
+            waiting = False
+    return history
+
+
+def allowed_after(history: Sequence[Written], after: int) -> list[object]:
+    """Return what may be found after so many calls: the last that is there, and what was begun."""
+    last = max(number for number, written in enumerate(history) if written.done <= after)
+    return [w.holds for w in history[last:] if w.begun <= after]
+
+
+def mission_outcomes(
+    trace: Trace, cuts: Sequence[Cut], folder: Path, keep: Path
+) -> Iterator[Outcome]:
+    """Cut a mission, and start a daemon on each."""
+    history, disk, done = ledgers_of(trace), Disk(trace.root), 0
+    for cut in cuts:
+        for call in trace.calls[done : cut.after]:
+            disk.do(call)
+        done = cut.after
+        place = folder / "cut"
+        place.mkdir()
+        started = time.monotonic()
+        disk.write(cut, place)
+        found, fault, wrong = _found(place / STATE, allowed_after(history, cut.after))
+        is_torn, unreadable = _recordings(place / RECORDINGS)
+        wrong = wrong or unreadable or _start(place, found)
+        kept = ""
+        if wrong:
+            kept = str(keep / f"{MISSION}-{cut.salt}")
+            shutil.copytree(place, kept, dirs_exist_ok=True)
+        shutil.rmtree(place)
+        seconds = time.monotonic() - started
+        yield Outcome(MISSION, str(cut), wrong, round(seconds, 3), is_torn, fault, kept)
+
+
+def _found(state: Path, allowed: Sequence[object]) -> tuple[int, str, str]:
+    """Return how many cells a daemon will know of, what it will say, and what is wrong with it."""
+    with tempfile.TemporaryDirectory() as scratch:
+        copied = Path(scratch, STATE)
+        if state.is_dir():
+            shutil.copytree(state, copied)
+        found = LedgerFile(copied, "robot").load(CELL_M)
+    cells = found.ledger.cells if found.ledger else 0
+    fault = str(found.fault) if found.fault else ""
+    if found.fault is not None and not isinstance(found.fault, LedgerFileError):
+        return cells, fault, f"not the ledger's own fault: {found.fault!r}"
+    if contents(found.ledger) not in allowed:
+        return cells, fault, f"{cells} cells, {fault or 'nothing told'}: not what was written last"
+    return cells, fault, ""
+
+
+def _recordings(folder: Path) -> tuple[bool, str]:
+    """Repair a copy as a recorder does; return whether that was needed, and what is unreadable."""
+    if not folder.is_dir():
+        return False, ""
+    with tempfile.TemporaryDirectory() as scratch:
+        copied = Path(shutil.copytree(folder, Path(scratch, RECORDINGS)))
+        is_torn = bool(repair_folder(copied))
+        for part in sorted(copied.glob("*.rrd")):
+            with part.open("rb") as file:
+                if scan_recording(file) is None:
+                    continue  # nothing of it was ever on the disk
+            try:
+                read_summary(part)
+            except UnreadableRecording as error:
+                if "No recording store" in str(error):
+                    continue  # not so much as its first message
+                return is_torn, f"{part.name} is not readable after its repair: {error}"
+    return is_torn, ""
+
+
+def _start(place: Path, cells: int, environment: Mapping[str, str] | None = None) -> str:
+    """Start a daemon on what a cut has left; return what is wrong with it."""
+    told = _run(place, "", "--state", str(place / STATE))
+    with service(place, told, environment) as daemon:
+        if not daemon.wait_ready():
+            return f"not ready: {daemon.said()[-500:]}"
+        code, said = daemon.stop(), daemon.said()
+    if code != 0 or "Traceback" in said:
+        return f"ended with {code}: {said[-500:]}"
+    if f": {cells} cells covered before" not in said:
+        return f"does not know of {cells} cells: {said[-500:]}"
+    return ""
+
+
+def watched_first_start(folder: Path) -> Trace:
+    """Let the compiler fill an empty cache; write down what is written."""
+    root = folder / "computer"
+    root.mkdir()
+    with Watch([root], is_logged=True) as watch:
+        _warm_up(root / CACHE, watch.environment)
+        return Trace(root, watch.calls(), {}, set())
+
+
+def _warm_up(place: Path, environment: Mapping[str, str], *words: str) -> Completed:
+    told = ENVIRONMENT | {"NUMBA_CACHE_DIR": str(place)} | dict(environment)
+    command = [*PROGRAM, "warmup", *words]
+    return subprocess.run(command, env=told, capture_output=True, text=True, check=False)
+
+
+def first_start_outcomes(
+    trace: Trace, cuts: Sequence[Cut], folder: Path, keep: Path
+) -> Iterator[Outcome]:
+    """Cut a first start, and start a daemon on each.
+
+    What was still to be compiled then is given to it: else each would take as long as the first.
+    """
+    disk, done = Disk(trace.root), 0
+    for cut in cuts:
+        for call in trace.calls[done : cut.after]:
+            disk.do(call)
+        done = cut.after
+        place = folder / "cut"
+        place.mkdir()
+        started = time.monotonic()
+        disk.write(cut, place)
+        _give_the_rest(trace.root, disk, place)
+        environment = {"NUMBA_CACHE_DIR": str(place / CACHE)}
+        wrong = _start(place, 0, environment)
+        if not wrong and (check := _warm_up(place / CACHE, {}, "--check")).returncode:
+            wrong = f"ready, and its kernels are not: {check.stderr[-500:]}"
+        kept = ""
+        if wrong:
+            kept = str(keep / f"{FIRST_START}-{cut.salt}")
+            shutil.copytree(place, kept, dirs_exist_ok=True)
+        said = (place / "service.log").read_text(errors="replace")
+        fault = "compiled again" if "compiled in" in said else ""
+        shutil.rmtree(place)
+        seconds = time.monotonic() - started
+        yield Outcome(FIRST_START, str(cut), wrong, round(seconds, 3), False, fault, kept)
+
+
+def _give_the_rest(root: Path, disk: Disk, place: Path) -> None:
+    """Copy into ``place`` what in the end is in the root, and was not begun at the cut."""
+    for path in sorted(root.rglob("*")):
+        to = place / path.relative_to(root)
+        if path.is_dir():
+            to.mkdir(parents=True, exist_ok=True)
+        elif not disk.has_had(path):
+            shutil.copy2(path, to)
+
+
+PARTS = {
+    MISSION: (watched_mission, mission_outcomes, Spread.ALL),
+    FIRST_START: (watched_first_start, first_start_outcomes, Spread.ONE),
+}
+
+
+def run_campaign(
+    cuts: Mapping[str, int], seed: int, scratch: Path, keep: Path
+) -> Iterator[tuple[Outcome, int]]:
+    """Yield what became of each cut, and how many there are in its part.
+
+    Args:
+        cuts: how many of each part.
+        seed: which of those there could be.
+        scratch: an empty folder.
+        keep: where what went wrong is kept.
+    """
+    for part, most in cuts.items():
+        watched, outcomes, spread = PARTS[part]
+        (scratch / part).mkdir()
+        trace = watched(scratch / part)
+        chosen = cuts_of(trace.root, trace.calls, most, seed, spread)
+        for outcome in outcomes(trace, chosen, scratch, keep):
+            yield outcome, len(chosen)
+
+
+def main() -> int:
+    """Run the campaign, and report."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--cuts", type=int, default=200, help="in all (default: %(default)s)")
+    parser.add_argument("--only", choices=PARTS, metavar="PART", help=f"one of {', '.join(PARTS)}")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--keep", type=Path, default=Path("runs/power_cut"), metavar="DIR",
+                        help="where what went wrong is kept (default: %(default)s)")  # fmt: skip
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all outcomes")
+    args = parser.parse_args()
+    if why := why_not():
+        print(f"not possible here: {why}", file=sys.stderr)
+        return 2
+    first = round(FIRST_SHARE * args.cuts)
+    cuts = {MISSION: args.cuts - first, FIRST_START: first}
+    if args.only:
+        cuts = {args.only: args.cuts}
+    outcomes: list[Outcome] = []
+    with tempfile.TemporaryDirectory(prefix="power-cut-") as scratch:
+        try:
+            for outcome, many in run_campaign(cuts, args.seed, Path(scratch), args.keep):
+                outcomes.append(outcome)
+                _show(outcome, sum(o.part == outcome.part for o in outcomes), many)
+        except KeyboardInterrupt:
+            print("\ninterrupted", file=sys.stderr)
+    _tell(outcomes)
+    if args.json:
+        args.json.write_text(json.dumps([asdict(outcome) for outcome in outcomes], indent=1))
+    return int(any(outcome.wrong for outcome in outcomes))
+
+
+def _show(outcome: Outcome, number: int, many: int) -> None:
+    if outcome.wrong:
+        print(f"{outcome.part}: {outcome.cut}: {outcome.wrong}")
+        print(f"  again: fasaco-edge run --state {outcome.kept}/{STATE}", flush=True)
+    show(f"{outcome.part}: {number} of {many} cuts, the last took {outcome.seconds:.1f} s")
+
+
+def _tell(outcomes: Sequence[Outcome]) -> None:
+    """Print a table: what came of the cuts of each part."""
+    print(f"{'part':12} {'cuts':>6} {'not ready or wrong':>19} {'told':>6} {'torn recordings':>16}")
+    for part in PARTS:
+        came = [outcome for outcome in outcomes if outcome.part == part]
+        numbers = [sum(map(bool, column)) for column in zip(
+            *((o.wrong, o.fault, o.is_torn) for o in came), strict=True)] or [0, 0, 0]  # fmt: skip
+        print(f"{part:12} {len(came):6} {numbers[0]:19} {numbers[1]:6} {numbers[2]:16}")
+    seconds = sum(outcome.seconds for outcome in outcomes)
+    print(f"{len(outcomes)} cuts in {seconds / 60:.1f} min")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,59 @@
+"""Some file calls of the daemon and the recorder fail; the campaign lets all of them fail."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.campaigns.file_calls import Failure, Kind, Watch, why_not
+from tests.campaigns.io_faults import failures_of, outcome_of
+
+pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not())
+
+READS = "import sys; sys.stdout.write(open(sys.argv[1]).read() + open(sys.argv[1]).read())"
+
+
+@pytest.mark.parametrize(
+    ("failure", "printed", "code"),
+    [
+        (None, "helloworldhelloworld", 0),
+        (Failure(Kind.READ, 1, "short"), "helloworldhelloworld", 0),
+        (Failure(Kind.READ, 1, "EINTR"), "helloworldhelloworld", 0),
+        (Failure(Kind.OPEN, 2, "EIO"), "", 1),
+        (Failure(Kind.OPEN, 3, "EIO"), "helloworldhelloworld", 0),
+        (Failure(Kind.READ, 1, "EIO", for_good=True), "", 1),
+    ],
+)
+def test_the_call_that_is_named_fails_and_no_other(tmp_path, failure, printed, code):
+    file = tmp_path / "file"
+    file.write_text("helloworld")
+    with Watch([tmp_path], failure) as watch:
+        command = [sys.executable, "-c", READS, str(file)]
+        environment = os.environ | watch.environment
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert (done.stdout, done.returncode) == (printed, code)
+        is_reached = failure is not None and failure.at < 3
+        assert watch.failed_on() == (str(file) if is_reached else None)
+        assert "Input/output error" in done.stderr or code == 0
+
+
+def test_a_failure_is_written_as_it_is_read():
+    for failure in failures_of({Kind.OPEN: 2, Kind.SYNC: 1}, 0, 0, every=True):
+        assert Failure.of_text(str(failure)) == failure
+    with pytest.raises(ValueError, match="no such error"):
+        Failure.of_text("open:1:ENONE")
+
+
+@pytest.mark.parametrize(
+    "fault",
+    ["orders:open:1:EIO", "orders:read:2:EIO", "orders:sync:1:EIO+", "recorder:write:9:ENOSPC"],
+)
+def test_a_fault_is_told_and_nothing_is_lost(fault):
+    """Long form: python -m tests.campaigns.io_faults."""
+    name, _, text = fault.partition(":")
+    outcome, _ = outcome_of(name, Failure.of_text(text))
+    assert outcome.came != "wrong", outcome
+    assert outcome.on, "the call was made"
