@@ -106,7 +106,10 @@ install_version() {
 }
 
 write_complete() {
-    echo "$VERSION $FINGERPRINT" >"$PREFIX/$NAME/INSTALLED"
+    local place=$PREFIX/$NAME
+    sync --file-system "$place"
+    echo "$VERSION $FINGERPRINT" >"$place/INSTALLED.part"
+    name_for_good "$place/INSTALLED.part" "$place/INSTALLED"
     BUILDING=''
 }
 
@@ -139,6 +142,8 @@ conclude() {
     if [[ $CHANGES -eq 0 ]]; then
         say "nothing to do: version $NAME is installed"
     elif [[ ! $DRY_RUN ]]; then
+        # What is said to be done is on the disk.
+        sync --file-system "$PREFIX" "$UNITS" "$SETTINGS"
         say "version $NAME is installed${START:+ and runs}"
     fi
 }

@@ -82,3 +82,8 @@ version_of() {
         readlink "$PREFIX/$1"
     fi
 }
+
+# name_for_good FILE PLACE: let PLACE be that file, whole: also after a loss of power.
+name_for_good() {
+    sync "$1" && mv --force --no-target-directory "$1" "$2" && sync "$(dirname "$2")"
+}

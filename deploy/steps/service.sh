@@ -10,7 +10,7 @@ lay() {
 lay_now() {
     mkdir -p "$(dirname "$2")"
     install --mode=644 "$1" "$2.part"
-    mv --force --no-target-directory "$2.part" "$2"
+    name_for_good "$2.part" "$2"
 }
 
 # lay_units VERSION: give systemd the units of that version, and none that it does not have.
@@ -38,8 +38,8 @@ drop_unit() {
 
 # point LINK VERSION: let $PREFIX/LINK be that version; whoever looks finds the old one or the new.
 point() {
-    ln --symbolic --force --no-dereference "$2" "$PREFIX/.$1"
-    mv --force --no-target-directory "$PREFIX/.$1" "$PREFIX/$1"
+    ln --symbolic --force --no-dereference "$2" "$PREFIX/.$1" &&
+        mv --force --no-target-directory "$PREFIX/.$1" "$PREFIX/$1" && sync "$PREFIX"
 }
 
 # switch_to VERSION: link, units, and a service that has said READY and stays up; false if not.
@@ -120,6 +120,9 @@ prune() {
 # code after the place of the sources.
 drop_version() {
     local sources
+    # Else half of it may be left after a loss of power, and take itself for complete.
+    rm -f "$PREFIX/$1/INSTALLED"
+    [[ ! -d $PREFIX/$1 ]] || sync "$PREFIX/$1"
     for sources in "$PREFIX/$1"/lib/python3.*/site-packages/fasaco_edge/kernels; do
         rm -rf "$KERNELS"/kernels-*/"kernels_$(printf '%s' "$sources" | sha1sum | cut -d ' ' -f 1)"
     done

@@ -1,7 +1,7 @@
 # A version's folder: built where it stays, tried out before anything points to it.
 # shellcheck shell=bash disable=SC2154
 
-# What is complete says so in the file INSTALLED, which is written last.
+# What is complete says so in the file INSTALLED, which is written last, once all else is on the disk.
 is_complete() {
     [[ -f $PREFIX/$1/INSTALLED ]]
 }
