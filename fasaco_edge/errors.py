@@ -168,6 +168,13 @@ class OpenToEveryone(BadConfiguration):
     )
 
 
+class DiskFailed(FasacoError):
+    """A disk is broken or full, or the computer is out of files or memory: it may pass."""
+
+    code = "disk_failed"
+    hint = "look at the disk, and make room there; a service tries again by itself"
+
+
 class BusUnavailable(FasacoError):
     """No session could be opened on the Zenoh bus."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -30,12 +31,18 @@ from fasaco_edge.cli.arguments import with_negative_pairs
 from fasaco_edge.cli.logs import begin_logging, say_why
 from fasaco_edge.cli.parent import end_with_parent
 from fasaco_edge.cli.streams import clean_streams
-from fasaco_edge.errors import BadConfiguration, FasacoError
+from fasaco_edge.errors import BadConfiguration, DiskFailed, FasacoError
 
 COMMANDS = (
     demo, plan, run, mission, ask, watch, record, review, replay, simulate, bench, maps, warmup,
     check_config, doctor,
 )  # fmt: skip
+
+# A broken or full disk, a computer that is out of files or memory. Who is told so does not look
+# for a mistake in the configuration, and a service is started again.
+_PASSING = frozenset(
+    (errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE)
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -51,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         code: int = args.command(args)
     except FasacoError as error:
-        return _fail(error)
+        return _fail(DiskFailed(str(error)) if _may_pass(error) else error)
     except KeyboardInterrupt:
         return exits.INTERRUPTED
     except SystemError as error:
@@ -63,6 +70,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader has seen enough (``| head``); nothing is left to be flushed to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return exits.ERROR
+    except OSError as error:
+        if not _may_pass(error):
+            raise
+        return _fail(DiskFailed(": ".join(filter(None, (error.filename, error.strerror)))))
     return code
 
 
@@ -86,6 +97,15 @@ def _parser() -> argparse.ArgumentParser:
     for module in COMMANDS:
         module.add_to(commands, common)
     return parser
+
+
+def _may_pass(error: BaseException | None) -> bool:
+    """Tell whether what is behind an error is no mistake of anybody's, and may be over soon."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in _PASSING:
+            return True
+        error = error.__cause__
+    return False
 
 
 def _fail(error: FasacoError) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import fcntl
 import os
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -98,16 +99,21 @@ class Part:
         """
         os.close(self._lock)
         if not self._flushed_bytes:
-            self.path.unlink(missing_ok=True)
+            with suppress(OSError):
+                self.path.unlink(missing_ok=True)
             return
         self.cut()
 
     def cut(self) -> None:
-        """Cut a broken part again: rerun may write to it long after it has given up on it."""
-        if self.path.is_file() and self.path.stat().st_size > self._flushed_bytes:
-            with open(self.path, "r+b", opener=open_own) as file:
-                file.truncate(self._flushed_bytes)
-            repair_recording(self.path)
+        """Cut a broken part again: rerun may write to it long after it has given up on it.
+
+        A disk that refuses even that is asked again with the next call.
+        """
+        with suppress(OSError):
+            if self.path.is_file() and self.path.stat().st_size > self._flushed_bytes:
+                with open(self.path, "r+b", opener=open_own) as file:
+                    file.truncate(self._flushed_bytes)
+                repair_recording(self.path)
 
     def _has_writer(self) -> bool:
         """Tell whether rerun still holds the file open: its writer closes it when it dies."""

@@ -258,9 +258,7 @@ def _repaired(folder: Path) -> list[str]:
         repairs = repair_folder(folder)
     except OSError as error:
         raise BadConfiguration(f"cannot record into {folder}: {error}") from error
-    return [
-        f"{r.path.name} was torn: {r.cut_bytes} bytes behind the last frame cut" for r in repairs
-    ]
+    return [str(repair) for repair in repairs]
 
 
 @contextmanager

@@ -50,10 +50,16 @@ class Scan:
 
 @dataclass(frozen=True, slots=True)
 class Repair:
-    """A recording that was cut, and by how much [bytes]."""
+    """A recording that was cut, and by how much [bytes]; or why it could not be looked at."""
 
     path: Path
     cut_bytes: int
+    failed: str = ""
+
+    def __str__(self) -> str:
+        if self.failed:
+            return f"{self.path.name} could not be looked at: {self.failed}"
+        return f"{self.path.name} was torn: {self.cut_bytes} bytes behind the last frame cut"
 
 
 def scan_recording(recording: BinaryIO) -> Scan | None:
@@ -115,8 +121,21 @@ def _open_no_link(path: str, flags: int) -> int:
 
 
 def repair_folder(folder: Path) -> list[Repair]:
-    """Cut every torn recording in ``folder``; return what was cut, in order of name."""
-    paths = sorted(
-        path for path in folder.glob("*.rrd") if path.is_file() and not path.is_symlink()
-    )
-    return [repair for path in paths if (repair := repair_recording(path)) is not None]
+    """Cut every torn recording in ``folder``; return what was cut, in order of name.
+
+    One that the disk does not give, or does not let be cut, is returned with the reason: it is
+    no reason to record nothing from now on.
+
+    Raises:
+        OSError: the folder cannot be read.
+    """
+    repairs = []
+    for path in sorted(folder.glob("*.rrd")):
+        try:
+            is_plain = path.is_file() and not path.is_symlink()
+            repair = repair_recording(path) if is_plain else None
+        except OSError as error:
+            repair = Repair(path, 0, error.strerror or str(error))
+        if repair is not None:
+            repairs.append(repair)
+    return repairs

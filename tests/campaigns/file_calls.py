@@ -38,6 +38,8 @@ class Kind(enum.IntEnum):
     TRUNCATE = 8
     LOOK = 9
     LINK = 10
+    ANY = 11
+    """Counts them all."""
 
 
 SHORT = -1

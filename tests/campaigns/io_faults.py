@@ -5,7 +5,8 @@
 
 The Nth open, read, write, fsync, rename, mmap and so on under the folders of state, recordings,
 configuration and compiled kernels fails, for every N there is, with each error that it may fail
-with: once, or from then on. What is run is the real command; what fails is a call to the C library.
+with: once, or from then on, also for all kinds of calls at once. What is run is the real command;
+what fails is a call to the C library.
 
 It may end, with a documented exit code and a line that says what was wrong; or go on, and say what
 was wrong where it matters. It may not hang, die of a signal, show a traceback, lose a ledger or a
@@ -67,6 +68,7 @@ MAY_FAIL = {
     Kind.TRUNCATE: ("EIO",),
     Kind.LOOK: ("EIO", "EACCES"),
     Kind.LINK: ("EIO", "EROFS"),
+    Kind.ANY: ("EIO", "ENOSPC", "EMFILE"),
 }
 TIMEOUT_S = 40.0
 # What says, on standard error, that something was wrong.
@@ -308,7 +310,7 @@ def _is_warm(folder: Path, is_told: bool) -> None:
 
 
 DRIVEN, MESSAGES = 6, 60
-LASTING_SHARE = 0.2
+LASTING_SHARE, STRIDE = 0.2, 3
 TO_COMPILE = "regions."
 SCENARIOS = {
     "orders": Scenario(_lay_ledgers, _give_orders, _keeps_the_four, (STATE, "etc")),
@@ -332,7 +334,7 @@ def outcome_of(name: str, failure: Failure | None) -> tuple[Outcome, dict[Kind, 
             try:
                 code, log = scenario.run(folder, watch.environment)
                 said = _told_by(log)
-                _check_end(code, log, said)
+                _check_end(code, log, said, str(failure))
                 scenario.after(folder, bool(said))
                 came = "told" if said else "unnoticed"
             except Exception as error:
@@ -349,13 +351,15 @@ def _told_by(log: str) -> str:
     return lines[0] if lines else ""
 
 
-def _check_end(code: int | None, log: str, said: str) -> None:
+def _check_end(code: int | None, log: str, said: str, failure: str) -> None:
     if code is None:
         raise WrongError(f"hangs: {log[-600:]}")
     if code not in (exits.OK, exits.ERROR, exits.CONFIG):
         raise WrongError(f"ended with {code}: {log[-600:]}")
     if "Traceback" in log:
         raise WrongError(f"a traceback: {log[-900:]}")
+    if code == exits.CONFIG and "EACCES" not in failure and "EROFS" not in failure:
+        raise WrongError(f"a service is not started again, for a fault that may pass: {said}")
     if code != exits.OK and not said:
         raise WrongError(f"ended with {code} and not a word: {log[-600:]}")
 
@@ -373,9 +377,11 @@ def failures_of(counts: dict[Kind, int], most: int, seed: int, *, every: bool) -
     for kind, count in counts.items():
         errors = [(error, False) for error in MAY_FAIL[kind]]
         lasting = [(error, True) for error, _ in errors if error not in ("EINTR", "short")]
-        for at in range(1, count + 1):
-            chosen = [(errors, lasting)[rng.random() < LASTING_SHARE]]
-            for error, for_good in errors + lasting if every else [rng.choice(*chosen)]:
+        if kind is Kind.ANY:
+            errors = []  # a disk that is gone from then on
+        for at in range(1, count + 1, STRIDE if kind is Kind.ANY and not every else 1):
+            chosen = lasting if not errors or rng.random() < LASTING_SHARE else errors
+            for error, for_good in errors + lasting if every else [rng.choice(chosen)]:
                 failures.append(Failure(kind, at, error, for_good))
     if not 0 < most < len(failures):
         return failures

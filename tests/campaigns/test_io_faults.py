@@ -10,6 +10,7 @@ import pytest
 
 from tests.campaigns.file_calls import Failure, Kind, Watch, why_not
 from tests.campaigns.io_faults import failures_of, outcome_of
+from tests.daemon.processes import ENVIRONMENT
 
 pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not())
 
@@ -49,7 +50,13 @@ def test_a_failure_is_written_as_it_is_read():
 
 @pytest.mark.parametrize(
     "fault",
-    ["orders:open:1:EIO", "orders:read:2:EIO", "orders:sync:1:EIO+", "recorder:write:9:ENOSPC"],
+    [
+        "orders:open:1:EIO",
+        "orders:read:2:EIO",
+        "orders:sync:1:EIO+",
+        "recorder:write:9:ENOSPC",
+        "recorder:folder:1:EIO",
+    ],
 )
 def test_a_fault_is_told_and_nothing_is_lost(fault):
     """Long form: python -m tests.campaigns.io_faults."""
@@ -57,3 +64,15 @@ def test_a_fault_is_told_and_nothing_is_lost(fault):
     outcome, _ = outcome_of(name, Failure.of_text(text))
     assert outcome.came != "wrong", outcome
     assert outcome.on, "the call was made"
+
+
+def test_one_recording_that_the_disk_does_not_give_keeps_no_recorder_from_recording(tmp_path):
+    old = tmp_path / "old.rrd"
+    old.write_bytes(b"RRF2 and so on")
+    script = "import sys; from pathlib import Path; from fasaco_edge.recording import repair; "
+    script += "print(*repair.repair_folder(Path(sys.argv[1])))"
+    with Watch([tmp_path], Failure(Kind.READ, 1, "EIO")) as watch:
+        command = [sys.executable, "-c", script, str(tmp_path)]
+        environment = ENVIRONMENT | watch.environment
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout == "old.rrd could not be looked at: Input/output error\n", done.stderr

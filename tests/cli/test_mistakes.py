@@ -144,7 +144,7 @@ def test_a_mistake_ends_a_process_in_order(folder):
 
 
 def test_a_full_disk_is_named(capsys, folder):
-    assert main(["plan", "good.npy", "--ants", "8", "--path-out", "/dev/full"]) == 78
+    assert main(["plan", "good.npy", "--ants", "8", "--path-out", "/dev/full"]) == 1
     assert "cannot write /dev/full: No space left on device" in capsys.readouterr().err
 
 
@@ -208,3 +208,13 @@ def test_a_recorder_without_a_folder_says_so(folder):
         ended = fasaco_edge("record", "--out", "good.npy", "--connect", endpoint)
     assert ended.code == 78
     assert "cannot record into good.npy" in ended.err
+
+
+def test_a_disk_that_fails_is_no_wrong_configuration():
+    """Of that a service would never be started again (RestartPreventExitStatus=78)."""
+    # Whoever reads this file from its beginning gets an error of the device.
+    ended = fasaco_edge("run", "--config", "/proc/self/mem")
+    assert ended.code == 1
+    assert "/proc/self/mem: Input/output error" in ended.err
+    assert "look at the disk" in ended.err
+    assert fasaco_edge("run", "--config", "/proc/self").code == 78, "that is a mistake"
