@@ -1,4 +1,4 @@
-"""Files this process writes: its own, never what somebody put in their place."""
+"""Files and folders of this process: its own, never what somebody else put in their place."""
 
 from __future__ import annotations
 
@@ -23,11 +23,41 @@ def open_own(path: str | Path, flags: int, mode: int = 0o644) -> int:
     try:
         status = os.fstat(descriptor)
         if stat.S_ISREG(status.st_mode):
-            if status.st_uid != os.geteuid():
-                raise PermissionError(errno.EPERM, "another user has put it there", str(path))
+            _check_owner(path, status)
             if flags & os.O_TRUNC:
                 os.ftruncate(descriptor, 0)
     except BaseException:
         os.close(descriptor)
         raise
     return descriptor
+
+
+def read_own(path: str | Path, most: int = -1) -> bytes:
+    """Return what is in a plain file of ours, or of root's, that is no link; ``most`` bytes of it.
+
+    Raises:
+        OSError: that failed, or it is somebody else's.
+    """
+    # Where it is no plain file, to open it may wait, or do something.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    with open(descriptor, "rb") as file:
+        status = os.fstat(descriptor)
+        _check_owner(path, status)
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EINVAL, "no plain file", str(path))
+        return file.read(most)
+
+
+def make_own_folder(folder: Path) -> None:
+    """Make a folder, or take the one there is, if it is ours: nor is a link of somebody's taken.
+
+    Raises:
+        OSError: that failed, or it is somebody else's.
+    """
+    folder.mkdir(exist_ok=True)
+    _check_owner(folder, folder.lstat())
+
+
+def _check_owner(path: str | Path, status: os.stat_result) -> None:
+    if status.st_uid not in (os.geteuid(), 0):
+        raise PermissionError(errno.EPERM, "another user has put it there", str(path))

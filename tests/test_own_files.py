@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge.daemon.durable import write_through
-from fasaco_edge.own_files import open_own
+from fasaco_edge.own_files import make_own_folder, open_own, read_own
 
 NOBODY = 65534
 
@@ -35,4 +35,19 @@ def test_another_users_file_is_not_taken(tmp_path: Path):
     os.chown(file, NOBODY, NOBODY)
     with pytest.raises(PermissionError, match="another user"):
         open_own(file, os.O_WRONLY | os.O_TRUNC)
+    with pytest.raises(PermissionError, match="another user"):
+        read_own(file)
     assert file.read_text() == "theirs"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+def test_another_users_folder_or_link_is_not_taken(tmp_path: Path):
+    theirs, link = tmp_path / "theirs", tmp_path / "link"
+    make_own_folder(theirs)
+    make_own_folder(theirs)
+    link.symlink_to(theirs)
+    os.chown(link, NOBODY, NOBODY, follow_symlinks=False)
+    os.chown(theirs, NOBODY, NOBODY)
+    for folder in (theirs, link):
+        with pytest.raises(PermissionError, match="another user"):
+            make_own_folder(folder)

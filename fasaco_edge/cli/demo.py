@@ -12,6 +12,8 @@ from fasaco_edge.cli.arguments import DEFAULT_CELL_M, DEFAULT_RADIUS_M
 if TYPE_CHECKING:
     from fasaco_edge.cli.arguments import Subparsers
 
+RUNS = Path("runs")
+
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
@@ -57,14 +59,18 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.cli.warmup import compile_kernels
     from fasaco_edge.errors import BadConfiguration
     from fasaco_edge.grid.map_files import find_map
+    from fasaco_edge.own_files import make_own_folder
 
     find_map(args.map)
     if not args.speed > 0:
         raise BadConfiguration(f"--speed must be above 0, got {args.speed}")
-    out: Path = args.out or Path("runs") / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
+    out: Path = args.out or RUNS / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
     with writing(out):
-        # Of the folder that nobody named, nobody else can have made one beforehand.
-        out.mkdir(parents=True, exist_ok=args.out is not None)
+        if args.out is None:
+            # Nobody named it, and anybody may have made it.
+            make_own_folder(RUNS)
+            make_own_folder(out)
+        out.mkdir(parents=True, exist_ok=True)
     seconds = compile_kernels()
     err().print(f"kernels ready ({seconds:.1f} s); results go to {out}")
     with DemoMission(args, out) as mission:

@@ -26,7 +26,7 @@ from fasaco_edge.daemon.ledger_codec import (
 )
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.ledger import LedgerMismatchError, LedgerSnapshot
-from fasaco_edge.own_files import open_own
+from fasaco_edge.own_files import open_own, read_own
 
 # So many files of each kind are kept aside, and the largest.
 KEPT_ASIDE = 3
@@ -224,8 +224,7 @@ def _read(path: Path) -> bytes:
     # Anything but a plain file might keep the reader waiting.
     if path.exists() and not path.is_file():
         raise LedgerFileError("no plain file")
-    with path.open("rb") as file:
-        payload = file.read(MOST_BYTES + 1)
+    payload = read_own(path, MOST_BYTES + 1)
     if len(payload) > MOST_BYTES:
         raise LedgerFileError(f"over {MOST_BYTES} bytes")
     return payload
@@ -240,13 +239,7 @@ def _is_empty(path: Path) -> bool:
 
 def _prune(path: Path, why: str, newest: Path) -> None:
     """Delete what was kept of the same kind, but the newest few and the largest."""
-    form = re.compile(re.escape(f"{path.name}.{why}-") + r"(\w+Z)(?:-(\d+))?")
-    found = [
-        (match[1], int(match[2] or 1), other)
-        for other in path.parent.iterdir()
-        if (match := form.fullmatch(other.name)) and other != newest
-    ]
-    older = [other for *_, other in sorted(found)]
+    older = [other for other in _aside(path, why).values() if other != newest]
     largest = max([*older, newest], key=lambda other: other.stat().st_size)
     for other in older[: 1 - KEPT_ASIDE]:
         if other != largest:
@@ -254,12 +247,21 @@ def _prune(path: Path, why: str, newest: Path) -> None:
 
 
 def _free_name(path: Path, why: str) -> Path:
+    """Return a name that tells when, and by its number after which others, whatever the clock."""
     moment = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
-    name, number = path.with_name(f"{path.name}.{why}-{moment}"), 1
-    while name.exists():
-        number += 1
-        name = path.with_name(f"{path.name}.{why}-{moment}-{number}")
-    return name
+    number = max((number for number, _, _ in _aside(path, why)), default=0) + 1
+    return path.with_name(f"{path.name}.{why}-{moment}" + (f"-{number}" if number > 1 else ""))
+
+
+def _aside(path: Path, why: str) -> dict[tuple[int, str, str], Path]:
+    """Return what was kept of one kind by number, time and name, the oldest first."""
+    form = re.compile(re.escape(f"{path.name}.{why}-") + r"(\w+Z)(?:-(\d+))?")
+    found = {
+        (int(match[2] or 1), match[1], other.name): other
+        for other in path.parent.iterdir()
+        if (match := form.fullmatch(other.name))
+    }
+    return dict(sorted(found.items()))
 
 
 def reason_of(error: Exception) -> str:

@@ -6,6 +6,7 @@ import errno
 import fcntl
 import re
 import shutil
+import time
 from pathlib import Path
 
 import pytest
@@ -282,3 +283,17 @@ def test_an_empty_ledger_is_not_kept(tmp_path):
         file.write(lane(length))
     assert file.set_aside("reset") == []
     assert names(tmp_path) == []
+
+
+def test_what_is_kept_aside_is_as_old_as_its_number_whatever_the_clock(tmp_path, monkeypatch):
+    path = tmp_path / "robot.ledger"
+    years = iter([2026, 2027, 2026, 1970, 1970, 1970])
+    monkeypatch.setattr(time, "gmtime", lambda: (next(years), 1, 1, 0, 0, 0, 3, 1, 0))
+    names = []
+    for _ in range(6):
+        path.write_bytes(b"broken")
+        names += LedgerFile(tmp_path, "robot").set_aside("reset")
+    assert len(set(names)) == 6
+    kept = {file.name for file in tmp_path.glob("robot.ledger.reset-*")}
+    assert set(names[-3:]) <= kept
+    assert len(kept) <= 4

@@ -1,0 +1,371 @@
+"""Every command as root, lured into folders that another user has prepared.
+
+    PYTHONPATH=deploy python -m tests.campaigns.hostile_user [--short] [--json FILE]
+
+Home, working folder, TMPDIR, PYTHONPATH and more lead into a trap (``tests.campaigns.trap``); the
+mode mask is 0. Each of fasaco-edge's commands runs there as it is installed, with a daemon and a
+recorder that keep their files in the trap; then install.sh, its rollback and uninstall.sh on a
+robot with a real systemd (without --short; a dry run beside this with it). Nothing of the trap may
+be loaded, or opened at all; no file of root's is written through a link, or open to everybody. Exit
+code 1 on any violation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fasaco_edge.bench.daemon_process import warm_kernels
+from fasaco_edge.kernels.jit import CACHE_FOLDER
+from tests.campaigns.trap import NOBODY, Trap
+from tests.daemon.processes import free_endpoint
+from tests.deploy import installed, lab, releases
+from tests.deploy.installing import Robot, bare_robot
+
+PROGRAM = """\
+#!{python} -I
+import sys
+from fasaco_edge.cli import main
+sys.exit(main())
+"""
+TIMEOUT_S = 400.0
+
+
+def why_not() -> str:
+    """Return why this cannot be tried here, "" if it can."""
+    return "" if os.geteuid() == 0 else "only root can be lured"
+
+
+@dataclass
+class Campaign:
+    """A trap, what was run in it, and what came of that.
+
+    Attributes:
+        folder: of root's alone: what the commands are told to write goes here.
+        endpoint: where the daemon listens.
+        slow: compile the kernels where no cache can be trusted, and run the demo.
+    """
+
+    folder: Path
+    trap: Trap
+    slow: bool
+    say: Callable[[str], None]
+    endpoint: str = field(default_factory=free_endpoint)
+    counted: Counter[str] = field(default_factory=Counter)
+    violations: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        program = self.folder / "fasaco-edge"
+        program.write_text(PROGRAM.format(python=sys.executable))
+        program.chmod(0o755)
+        self.program = str(program)
+        self.own_cache = {"NUMBA_CACHE_DIR": str(CACHE_FOLDER.parent)}
+
+    @contextmanager
+    def judged(self, what: str) -> Iterator[None]:
+        """Judge what is done in the block."""
+        before = self.trap.state_of_secrets()
+        with self.trap.watched() as opened:
+            yield
+        self.counted["runs"] += 1
+        faults = {
+            "loaded": self.trap.loaded(),
+            "opened": sorted(map(str, opened)),
+            "changed": self.trap.changed_secrets(before),
+            "open to everybody": self.trap.open_to_all(self.folder),
+        }
+        found = [f"{what}: {name} {told}" for name, told in faults.items() if told]
+        self.violations += found
+        self.trap.mark.unlink(missing_ok=True)
+        self.say(f"{what}: {'; '.join(found) or 'nothing'}")
+
+    def run(self, *words: str, ends: tuple[int, ...] = (0,), cache: bool = True) -> None:
+        """Run a command in the trap, and judge it; ``cache``: with one of its own for kernels."""
+        with self.judged(" ".join(words[:3])):
+            done = subprocess.run(
+                [self.program, *words],
+                cwd=self.trap.work,
+                env=self.trap.environment | (self.own_cache if cache else {}),
+                umask=0,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                timeout=TIMEOUT_S,
+                check=False,
+            )
+        if done.returncode not in ends:
+            said = (done.stdout + done.stderr)[-600:]
+            self.violations.append(f"{words}: ended with {done.returncode}: {said}")
+
+    @contextmanager
+    def started(self, *words: str) -> Iterator[None]:
+        """Run a command in the trap for as long as the block, and judge it."""
+        log = self.folder / f"{words[0]}.log"
+        with self.judged(f"{words[0]} for a while"), log.open("w") as out:
+            process = subprocess.Popen(
+                [self.program, *words],
+                cwd=self.trap.work,
+                env=self.trap.environment | self.own_cache,
+                umask=0,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=out,
+            )
+            try:
+                yield
+                if process.poll() is not None:
+                    told = log.read_text()[-600:]
+                    self.violations.append(f"{words[0]}: ended with {process.poll()}: {told}")
+            finally:
+                process.send_signal(signal.SIGTERM)
+                process.wait(20)
+
+
+def try_alone(campaign: Campaign) -> None:
+    """Run the commands that need nobody else."""
+    out = campaign.folder
+    campaign.run("--version")
+    campaign.run("maps")
+    campaign.run("warmup", "--check", ends=(0, 1), cache=False)
+    campaign.run("doctor", "--json", ends=(0, 1), cache=False)
+    campaign.run("warmup")
+    config = out / "config.yaml"
+    config.write_text(f"bus: {{listen: ['{campaign.endpoint}']}}\n")
+    config.chmod(0o600)
+    campaign.run("check-config", str(config), "--show")
+    files = [f"--png={out}/plan.png", f"--path-out={out}/path.csv"]
+    campaign.run("plan", "flat", "--budget", "0.2", "--json", *files)
+    campaign.run("plan", "flat", "--budget", "0.2")
+    if campaign.slow:
+        campaign.run("plan", "flat", "--budget", "0.2", cache=False)
+        campaign.run("bench", "codec", ends=(0, 1))
+    # Where to is foreseen, and is a link of somebody's: it says so, and does nothing.
+    campaign.run("demo", ends=(78,))
+    if campaign.slow:
+        campaign.run("demo", "--out", str(out / "demo"), "--json")
+
+
+def try_together(campaign: Campaign) -> None:
+    """Run the daemon with a recorder and a robot in the trap, and those who ask."""
+    folder, connect = campaign.folder, ("--connect", campaign.endpoint)
+    config, state = str(folder / "config.yaml"), str(campaign.trap.state)
+    recordings = folder / "recordings"
+    daemon = ("run", "--config", config, "--record", state, "--state", state)
+    recorder = ("record", "--config", config, "--out", str(recordings))
+    with campaign.started(*daemon):
+        _until(lambda: _asks(campaign, connect))
+        with (
+            campaign.started("simulate", "flat", "--speed", "10", *connect),
+            campaign.started(*recorder),
+        ):
+            _until(lambda: _bytes_in(campaign.trap.state) > 100_000)
+            campaign.run("ask", "status", "--json", *connect)
+            campaign.run("mission", "status", *connect)
+            campaign.run("watch", "--once", *connect)
+            campaign.run("doctor", "--config", config, ends=(0, 1))
+            _until(lambda: _bytes_in(recordings) > 200_000)
+    # In the home, where it is kept unless told otherwise, and what is there is links.
+    with campaign.started("run", "--config", config):
+        _until(lambda: _asks(campaign, connect))
+    recording = next(recordings.glob("*.rrd"))
+    torn = folder / "torn.rrd"
+    torn.write_bytes(recording.read_bytes()[:-7])
+    told = [f"--html={folder}/a.html", f"--png={folder}/a.png", "--json"]
+    campaign.run("review", str(recording), *told)
+    campaign.run("review", str(torn), ends=(0, 1))
+    campaign.run("replay", str(recording), ends=(0, 1))
+
+
+def _asks(campaign: Campaign, connect: tuple[str, ...]) -> bool:
+    words = [campaign.program, "ask", "status", *connect]
+    return subprocess.run(words, capture_output=True, check=False).returncode == 0
+
+
+def try_scripts_dry(campaign: Campaign) -> None:
+    """Run install.sh and uninstall.sh where they change nothing."""
+    release = releases.write_release(campaign.folder / "release", "1.0")
+    environment = campaign.trap.environment
+    for words in (
+        (release / "install.sh", "--dry-run", "--no-start"),
+        (release / "uninstall.sh", "--dry-run"),
+        # From a source tree, whose wheels would be downloaded.
+        (installed.CHECKOUT / "deploy/install.sh", "--dry-run", "--no-start"),
+    ):
+        with campaign.judged(f"{words[0].name} {' '.join(words[1:])}"):
+            done = subprocess.run(
+                list(map(str, words)),
+                cwd=campaign.trap.work,
+                env=environment,
+                umask=0,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+        if done.returncode:
+            campaign.violations.append(f"{words}: {done.stderr}")
+
+
+def try_scripts(campaign: Campaign) -> None:
+    """Install, upgrade, roll back and uninstall on a robot whose root is lured."""
+    folders = {
+        version: releases.write_release(campaign.folder / f"release-{version}", version)
+        for version in ("1.0", "1.1")
+    }
+    place, shown = campaign.folder / "lab", "/srv/trap"
+    place.mkdir()
+    with bare_robot(place, folders) as robot:
+        # In the lab's own folder: what is bound into it is read-only.
+        trap = Trap(Path(f"{robot.root}{shown}"))
+        inside = {
+            name: value.replace(str(robot.root), "") for name, value in trap.environment.items()
+        }
+        _name_marks(trap, robot)
+        luring = replace_trap(campaign, trap)
+        current = "/opt/fasaco-edge/current"
+        for script in (
+            ("/srv/1.0/install.sh",),
+            ("fasaco-edge", "ask", "version"),
+            ("fasaco-edge", "doctor", "--config", "/etc/fasaco-edge/config.yaml"),
+            ("/srv/1.1/install.sh",),
+            (f"{current}/deploy/install.sh", "--rollback"),
+            ("/srv/1.0/install.sh", "--dry-run"),
+            ("/srv/1.0/uninstall.sh", "--dry-run"),
+        ):
+            _in_trap(luring, robot, inside, script)
+        luring.violations += [
+            f"installed, open to everybody: {path}" for path in _open_inside(robot)
+        ]
+        _in_trap(luring, robot, inside, (f"{current}/deploy/uninstall.sh", "--purge"))
+        left = robot.run("ls", "/opt").stdout
+        if "fasaco" in left:
+            luring.violations.append(f"left behind: {left}")
+    campaign.violations += luring.violations
+    campaign.counted += luring.counted
+
+
+def replace_trap(campaign: Campaign, trap: Trap) -> Campaign:
+    """Return a campaign with another trap, and nothing counted."""
+    return Campaign(campaign.folder, trap, campaign.slow, campaign.say)
+
+
+def _name_marks(trap: Trap, robot: Robot) -> None:
+    """Let what lies in the trap write to the mark as it is called inside."""
+    outside, inside = str(robot.root), ""
+    for folder, folders, files in os.walk(trap.place):
+        for path in (Path(folder, name) for name in (*folders, *files)):
+            if path.is_symlink():
+                target = os.readlink(path).replace(outside, inside)
+                path.unlink()
+                path.symlink_to(target)
+                os.chown(path, NOBODY, NOBODY, follow_symlinks=False)
+            elif path.is_file():
+                content = path.read_bytes()
+                # A pickle knows how long its strings are.
+                if not content.startswith(b"\x80"):
+                    path.write_bytes(content.replace(outside.encode(), b""))
+
+
+def _in_trap(
+    campaign: Campaign, robot: Robot, environment: dict[str, str], words: tuple[str, ...]
+) -> None:
+    told = [f"{name}={value}" for name, value in environment.items() if name != "PATH"]
+    alone = ("env", "-i", "--chdir=/srv/trap/work", f"PATH={lab.ENVIRONMENT['PATH']}", *told)
+    with campaign.judged(" ".join(words)):
+        done = robot.run(
+            *alone,
+            "SETTLE_S=1",
+            "sh",
+            "-c",
+            'umask 0; exec "$@"',
+            "sh",
+            *words,
+            check=False,
+            timeout_s=200.0,
+        )
+    if done.returncode and "doctor" not in words:
+        campaign.violations.append(f"{words}: {done.returncode} {done.stdout}{done.stderr}")
+
+
+def _open_inside(robot: Robot) -> list[str]:
+    places = (
+        "/opt",
+        "/etc/fasaco-edge",
+        "/etc/systemd/system",
+        "/usr/local/bin",
+        "/var/lib/private",
+    )
+    words = ("find", *places, "-xdev", "-perm", "-o+w", "!", "-type", "l", "-uid", "0")
+    return robot.run(*words, check=False).stdout.split()
+
+
+def _bytes_in(folder: Path) -> int:
+    files = [path for path in folder.glob("*.rrd") if not path.is_symlink()]
+    return sum(path.stat().st_size for path in files)
+
+
+def _until(holds: Callable[[], bool], seconds: float = 60.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < deadline, "it never came to that"
+        time.sleep(0.1)
+
+
+def run_campaign(folder: Path, say: Callable[[str], None], *, short: bool) -> Campaign:
+    """Lure every command; ``short``: without the demo, a cold compiler and an installation."""
+    place = folder / "trap"
+    own = folder / "own"
+    own.mkdir(mode=0o700)
+    campaign = Campaign(own, Trap(place), not short, say)
+    try_alone(campaign)
+    try_together(campaign)
+    try_scripts_dry(campaign)
+    if not short:
+        reason = lab.why_not() or installed.why_not()
+        if reason:
+            say(f"no installation was tried: {reason}")
+        else:
+            try_scripts(campaign)
+    return campaign
+
+
+def main() -> int:
+    """Run the campaign, and report."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--short", action="store_true", help="what the tests run")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
+    args = parser.parse_args()
+    if reason := why_not():
+        print(reason)
+        return 1
+    warm_kernels()
+    folder = Path(tempfile.mkdtemp(prefix="fasaco-hostile-"))
+    folder.chmod(0o755)
+    try:
+        campaign = run_campaign(folder, lambda text: print(text, flush=True), short=args.short)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    for what, count in campaign.counted.items():
+        print(f"{count:7}  {what}")
+    print(f"{len(campaign.violations):7}  violations", *campaign.violations, sep="\n         ")
+    if args.json:
+        told = dict(campaign.counted) | {"violations": campaign.violations}
+        args.json.write_text(json.dumps(told, indent=2))
+    return 1 if campaign.violations else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
