@@ -26,6 +26,8 @@ FIRST_PAUSE_S = 1.0
 LONGEST_PAUSE_S = 30.0
 # A recorder that says nothing for this long, although its process lives, hangs.
 SILENT_AFTER_S = 10.0
+# Its first word may take longer: a slow or busy computer loads its libraries for half a minute.
+START_WITHIN_S = 120.0
 
 
 class RecorderSupervisor:
@@ -95,11 +97,12 @@ class RecorderSupervisor:
             self._pause_s = FIRST_PAUSE_S
 
     def _running(self, now: float) -> dict[str, Any]:
-        if now - self._heard_at > SILENT_AFTER_S:
+        patience_s = SILENT_AFTER_S if self._heard else START_WITHIN_S
+        if now - self._heard_at > patience_s:
             # It hangs: what follows is the way of a recorder that died.
             assert self._process is not None
             self._process.kill()
-            state = {"state": "silent", "reason": f"no word for {SILENT_AFTER_S:.0f} s"}
+            state = {"state": "silent", "reason": f"no word for {patience_s:.0f} s"}
         else:
             state = self._heard or {"state": "starting"}
         return {**state, "restarts": self._restarts}

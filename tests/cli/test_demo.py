@@ -21,7 +21,7 @@ CELL_M, RADIUS_M = 0.3, 0.18
 def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path):
     pytest.importorskip("rerun")
     out = tmp_path / "demo"
-    options = ("--map", "office", "--speed", 60, "--timeout", 80)
+    options = ("--map", "office", "--speed", 60, "--timeout", 300)
     ended = fasaco_edge("demo", *options, "--out", out, "--json")
     assert ended.code == 0, ended.err
     summary = json.loads(ended.out)

@@ -199,7 +199,9 @@ def test_anywhere_is_where_a_walk_ends_unless_asked(plan, grid_file):
 
 
 def test_turns_cost_what_they_take(plan, grid_file):
-    cells, options = cells_in(grid_file), ("--ants", 400, "--velocities", 1, "--seed", 2)
+    cells = cells_in(grid_file)
+    # Of ants alone: what a local search comes to in its time depends on the machine.
+    options = ("--ants", 400, "--velocities", 1, "--seed", 2, "--no-local-search")
     robot = ("--speed-m-s", 0.5, "--turn-s", 4)
     plain, walk = plan(grid_file, *options)
     check(plain, walk, cells, (0, 0))

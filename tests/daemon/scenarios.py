@@ -112,6 +112,12 @@ def left(mission: Mission) -> set[Cell]:
     return {(row + window.row0, col + window.col0) for row, col in found} - visited(mission)
 
 
+def driven_m(samples: Samples, poses: Sequence[int]) -> float:
+    """Return how far the robot drives over some of its poses [m]."""
+    way = [decode_pose(samples[index].sample.payload, POSE_STAMPED).pose for index in poses]
+    return sum(math.dist((a.x, a.y), (b.x, b.y)) for a, b in pairwise(way))
+
+
 def under_tool(samples: Iterable[Arrival], tool_m: float) -> set[Cell]:
     """Return the cells whose centre the tool has passed over, drive by drive."""
     poses = [decode_pose(s.sample.payload, POSE_STAMPED).pose for s in samples if s.topic == "pose"]

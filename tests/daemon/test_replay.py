@@ -20,7 +20,7 @@ from fasaco_edge.recording.samples import RecordedSamples
 from tests.cli.commands import fasaco_edge
 from tests.daemon import scenarios
 from tests.daemon.recorded import record_mission
-from tests.daemon.scenarios import left, places, played
+from tests.daemon.scenarios import driven_m, left, places, played
 
 
 @pytest.fixture(scope="module")
@@ -171,6 +171,9 @@ def test_for_a_while_nobody_knows_where_the_robot_is(samples, config, as_it_was,
     poses = places(samples, "pose")
     begin = int(share * len(poses))
     gone = poses[begin : begin + len(poses) // 4]
+    # On a busy machine it may have stood all that while.
+    while driven_m(samples, gone) < 1.5:
+        gone = poses[begin : begin + len(gone) + 1]
     story = played(scenarios.without(samples, gone), config)
     assert_told(story)
     assert story.visited <= as_it_was.visited

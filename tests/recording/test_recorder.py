@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +19,7 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.bus.arrival import PATH_DIGEST
-from fasaco_edge.errors import MissingExtra
+from fasaco_edge.errors import MissingExtra, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.input_log import PERIOD_NS as INPUT_PERIOD_NS
 from fasaco_edge.recording.journal import FLUSH_PERIOD_NS
@@ -253,6 +254,16 @@ def tiny_disk(tmp_path):
     subprocess.run(["umount", "--lazy", str(disk)], check=True)
 
 
+def wait_robot(folder: Path) -> None:
+    """Wait until a pose is on the disk."""
+    robot = 0
+    while not robot:
+        time.sleep(0.1)
+        (newest,) = folder.glob("*.rrd")
+        with suppress(UnreadableRecording):
+            robot = read_summary(newest).rows.get(entities.ROBOT, 0)
+
+
 def test_a_full_disk_is_told_and_recording_goes_on_when_there_is_room(tiny_disk):
     ballast = tiny_disk / "ballast"
     with (
@@ -261,7 +272,7 @@ def test_a_full_disk_is_told_and_recording_goes_on_when_there_is_room(tiny_disk)
     ):
         mission = Mission(bus)
         play(mission, 10)
-        time.sleep(FLUSH_PERIOD_NS / 1e9)
+        wait_robot(tiny_disk)
         with ballast.open("wb") as file:
             file.write(bytes(os.statvfs(tiny_disk).f_bavail * os.statvfs(tiny_disk).f_bsize - 9000))
         play(mission, 10)
