@@ -9,7 +9,14 @@ from fasaco_edge.daemon.keeping import Keeping
 from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
 from fasaco_edge.mission.assignment import CommandError
-from fasaco_edge.mission.events import Answer, CommandReceived, Event, MapReceived, PoseReceived
+from fasaco_edge.mission.events import (
+    Answer,
+    CommandReceived,
+    Event,
+    MapReceived,
+    PatchReceived,
+    PoseReceived,
+)
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.worker import PlanningWorker
@@ -21,7 +28,8 @@ class Beginning:
 
     Attributes:
         assignment: what the mission will have to do.
-        held: the newest map with the updates after it, and the newest pose.
+        held: of the newest two frames each the newest map with the updates after it, and the
+            newest pose: which of them counts is for the mission to find.
     """
 
     def __init__(
@@ -44,10 +52,10 @@ class Beginning:
         faults: list[FasacoError] = []
         for event in events:
             match event:
-                case MapReceived():
-                    self.held = [held for held in self.held if isinstance(held, PoseReceived)]
-                case PoseReceived():
-                    self.held = [held for held in self.held if not isinstance(held, PoseReceived)]
+                case MapReceived(grid):
+                    self._drop(lambda held: not _is_pose(held), grid.frame)
+                case PoseReceived(pose):
+                    self._drop(_is_pose, pose.frame)
                 case _ if not any(isinstance(held, MapReceived) for held in self.held):
                     faults.append(PatchWithoutBase("map update refused: there is no map yet"))
                     continue
@@ -55,6 +63,12 @@ class Beginning:
         if self._loader is None and any(isinstance(event, MapReceived) for event in events):
             self._loader = self._load()
         return faults
+
+    def _drop(self, kind: Callable[[Event], bool], frame: str) -> None:
+        """Drop of a kind what is in this frame, and all but the newest of the other frames."""
+        others = [_frame(held) for held in self.held if kind(held)]
+        kept = next((other for other in reversed(others) if other not in ("", frame)), None)
+        self.held = [held for held in self.held if not kind(held) or _frame(held) == kept]
 
     def loaded(self) -> tuple[Mission, PlanningWorker] | None:
         """Return mission and worker once they are there."""
@@ -78,6 +92,21 @@ class Beginning:
                 self._keeping.forget()
             answers.append(Answer(asked.number))
         return answers
+
+
+def _is_pose(event: Event) -> bool:
+    return isinstance(event, PoseReceived)
+
+
+def _frame(event: Event) -> str:
+    match event:
+        case MapReceived(grid):
+            return grid.frame
+        case PatchReceived(patch):
+            return patch.frame
+        case PoseReceived(pose):
+            return pose.frame
+    return ""  # it lies in none
 
 
 def heard_of(mission: Mission) -> list[Event]:

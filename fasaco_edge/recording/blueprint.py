@@ -45,7 +45,8 @@ def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
 
 def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
-        origin="/",
+        # Above it stands where the world lies in the map's frame: too far for float32, perhaps.
+        origin=f"/{entities.WORLD}",
         name="Map, coverage and path",
         contents=["/world/**", f"- /{entities.PHEROMONE}/**", f"- /{entities.DIRECTIONS}/**"],
         eye_controls=_eye_above(bounds, MARGIN, VIEW_ASPECT),
@@ -57,7 +58,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
 
 def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
-        origin="/",
+        origin=f"/{entities.WORLD}",
         name="Pheromone, main directions",
         contents=[
             f"/{entities.PHEROMONE}/**",

@@ -14,6 +14,7 @@ ITER: Final = "iter"
 """Timeline: cohorts seen, over all plans."""
 
 WORLD: Final = "world"
+"""All that has a place. Far from 0 it is drawn from whole kilometres: its static transform."""
 MAP: Final = "world/map"
 MAP_CHANGE: Final = "world/map_change"
 REPLAN_WINDOW: Final = "world/replan_window"

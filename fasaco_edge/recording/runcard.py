@@ -48,6 +48,7 @@ class RunDescription:
         version: of the planner; "" while unknown.
         config: its configuration, as its status gives it.
         trail_range: least and greatest pheromone of all fields; None while there is none.
+        anchor: place (x, y) [m] in the map's frame that is drawn at 0; None for 0 itself.
     """
 
     robot: str
@@ -55,6 +56,7 @@ class RunDescription:
     version: str = ""
     config: dict[str, Any] = field(default_factory=dict)
     trail_range: tuple[float, float] | None = None
+    anchor: tuple[float, float] | None = None
 
     @property
     def name(self) -> str:
@@ -70,6 +72,9 @@ class RunDescription:
         if self.trail_range:
             least, most = self.trail_range
             known |= {"trail_min": f"{least:.6g}", "trail_max": f"{most:.6g}", "trail": LEVELS}
+        if self.anchor:
+            x, y = self.anchor
+            known |= {"drawn_from_x_m": f"{x:.0f}", "drawn_from_y_m": f"{y:.0f}"}
         return {name: value for name, value in (settings | known).items() if value}
 
     def markdown(self) -> str:
@@ -82,6 +87,9 @@ class RunDescription:
         if self.trail_range:
             least, most = self.trail_range
             rows.append(("pheromone", f"{least:.3g} to {most:.3g}, log scale"))
+        if self.anchor:
+            x, y = self.anchor
+            rows.append(("drawn from", f"x {x:.0f} m, y {y:.0f} m of the map's frame"))
         rows += sorted(flat_settings(self.config), key=_rank)
         table = "\n".join(f"| {_cell(name)} | {_cell(value)} |" for name, value in rows)
         return f"{self._head()}\n\n{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"

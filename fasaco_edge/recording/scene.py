@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.errors import PatchWithoutBase
-from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.recording import archetypes as draw
 from fasaco_edge.recording import entities
+from fasaco_edge.recording.anchor import Anchor
 from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.changes import Bounds, changed_bounds, known_bounds, union
 from fasaco_edge.recording.curves import TREMBLE, Curves
@@ -41,6 +42,8 @@ class Scene:
     def __init__(self, journal: Journal, description: RunDescription) -> None:
         self._journal = journal
         self._run = description
+        # Where 0 is drawn; known with the first place.
+        self._anchor: Anchor | None = None
         self._map: OccupancyGrid | None = None
         self._known: Bounds | None = None
         self._framed: Bounds | None = None
@@ -58,6 +61,9 @@ class Scene:
 
     def add_map(self, grid: OccupancyGrid) -> None:
         """Draw the map, and where it contradicts the one before."""
+        self._draw_grid(self._anchored(grid.geometry.origin).grid(grid))
+
+    def _draw_grid(self, grid: OccupancyGrid) -> None:
         before, self._map = self._map, grid
         if before is not None:
             if before.geometry == grid.geometry and np.array_equal(before.cells, grid.cells):
@@ -82,11 +88,11 @@ class Scene:
         """
         if self._map is None:
             raise PatchWithoutBase("a map update came before any map")
-        self.add_map(self._map.patched(patch))
+        self._draw_grid(self._map.patched(patch))
 
     def add_pose(self, stamped: StampedPose) -> None:
         """Move the robot, and draw its trail."""
-        pose = stamped.pose
+        pose = self._anchored(stamped.pose).pose(stamped.pose)
         self._journal.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
         self._trail.add(pose.x, pose.y)
 
@@ -96,11 +102,16 @@ class Scene:
 
     def add_path(self, message: PathMessage, note: Json) -> None:
         """Draw the path to drive, over the one before it, and log why it came."""
-        self._paths.add(message, note)
+        anchor = self._anchor
+        if anchor is None and len(message.xy):
+            anchor = self._anchored(Pose2D(*message.xy[0].tolist()))
+        anchor = anchor or Anchor()
+        self._paths.add(anchor.path(message), anchor.note(note))
         self._figures.add_path(note)
 
     def add_coverage(self, grid: OccupancyGrid) -> None:
         """Tint what is covered, and plot how much that is."""
+        grid = self._anchored(grid.geometry.origin).grid(grid)
 
         def draw_coverage() -> None:
             self._journal.log(
@@ -118,7 +129,7 @@ class Scene:
 
     def add_pheromone(self, message: PheromoneMessage) -> None:
         """Draw the pheromone after a cohort, and plot the best walk so far."""
-        self._pheromone.add(message)
+        self._pheromone.add(self._anchored(message.geometry.origin).pheromone(message))
         if self._pheromone.trail_range != self._run.trail_range:
             self._run = replace(self._run, trail_range=self._pheromone.trail_range)
             self._describe()
@@ -169,6 +180,17 @@ class Scene:
 
     def _draw(self, layer: str, size: int, draw_it: Callable[[], None]) -> None:
         self._layers.draw(layer, size, draw_it, self._journal.wall_ns)
+
+    def _anchored(self, place: Pose2D) -> Anchor:
+        """Return where 0 is drawn; say so with the first place, where that is far away."""
+        if self._anchor is None:
+            self._anchor = anchor = Anchor.near(place.x, place.y)
+            if anchor:
+                where = rr.Transform3D(translation=[anchor.x, anchor.y, 0.0])
+                self._journal.log_static(entities.WORLD, where)
+                self._run = replace(self._run, anchor=(anchor.x, anchor.y))
+                self._describe()
+        return self._anchor
 
     def _frame(self, grid: OccupancyGrid) -> None:
         bounds = known_bounds(grid)

@@ -121,7 +121,8 @@ class Mission:
         trail[blocked_cells(done)] = 0.0
         trail = trail[:, : self.seen_cells]
         self.best_steps = round(len(rows) * (1.3 - 0.1 * cohort) - 40 * done)
-        window = Window(-8, -4, trail.shape[0] - 8, trail.shape[1] - 4)
+        col, row = (round(at / CELL_M) for at in ORIGIN)
+        window = Window(0, 0, *trail.shape).moved(row, col)
         snapshot = ColonySnapshot(
             window, CELL_M, trail, cohort, 1, 20 * (cohort + 1), self.best_steps
         )
