@@ -69,8 +69,9 @@ def run(args: argparse.Namespace) -> int:
     config = SimulationConfig(
         robot_radius_m=args.robot_radius, range_m=args.range, map_hz=args.map_hz
     )
-    x, y = args.start_xy or start_point(path)
-    world = World(read_map(path), Pose2D(x, y), config)
+    truth = read_map(path)
+    x, y = args.start_xy or start_point(path, truth, args.robot_radius)
+    world = World(truth, Pose2D(x, y), config)
     result = run_simulation(
         world, Keys(args.robot, args.base), client_settings(args), speed=args.speed, report=_report
     )
