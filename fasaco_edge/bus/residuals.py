@@ -76,6 +76,8 @@ def _flat(residual: Residual, size: int) -> Bytes:
     runs = np.ascontiguousarray(body[_COUNT.size : end].reshape(4, -1).T).view("<u4").ravel()
     edges = np.cumsum(runs, dtype=np.int64)
     starts, lengths = edges[0::2], runs[1::2]
+    if int(lengths.sum(dtype=np.int64)) != body.size - end:
+        raise ValueError(f"runs of {lengths.sum(dtype=np.int64)} bytes, {body.size - end} follow")
     # Of each byte that is not zero: its place among them, and how many zeros come before.
     places = np.arange(body.size - end)
     places += np.repeat(starts - (np.cumsum(lengths, dtype=np.int64) - lengths), lengths)

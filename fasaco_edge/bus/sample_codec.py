@@ -13,15 +13,17 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
+from typing import Annotated
 
 import msgspec
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.residuals import Residual, payloads_of, residual_of
 from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.session_config import MAX_MESSAGE_BYTES
 from fasaco_edge.errors import MalformedMessage
 
 FORMAT = 1
@@ -29,8 +31,15 @@ FORMAT = 1
 _HEAD = struct.Struct("<BQQ")
 LARGE_BYTES = 16_384
 DEFLATE_LEVEL = 6
+# What a batch may claim to hold, before any of it is believed: a map in force, a new one and what
+# gathers meanwhile, payloads and all (``recording.input_log``).
+MOST_BATCH_BYTES = 3 * MAX_MESSAGE_BYTES
+MOST_SAMPLES = 200_000
 # What ``_Lane.against`` says where the first payload is told as a whole.
 WHOLE = -1
+
+
+_MANY = msgspec.Meta(max_length=MOST_SAMPLES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +73,11 @@ class _Lane(msgspec.Struct, array_like=True):
     topic: str
     key: str
     schema: str
-    length: int
-    numbers: list[int]
-    at_ns: list[int]
-    ahead_ns: list[int]
-    attachments: list[bytes]
+    length: Annotated[int, msgspec.Meta(ge=0, le=MAX_MESSAGE_BYTES)]
+    numbers: Annotated[list[int], _MANY]
+    at_ns: Annotated[list[int], _MANY]
+    ahead_ns: Annotated[list[int], _MANY]
+    attachments: Annotated[list[bytes], _MANY]
     against: int
     checksum: int
     sparse: bool
@@ -160,9 +169,11 @@ class SampleDecoder:
         """
         place_of(batch)
         try:
-            body = zlib.decompress(batch[_HEAD.size :])
-            lanes = msgspec.msgpack.decode(body, type=list[_Lane])
-            samples = [numbered for lane in lanes for numbered in self._samples(lane)]
+            samples = [
+                numbered
+                for lane in _lanes(_inflated(batch[_HEAD.size :]))
+                for numbered in self._samples(lane)
+            ]
         except (zlib.error, struct.error, msgspec.DecodeError, ValueError, IndexError) as error:
             raise MalformedMessage(f"batch of samples: {error}") from error
         return sorted(samples, key=lambda numbered: numbered.number)
@@ -196,6 +207,8 @@ class SampleDecoder:
             )
         ]
         self._last[lane.topic] = samples[-1]
+        if sum(len(kept.arrival.sample.payload) for kept in self._last.values()) > MOST_BATCH_BYTES:
+            raise MalformedMessage("samples of more topics, and larger ones, than there are")
         return samples
 
 
@@ -211,6 +224,29 @@ def place_of(batch: bytes) -> Place:
     if kind != FORMAT:
         raise MalformedMessage(f"batch of samples: format must be {FORMAT}, got {kind}")
     return Place(run, first)
+
+
+def _inflated(body: bytes) -> bytes:
+    inflater = zlib.decompressobj()
+    content = inflater.decompress(body, MOST_BATCH_BYTES)
+    if inflater.unconsumed_tail or not inflater.eof:
+        raise MalformedMessage(f"batch of samples: torn, or more than {MOST_BATCH_BYTES} bytes")
+    return content
+
+
+def _lanes(content: bytes) -> Iterator[_Lane]:
+    """Yield lanes one by one, as long as what they claim to hold can be held."""
+    samples = claimed = 0
+    for raw in msgspec.msgpack.decode(content, type=Annotated[list[msgspec.Raw], _MANY]):
+        lane = msgspec.msgpack.decode(raw, type=_Lane)
+        samples += len(lane.numbers)
+        claimed += len(lane.numbers) * lane.length
+        if samples > MOST_SAMPLES or claimed > MOST_BATCH_BYTES:
+            raise MalformedMessage(
+                f"batch of samples: claims {samples} samples of {claimed} bytes, at most "
+                f"{MOST_SAMPLES} of {MOST_BATCH_BYTES} are written"
+            )
+        yield lane
 
 
 def _kind(arrival: Arrival) -> tuple[str, str, str, int]:

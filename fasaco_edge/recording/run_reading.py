@@ -5,7 +5,6 @@ Pictures are passed over chunk by chunk, so that memory does not grow with them.
 
 from __future__ import annotations
 
-import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,13 +17,15 @@ from numpy.typing import NDArray
 from fasaco_edge.bus.sample_codec import place_of
 from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
+from fasaco_edge.recording.frames import Chunk, chunks, column
 from fasaco_edge.recording.repair import Scan, scan_recording
-from fasaco_edge.recording.samples import HINT, Batch, blobs
-from fasaco_edge.recording.sdk import RrdReader
-from fasaco_edge.recording.whole import whole_part
+from fasaco_edge.recording.samples import HINT, Batch, blobs, wall_ns
+from fasaco_edge.recording.sdk import pa
 
 SCALAR, STATE, TEXT = "Scalars:scalars", "StateChange:state", "TextLog:text"
-READ = ("/metrics/", "/state/", "/log/")
+READ = ("metrics/", "state/", "log/")
+# What is kept of a file, unpacked, is at most so many times its size, and this [bytes].
+MOST_RATIO, LEAST_ROOM_BYTES = 16, 16_000_000
 
 Told = tuple[int, str]
 """When [ns], and what."""
@@ -103,37 +104,38 @@ class _Gathering:
 
     def read(self, path: Path) -> None:
         try:
-            with whole_part(path) as (whole, scan), warnings.catch_warnings():
-                # Of a file without its footer: slower to open, and all there.
-                warnings.filterwarnings("ignore", message="RRD file has no footer")
-                reader = RrdReader(str(whole))
-                self._note_part(path, scan, [entry.recording_id for entry in reader.recordings()])
-                for chunk in reader.stream() if scan.frames else ():
+            with path.open("rb") as recording:
+                scan = _scan(path)
+                torn = 0 if scan.has_footer else scan.torn_bytes
+                self.parts.append(PartFile(path, scan.total_bytes, torn, scan.has_footer))
+                room = MOST_RATIO * scan.total_bytes + LEAST_ROOM_BYTES
+                for chunk in chunks(recording, scan):
                     self.advance()
-                    self._take(chunk, path)
+                    if chunk is not None:
+                        self.ids.setdefault(chunk.recording_id, path)
+                        room -= self._take(chunk, path)
+                        if room < 0:
+                            raise ValueError(f"unpacks to more than {MOST_RATIO} times its size")
         except OSError as error:
             raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
-        except (RuntimeError, ValueError, MalformedMessage) as error:
+        except (ValueError, MalformedMessage) as error:
             raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error
 
-    def _note_part(self, path: Path, scan: Scan, ids: list[str]) -> None:
-        for name in ids:
-            self.ids.setdefault(name, path)
-        torn = 0 if scan.has_footer else scan.torn_bytes
-        self.parts.append(PartFile(path, scan.total_bytes, torn, scan.has_footer))
-
-    def _take(self, chunk: Any, path: Path) -> None:  # noqa: ANN401 - rerun has no types
-        entity = chunk.entity_path
-        if entity == f"/{entities.INPUTS}":
-            bodies = blobs(chunk.to_record_batch())
-            self.batches += [Batch(place_of(body), body, path) for body in bodies]
-        elif entity.startswith(READ) and not chunk.is_static:
-            batch = chunk.to_record_batch()
-            times = batch.column(entities.WALL).to_numpy(False).astype(np.int64).tolist()
+    def _take(self, chunk: Chunk, path: Path) -> int:
+        """Take a chunk; return how many bytes of it are kept."""
+        entity, batch = chunk.entity, chunk.batch
+        if entity == entities.INPUTS:
+            self.batches += [Batch(place_of(body), body, path) for body in blobs(batch)]
+        elif entity.startswith(READ) and not chunk.is_static and batch.num_rows:
+            times = wall_ns(batch)
             self.span += [min(times), max(times)]
             values = [value[0] if value else None for value in _values(batch)]
-            rows = [row for row in zip(times, values, strict=False) if row[1] is not None]
-            self.rows[entity[1:]] += rows
+            self.rows[entity] += [
+                row for row in zip(times, values, strict=False) if row[1] is not None
+            ]
+        else:
+            return 0
+        return chunk.bytes
 
     def record(self) -> RunRecord:
         """Return all of it, in order of time."""
@@ -176,9 +178,10 @@ class _Gathering:
 
 
 def _values(batch: Any) -> list[Any]:  # noqa: ANN401 - pyarrow has no types
-    for component in (SCALAR, STATE, TEXT):
-        if component in batch.schema.names:
-            values: list[Any] = batch.column(component).to_pylist()
+    for component, kind in ((SCALAR, pa.float64()), (STATE, pa.string()), (TEXT, pa.string())):
+        found = column(batch, component, pa.list_(kind))
+        if found is not None:
+            values: list[Any] = found.to_pylist()
             return values
     return []
 

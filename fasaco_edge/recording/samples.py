@@ -6,7 +6,6 @@ that is still being written, the whole frames are read.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +17,9 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.sample_codec import Place, SampleDecoder, place_of
 from fasaco_edge.errors import MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.sdk import RrdReader
-from fasaco_edge.recording.whole import whole_part
+from fasaco_edge.recording.frames import chunks, column
+from fasaco_edge.recording.repair import scan_recording
+from fasaco_edge.recording.sdk import pa
 
 HINT = "name the .rrd files that a recorder has written"
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
@@ -95,20 +95,38 @@ class RecordedSamples:
 
 def _batches(path: Path) -> list[Batch]:
     try:
-        with whole_part(path) as (whole, _), warnings.catch_warnings():
-            # Of a file without its footer: slower to open, and all there.
-            warnings.filterwarnings("ignore", message="RRD file has no footer")
-            chunks = RrdReader(str(whole)).stream().filter(content=f"/{entities.INPUTS}")
-            bodies = [body for chunk in chunks for body in blobs(chunk.to_record_batch())]
+        with path.open("rb") as recording:
+            scan = scan_recording(recording)
+            if scan is None:
+                raise ValueError("this is no recording")
+            bodies = [
+                body
+                for chunk in chunks(recording, scan)
+                if chunk is not None and chunk.entity == entities.INPUTS
+                for body in blobs(chunk.batch)
+            ]
         return [Batch(place_of(body), body, path) for body in bodies]
     except OSError as error:
         raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
-    except (RuntimeError, ValueError, MalformedMessage) as error:
+    except (ValueError, MalformedMessage) as error:
         raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error
 
 
 def blobs(batch: Any) -> Iterator[bytes]:  # noqa: ANN401 - pyarrow has no types
     """Yield the batches of samples in a record batch of the entity ``inputs``."""
-    if COMPONENT in batch.schema.names:
-        for blob in batch.column(COMPONENT):
-            yield np.asarray(blob.values, np.uint8).tobytes()
+    found = column(batch, COMPONENT, pa.list_(pa.uint8()))
+    for blob in found if found is not None else ():
+        yield np.asarray(blob.values, np.uint8).tobytes()
+
+
+def wall_ns(batch: Any) -> list[int]:  # noqa: ANN401 - pyarrow has no types
+    """Return when the rows of a record batch were logged [ns].
+
+    Raises:
+        ValueError: they have no such times.
+    """
+    found = column(batch, entities.WALL, pa.timestamp("ns"))
+    if found is None:
+        raise ValueError(f"rows without the timeline {entities.WALL}")
+    times: list[int] = found.cast(pa.int64()).to_pylist()
+    return times

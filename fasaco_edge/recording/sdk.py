@@ -20,4 +20,4 @@ except ImportError as error:
 # Arrow's own pool keeps what is freed: some ten megabytes of it.
 pa.set_memory_pool(pa.system_memory_pool())
 
-__all__ = ["RrdReader", "rr", "rrb"]
+__all__ = ["RrdReader", "pa", "rr", "rrb"]

@@ -1,0 +1,248 @@
+"""Recordings are read as Rerun reads them, and believed no further than they go."""
+
+from __future__ import annotations
+
+import random
+import struct
+import subprocess
+import sys
+import warnings
+import zlib
+
+import msgspec
+import numpy as np
+import pytest
+
+pytest.importorskip("rerun")
+
+import pyarrow as pa
+
+from fasaco_edge.bus.sample_codec import _HEAD, WHOLE, SampleEncoder, _Lane
+from fasaco_edge.errors import UnreadableRecording
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.frames import MOST_CHUNK_BYTES, chunks
+from fasaco_edge.recording.part import Part
+from fasaco_edge.recording.repair import FRAME, HEADER_BYTES, scan_recording
+from fasaco_edge.recording.samples import RecordedSamples
+from fasaco_edge.recording.sdk import RrdReader, rr
+from fasaco_edge.review.reading import read_review
+from tests.bus.test_sample_codec import arrival
+
+RUN_ID = "20260101T000000Z-robot"
+BEGAN_NS = 1_767_225_600 * 10**9
+
+
+def recorded(folder, *batches):
+    """Record some of all that a recorder does; return the file."""
+    file = folder / f"{RUN_ID}-part1.rrd"
+    part = Part(file, RUN_ID)
+    for number in range(5):
+        rr.set_time(entities.WALL, timestamp=np.datetime64(BEGAN_NS, "ns"), recording=part.stream)
+        rr.log(entities.COVERED_FRACTION, rr.Scalars(0.2 * number), recording=part.stream)
+        rr.log(entities.MISSION_LOG, rr.TextLog(f"covering: {number}"), recording=part.stream)
+    rr.log("world/card", rr.TextDocument("static"), static=True, recording=part.stream)
+    for batch in batches or (samples(),):
+        part.write_blob(batch, BEGAN_NS)
+    part.flush(10.0)
+    part.close()
+    return file
+
+
+def samples():
+    encoder = SampleEncoder(1)
+    for number in range(20):
+        encoder.add(arrival(b"pose %3d" % number, "pose"))
+    return encoder.take()
+
+
+def frames_of(content):
+    """Return where each frame begins, its kind, and its length."""
+    found, at = [], HEADER_BYTES
+    while at + FRAME.size <= len(content):
+        kind, length = FRAME.unpack_from(content, at)
+        found.append((at, kind, length))
+        at += FRAME.size + length
+        if not kind:
+            break
+    return found
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    return recorded(tmp_path_factory.mktemp("recording"))
+
+
+def test_they_are_read_as_rerun_reads_them(recording):
+    with recording.open("rb") as file:
+        mine = [chunk for chunk in chunks(file, scan_recording(file)) if chunk is not None]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        theirs = list(RrdReader(str(recording)).stream())
+    assert {chunk.recording_id for chunk in mine} == {RUN_ID}
+    told = {(chunk.entity, chunk.is_static, chunk.batch.num_rows) for chunk in mine}
+    assert told == {
+        (chunk.entity_path.removeprefix("/"), chunk.is_static, chunk.num_rows) for chunk in theirs
+    }
+    assert len(mine) == len(theirs) > 3
+    columns = {chunk.entity: chunk.batch for chunk in mine if not chunk.is_static}
+    for chunk in theirs:
+        if not chunk.is_static:
+            batch = chunk.to_record_batch()
+            entity = columns[chunk.entity_path.removeprefix("/")]
+            assert [entity.column(name).to_pylist() for name in batch.schema.names] == [
+                column.to_pylist() for column in batch.columns
+            ]
+
+
+def lane(**changes):
+    """Return a batch with one lane that holds what it claims, but for the changes."""
+    told = {
+        "topic": "map",
+        "key": "k",
+        "schema": "s",
+        "length": 8,
+        "numbers": [0],
+        "at_ns": [0],
+        "ahead_ns": [0],
+        "attachments": [],
+        "against": WHOLE,
+        "checksum": zlib.crc32(bytes(8)),
+        "sparse": True,
+        "body": struct.pack("<I", 0),
+    }
+    content = msgspec.msgpack.encode([_Lane(**(told | changes))])
+    return _HEAD.pack(1, 5, 0) + zlib.compress(content)
+
+
+LIES = {
+    "a payload of 2 GB": lane(length=2 * 10**9),
+    "many payloads of 60 MB": lane(length=60_000_000, numbers=[1] * 9, at_ns=[1] * 9),
+    "a million samples": lane(numbers=[1] * 10**6, at_ns=[1] * 10**6, ahead_ns=[1] * 10**6),
+    "runs of 4 GB": lane(
+        body=struct.pack("<I", 2)
+        + np.array([0, 2**32 - 1], "<u4").view("u1").reshape(2, 4).T.tobytes()
+    ),
+    "a gigabyte of zeros, deflated": _HEAD.pack(1, 5, 0) + zlib.compress(bytes(10**9), 9),
+}
+
+
+@pytest.mark.parametrize("batch", LIES.values(), ids=list(LIES))
+def test_a_batch_that_claims_too_much_is_refused_in_little_memory(tmp_path, batch):
+    told = limited(recorded(tmp_path, batch))
+    assert "UnreadableRecording" in told, told
+
+
+def repacked(recording, folder, change):
+    """Copy a recording, its first chunk's Arrow message changed; return the file."""
+    content = bytearray(recording.read_bytes())
+    at, _, length = next(frame for frame in frames_of(content) if frame[1] == 2)
+    body = change(bytes(content[at + FRAME.size : at + FRAME.size + length]))
+    content[at : at + FRAME.size + length] = FRAME.pack(2, len(body)) + body
+    file = folder / recording.name
+    file.write_bytes(content)
+    return file
+
+
+def varint(value):
+    parts = []
+    while value > 0x7F:
+        parts.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*parts, value])
+
+
+def chunk_of(batch, *, claimed=None, options=None):
+    """Return a frame's body that holds a record batch, packed with LZ4."""
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, batch.schema, options=options) as writer:
+        writer.write_batch(batch)
+    content = sink.getvalue().to_pybytes()
+    packed = pa.compress(content, codec="lz4_raw", asbytes=True)
+    store = b"\x08\x01\x12" + varint(len(RUN_ID)) + RUN_ID.encode()
+    return b"".join(
+        (
+            b"\x0a" + varint(len(store)) + store,
+            b"\x10\x02\x18" + varint(len(content) if claimed is None else claimed),
+            b"\x2a" + varint(len(packed)) + packed,
+        )
+    )
+
+
+def batch_of(entity, **columns):
+    table = pa.table(columns).replace_schema_metadata({"rerun:entity_path": f"/{entity}"})
+    return table.to_batches()[0]
+
+
+WALL = pa.array([BEGAN_NS], pa.timestamp("ns"))
+ZEROS = batch_of("log/x", wall=WALL, x=pa.array([bytes(10**6)]))
+LYING_CHUNKS = {
+    "unpacks to 60 GB": (chunk_of(ZEROS, claimed=60 * 10**9), "hold at most"),
+    "unpacks to more than there is": (chunk_of(ZEROS, claimed=MOST_CHUNK_BYTES), "hold at most"),
+    "columns that are packed, too": (
+        chunk_of(ZEROS, options=pa.ipc.IpcWriteOptions(compression="zstd")),
+        "columns that are compressed",
+    ),
+    "a list of two thousand million nothings": (
+        chunk_of(
+            batch_of(
+                entities.MISSION_LOG,
+                wall=WALL,
+                **{
+                    "TextLog:text": pa.ListArray.from_arrays(
+                        pa.array([0, 2**31 - 1], pa.int32()), pa.nulls(2**31 - 1)
+                    )
+                },
+            )
+        ),
+        "has to be list<item: string> without nulls",
+    ),
+    "no times": (chunk_of(batch_of("metrics/x", y=WALL)), "without the timeline wall"),
+    "no Protobuf": (b"\xff" * 40, "frame 3"),
+}
+
+
+@pytest.mark.parametrize(("body", "said"), LYING_CHUNKS.values(), ids=list(LYING_CHUNKS))
+def test_a_chunk_that_claims_what_it_cannot_be_is_named(recording, tmp_path, body, said):
+    told = limited(repacked(recording, tmp_path, lambda _: body))
+    assert told.startswith("UnreadableRecording"), told
+    assert said in told
+
+
+def limited(file):
+    """Read a recording in a process that may have 700 MB more than it has; return what it says."""
+    code = (
+        "import resource, sys, pathlib\n"
+        "from fasaco_edge.review.reading import read_review\n"
+        "from fasaco_edge.errors import FasacoError\n"
+        "pages = int(open('/proc/self/statm').read().split()[0])\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (4096 * pages + 700_000_000,) * 2)\n"
+        "try:\n    read_review([pathlib.Path(sys.argv[1])])\n"
+        "except FasacoError as error:\n    print(type(error).__name__, error)\n"
+    )
+    words = [sys.executable, "-c", code, str(file)]
+    ended = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+    return ended.stdout
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_recording_with_wrong_bytes_is_read_or_named(recording, tmp_path, seed):
+    """Never a traceback, never the end of the process, as with Rerun's own reader."""
+    dice, content = random.Random(seed), recording.read_bytes()
+    frames = frames_of(content)
+    file, read = tmp_path / recording.name, 0
+    for _ in range(60):
+        wrong = bytearray(content)
+        for _ in range(dice.choice((1, 1, 3))):
+            at, _, length = dice.choice(frames)
+            place = at + dice.choice((dice.randrange(16), 16 + dice.randrange(max(length, 1))))
+            wrong[place % len(wrong)] = dice.choice((0, 0x7F, 0x80, 0xFF, dice.randrange(256)))
+        file.write_bytes(wrong)
+        try:
+            read_review([file])
+            list(RecordedSamples([file]))
+            read += 1
+        except UnreadableRecording as error:
+            told = str(error)
+    assert 0 < read < 60
+    assert str(file) in told
