@@ -22,7 +22,9 @@ SPEAK = ("put", "reply", "declare_queryable", "liveliness_token")
 LISTEN = ("declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query")
 
 MAPS = ("map", "map_update")
-VIEWS = ("path", "status", "coverage", "pheromone", "alive")
+# By these the daemons of one name see each other.
+CLAIMS = "claim/*/*"
+VIEWS = ("path", "status", "coverage", "pheromone", "alive", CLAIMS)
 VIEW_QUERIES = (
     "@rpc/path",
     "@rpc/status",
@@ -33,7 +35,7 @@ VIEW_QUERIES = (
 )
 # To ask these is to command.
 COMMANDS = ("@rpc/mission", "@rpc/replan")
-TOKENS = ("alive", "recorder/alive")
+TOKENS = ("alive", CLAIMS, "recorder/alive")
 RECORDER = ("recorder", "recorder/alive")
 SAID_BY_ROBOT = (*VIEWS, "command", "turns", *VIEW_QUERIES, *COMMANDS)
 HEARD_BY_ROBOT = (*MAPS, "pose", *RECORDER)
@@ -86,7 +88,9 @@ ROLES: Mapping[str, Role] = {
     # Whom a daemon connects to: what others may do there, the router itself has to restrict.
     "router": Role("passes everything on, both ways", speaks=EVERYTHING, listens=EVERYTHING),
     # The daemon itself, as a router sees it.
-    "robot": Role("plans: hears maps, says paths", speaks=SAID_BY_ROBOT, listens=HEARD_BY_ROBOT),
+    "robot": Role(
+        "plans: hears maps, says paths", speaks=SAID_BY_ROBOT, listens=(*HEARD_BY_ROBOT, CLAIMS)
+    ),
 }
 
 

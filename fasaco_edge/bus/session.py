@@ -25,6 +25,7 @@ from fasaco_edge.bus.latched import Asker, LatchedSubscription, Subscription
 from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.qos import VOLATILE, Qos
 from fasaco_edge.bus.queries import Question, Reply, Request, reply_of, request_of, send
+from fasaco_edge.bus.roll import Roll
 from fasaco_edge.bus.session_config import session_config
 from fasaco_edge.errors import BusUnavailable
 
@@ -61,15 +62,27 @@ class Sample:
     attachment: bytes = b""
 
 
+@dataclass(slots=True)
+class _Served:
+    """What answers queries on a key."""
+
+    key: str
+    receive: Callable[[zenoh.Query], None]
+    complete: bool
+    declared: Any
+
+
 class Bus:
     """A session, with everything declared on it; close it on every way out."""
 
-    def __init__(self, session: zenoh.Session) -> None:
+    def __init__(self, session: zenoh.Session, listens: bool = False) -> None:
         self._session = session
+        self._listens = listens
         self._declared: list[Any] = []
+        self._served: list[_Served] = []
         # What others hold, too: nothing of Zenoh's may be left to the last garbage collection,
         # in which its threads and the interpreter may wait for each other for ever.
-        self._lent: list[Publisher | Subscription] = []
+        self._lent: list[Publisher | Subscription | Roll] = []
         self._asker = Asker()
 
     def __enter__(self) -> Self:
@@ -133,7 +146,7 @@ class Bus:
             if reply is not None:
                 send(query, key, reply)
 
-        self._declared.append(self._session.declare_queryable(key, receive, complete=complete))
+        self._serve(key, receive, complete=complete)
 
     def take_questions(self, key: str, receive: Callable[[Question], None]) -> None:
         """Call ``receive`` with each query on ``key``, on a Zenoh thread; to be answered later."""
@@ -141,7 +154,20 @@ class Bus:
         def take(query: zenoh.Query) -> None:
             receive(Question(query, key))
 
-        self._declared.append(self._session.declare_queryable(key, take, complete=True))
+        self._serve(key, take, complete=True)
+
+    def _serve(self, key: str, receive: Callable[[zenoh.Query], None], *, complete: bool) -> None:
+        declared = self._session.declare_queryable(key, receive, complete=complete)
+        self._served.append(_Served(key, receive, complete, declared))
+
+    def let_others_answer(self, yes: bool) -> None:
+        """Answer only who asks everybody, as long as another session serves the same; or all."""
+        for served in self._served:
+            if served.complete:
+                served.declared.undeclare()
+                served.declared = self._session.declare_queryable(
+                    served.key, served.receive, complete=not yes
+                )
 
     def get(self, selector: str, timeout_s: float = 2.0, payload: bytes = b"") -> list[Reply]:
         """Ask ``selector`` (a key, parameters behind ``?``) and return all answers.
@@ -157,9 +183,28 @@ class Bus:
         )
         return [reply_of(reply) for reply in replies]
 
-    def token(self, key: str) -> None:
-        """Declare a liveliness token; it vanishes with this session."""
-        self._declared.append(self._session.liveliness().declare_token(key))
+    def token(self, key: str) -> object:
+        """Declare a liveliness token and return it; it vanishes with this session."""
+        token = self._session.liveliness().declare_token(key)
+        self._declared.append(token)
+        return token
+
+    def withdraw(self, token: object) -> None:
+        """Take a token back."""
+        declared: Any = token
+        self._declared.remove(declared)
+        declared.undeclare()
+
+    def roll(self, key: str) -> Roll:
+        """Keep account of the liveliness tokens that match ``key``."""
+        roll = Roll(self._session, key)
+        self._lent.append(roll)
+        return roll
+
+    def is_in_touch(self) -> bool:
+        """Tell whether others can be heard: somebody is connected, or could be at any time."""
+        info = self._session.info
+        return self._listens or bool(info.routers_zid() or info.peers_zid())
 
     def alive(self, key: str, timeout_s: float = 1.0) -> list[str]:
         """Return the keys of the liveliness tokens that match ``key`` now."""
@@ -181,6 +226,7 @@ class Bus:
         """End the session; a process that does not close it may hang at exit."""
         self._asker.close()
         self._declared.clear()
+        self._served.clear()
         for lent in self._lent:
             lent.release()
         self._lent.clear()
@@ -195,7 +241,7 @@ def open_bus(settings: BusSettings) -> Bus:
         BusUnavailable: nothing listens at the endpoints, or an address is wrong.
     """
     try:
-        return Bus(zenoh.open(_config(settings)))
+        return Bus(zenoh.open(_config(settings)), bool(settings.listen))
     except zenoh.ZError as error:
         # A secured session joins nobody it was not told to.
         taken = settings.listen and "Address already in use" in str(error)

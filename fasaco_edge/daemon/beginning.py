@@ -20,6 +20,7 @@ from fasaco_edge.mission.events import (
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.worker import PlanningWorker
+    from fasaco_edge.grid.occupancy import OccupancyGrid
     from fasaco_edge.mission.mission import Mission
 
 
@@ -40,7 +41,7 @@ class Beginning:
         self._keeping = keeping
         self._load = load
         self._loader: Loader | None = None
-        self.take(held)
+        self.held.extend(held)
 
     @property
     def stage(self) -> str:
@@ -60,8 +61,33 @@ class Beginning:
                     faults.append(PatchWithoutBase("map update refused: there is no map yet"))
                     continue
             self.held.append(event)
-        if self._loader is None and any(isinstance(event, MapReceived) for event in events):
+        return faults
+
+    def load(self) -> None:
+        """Begin to load what plans, once there is a map."""
+        if self._loader is None and any(isinstance(held, MapReceived) for held in self.held):
             self._loader = self._load()
+
+    def condense(self) -> list[FasacoError]:
+        """Put updates into their map: what is held for long must not grow. Return what misfits."""
+        faults: list[FasacoError] = []
+        grid: OccupancyGrid | None = None
+        kept: list[Event] = []
+        for event in self.held:
+            match event:
+                case MapReceived():
+                    grid = event.grid
+                case PatchReceived() if grid is not None:
+                    try:
+                        grid = grid.patched(event.patch)
+                    except FasacoError as error:
+                        faults.append(error.with_traceback(None))
+                case PoseReceived():
+                    kept.append(event)
+                case _ if grid is not None:
+                    faults.append(PatchWithoutBase("map update refused: some before it were lost"))
+                    grid = None
+        self.held = [*([MapReceived(grid)] if grid is not None else []), *kept]
         return faults
 
     def _drop(self, kind: Callable[[Event], bool], frame: str) -> None:
@@ -72,16 +98,19 @@ class Beginning:
 
     def loaded(self) -> tuple[Mission, PlanningWorker] | None:
         """Return mission and worker once they are there."""
+        self.load()
         loaded = self._loader.poll() if self._loader else None
         if loaded is not None:
             self._keeping.restore(loaded[0], self.assignment)
         return loaded
 
-    def obey(self, commands: Sequence[CommandReceived]) -> list[Answer]:
-        """Take commands, as the mission will; return the answers."""
+    def obey(self, commands: Sequence[CommandReceived], rival: str = "") -> list[Answer]:
+        """Take commands, as the mission will, unless another daemon is to; return the answers."""
         answers = []
         for asked in commands:
             try:
+                if rival:
+                    raise CommandError(rival, hint="command the one that plans")
                 self.assignment = self.assignment.after(asked.command, asked.order)
                 if asked.command == "replan":
                     raise CommandError("nothing to plan: the first plan is still to come")

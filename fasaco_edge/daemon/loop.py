@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, cast
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.daemon.beginning import Beginning, heard_of
+from fasaco_edge.daemon.claim import NameClaim, Stand
 from fasaco_edge.daemon.commands import Commands
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.coverage_news import CoverageNews
@@ -46,6 +47,8 @@ LOG = logging.getLogger(__name__)
 TICK_S = 0.1
 # A mission that breaks again within so long broke on the map it has [s].
 SOON_S = 60.0
+# While another daemon plans, so many updates of the map gather before they are put into it.
+MOST_HELD = 64
 
 
 class Loop:
@@ -67,6 +70,7 @@ class Loop:
         turns: TurnLog,
         vitals: Vitals,
         reload: Reload,
+        claim: NameClaim,
     ) -> None:
         self.config = config
         self._mailbox = mailbox
@@ -82,6 +86,7 @@ class Loop:
         self._turns = turns
         self._vitals = vitals
         self._reload = reload
+        self._claim = claim
         self._status = StatusBoard(config)
         self._mission: Mission | None = None
         self._worker: PlanningWorker | None = None
@@ -95,6 +100,9 @@ class Loop:
     def run(self, stop: threading.Event) -> None:
         """Turn until ``stop`` is set."""
         while not stop.is_set():
+            if not self._heed_claim(time.monotonic()):
+                stop.wait(TICK_S)
+                continue
             items = self._mailbox.take(TICK_S)
             taken = time.monotonic()
             if self._reload.asked.is_set() and not self._loading:
@@ -109,7 +117,8 @@ class Loop:
             if mission is not None:
                 decision = self._turn(mission, [*events, *commands, *_plans(items)], started)
             else:
-                decision = Decision(answers=tuple(self._beginning.obey(commands)))
+                rival = self._status.stands_back
+                decision = Decision(answers=tuple(self._beginning.obey(commands, rival)))
             answers = decision.answers
             note = TurnNote(started, items, lost, commands, decision)
             if not self._gate.let_out("turns", partial(self._turns.note, note, self._mission)):
@@ -149,17 +158,36 @@ class Loop:
         else:
             self._vitals.remark = ""
             if config != self.config:
-                self._go_on_with(config)
+                self._go_on_with(config, "the configuration has changed")
                 items = [(kind, item) for kind, item in items if kind != "plan"]
         self._reload.done()
         return items
 
-    def _go_on_with(self, config: DaemonConfig) -> None:
+    def _heed_claim(self, now: float) -> bool:
+        """Stand back where another daemon of this name plans; tell whether a turn is to be made."""
+        claim, mission = self._claim, self._mission
+        if claim.look(now):
+            self._status.stands_back = claim.reason if claim.waits else ""
+            if claim.waits:
+                self._turns.end(claim.reason)
+                if mission is not None:
+                    self._let_stand(mission, claim.reason)
+                    self._outbox.forget()
+                    self._go_on_with(self.config, claim.reason)
+            claim.show()
+        elif claim.hears_of_yielding and mission is not None:
+            # The robot may have heard the other last, and that was to stand.
+            self._go_on_with(self.config, "another daemon planned, too")
+        elif self._status.stands_back:
+            self._status.stands_back = claim.reason
+        return not claim.doubts(now)
+
+    def _go_on_with(self, config: DaemonConfig, why: str) -> None:
         """Let another mission go on from the ledger, as after a restart."""
         self.config = config
         self._status.show(config)
         held = heard_of(self._mission) if self._mission is not None else self._beginning.held
-        self._begin_again("the configuration has changed", held)
+        self._begin_again(why, held)
 
     def _begin_again(self, why: str, held: Sequence[Event]) -> None:
         """Let another mission go on from the ledger, with what is to be heard first."""
@@ -175,7 +203,12 @@ class Loop:
     def _begin(self, events: list[Event]) -> Mission | None:
         """Hold ``events`` until there is a mission; once it is there, they are all that was."""
         self._refuse(self._beginning.take(events))
-        loaded = self._beginning.loaded()
+        if self._claim.waits:
+            if len(self._beginning.held) > MOST_HELD:
+                self._refuse(self._beginning.condense())
+            return None
+        self._beginning.load()
+        loaded = self._beginning.loaded() if self._claim.stand is Stand.PLANS else None
         if loaded is None:
             return None
         self._mission, self._worker = loaded
@@ -213,9 +246,7 @@ class Loop:
         self._broke_at = now
         held = heard_of(mission) if now - broke_at > SOON_S else []
         self._status.waits = f"{fault}: waits for another map"
-        if mission.grid is not None and mission.lattice is not None and len(mission.path.cells):
-            stop = PathUpdate(mission.revision + 1, mission.path.cells[:0], str(fault))
-            self._publish_path(mission, stop)
+        self._let_stand(mission, str(fault))
         self._begin_again("the mission broke off", held)
         return Decision(
             answers=tuple(
@@ -224,6 +255,12 @@ class Loop:
                 if isinstance(event, CommandReceived)
             )
         )
+
+    def _let_stand(self, mission: Mission, reason: str) -> None:
+        """Take back the path of a mission that goes no further."""
+        if mission.grid is not None and mission.lattice is not None and len(mission.path.cells):
+            stop = PathUpdate(mission.revision + 1, mission.path.cells[:0], reason)
+            self._publish_path(mission, stop)
 
     def announce(self) -> None:
         """Publish a first status, so that who asks gets one from the beginning."""
@@ -287,6 +324,7 @@ class Loop:
     def _publish_status(self, now: float) -> None:
         if self._recorder is not None:
             self._status.recorder = self._recorder.poll(now)
+        self._status.claim = self._claim.document()
         self._status.ledger = self._ledger.document(now)
         self._status.faults.count(self._ledger.take_faults(), is_logged=True)
         self._status.faults.count(self._gate.take_faults(), is_logged=True)

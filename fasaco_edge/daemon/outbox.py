@@ -72,6 +72,14 @@ class Outbox:
         if self._ros is not None:
             self._ros.path.put(payload)
 
+    def forget(self) -> None:
+        """Keep no path and no coverage for those who join late: another daemon has them."""
+        for publisher in (self._path, self._coverage):
+            publisher.forget()
+        if self._ros is not None:
+            self._ros.path.forget()
+            self._ros.coverage.forget()
+
     def status(self, document: dict[str, Any]) -> None:
         """Publish the status."""
         self.gate.let_out("status", lambda: self._say_status(document))

@@ -74,6 +74,10 @@ class RosPublisher:
         self._gid = gid
         self._count = 0
 
+    def forget(self) -> None:
+        """Keep nothing of what was said for those who join late."""
+        self._publisher.forget()
+
     def put(self, payload: bytes) -> None:
         """Send a message."""
         self._count += 1

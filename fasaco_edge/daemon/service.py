@@ -12,6 +12,7 @@ from pathlib import Path
 from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.daemon.about import serve_about
+from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.commands import Commands
 from fasaco_edge.daemon.compiling import KernelCompiler
 from fasaco_edge.daemon.config import DaemonConfig
@@ -104,7 +105,10 @@ def _serve(
     commands = Commands(bus, keys, mailbox)
     turns = TurnLog(bus.publisher(keys.turns, qos=QOS["turns"]), config, ledger.restored)
     vitals = Vitals(manager)
-    loop = Loop(config, mailbox, inbox, commands, outbox, ledger, recorder, turns, vitals, reload)
+    claim = NameClaim(bus, keys)
+    loop = Loop(
+        config, mailbox, inbox, commands, outbox, ledger, recorder, turns, vitals, reload, claim
+    )
     serve_about(bus, keys, lambda: loop.config)
     try:
         loop.announce()

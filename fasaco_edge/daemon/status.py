@@ -70,7 +70,12 @@ class Faults:
 
 
 class StatusBoard:
-    """Collects what a status says, and knows when one is due."""
+    """Collects what a status says, and knows when one is due.
+
+    Attributes:
+        claim: who this daemon is, and whether it plans, as the status has it.
+        stands_back: why another daemon plans, and this one does not; "" where it does.
+    """
 
     def __init__(self, config: DaemonConfig) -> None:
         self.faults = Faults()
@@ -82,6 +87,8 @@ class StatusBoard:
         self.ledger: dict[str, Any] = {}
         self.path: PathUpdate | None = None
         self.waits = "no map yet"
+        self.claim: dict[str, str] = {}
+        self.stands_back = ""
         self._config = config
         self.show(config)
         self._started = time.monotonic()
@@ -95,13 +102,18 @@ class StatusBoard:
     def due(
         self, mission: Mission | None, assignment: Assignment, loading: str, now: float
     ) -> dict[str, Any] | None:
-        """Return the status if it changed or a second has passed, else None."""
+        """Return the status if it changed or a second has passed, else None.
+
+        Who waits for another daemon leaves the seconds to that one.
+        """
         state, reason = self._state(mission, assignment, loading)
         recorder = (self.recorder or {}).get("state")
         revision = self.path and self.path.revision
-        key = (state, reason, revision, recorder, self.ledger.get("fault"), assignment)
+        claim = self.claim.get("stand")
+        key = (state, reason, revision, recorder, self.ledger.get("fault"), assignment, claim)
         # Many small faults are not worth a message each: the heartbeat counts them.
-        wait = LEAST_INTERVAL_S if key != self._sent_key else HEARTBEAT_S
+        heartbeat_s = float("inf") if self.stands_back else HEARTBEAT_S
+        wait = LEAST_INTERVAL_S if key != self._sent_key else heartbeat_s
         if now - self._sent_at < wait:
             return None
         self._sent_at, self._sent_key = now, key
@@ -110,6 +122,7 @@ class StatusBoard:
             "version": __version__,
             "state": state,
             "reason": reason,
+            "claim": self.claim,
             **self._document(mission, now),
             "mission": mission_report(mission, assignment),
         }
@@ -130,6 +143,8 @@ class StatusBoard:
     def _state(
         self, mission: Mission | None, assignment: Assignment, loading: str
     ) -> tuple[str, str]:
+        if self.stands_back:
+            return "blocked", self.stands_back
         if mission is not None:
             return str(mission.state), mission.reason
         if assignment.order is None:

@@ -41,7 +41,7 @@ from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.pose_decoding import PoseDecoder
-from fasaco_edge.wire.status import decode_json, encode_json
+from fasaco_edge.wire.status import decode_json, encode_json, is_the_planners
 
 TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000
@@ -186,6 +186,10 @@ class Recorder:
     def _write(self, arrival: Arrival) -> None:
         self._messages += 1
         self._journal.message(arrival.wall_ns)
+        if arrival.topic == "status" and not is_the_planners(arrival.sample.payload):
+            line = "another daemon of this robot's name is there, and waits: it is not recorded"
+            self._scene.complain(entities.BUS_LOG, line)
+            return
         self._inputs.add(arrival)
         try:
             self._readers[arrival.topic](arrival.sample)

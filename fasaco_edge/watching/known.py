@@ -145,6 +145,11 @@ class Known:
 
     def _read_status(self, sample: Sample, now: float) -> None:
         report = read(decode_json(sample.payload), Report)
+        if report.claim.stand != "plans":
+            # It may be a second daemon of this name: what that is like is not how the robot is.
+            if report.claim.stand != "looks":
+                self.journal.add(now, f"a second daemon is {report.state}: {report.reason}", BAD)
+            return
         for text, tone in differences(self.report, report):
             self.journal.add(now, text, tone)
         self.report, self.document, self._reported_at = report, sample.payload, now

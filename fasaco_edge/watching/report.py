@@ -143,11 +143,19 @@ class Config(msgspec.Struct, frozen=True):
     pose: PoseType = PoseType()
 
 
+class ClaimReport(msgspec.Struct, frozen=True):
+    """Who has said it, and whether that daemon plans."""
+
+    id: str = ""
+    stand: str = "plans"
+
+
 class Report(msgspec.Struct, frozen=True):
     """A status."""
 
     state: str
     reason: str = ""
+    claim: ClaimReport = ClaimReport()
     uptime_s: float = 0.0
     pose: Place | None = None
     coverage: Coverage | None = None

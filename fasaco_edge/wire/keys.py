@@ -91,6 +91,15 @@ class Keys:
         return f"{self.prefix}/alive"
 
     @property
+    def claims(self) -> str:
+        """What matches the claims of all daemons of this name."""
+        return self.claim("*", "*")
+
+    def claim(self, own: str, stand: str) -> str:
+        """Liveliness token of the daemon with the Zenoh id ``own``, which "plans" or "waits"."""
+        return f"{self.prefix}/claim/{own}/{stand}"
+
+    @property
     def recorder(self) -> str:
         """Out, by the recorder: what it is doing."""
         return f"{self.prefix}/recorder"

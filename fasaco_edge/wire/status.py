@@ -54,3 +54,15 @@ def _check_finite(value: object, where: str) -> None:
     elif isinstance(value, list | tuple):
         for index, item in enumerate(value):
             _check_finite(item, f"{where}[{index}]")
+
+
+def is_the_planners(payload: bytes) -> bool:
+    """Tell whether a status is of the daemon that plans; another of its name may wait.
+
+    What cannot be read is, so that whoever reads it says so.
+    """
+    try:
+        claim = decode_json(payload).get("claim")
+    except MalformedMessage:
+        return True
+    return not isinstance(claim, dict) or claim.get("stand", "plans") == "plans"

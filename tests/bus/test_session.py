@@ -15,6 +15,7 @@ import zenoh.ext
 
 from fasaco_edge.bus.qos import QOS
 from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.roll import MOST_TOKENS
 from fasaco_edge.bus.session import BusSettings, Sample, open_bus
 from fasaco_edge.errors import BusUnavailable
 from tests.daemon.outsider import Ear, open_client
@@ -295,3 +296,39 @@ with open_bus(BusSettings("peer", (), ({endpoint!r},))) as bus:
     bus.publisher({KEY!r}, qos=QOS["path"]).put(b"")
 """
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
+def test_a_roll_of_tokens_is_kept_up_to_date(bus, endpoint):
+    with open_bus(BusSettings("client", (endpoint,))) as other:
+        before = other.token(f"{KEY}/a")
+        roll = bus.roll(f"{KEY}/*")
+        until(lambda: roll.is_whole and roll.there() == {f"{KEY}/a"})
+        other.token(f"{KEY}/b")
+        until(lambda: roll.there() == {f"{KEY}/a", f"{KEY}/b"})
+        other.withdraw(before)
+        until(lambda: roll.there() == {f"{KEY}/b"})
+    until(lambda: roll.there() == set())
+
+
+def test_a_roll_has_a_bound_and_forgets_no_one_for_good(bus, endpoint):
+    with open_bus(BusSettings("client", (endpoint,))) as honest:
+        with open_bus(BusSettings("client", (endpoint,))) as flood:
+            for number in range(3 * MOST_TOKENS):
+                flood.token(f"{KEY}/flood-{number}")
+            roll = bus.roll(f"{KEY}/*")
+            until(lambda: roll.is_whole and len(roll.there()) == MOST_TOKENS)
+            honest.token(f"{KEY}/honest")
+        until(lambda: roll.check_if_due() or roll.there() == {f"{KEY}/honest"})
+
+
+def test_who_lets_others_answer_is_asked_no_more(bus, endpoint):
+    with (
+        open_bus(BusSettings("client", (endpoint,))) as other,
+        open_bus(BusSettings("client", (endpoint,))) as client,
+    ):
+        for number, session in enumerate((bus, other)):
+            session.serve(KEY, lambda _, number=number: Reply(b"%d" % number))
+        for yielding, asked in ((bus, b"1"), (other, b"0")):
+            yielding.let_others_answer(True)
+            until(lambda asked=asked: [r.payload for r in client.get(KEY)] == [asked])
+            yielding.let_others_answer(False)

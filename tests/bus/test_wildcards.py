@@ -9,7 +9,7 @@ from fasaco_edge.wire.keys import RPC_NAMES, Keys
 from tests.wire.readme_tables import WILDCARDS, load
 
 TOPICS = {
-    entry["name"]: entry["key"].removeprefix("{base}/@v1/{robot}/")
+    entry["name"]: entry["key"].removeprefix("{base}/@v1/{robot}/").replace("*/*", "1f/plans")
     for entry in load("keys.yaml")["keys"]
 }
 ROBOTS = ("robot", "mower-2")
@@ -29,7 +29,7 @@ MATCHED = {
     "**": set(),
     "fasaco/@v1/**": topics(*TOPICS, robots=ROBOTS),
     "fasaco/@v1/robot/**": topics(*TOPICS),
-    "fasaco/@v1/robot/*": topics(*TOPICS.keys() - {"recorder_alive"}),
+    "fasaco/@v1/robot/*": topics(*TOPICS.keys() - {"recorder_alive", "claim"}),
     "fasaco/@v1/*/status": topics("status", robots=ROBOTS),
     "fasaco/@v1/*/alive": topics("alive", robots=ROBOTS),
     "fasaco/@v1/**/alive": topics("alive", "recorder_alive", robots=ROBOTS),

@@ -102,3 +102,20 @@ def test_a_viewer_views_both(ca, endpoint):
             assert status(tablet)["robot"] == name
             key = f"{tablet.prefix}/@rpc/mission"
             assert list(tablet.session.get(key, timeout=SILENCE_S, payload=PAUSE)) == []
+
+
+def test_a_robot_alone_claims_its_name(office, voice, ca, endpoint, tmp_path):
+    """Whoever else says that it plans is not heard; a second daemon with its certificate is."""
+    sessions = [voice(name) for name in ("slam-r1", "tablet", "office", "r2")]
+    tokens = [s.liveliness().declare_token("fasaco/@v1/r1/claim/0/plans") for s in sessions]
+    time.sleep(SILENCE_S)
+    assert status(office[0])["claim"]["stand"] == "plans"
+    assert len(tokens) == len(sessions)
+    security = {"kind": "tls", "tls": ca.files("r1"), "roles": {"router": ["router"]}}
+    bus = {"mode": "client", "listen": [], "connect": [endpoint], "security": security}
+    with daemon_process(tmp_path, bus=bus, robot={"name": "r1"}) as second:
+        deadline = time.monotonic() + 60.0
+        while "this one waits" not in second.log_text():
+            assert time.monotonic() < deadline, second.log_text()
+            time.sleep(0.05)
+        assert status(office[0])["claim"]["id"] in second.log_text()

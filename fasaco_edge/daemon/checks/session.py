@@ -12,6 +12,7 @@ from typing import Any
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, check_settings, open_bus
 from fasaco_edge.daemon.checks.finding import Finding, Level, Patient
 from fasaco_edge.daemon.checks.listeners import answers, program_at, why_not_bound
+from fasaco_edge.daemon.claim import claims_in
 from fasaco_edge.daemon.endpoints import from_here
 from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.errors import BadConfiguration, BusUnavailable, MalformedMessage
@@ -83,6 +84,8 @@ def _seen(patient: Patient, bus: Bus) -> Finding:
     alive = bus.alive(f"{keys.base}/{VERSION}/*/alive", ASK_S)
     others = sorted(key.split("/")[-2] for key in alive if key != keys.alive)
     details = [f"other robots: {', '.join(others)}"] if others else []
+    claims = claims_in(bus.alive(keys.claims, ASK_S))
+    details += [f"daemon {own} {stand}" for own, stand in sorted(claims.items())]
     status = _status(bus, keys.rpc("status")) if keys.alive in alive else None
     for kind, count in heard.items():
         details.append(f"{kind}: {f'{count} in {LISTEN_S:g} s' if count else 'nothing heard'}")
@@ -94,6 +97,10 @@ def _seen(patient: Patient, bus: Bus) -> Finding:
         to_do = "ask under a name with the role viewer (bus.security.roles)"
         return Finding(Level.WARN, found, to_do, tuple(details))
     found = f"the daemon runs: {status['state']}, {status['reason']}"
+    if len(claims) > 1:
+        found = f"{len(claims)} daemons have the name {keys.robot!r}, of which one plans; {found}"
+        to_do = "end those that wait, or give them names of their own (robot.name)"
+        return Finding(Level.WARN, found, to_do, tuple(details))
     if status["map"] is None or status["pose"] is None:
         lacking = " and ".join(kind for kind in ("map", "pose") if status[kind] is None)
         topics = ", ".join(key for kind in wanted if status[kind] is None for key in wanted[kind])

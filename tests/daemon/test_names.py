@@ -1,0 +1,280 @@
+"""Two daemons of one name: one plans, the other says why it does not, and takes over."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from contextlib import ExitStack, contextmanager
+
+import pytest
+import zenoh
+
+from fasaco_edge.daemon.claim import Stand, claims_in
+from tests.daemon.outsider import Ear, Outsider
+from tests.daemon.processes import daemon_process, free_endpoint
+from tests.daemon.rooms import map_bytes, pose_bytes, room
+from tests.daemon.router import router_process
+
+PREFIX = "fasaco/@v1/robot"
+PATIENCE_S = 90.0
+ROOM = room(4.0, 3.0)
+
+
+def until(holds):
+    deadline = time.monotonic() + PATIENCE_S
+    while not (held := holds()):
+        assert time.monotonic() < deadline, "never came"
+        time.sleep(0.02)
+    return held
+
+
+class Robot:
+    """A mapper, and ears, beside the router."""
+
+    def __init__(self, endpoint):
+        config = {
+            "mode": "client",
+            "connect": {
+                "endpoints": [endpoint],
+                "timeout_ms": -1,
+                "exit_on_failure": False,
+                "retry": {"period_init_ms": 100, "period_max_ms": 500},
+            },
+        }
+        self.session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
+        self.paths, self.statuses = Ear(), Ear()
+        self.session.declare_subscriber(f"{PREFIX}/path", self.paths)
+        self.session.declare_subscriber(f"{PREFIX}/status", self.statuses)
+
+    def tell(self):
+        self.session.put(f"{PREFIX}/map", map_bytes(ROOM))
+        self.session.put(f"{PREFIX}/pose", pose_bytes(0.75, 0.75))
+
+    def claims(self):
+        """The daemons there are, by id."""
+        replies = self.session.liveliness().get(f"{PREFIX}/claim/*/*", timeout=2.0)
+        return claims_in(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
+
+    def wait_claims(self, planning, waiting=0):
+        """Wait until so many daemons plan, and so many do not; return them."""
+
+        def holds():
+            claims = self.claims()
+            plan = list(claims.values()).count(Stand.PLANS)
+            return claims if (plan, len(claims) - plan) == (planning, waiting) else None
+
+        return until(holds)
+
+    def wait_path(self, since=0):
+        """Give map and pose until somebody answers with a path of some steps."""
+
+        def holds():
+            self.tell()
+            time.sleep(0.2)
+            return next((p for p in self.paths.heard[since:] if attached(p)["steps"] > 0), None)
+
+        return until(holds)
+
+
+def attached(path):
+    return json.loads(path.attachment)
+
+
+@contextmanager
+def two_daemons(folder, *endpoints, **sections):
+    """Two of one name, begun at the same moment, each with a state of its own."""
+    with ExitStack() as stack:
+        daemons = []
+        for number, endpoint in enumerate(endpoints):
+            place = folder / str(number)
+            place.mkdir()
+            bus = {"mode": "client", "listen": [], "connect": [endpoint]}
+            daemons.append(stack.enter_context(daemon_process(place, bus=bus, **sections)))
+        yield daemons
+
+
+@pytest.fixture
+def robot_at():
+    with ExitStack() as stack:
+
+        def at(endpoint):
+            robot = Robot(endpoint)
+            stack.callback(robot.session.close)
+            return robot
+
+        yield at
+
+
+def waits(daemon):
+    return "this one waits" in daemon.log_text()
+
+
+def test_of_two_begun_at_once_one_plans_and_the_other_follows_it(tmp_path, robot_at):
+    endpoint = free_endpoint()
+    with router_process(endpoint), two_daemons(tmp_path, endpoint, endpoint) as daemons:
+        robot = robot_at(endpoint)
+        claims = robot.wait_claims(1, 1)
+        (planner,) = (own for own, stand in claims.items() if stand is Stand.PLANS)
+        robot.wait_path()
+        told = [status.json() for status in robot.statuses.heard]
+        (blocked,) = {one["reason"] for one in told if one["state"] == "blocked"} or {""}
+        assert planner in blocked
+        # Questions are answered by the one that plans.
+        with Outsider(endpoint) as outsider:
+            for _ in range(5):
+                assert outsider.ask("@rpc/status").json()["state"] != "blocked"
+                assert outsider.ask("@rpc/path").payload
+        second, first = sorted(daemons, key=waits, reverse=True)
+        assert waits(second)
+        assert not waits(first)
+        assert second.log_text().count("this one waits") == 1
+        assert {attached(path)["revision"] for path in robot.paths.heard} == set(
+            range(1, len(robot.paths.heard) + 1)
+        ), "two daemons counted"
+        heard = len(robot.paths.heard)
+        first.kill()
+        assert list(robot.wait_claims(1)) == [own for own in claims if own != planner]
+        assert attached(robot.wait_path(heard))["revision"] == 1
+        assert "this daemon plans" in second.log_text()
+        assert json.loads(until(lambda: robot.statuses.heard[-1:])[0].payload)["state"] != "blocked"
+
+
+def test_a_command_reaches_the_one_that_plans(tmp_path, robot_at):
+    endpoint = free_endpoint()
+    with router_process(endpoint), two_daemons(tmp_path, endpoint, endpoint):
+        robot = robot_at(endpoint)
+        robot.wait_claims(1, 1)
+        robot.wait_path()
+        asked = {"payload": b'{"command":"pause"}', "timeout": 20.0}
+        (reply,) = robot.session.get(f"{PREFIX}/@rpc/mission", **asked)
+        assert json.loads(reply.ok.payload.to_bytes())["state"] == "paused"
+        # Who insists on asking both is told so by the other.
+        target = zenoh.QueryTarget.ALL
+        replies = list(robot.session.get(f"{PREFIX}/@rpc/mission", target=target, **asked))
+        (refused,) = (json.loads(r.err.payload.to_bytes()) for r in replies if r.err is not None)
+        assert len(replies) == 2
+        assert refused["code"] == "not_now"
+
+
+def test_a_frozen_one_is_followed_and_does_not_come_back_beside_it(tmp_path, robot_at):
+    endpoint = free_endpoint()
+    with router_process(endpoint), two_daemons(tmp_path, endpoint, endpoint) as daemons:
+        robot = robot_at(endpoint)
+        robot.wait_claims(1, 1)
+        robot.wait_path()
+        second, first = sorted(daemons, key=waits, reverse=True)
+        heard = len(robot.paths.heard)
+        first.process.send_signal(signal.SIGSTOP)
+        robot.wait_claims(1)
+        robot.wait_path(heard)
+        first.process.send_signal(signal.SIGCONT)
+        robot.wait_claims(1, 1)
+        # Whichever goes on, the robot is left with a path to drive.
+        until(lambda: attached(robot.paths.heard[-1])["steps"] > 0)
+        assert second.process.poll() is None
+
+
+def test_a_router_that_is_started_again_changes_nothing(tmp_path, robot_at):
+    endpoint = free_endpoint()
+    with router_process(endpoint) as router, two_daemons(tmp_path, endpoint, endpoint) as daemons:
+        robot = robot_at(endpoint)
+        before = robot.wait_claims(1, 1)
+        robot.wait_path()
+        heard = len(robot.paths.heard)
+        router.kill()
+        router.wait()
+        time.sleep(1.0)
+        with router_process(endpoint):
+            assert robot.wait_claims(1, 1) == before
+            robot.tell()
+            time.sleep(1.0)
+            assert robot.claims() == before
+            assert not any("this daemon plans" in daemon.log_text() for daemon in daemons)
+            assert all(attached(path)["steps"] > 0 for path in robot.paths.heard[heard:])
+
+
+def test_where_a_network_grows_together_one_goes_on(tmp_path, robot_at):
+    """Each had its own router and planned; then a router connects the two."""
+    one, other = free_endpoint(), free_endpoint()
+    with router_process(one), router_process(other), two_daemons(tmp_path, one, other) as daemons:
+        robots = robot_at(one), robot_at(other)
+        for robot in robots:
+            robot.wait_claims(1)
+            robot.wait_path()
+        heard = [len(robot.paths.heard) for robot in robots]
+        bridge = {"mode": "router", "connect": {"endpoints": [one, other]}}
+        bridge["scouting"] = {"multicast": {"enabled": False}}
+        with zenoh.open(zenoh.Config.from_json5(json.dumps(bridge))):
+            for robot in robots:
+                claims = robot.wait_claims(1, 1)
+                # The robot is told to stand by one, and then where to go by the other.
+                until(
+                    lambda robot=robot: (
+                        "0 steps then some"
+                        if [attached(p)["steps"] > 0 for p in robot.paths.heard[-2:]]
+                        == [False, True]
+                        else ""
+                    )
+                )
+            assert claims[min(claims)] is Stand.PLANS, "the smaller id goes on"
+            assert sorted(map(waits, daemons)) == [False, True]
+            # Who joins now gets one path, and it is one to drive.
+            with Outsider(one) as late:
+                ear = late.listen("path")
+                ear.wait(lambda heard: True)
+                time.sleep(0.5)
+                assert [attached(path)["steps"] > 0 for path in ear.heard] == [True]
+    assert heard
+
+
+def test_a_router_that_comes_late_with_another_behind_it(tmp_path, robot_at):
+    endpoint = free_endpoint()
+    (tmp_path / "a").mkdir()
+    early = {"mode": "peer", "listen": [], "connect": [endpoint]}
+    late = {"mode": "client", "listen": [], "connect": [endpoint]}
+    with daemon_process(tmp_path / "a", bus=early) as first:
+        until(lambda: "ready after" in first.log_text())
+        with router_process(endpoint), two_daemons(tmp_path, endpoint):
+            robot = robot_at(endpoint)
+            robot.wait_claims(1, 1)
+            robot.wait_path()
+            assert [one["mode"] for one in (early, late)] == ["peer", "client"]
+            revisions = [attached(path)["revision"] for path in robot.paths.heard]
+            assert len(revisions) == len(set(revisions))
+
+
+def test_a_flood_of_claims_is_survived(tmp_path, robot_at):
+    """Three thousand tokens that plan, then none: it waits, answers, and goes on."""
+    endpoint = free_endpoint()
+    with router_process(endpoint), two_daemons(tmp_path, endpoint):
+        robot, flood = robot_at(endpoint), robot_at(endpoint)
+        robot.wait_claims(1)
+        robot.wait_path()
+        tokens = [
+            flood.session.liveliness().declare_token(f"{PREFIX}/claim/{number:x}/plans")
+            for number in range(1, 3001)
+        ]
+        blocked = robot.statuses.wait(lambda heard: heard.json()["state"] == "blocked").json()
+        assert blocked["loop_ms"]["max"] < 1000.0
+        assert len(tokens) == 3000
+        heard = len(robot.paths.heard)
+        flood.session.close()
+        robot.wait_claims(1)
+        robot.wait_path(heard)
+
+
+def test_two_names_are_none_of_each_others_business(tmp_path):
+    endpoint = free_endpoint()
+    bus = {"mode": "client", "listen": [], "connect": [endpoint]}
+    with router_process(endpoint), ExitStack() as stack:
+        for name in ("one", "two"):
+            (tmp_path / name).mkdir()
+            running = daemon_process(tmp_path / name, bus=bus, robot={"name": name})
+            stack.enter_context(running)
+        seats = [stack.enter_context(Outsider(endpoint, name)) for name in ("one", "two")]
+        paths = [seat.listen("path") for seat in seats]
+        for seat, path in zip(seats, paths, strict=True):
+            seat.put("map", map_bytes(ROOM))
+            seat.put("pose", pose_bytes(0.75, 0.75))
+            path.wait(lambda heard: attached(heard)["steps"] > 0)
