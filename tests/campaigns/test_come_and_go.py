@@ -1,0 +1,19 @@
+"""The come-and-go campaign's short form."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("rerun")
+
+from tests.campaigns import come_and_go
+
+# What is random in the memory of processes this young says nothing of what grows.
+YOUNG = ("rss_mb", "cores")
+
+
+@pytest.mark.timeout(300)
+def test_who_comes_and_goes_leaves_nothing_behind(tmp_path):
+    campaign = come_and_go.run_campaign(tmp_path, mappers=30, daemons=3, rest_s=3.0)
+    assert [row.questions_hz > 0 for row in campaign.rows[1:]], "nobody was counted"
+    assert [told for told in campaign.violations if not any(what in told for what in YOUNG)] == []
