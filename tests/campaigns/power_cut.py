@@ -36,7 +36,7 @@ from fasaco_edge.recording.reading import read_summary
 from fasaco_edge.recording.repair import repair_folder, scan_recording
 from tests.campaigns.file_calls import Call, Kind, Watch, why_not
 from tests.campaigns.power_states import Cut, Disk, Spread, cuts_of
-from tests.campaigns.services import service, show
+from tests.campaigns.services import START_S, service, show
 from tests.daemon.ledgers import CELL_M, Cell, contents
 from tests.daemon.outsider import Outsider
 from tests.daemon.processes import ENVIRONMENT, PROGRAM, free_endpoint
@@ -50,6 +50,8 @@ STATE, RECORDINGS, CACHE = "state", "recordings", "cache"
 MISSION, FIRST_START = "mission", "first-start"
 # Of the cuts, so many are of a first start: to compile a kernel again takes seconds.
 FIRST_SHARE = 0.15
+# A recorder takes longer to start than all the rest: one is, after each so many cuts.
+RECORDS_EACH = 8
 Completed = subprocess.CompletedProcess[str]
 NEW = "robot.ledger.new"
 MISSION_S = 5.0
@@ -172,7 +174,7 @@ def mission_outcomes(
         disk.write(cut, place)
         found, fault, wrong = _found(place / STATE, allowed_after(history, cut.after))
         is_torn, unreadable = _recordings(place / RECORDINGS)
-        wrong = wrong or unreadable or _start(place, found)
+        wrong = wrong or unreadable or _start(place, found, records=cut.salt % RECORDS_EACH == 0)
         kept = ""
         if wrong:
             kept = str(keep / f"{MISSION}-{cut.salt}")
@@ -218,12 +220,33 @@ def _recordings(folder: Path) -> tuple[bool, str]:
     return is_torn, ""
 
 
-def _start(place: Path, cells: int, environment: Mapping[str, str] | None = None) -> str:
-    """Start a daemon on what a cut has left; return what is wrong with it."""
+def _start(
+    place: Path,
+    cells: int,
+    environment: Mapping[str, str] | None = None,
+    *,
+    records: bool = False,
+) -> str:
+    """Start a daemon on what a cut has left; return what is wrong with it.
+
+    Args:
+        place: where that is.
+        cells: how many it has to know of.
+        environment: beside ours.
+        records: whether it is to go on recording there, too.
+    """
     told = _run(place, "", "--state", str(place / STATE))
+    if records:
+        told += ["--record", str(place / RECORDINGS)]
+    before = set(place.rglob("*.rrd"))
     with service(place, told, environment) as daemon:
         if not daemon.wait_ready():
             return f"not ready: {daemon.said()[-500:]}"
+        deadline = time.monotonic() + START_S
+        while records and set(place.rglob("*.rrd")) <= before:
+            if time.monotonic() > deadline:
+                return f"nothing is recorded: {daemon.said()[-500:]}"
+            time.sleep(0.05)
         code, said = daemon.stop(), daemon.said()
     if code != 0 or "Traceback" in said:
         return f"ended with {code}: {said[-500:]}"
