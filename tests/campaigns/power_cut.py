@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -357,6 +358,8 @@ def main() -> int:
     cuts = {MISSION: args.cuts - first, FIRST_START: first}
     if args.only:
         cuts = {args.only: args.cuts}
+    # As Ctrl-C, which a shell keeps from what it runs in the background.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     outcomes: list[Outcome] = []
     with tempfile.TemporaryDirectory(prefix="power-cut-") as scratch:
         try:
