@@ -108,15 +108,13 @@ class Agenda:
         cell: Cell,
         before: NDArray[np.int32],
         *,
-        driven: NDArray[np.int32] | None = None,
         attempt: int = 0,
     ) -> CoverageProblem:
         """Return the problem of what is still to be covered now.
 
         Args:
-            cell: where the robot is, or will be.
+            cell: where the robot is.
             before: int32 (n, 2), the path from there on.
-            driven: int32 (m, 2), cells it will have driven by then; None for none.
             attempt: see ``CoverageProblem``.
 
         Raises:
@@ -133,8 +131,6 @@ class Agenda:
             and ground.holds(home)
         )
         covered = ~self.open_cells(lattice.window)
-        if driven is not None:
-            covered[tuple((driven - (lattice.window.row0, lattice.window.col0)).T)] = True
         return CoverageProblem.of(
             lattice,
             cell,

@@ -63,11 +63,13 @@ class Attempt:
 
     Attributes:
         revision: of the path.
+        index: where on it the robot is.
         joint: index of that cell.
-        problem: that the rest of the path solves.
+        problem: that the rest of the path solves, the end of the one that is left.
     """
 
     revision: int
+    index: int
     joint: int
     problem: CoverageProblem
 
@@ -78,19 +80,18 @@ class Attempt:
         joint = path.index + HELD_CELLS
         if joint + HELD_CELLS > len(path.cells):
             return None
-        row, col = path.cells[joint].tolist()
-        driven, rest = path.cells[path.index : joint], path.cells[joint:]
+        row, col = path.cells[path.index].tolist()
         try:
-            problem = agenda.problem((row, col), rest, driven=driven, attempt=number)
+            problem = agenda.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
         except FasacoError:
             return None  # the map has changed: a repair is due
-        return cls(revision, joint, problem)
+        return cls(revision, path.index, joint, problem)
 
-    def joined(self, path: DrivenPath, rest: NDArray[np.int32]) -> NDArray[np.int32] | None:
-        """Return the way ahead, int32 (n, 2), with another rest; None if it is not worth it."""
+    def joined(self, path: DrivenPath, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
+        """Return what is ahead of a better path, int32 (n, 2); None if it is not worth it."""
         if path.index > self.joint:
             return None
-        ahead = np.concatenate((path.cells[path.index : self.joint], rest))
+        ahead = better[path.index - self.index :]
         return ahead if _is_worth_it(self.problem.cost, path.ahead, ahead) else None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,9 @@ class CoverageProblem:
             to this one; a planner that can keeps of it what holds. None for none.
         attempt: where all of ``before`` holds, and is only to be made better, which attempt at
             that it is, from 1 on: each looks elsewhere. 0 for a plan that is needed.
+        whole: the problem that this one is the end of, see ``after``: a path that solves this
+            one begins with what comes before, and its figures are those of the whole. None for
+            a problem that is whole itself.
     """
 
     lattice: CoverageLattice
@@ -49,6 +52,7 @@ class CoverageProblem:
     cost: CoverageCost = STEPS_ALONE
     before: NDArray[np.int32] | None = None
     attempt: int = 0
+    whole: CoverageProblem | None = None
 
     @classmethod
     def of(
@@ -91,6 +95,31 @@ class CoverageProblem:
             raise NothingToCover("every reachable cell is covered")
         to_cover.flags.writeable = unreachable.flags.writeable = False
         return cls(lattice, start, to_cover, unreachable, end, cost, before, attempt)
+
+    def after(self, driven: int) -> CoverageProblem:
+        """Return what is left of it once so many steps of the walk ``before`` are driven.
+
+        Raises:
+            NothingToCover: all is covered on the way.
+        """
+        assert self.before is not None
+        lead, rest = self.before[:driven], self.before[driven:]
+        to_cover = self.to_cover.copy()
+        window = self.lattice.window
+        to_cover[tuple((lead - (window.row0, window.col0)).T)] = False
+        if not to_cover.any():
+            raise NothingToCover("every reachable cell is covered on the way")
+        to_cover.flags.writeable = False
+        row, col = rest[0].tolist()
+        return replace(self, start=(row, col), to_cover=to_cover, before=rest, whole=self)
+
+    @property
+    def lead(self) -> NDArray[np.int32]:
+        """What is driven before this problem begins, int32 (n, 2)."""
+        nothing = np.empty((0, 2), np.int32)
+        if self.whole is None or self.whole.before is None or self.before is None:
+            return nothing
+        return self.whole.before[: len(self.whole.before) - len(self.before)]
 
     @property
     def only_better(self) -> bool:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +63,19 @@ def repaired(
     for _ in repair.run():
         if stop(repair.progress()):
             break
-    return repair.path(name, seed)
+    path = repair.path(name, seed)
+    return path if problem.whole is None else _of_the_whole(problem, problem.whole, path)
+
+
+def _of_the_whole(
+    problem: CoverageProblem, whole: CoverageProblem, path: CoveragePath
+) -> CoveragePath:
+    """Return a path with what is driven before it; steps, cost and bound are of one problem."""
+    assert problem.before is not None
+    cells = np.concatenate((problem.lead, path.cells))
+    # What is not better is no path: nobody asks how good it is.
+    bound = 0 if np.array_equal(path.cells, problem.before) else lower_bound_steps(whole)
+    return replace(path, cells=cells, cost_s=whole.cost.of_walk(cells), lower_bound_steps=bound)
 
 
 class _Repair:

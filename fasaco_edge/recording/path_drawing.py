@@ -90,8 +90,10 @@ def _line(message: PathMessage, note: Json) -> str:
     cost_s = number(note, "planned_cost_s")
     if cost_s is not None:
         facts.append(f"{cost_s:.0f} s")
-    if gap is not None:
-        facts.append(f"{100 * gap:.0f} % over the bound")
+    planned = integer(note, "planned_steps")
+    if gap is not None and planned is not None:
+        # Of the plan as it was made; of the path, a part may have been driven since.
+        facts.append(f"planned {planned} steps, {100 * gap:.0f} % over the bound")
     if planner:
         facts.append(planner)
     if plan_ms is not None:

@@ -135,6 +135,7 @@ def _replan(path: TakenPath) -> dict[str, Any]:
         "reason": path.reason,
         "plan_ms": _rounded(path.plan_ms),
         "steps": path.steps,
+        "planned_steps": path.planned_steps,
         "lower_bound_steps": path.lower_bound,
         "gap": path.gap,
         "cost_s": path.cost_s,

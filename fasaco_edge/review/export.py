@@ -17,7 +17,8 @@ from fasaco_edge.text import one_line
 
 FORMULA = re.compile(r"[=@]|[+-](?![\d.]+(e[+-]?\d+)?\Z)")
 PATH_COLUMNS = (
-    *("at_s", "revision", "steps", "planner", "plan_ms", "lower_bound_steps", "gap", "cost_s"),
+    *("at_s", "revision", "steps", "planner", "plan_ms"),
+    *("planned_steps", "lower_bound_steps", "gap", "cost_s"),
     *("x_min", "y_min", "x_max", "y_max", "reason"),
 )
 
@@ -27,9 +28,9 @@ def export(review: Review, folder: Path) -> None:
 
     ==============  ==========================================================================
     trail.csv       at_s, x_m, y_m, yaw_rad: each pose
-    paths.csv       at_s, revision, steps, planner, plan_ms, lower_bound_steps, gap, cost_s,
-                    x_min, y_min, x_max, y_max, reason: each published path, and where the
-                    map had changed [m]
+    paths.csv       at_s, revision, steps, planner, plan_ms, planned_steps, lower_bound_steps,
+                    gap, cost_s, x_min, y_min, x_max, y_max, reason: each published path, and
+                    where the map had changed [m]
     plans.csv       at_s, took_ms, attempt, used, reason: each plan that was made
     states.csv      begin_s, end_s, state, reason: what the mission was doing
     coverage.csv    at_s, share: covered share of the cells coverable at the end
@@ -55,7 +56,14 @@ def export(review: Review, folder: Path) -> None:
         (
             (
                 *(f"{p.at_s:.6f}", p.revision, p.steps, p.planner, p.plan_ms),
-                *(p.lower_bound, p.gap, p.cost_s, *(p.changed or (None,) * 4), p.reason),
+                *(
+                    p.planned_steps,
+                    p.lower_bound,
+                    p.gap,
+                    p.cost_s,
+                    *(p.changed or (None,) * 4),
+                    p.reason,
+                ),
             )
             for p in story.paths
         ),

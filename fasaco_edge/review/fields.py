@@ -30,9 +30,10 @@ FIELDS: Final = {
     "first_plan_ms": "how long the first plan took [ms]",
     "replan_ms_p50, replan_ms_p99, replan_ms_max": "how long replans took [ms], nearest rank",
     "replan_ms_by_reason": "median (p50) and slowest (max) of each kind of reason [ms]",
-    "replan_list": "each replan: at_s, revision, reason, plan_ms, steps, lower_bound_steps, gap "
-    "(steps above that bound, as a share of it), cost_s (driving it, by the configuration) and "
-    "changed, the rectangle of the map that led to it [m]",
+    "replan_list": "each replan: at_s, revision, reason, plan_ms, steps (to drive); of the plan as "
+    "it was made, from where the robot was then: planned_steps, lower_bound_steps, gap (steps over "
+    "that bound, as a share of it) and cost_s (driving it, by the configuration); changed, the "
+    "rectangle of the map that led to it [m]",
     "plans, plans_unused": "by the turn log: plans that were made, those of them that became no "
     "path, because they found the one there was or did not hold any more",
     "plan_ms_p50, plan_ms_p99, plan_ms_max": "how long they took, the unused ones too [ms]",

@@ -42,7 +42,7 @@ NUMBERS = (
 """Names of figures, the members of the document they are, and their units."""
 
 REASONS = ("reason", "replans", "median", "slowest")
-REPLANS = ("at", "took", "steps", "gap", "to drive", "changed on the map", "why")
+REPLANS = ("at", "took", "steps planned", "gap", "to drive", "changed on the map", "why")
 """Columns of ``reason_rows`` and ``replan_rows``."""
 MOST_REPLANS = 8
 
@@ -104,7 +104,7 @@ def replan_rows(paths: Iterable[TakenPath]) -> list[tuple[str, ...]]:
         (
             clock(path.at_s),
             amount(path.plan_ms, "ms"),
-            str(path.steps),
+            str(path.steps if path.planned_steps is None else path.planned_steps),
             "-" if path.gap is None else f"{100 * path.gap:.1f} %",
             "-" if path.cost_s is None else clock(path.cost_s),
             _place(path.changed),

@@ -33,6 +33,7 @@ class TakenPath:
         revision: counts the paths of a daemon.
         reason: why it came.
         steps: from its first cell to its last.
+        planned_steps: of the plan as it was made, which gap and bound are of; None where not told.
         planner: what found it; "" where no plan was needed.
         plan_ms: how long planning took [ms]; None where no plan was needed.
         gap: steps of the plan above the lower bound, as a share of it; None where not told.
@@ -50,6 +51,7 @@ class TakenPath:
     gap: float | None = None
     cost_s: float | None = None
     lower_bound: int | None = None
+    planned_steps: int | None = None
     changed: tuple[float, ...] | None = None
 
 
@@ -230,6 +232,7 @@ class _Listener:
                 gap=number(note, "gap"),
                 cost_s=number(note, "planned_cost_s"),
                 lower_bound=integer(note, "lower_bound_steps"),
+                planned_steps=integer(note, "planned_steps"),
                 changed=_rectangle(section(note, "changed")),
             )
         )

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from fasaco_edge.bench.checking import check_walk
+from fasaco_edge.daemon.status import path_note
 from fasaco_edge.mission.events import MapReceived, PlanReady
 from fasaco_edge.mission.spare_time import SKIPPED_S, Attempt
+from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import never
@@ -38,6 +40,11 @@ def plan(request, cells, seconds=0.05):
     return PlanReady(request.number, replace(path, cells=cells), seconds)
 
 
+def whole(request, rest):
+    """Return a path with another rest."""
+    return np.concatenate((request.problem.lead, rest))
+
+
 def driving(share=SHARE, gap=4):
     """Return a robot that has been given a path that is poor further on."""
     config = replace(CONFIG, spare_share=share, cost=CoverageCost())
@@ -64,6 +71,44 @@ def test_a_poor_path_is_made_better_further_on():
     assert verdict.complete
 
 
+def test_all_figures_of_a_path_are_of_one_problem():
+    """Over a whole mission with a poor first path: what is published of each path fits together."""
+    drive, notes = driving(share=1.0), []
+    for _ in range(2000):
+        if drive.mission.state == "done":
+            break
+        request, drive.request = drive.request, None
+        known = len(drive.updates)
+        if request is not None:
+            limit = WorkLimit(SearchWork(kicks=1))
+            drive.tell(PlanReady(request.number, NearOptimal().plan(request.problem, limit), 0.05))
+        drive.go()
+        for update in drive.updates[known:]:
+            notes.append(path_note(drive.mission, update) | {"asked": request, "update": update})
+    assert drive.mission.state == "done"
+    better = [note for note in notes if note["reason"] == BETTER]
+    assert better
+    for note in better:
+        planned, bound = note["planned_steps"], note["lower_bound_steps"]
+        assert 0 < bound <= planned
+        assert note["gap"] == pytest.approx(planned / bound - 1, abs=1e-6)
+        # The robot may have driven on meanwhile: the path is the end of what was planned.
+        cells = note["update"].cells
+        assert note["steps"] == len(cells) - 1 <= planned
+        plan, whole_problem = note["update"].plan, note["asked"].problem.whole
+        assert np.array_equal(plan.cells[len(plan.cells) - len(cells) :], cells)
+        assert bound == lower_bound_steps(whole_problem)
+        assert note["planned_cost_s"] == pytest.approx(
+            whole_problem.cost.of_walk(plan.cells), abs=1e-3
+        )
+        lattice = whole_problem.lattice
+        verdict = check_walk(
+            lattice.steps, whole_problem.to_cover, plan.cells, tuple(whole_problem.start)
+        )
+        assert verdict.legal
+        assert verdict.complete
+
+
 def test_attempts_take_their_share_of_the_time_and_less_in_vain():
     drive = driving()
     asked_at = []
@@ -71,7 +116,9 @@ def test_attempts_take_their_share_of_the_time_and_less_in_vain():
         request, drive.request = drive.request, None
         if request is not None:
             asked_at.append(drive.now)
-            drive.tell(plan(request, request.problem.before, seconds=0.05), after=0.05)
+            drive.tell(
+                plan(request, whole(request, request.problem.before), seconds=0.05), after=0.05
+            )
         else:
             drive.tell(after=0.05)
     assert drive.revision == 1  # nothing was better
@@ -98,7 +145,9 @@ def test_where_nothing_can_be_attempted_it_is_not_tried_with_each_pose(monkeypat
         drive.tell(pose_at(*cell))
         if drive.request is not None:
             request, drive.request = drive.request, None
-            drive.tell(plan(request, request.problem.before, seconds=0.0), after=0.0)
+            drive.tell(
+                plan(request, whole(request, request.problem.before), seconds=0.0), after=0.0
+            )
     tried_at.clear()
     for cell in hall[-2::-1].tolist():
         drive.tell(pose_at(*cell))
@@ -115,7 +164,7 @@ def test_what_saves_next_to_nothing_is_no_reason_for_another_path():
     drive = driving(gap=10)
     request, drive.request = drive.request, None
     shorter = request.problem.before[:-1]  # the last step led to a cell it had been in
-    drive.tell(plan(request, shorter))
+    drive.tell(plan(request, whole(request, shorter)))
     assert drive.revision == 1
 
 
@@ -146,6 +195,6 @@ def test_what_is_needed_comes_next():
     request, drive.request = drive.request, None
     drive.tell(patch("#", at=(11, 11)))
     assert drive.mission.wants_plan
-    drive.tell(plan(request, request.problem.before))
+    drive.tell(plan(request, whole(request, request.problem.before)))
     assert not drive.request.problem.only_better
     assert not drive.mission.wants_plan

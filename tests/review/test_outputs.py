@@ -214,7 +214,7 @@ def test_exported_files_hold_what_was_driven(parts, tmp_path):
 
 @pytest.mark.parametrize("option", ["--png", "--html"])
 def test_a_full_disk_is_named(parts, option, capsys):
-    assert main(["review", *map(str, parts), option, "/dev/full"]) == 78
+    assert main(["review", *map(str, parts), option, "/dev/full"]) == 1
     assert "cannot write /dev/full: No space left on device" in capsys.readouterr().err
 
 
