@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.daemon.durable import write_through
+from fasaco_edge.durable import write_through
 from fasaco_edge.own_files import make_own_folder, open_own, read_own
 
 NOBODY = 65534

@@ -17,13 +17,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from fasaco_edge.daemon.durable import make_folder, sync_folder, write_through
 from fasaco_edge.daemon.ledger_codec import (
     MOST_BYTES,
     LedgerFileError,
     decode_ledger,
     encode_ledger,
 )
+from fasaco_edge.durable import make_folder, sync_folder, write_through
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.ledger import LedgerMismatchError, LedgerSnapshot
 from fasaco_edge.own_files import open_own, read_own

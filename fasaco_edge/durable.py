@@ -9,28 +9,37 @@ from pathlib import Path
 from fasaco_edge.own_files import open_own
 
 
-def write_through(path: Path, payload: bytes) -> None:
+def write_through(path: Path, payload: bytes, *, mode: int = 0o644) -> None:
     """Write a file; its bytes are on the disk when this returns.
+
+    Args:
+        path: the file.
+        payload: what is to be in it.
+        mode: who may read and write a file that is new, less what the umask takes away.
 
     Raises:
         OSError: that failed.
     """
-    with open(path, "wb", opener=open_own) as file:
+    with open(path, "wb", opener=lambda name, flags: open_own(name, flags, mode)) as file:
         file.write(payload)
         file.flush()
         os.fsync(file.fileno())
 
 
-def make_folder(folder: Path) -> None:
+def make_folder(folder: Path, *, mode: int = 0o777) -> None:
     """Make a folder, and what is missing above it.
+
+    Args:
+        folder: its path.
+        mode: who may enter and write those that are new, less what the umask takes away.
 
     Raises:
         OSError: that failed.
     """
     if folder.is_dir():
         return
-    make_folder(folder.parent)
-    folder.mkdir(exist_ok=True)
+    make_folder(folder.parent, mode=mode)
+    folder.mkdir(mode=mode, exist_ok=True)
     sync_folder(folder.parent)
 
 
