@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 EPILOG = """\
 The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Code in it is for
 these very sources, for one numba, llvmlite and Python, and for one processor; a daemon that finds
-none compiles it itself, with its first map.
+none compiles it itself, with its first map. Each file is checked before it is used: one that is
+damaged is compiled again. A folder that others than root and you may write, or could put another
+in place of, is not used, but a temporary one.
 exit codes: 0 all is there, 1 (--check) it is not
 
 examples:
@@ -51,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.kernels import cache
 
     seconds = 0.0 if args.check else compile_kernels()
-    folder = cache.usable_folder()
+    folder, passed_over = cache.usable_folder()
     missing = cache.missing_from(folder)
     removed, freed_mb = cache.prune(folder) if args.prune else (0, 0.0)
     if args.json:
@@ -59,17 +61,19 @@ def run(args: argparse.Namespace) -> int:
             "ready": not missing,
             "folder": str(folder),
             "missing": missing,
+            "passed_over": passed_over,
             "seconds": round(seconds, 3),
             "removed": removed,
             "freed_mb": freed_mb,
         }
         print_json(document)
-    elif missing:
-        # After a run that compiled them: a folder that cannot be written, say.
-        err().print(f"kernels not ready: {missing}; in {folder}", soft_wrap=True)
     else:
+        if passed_over and args.check:  # or else it has been logged
+            err().print(f"{passed_over}: not used", soft_wrap=True)
         after = "" if args.check else f" after {seconds:.1f} s"
-        err().print(f"kernels ready{after} in {folder}", soft_wrap=True)
+        # Not ready after a run that compiled them: they could not be kept.
+        ready = f"not ready: {missing};" if missing else f"ready{after}"
+        err().print(f"kernels {ready} in {folder}", soft_wrap=True)
     if args.prune and not args.json:
         err().print(f"removed {removed} folders of other versions, {freed_mb} MB")
     return exits.ERROR if missing and args.check else exits.OK

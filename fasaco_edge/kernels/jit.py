@@ -1,18 +1,26 @@
-"""How kernels are compiled; ``kernels.cache`` says where the compiled code is kept."""
+"""How kernels are compiled, and what is loaded in place of that and kept after it.
 
+numba's own cache is not used. It keeps an index beside the code of each function, which processes
+write in turns: two that compile at once can leave one that leads to the code of other types; it
+unpickles before anything is checked; and it is not written through. Here each piece of code is a
+file by itself, named after what it is for and sealed, so no process ever changes what another one
+relies on. ``kernels.cache`` says where the files lie.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
 import os
+import pickle
 import sys
 import warnings
 from collections.abc import Callable
-from typing import TypeVar
+from pathlib import Path
+from typing import Protocol, TypeVar, cast
 
-from fasaco_edge.kernels.cache import cache_folder, note_complete
-
-Kernel = TypeVar("Kernel", bound=Callable[..., object])
-
-CACHE_FOLDER = cache_folder()
-if "numba" not in sys.modules:
-    os.environ["NUMBA_CACHE_DIR"] = str(CACHE_FOLDER)
+from fasaco_edge.kernels.cache import KERNEL_SUFFIX, KERNELS, cache_folder, note_complete
+from fasaco_edge.kernels.sealed import UnsoundFileError, read_sealed, write_sealed
 
 # numba takes settings from .numba_config.yaml in the working folder, which may be anybody's: at
 # import, unless there is no reader of YAML, and before it compiles, unless no file has that name.
@@ -20,35 +28,155 @@ warnings.filterwarnings("ignore", "A Numba config file is found")
 _yaml = sys.modules.get("yaml")
 sys.modules["yaml"] = None  # type: ignore[assignment]
 try:
-    import numba  # (reads NUMBA_CACHE_DIR once, at import)
+    import numba
+    from numba.core.compiler import CompileResult
+    from numba.core.serialize import dumps
 finally:
     del sys.modules["yaml"]
     if _yaml is not None:
         sys.modules["yaml"] = _yaml
 numba.core.config._config_fname = os.devnull
 
-numba.config.CACHE_DIR = str(CACHE_FOLDER)  # where numba was imported before us
+LOG = logging.getLogger(__name__)
+
+Kernel = TypeVar("Kernel", bound=Callable[..., object])
+
+CACHE_FOLDER = cache_folder()
+
+
+class Kept:
+    """What this process has met in the folder, each kind said once.
+
+    Attributes:
+        failure: why one could not be written; "" while all could be.
+    """
+
+    def __init__(self) -> None:
+        self.failure = ""
+        self._said: set[str] = set()
+
+    def cannot_load(self, file: Path, why: object) -> None:
+        """Say once that what is kept is not as it was written."""
+        self._say("load", f"{file}: the compiled kernel {why}: it is compiled again")
+
+    def cannot_keep(self, file: Path, error: OSError) -> None:
+        """Say once that nothing is kept."""
+        self.failure = f"{file.parent} cannot be written: {error.strerror}"
+        self._say("keep", f"{self.failure}: each process compiles its kernels anew")
+
+    def _say(self, about: str, text: str) -> None:
+        LOG.log(logging.DEBUG if about in self._said else logging.WARNING, "%s", text)
+        self._said.add(about)
+
+
+KEPT = Kept()
+
+
+class _Codegen(Protocol):
+    def magic_tuple(self) -> tuple[str, ...]: ...
+
+
+class _Library(Protocol):
+    has_dynamic_globals: bool
+
+
+class _Target(Protocol):
+    def refresh(self) -> None: ...
+    def codegen(self) -> _Codegen: ...
+
+
+class _Compiled(Protocol):
+    lifted: tuple[object, ...]
+    library: _Library
+    codegen: _Codegen
+
+    def _reduce(self) -> tuple[object, ...]: ...
+
+
+class _Dispatcher(Protocol):
+    _cache: object
+
+
+class _KernelCache:
+    """The code of one function, for numba: takes the place of ``numba.core.caching.Cache``."""
+
+    def __init__(self, function: Callable[..., object], folder: Path) -> None:
+        self.cache_path = str(folder)
+        self._folder = folder
+        code = function.__code__
+        self._name = f"{Path(code.co_filename).stem}.{function.__qualname__}"
+        self._line = code.co_firstlineno
+
+    def load_overload(self, signature: object, target: _Target) -> object:
+        """Return the result of compiling for ``signature``; None where it is not kept, or harmed.
+
+        Nothing that goes wrong here is more than a reason to compile.
+        """
+        target.refresh()
+        file = self._file(signature, target.codegen())
+        if not os.path.lexists(file):
+            return None
+        try:
+            kept_for, parts = pickle.loads(read_sealed(file))
+            if kept_for != signature:
+                return None
+            result: object = CompileResult._rebuild(target, *parts)
+        except UnsoundFileError as why:
+            KEPT.cannot_load(file, why)
+            return None
+        except Exception as error:
+            # It is as it was written; what numba cannot rebuild of that is numba's to know.
+            KEPT.cannot_load(file, f"cannot be used ({type(error).__name__}: {error})")
+            return None
+        return result
+
+    def save_overload(self, signature: object, result: _Compiled) -> None:
+        """Keep what was compiled for ``signature``, where that can be."""
+        if result.lifted or result.library.has_dynamic_globals:
+            return
+        file = self._file(signature, result.codegen)
+        try:
+            write_sealed(file, dumps((signature, result._reduce())))
+        except OSError as error:
+            KEPT.cannot_keep(file, error)
+
+    def flush(self) -> None:
+        """Forget nothing: what is compiled again takes the place of what there was."""
+
+    def _file(self, signature: object, codegen: _Codegen) -> Path:
+        words = [str(self._line), str(signature), *codegen.magic_tuple()]
+        digest = hashlib.sha256("\n".join(words).encode()).hexdigest()[:16]
+        return self._folder / f"{self._name}-{digest}{KERNEL_SUFFIX}"
+
+
+def _compiled(function: Kernel, compiler: Callable[[Kernel], object]) -> Kernel:
+    """Return what compiles ``function`` when it is called, or loads what is kept."""
+    compiled = compiler(function)
+    # The folder's name stands for all that the code comes from: for these files, and no closures.
+    is_named = Path(function.__code__.co_filename).parent == KERNELS and not function.__closure__
+    if is_named and CACHE_FOLDER is not None and not numba.config.DISABLE_JIT:
+        cast(_Dispatcher, compiled)._cache = _KernelCache(function, CACHE_FOLDER)
+    return cast(Kernel, compiled)
+
 
 # Nothing calls kernels from C: without that way in they are compiled a fifth faster.
-_compile = numba.njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+_compile = numba.njit(nogil=True, no_cfunc_wrapper=True)
 
 
 def kernel(function: Kernel) -> Kernel:
     """Compile ``function`` on its first call; it runs without the interpreter lock."""
-    compiled: Kernel = _compile(function)
-    return compiled
+    return _compiled(function, _compile)
 
 
 # Innermost loops allocate nothing. Without reference counts on the arrays they
 # hand on, a loop of small functions runs four times as fast.
-_compile_lean = numba.njit(cache=True, nogil=True, no_cfunc_wrapper=True, _nrt=False)
+_compile_lean = numba.njit(nogil=True, no_cfunc_wrapper=True, _nrt=False)
 _compile_into = numba.njit(nogil=True, forceinline=True, no_cfunc_wrapper=True, _nrt=False)
 
 
 def lean_kernel(function: Kernel) -> Kernel:
     """Compile a kernel that allocates no array, nor does anything it calls."""
-    compiled: Kernel = _compile_lean(function)
-    return compiled
+    return _compiled(function, _compile_lean)
 
 
 def inlined(function: Kernel) -> Kernel:
@@ -59,5 +187,5 @@ def inlined(function: Kernel) -> Kernel:
 
 def note_all_compiled() -> None:
     """Note that every kernel has been compiled by now, or loaded."""
-    if not numba.config.DISABLE_JIT:
+    if not numba.config.DISABLE_JIT and CACHE_FOLDER is not None and not KEPT.failure:
         note_complete(CACHE_FOLDER)

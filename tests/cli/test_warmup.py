@@ -7,7 +7,10 @@ import os
 import subprocess
 import sys
 
+from fasaco_edge.kernels.cache import code_digest
 from tests.cli.commands import ENVIRONMENT, fasaco_edge
+from tests.kernels.harm import zeroed
+from tests.kernels.installations import fill_with
 
 COUNT = """
 import importlib
@@ -46,6 +49,29 @@ def test_a_check_compiles_nothing_and_makes_no_folder(tmp_path, monkeypatch):
     assert ended.code == 1
     assert "kernels not ready: they were never all compiled" in ended.err
     assert os.listdir(tmp_path) == []
+
+
+def test_a_check_tells_what_is_damaged_and_what_is_not_trusted(tmp_path, monkeypatch):
+    monkeypatch.setitem(ENVIRONMENT, "NUMBA_CACHE_DIR", str(tmp_path))
+    folder = tmp_path / f"kernels-{code_digest()}"
+    file, _ = fill_with(tmp_path, 1, folder.name)
+    assert fasaco_edge("warmup", "--check").err == f"kernels ready in {folder}\n"
+    zeroed(file)
+    ended = fasaco_edge("warmup", "--check")
+    assert ended.code == 1
+    assert ended.err == f"kernels not ready: {file.name} is damaged; in {folder}\n"
+    folder.chmod(0o777)
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    temporary.chmod(0o1777)
+    monkeypatch.setitem(ENVIRONMENT, "TMPDIR", str(temporary))
+    ended = fasaco_edge("warmup", "--check")
+    assert ended.code == 1
+    not_used, not_ready = ended.err.splitlines()
+    assert not_used == f"{folder} may be written by everybody: not used"
+    assert not_ready.startswith("kernels not ready: they were never all compiled")
+    assert f"in {temporary}/" in not_ready
+    assert list(temporary.iterdir()) == []
 
 
 def test_a_check_with_prune_removes_what_others_have_left(tmp_path, monkeypatch):

@@ -17,9 +17,12 @@ from fasaco_edge.daemon.checks import folders, kernels, machine, memory, report,
 from fasaco_edge.daemon.checks.finding import Check, Finding, Level, Patient
 from fasaco_edge.daemon.checks.unit import Unit, find_unit
 from fasaco_edge.daemon.config import BusConfig, DaemonConfig, MissionSettings, RobotConfig
+from fasaco_edge.kernels.sealed import write_sealed
 from tests.daemon.outsider import Outsider
 from tests.daemon.processes import daemon_process, free_endpoint
 from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes
+from tests.kernels.harm import HARMS
+from tests.kernels.installations import fill_with
 
 MEMINFO = "MemTotal:        3884328 kB\nMemFree: 100000 kB\nMemAvailable:    {} kB\n"
 V1_OFF = "#subsys_name\thierarchy\tnum_cgroups\tenabled\nmemory\t0\t70\t0\n"
@@ -201,11 +204,35 @@ def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     from fasaco_edge.kernels.cache import cache_folder
 
-    cache_folder()
+    folder = cache_folder()
     assert "never all compiled" in kernels.kernels(patient).found
-    monkeypatch.setattr(os, "getuid", lambda: 4242)
-    other = kernels.kernels(Patient(DaemonConfig()))
-    assert "the daemon is 4242: it does not trust it" in other.found
+    folder.chmod(0o770)
+    found = kernels.kernels(Patient(DaemonConfig()))
+    assert found.level is Level.WARN
+    assert found.found.startswith(f"{folder} may be written by its group: the daemon takes no")
+    folder.chmod(0o700)
+    if os.geteuid() != 0:
+        return
+    os.chown(folder, 4242, 4242)
+    found = kernels.kernels(Patient(DaemonConfig()))
+    assert found.found.startswith(f"{folder} belongs to user 4242: the daemon takes no")
+
+
+def test_kernels_that_are_damaged_or_were_written_by_several(tmp_path, monkeypatch):
+    *files, note = fill_with(tmp_path, 3)
+    monkeypatch.setattr(kernels, "wanted_folder", lambda environ: note.parent)
+    assert kernels.kernels(Patient(DaemonConfig())).level is Level.OK
+    # By another process, that compiles at the same time.
+    write_sealed(files[1], b"the same, compiled again")
+    assert kernels.kernels(Patient(DaemonConfig())).level is Level.OK
+    for harm in HARMS.values():
+        before = files[1].read_bytes()
+        harm(files[1])
+        found = kernels.kernels(Patient(DaemonConfig()))
+        assert found.level is Level.WARN
+        assert found.found.startswith(f"{files[1].name} ")
+        assert found.to_do == "fasaco-edge warmup"
+        files[1].write_bytes(before)
 
 
 def test_nobody_is_there():

@@ -6,14 +6,12 @@ environment often lie; so both are shown to it elsewhere, and run by the system'
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-from fasaco_edge.kernels.cache import missing_from
-from fasaco_edge.kernels.jit import CACHE_FOLDER
+from fasaco_edge.kernels.cache import cache_folder, missing_from
 from tests.daemon.processes import PROGRAM
 from tests.deploy.lab import Lab
 
@@ -62,23 +60,16 @@ def binds(folder: Path) -> dict[str, Path]:
 
 
 def warm(lab: Lab, cache: str = "/var/cache/fasaco-edge/numba") -> None:
-    """Give the service the kernels that were compiled for this checkout.
-
-    numba keeps them in a folder named after that of their sources, which has another place inside.
-    """
-    if missing_from(CACHE_FOLDER):
+    """Give the service the kernels that were compiled for this checkout."""
+    here = cache_folder()
+    assert here is not None
+    if missing_from(here):
         subprocess.run([*PROGRAM, "warmup"], check=True, capture_output=True)
-    here = CACHE_FOLDER / _folder_of(str(CHECKOUT / "fasaco_edge/kernels"))
     # The folder's name tells the patch level of Python, of which the code in it is independent.
     tell = "from fasaco_edge.kernels.cache import code_digest; print(f'kernels-{code_digest()}')"
     name = lab.run(f"{HOME}/current/bin/python3", "-c", tell).stdout.strip()
-    there = Path(name, _folder_of(f"{SOURCE}/fasaco_edge/kernels"))
     # For root, who runs robots and asks questions, they are kept elsewhere.
     for home in (cache, str(Path("~root").expanduser() / ".cache/fasaco-edge")):
-        shutil.copytree(here, lab.root / home.lstrip("/") / there, dirs_exist_ok=True)
+        shutil.copytree(here, lab.root / home.lstrip("/") / name, dirs_exist_ok=True)
     # Finds all of them, and notes that the cache is complete.
     lab.run("env", f"NUMBA_CACHE_DIR={cache}", "fasaco-edge", "warmup")
-
-
-def _folder_of(sources: str) -> str:
-    return f"kernels_{hashlib.sha1(sources.encode()).hexdigest()}"

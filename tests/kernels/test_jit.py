@@ -1,10 +1,185 @@
-"""The compiler's settings: numba's own, and nobody else's."""
+"""Compiled kernels are kept and found again, and nobody meets code of other sources."""
 
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from fasaco_edge.kernels import cache
 from tests.daemon.processes import ENVIRONMENT
+from tests.kernels.installations import ALL_LOADED, Installation, package_in
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def kernel_copy(tmp_path, monkeypatch):
+    """The kernel sources as a copy that may be changed."""
+    folder = tmp_path / "kernels"
+    folder.mkdir()
+    for source in cache.KERNEL_SOURCES:
+        shutil.copy(source, folder)
+    monkeypatch.setattr(cache, "KERNEL_SOURCES", sorted(folder.glob("*.py")))
+    return folder
+
+
+def test_every_kernel_source_counts(kernel_copy):
+    seen = {cache.sources_digest()}
+    for source in sorted(kernel_copy.glob("*.py")):
+        source.write_text(source.read_text() + "\n# changed\n")
+        seen.add(cache.sources_digest())
+    assert len(seen) == 1 + len(list(kernel_copy.glob("*.py")))
+    assert all(len(digest) == 12 for digest in seen)
+
+
+def test_a_caller_in_another_file_never_meets_the_old_code_of_its_callee(tmp_path):
+    package = package_in(tmp_path)
+    head = "from fasaco_edge.kernels.jit import kernel\n"
+    callee = head + "@kernel\ndef one():\n    return {}\n"
+    caller = (
+        head
+        + "from fasaco_edge.kernels.callee import one\n"
+        + "@kernel\ndef two():\n    return one() + one()\n"
+    )
+    (package / "caller.py").write_text(caller)
+    for value in (1, 4):
+        (package / "callee.py").write_text(callee.format(value))
+        code = "from fasaco_edge.kernels.caller import two; print(two())"
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=tmp_path,
+            env={
+                **os.environ,
+                "NUMBA_DISABLE_JIT": "0",
+                "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+            },
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=100,
+        )
+        assert done.stdout.strip() == str(2 * value)
+    assert len(list((tmp_path / "cache").glob("kernels-*/*.kernel"))) == 4
+
+
+def test_other_compilers_have_a_folder_of_their_own():
+    now = cache.code_digest()
+    for changed in cache.COMPILERS:
+        versions = {"numba": "1", "llvmlite": "1"}
+        one = cache.code_digest(versions.__getitem__)
+        versions[changed] = "2"
+        assert len({now, one, cache.code_digest(versions.__getitem__)}) == 3
+
+
+@pytest.fixture
+def installed(tmp_path):
+    return Installation(tmp_path / "root", tmp_path / "cache")
+
+
+def test_what_is_said_to_be_there_is_loaded(installed):
+    first = installed.tell()
+    assert first.missing == "they were never all compiled for this version"
+    assert (first.loaded, first.compiled, first.warnings) == (0, 2, [])
+    again = installed.tell()
+    assert again.missing == ""
+    assert (again.loaded, again.compiled, again.warnings) == ALL_LOADED
+
+
+def test_code_of_another_processor_is_not_run(installed):
+    """As in a folder that was copied from another robot."""
+    installed.tell()
+    told = installed.tell(env={"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""})
+    assert told.missing.startswith("they were compiled for another processor")
+    assert (told.loaded, told.compiled) == (0, 2)
+    # Both are kept from then on.
+    for env in ({}, {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}):
+        told = installed.tell(env=env)
+        assert told.missing == ""
+        assert (told.loaded, told.compiled, told.warnings) == ALL_LOADED
+
+
+def test_an_installation_elsewhere_has_the_code_of_the_same_sources(installed, tmp_path):
+    installed.tell()
+    shutil.move(installed.root, tmp_path / "moved")
+    installed.root = tmp_path / "moved"
+    told = installed.tell()
+    assert told.missing == ""
+    assert (told.loaded, told.compiled, told.warnings) == ALL_LOADED
+
+
+def test_more_code_than_was_noted_is_no_change(installed):
+    """Another process compiles for other types: what was there is there."""
+    installed.tell()
+    more = installed.tell("seven.tell(1.5, note=False)")
+    assert (more.missing, more.loaded, more.compiled) == ("", 0, 2)
+    assert installed.tell().missing == ""
+    again = installed.tell("seven.tell(1.5, note=False)")
+    assert (again.missing, again.loaded, again.compiled) == ("", 1, 0)
+
+
+def test_code_for_other_types_under_the_same_name_is_not_run(installed):
+    """Should the digest in a file's name ever meet another one's."""
+    for number in ("1", "1.5"):
+        installed.tell(f"seven.tell({number})")
+    of_eight = sorted(installed.folder.glob("seven.eight-*.kernel"))
+    assert len(of_eight) == 2
+    one, other = (file.read_bytes() for file in of_eight)
+    of_eight[0].write_bytes(other)
+    of_eight[1].write_bytes(one)
+    told = installed.tell()
+    assert (told.loaded, told.compiled, told.warnings) == (1, 1, [])
+
+
+def test_a_function_in_a_file_that_is_not_named_is_not_kept(installed):
+    """The folder's name stands for the sources of the kernels: others may change below it."""
+    elsewhere = installed.root / "elsewhere.py"
+    elsewhere.write_text("from fasaco_edge.kernels import jit\n@jit.kernel\ndef f(x): return x\n")
+    installed.tell("import elsewhere; elsewhere.f(1); seven.tell()")
+    assert not list(installed.folder.glob("elsewhere*"))
+
+
+def test_numba_imported_before_us_with_folders_of_its_own_changes_nothing(installed, tmp_path):
+    given = {"NUMBA_CACHE_LOCATOR_CLASSES": "InTreeCacheLocator"}
+    told = installed.tell(before="import numba", env=given)
+    assert told.folder == str(installed.folder)
+    assert len(list(installed.folder.glob("*.kernel"))) == 2
+    assert not list(tmp_path.rglob("*.nb[ci]"))
+
+
+def test_folders_of_other_versions_are_removed_and_nothing_else(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    folder = cache.cache_folder()
+    kept = [folder, tmp_path / "kernels-mine", tmp_path / "other"]
+    elsewhere = tmp_path / "other" / "precious"
+    for other in (*kept, elsewhere, tmp_path / f"kernels-{'0' * 12}" / "kernels_abc"):
+        other.mkdir(parents=True, exist_ok=True)
+    (tmp_path / f"kernels-{'0' * 12}" / "kernels_abc" / "a.nbc").write_bytes(bytes(100_000))
+    (tmp_path / f"kernels-{'1' * 12}").symlink_to(elsewhere)
+    assert cache.prune(folder) == (1, 0.1)
+    assert all(other.is_dir() for other in (*kept, elsewhere))
+    assert not (tmp_path / f"kernels-{'0' * 12}").exists()
+
+
+def test_twins_agree_without_the_compiler():
+    """What is fine as machine code may overflow or fail in plain Python, and the reverse."""
+    if os.environ.get("NUMBA_DISABLE_JIT") == "1":
+        pytest.skip("this is the run without the compiler")
+    program = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "tests/kernels"]
+    done = subprocess.run(
+        [*program, "tests/planners", "-k", "twin or equation"],
+        cwd=ROOT,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=100,
+    )
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert " passed" in done.stdout
+
 
 LOOK = """\
 import yaml, warnings

@@ -7,9 +7,9 @@ import stat
 from pathlib import Path
 
 from fasaco_edge.daemon.checks.finding import Finding, Level, Patient, worst
-from fasaco_edge.kernels.cache import candidates
+from fasaco_edge.kernels.cache import wanted_folder
 
-# The ledger takes some hundred kilobytes, the kernels fifteen megabytes.
+# The ledger takes some hundred kilobytes, the kernels ten megabytes.
 LEAST_MB = {"state": 20.0, "kernel cache": 50.0}
 
 
@@ -29,7 +29,7 @@ def _folders(patient: Patient) -> dict[str, Path]:
     environ = patient.environ
     folders = {
         "state": patient.config.mission.state_folder(environ),
-        "kernel cache": candidates(environ)[0],
+        "kernel cache": wanted_folder(environ),
     }
     return folders | ({"recordings": patient.recordings} if patient.recordings else {})
 

@@ -1,0 +1,120 @@
+"""Files that carry the SHA-256 of what is in them, so that what was harmed is never taken for code.
+
+A loss of power leaves files that are empty, half or full of zeros, a worn card other bytes; machine
+code of that kind ends the process, and a pickle may do anything. So each file begins with a line
+that has the digest of all that follows, and is looked at before a byte of it is used::
+
+    fasaco-edge sealed 9f86d081...\\n
+    what is in it
+
+That tells harm, not malice, which could write the digest, too: ``fasaco_edge.trust`` says who could
+have written the file. Reading needs no right to write: the rule is the same in a folder of root's.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from pathlib import Path
+
+from fasaco_edge.durable import write_through
+from fasaco_edge.trust import UntrustedFileError, read_trusted
+
+_WORD = b"fasaco-edge sealed "
+_HEX = 64
+_HEAD = len(_WORD) + _HEX + 1
+# Begun, and not yet in place.
+PARTIAL = ".partial-"
+
+
+class UnsoundFileError(Exception):
+    """A file cannot be used; the text says why, without its name."""
+
+
+def seal(payload: bytes) -> bytes:
+    """Return the contents of a sealed file."""
+    return _WORD + hashlib.sha256(payload).hexdigest().encode() + b"\n" + payload
+
+
+def read_sealed(file: Path, user: int | None = None) -> bytes:
+    """Return what a sealed file holds, byte for byte as it was written.
+
+    Args:
+        file: the file, in a folder that is trusted.
+        user: whose it may be, beside root; without it this process's.
+
+    Raises:
+        UnsoundFileError: it is not there, cannot be read or is harmed, or others could have
+            written it.
+    """
+    try:
+        sealed = read_trusted(file, user)
+    except FileNotFoundError:
+        raise UnsoundFileError("is gone") from None
+    except OSError as error:
+        raise UnsoundFileError(f"cannot be read: {error.strerror}") from error
+    except UntrustedFileError as why:
+        raise UnsoundFileError(f"is not trusted: {why}") from why
+    payload = sealed[_HEAD:]
+    if sealed[:_HEAD] != seal(payload)[:_HEAD]:
+        raise UnsoundFileError("is damaged" if sealed else "is empty")
+    return payload
+
+
+def write_sealed(file: Path, payload: bytes) -> None:
+    """Put a sealed file in place, whole: whoever reads meanwhile finds the one before it, or none.
+
+    Raises:
+        OSError: that failed; what was there before is there.
+    """
+    # Of each process its own, so that two may write one file at once.
+    partial = file.with_name(f"{file.name}{PARTIAL}{os.getpid()}")
+    try:
+        remove(partial)  # of a process of the same number, that was killed
+        write_through(partial, seal(payload), mode=0o600)
+        if file.is_dir():
+            remove(file)
+        partial.replace(file)
+    except OSError:
+        partial.unlink(missing_ok=True)
+        raise
+
+
+def remove(path: Path) -> None:
+    """Remove whatever has this name, if anything.
+
+    Raises:
+        OSError: that failed.
+    """
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def sweep(folder: Path, pattern: str) -> list[Path]:
+    """Remove what cannot be used, and what was begun by processes that are no more.
+
+    Args:
+        folder: the folder, which is trusted.
+        pattern: of the names of all sealed files that count.
+
+    Returns:
+        those files that are left: each is sound.
+
+    Raises:
+        OSError: something could not be removed.
+    """
+    for partial in folder.glob(f"*{PARTIAL}*"):
+        number = partial.name.rpartition(PARTIAL)[2]
+        if not Path("/proc", number).exists():
+            remove(partial)
+    sound = []
+    for file in sorted(folder.glob(pattern)):
+        try:
+            read_sealed(file)
+            sound.append(file)
+        except UnsoundFileError:
+            remove(file)
+    return sound

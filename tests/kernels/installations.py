@@ -1,0 +1,139 @@
+"""Installations of two small kernels, each run as a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from fasaco_edge import durable, own_files, trust
+from fasaco_edge.kernels import cache, jit, sealed
+from fasaco_edge.kernels.cache import KERNEL_SUFFIX, note_complete
+from tests.kernels.harm import kernel_files
+
+KERNELS = """
+import json
+import logging
+
+# Before anything can be logged.
+logging.basicConfig(handlers=[handler := logging.Handler()])
+said = []
+handler.emit = lambda record: said.append(record.getMessage())
+
+from fasaco_edge.kernels import cache, jit
+
+more = []
+
+@jit.kernel
+def seven(x):
+    return 7 * x
+
+@jit.kernel
+def eight(x):
+    return seven(x) + x
+
+def tell(x=1, note=True):
+    folder, passed_over = cache.usable_folder()
+    missing = cache.missing_from(folder)
+    assert eight(x) == 8 * x
+    if note:
+        jit.note_all_compiled()
+    stats = [seven.stats, eight.stats, *more]
+    loaded, compiled = (
+        sum(sum(getattr(stat, kind).values()) for stat in stats)
+        for kind in ("cache_hits", "cache_misses")
+    )
+    place = jit.CACHE_FOLDER and str(jit.CACHE_FOLDER)
+    print(json.dumps([missing, passed_over, loaded, compiled, said, place]))
+"""
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a process found, and what it did: how many kernels it loaded and compiled."""
+
+    missing: str
+    passed_over: str
+    loaded: int
+    compiled: int
+    warnings: list[str]
+    folder: str | None
+
+
+# The one that is called by the other is linked into it, and not loaded.
+ALL_LOADED = (1, 0, [])
+
+
+class Installation:
+    """A package of two kernels, beside a cache."""
+
+    def __init__(self, root: Path, cache: Path) -> None:
+        self.root, self.cache = root, cache
+        self.package = package_in(root)
+        (self.package / "seven.py").write_text(KERNELS)
+
+    def tell(self, code: str = "seven.tell()", **process) -> Told:
+        """Run both kernels, and tell what came of it."""
+        return told_by(self.start(code, **process))
+
+    def start(self, code: str = "seven.tell()", *, before: str = "", words=(), env=None, **process):
+        """Begin a process that runs both kernels."""
+        ours = {"NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(self.cache)}
+        program = [
+            *words,
+            sys.executable,
+            "-c",
+            f"{before}\nfrom fasaco_edge.kernels import seven\n{code}",
+        ]
+        environment = os.environ | ours | (env or {})
+        return subprocess.Popen(
+            program,
+            cwd=self.root,
+            env={name: value for name, value in environment.items() if value is not None},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            **process,
+        )
+
+    @property
+    def folder(self) -> Path:
+        """The folder within the cache."""
+        (folder,) = self.cache.glob("kernels-*")
+        return folder
+
+
+def told_by(process: subprocess.Popen[str]) -> Told:
+    """Wait for the end of a process, and return what it has told."""
+    out, err = process.communicate(timeout=100)
+    assert process.returncode == 0, err
+    assert err == ""
+    return Told(*json.loads(out.splitlines()[-1]))
+
+
+def fill_with(cache: Path, count: int, name: str = "kernels-0") -> list[Path]:
+    """Make sealed files, as if these were compiled kernels, and the list of them; return all."""
+    folder = cache / name
+    folder.mkdir(parents=True, mode=0o700)
+    for number in range(count):
+        payload = bytes(range(256)) * (number + 1)
+        sealed.write_sealed(folder / f"{number}{KERNEL_SUFFIX}", payload)
+    note_complete(folder)
+    return kernel_files(cache)
+
+
+def package_in(folder: Path) -> Path:
+    """Begin another installation, of no kernels yet; return the place for them."""
+    package = folder / "fasaco_edge" / "kernels"
+    package.mkdir(parents=True)
+    for part in (package.parent / "__init__.py", package / "__init__.py"):
+        part.touch()
+    for module in (durable, own_files, trust):
+        shutil.copy(module.__file__, package.parent)
+    for module in (jit, cache, sealed):
+        shutil.copy(module.__file__, package)
+    return package
