@@ -1,13 +1,16 @@
 """Before a service is ready its kernels are compiled: a first map must not wait a minute.
 
 They are loaded with the first map, for an idle daemon has to be small. So a process of its own
-finds out whether all of them are there, compiles them where they are not, and ends.
+finds out whether all of them are there, compiles them where they are not, and ends. Kernels that
+are damaged, or that others could have written, are not there; where none can be kept, none are
+compiled before they are needed.
 """
 
 from __future__ import annotations
 
 import logging
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -16,6 +19,7 @@ import time
 from fasaco_edge.child_process import python_program
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.errors import ProcessEnded
+from fasaco_edge.kernels.cache import cache_folder, missing_from
 from fasaco_edge.process_memory import resident_mb
 
 LOG = logging.getLogger(__name__)
@@ -26,6 +30,8 @@ STAGE_S = 600.0
 LOOK_S = 0.02
 # A stage may add 250 MB to this, within what the unit may have in all (MemoryHigh=).
 MOST_MB = 220.0
+# What the process says: one of these words, a tab and a text, line by line.
+REASON, STAGE, WARNING = "reason", "stage", "warning"
 
 
 class KernelCompiler:
@@ -35,50 +41,92 @@ class KernelCompiler:
         self._manager = manager
         self._stages = 0
         self._started = time.monotonic()
-        self._process = subprocess.Popen(python_program(MODULE), stdout=subprocess.PIPE)
-        threading.Thread(target=self._listen, name="compiler", daemon=True).start()
+        self._process: subprocess.Popen[str] | None = None
+        folder = cache_folder()
+        if folder is None:
+            return  # which has been said; what it compiled would be lost
+        self._process = subprocess.Popen(
+            python_program(MODULE),
+            env=os.environ | {"NUMBA_CACHE_DIR": str(folder)},
+            stdout=subprocess.PIPE,
+            encoding="utf-8",
+            errors="replace",
+        )
+        self._listener = threading.Thread(target=self._listen, name="compiler", daemon=True)
+        self._listener.start()
 
     def wait(self, stop: threading.Event) -> None:
         """Wait until all kernels are there, or ``stop`` is set.
 
         Raises:
-            ProcessEnded: they could not be compiled.
+            ProcessEnded: the compiler failed, or was killed.
         """
+        if self._process is None:
+            return
         while self._process.poll() is None and not stop.wait(LOOK_S):
             pass
         if stop.is_set():
             return
         if (code := self._process.returncode) != 0:
             raise ProcessEnded(
-                f"the kernels were not compiled: the compiler ended with {code}",
-                hint="is there room in the cache folder, and memory? try `fasaco-edge warmup`",
+                f"the kernels were not compiled: the compiler {_ended(code)}",
+                hint="is there memory for it (500 MB)? try `fasaco-edge warmup`",
             )
         if self._stages:
             LOG.info("kernels compiled in %.0f s", time.monotonic() - self._started)
 
     def close(self) -> None:
         """End it: what is in a cache that is not complete, is whole."""
-        self._process.kill()
-        self._process.wait()
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
 
     def _listen(self) -> None:
+        assert self._process is not None
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            if not self._stages:
-                LOG.info("compiling the kernels: this takes a minute or more, once")
-            self._stages += 1
-            self._manager.extend(STAGE_S)
-            self._manager.status(f"compiling kernels: {line.decode(errors='replace').strip()}")
+            word, _, text = line.rstrip("\n").partition("\t")
+            if word == REASON:
+                LOG.info("compiling the kernels, for a minute or more: %s", text)
+            elif word == WARNING:
+                LOG.warning("%s", text)
+            elif word == STAGE:
+                self._stages += 1
+                self._manager.extend(STAGE_S)
+                self._manager.status(f"compiling kernels: {text}")
+
+
+def _ended(code: int) -> str:
+    """Return how a process ended, in words."""
+    if code >= 0:
+        return f"ended with {code}"
+    name = signal.Signals(-code).name
+    return f"was killed by {name}" + (", as for want of memory" if name == "SIGKILL" else "")
 
 
 def main() -> None:
-    """Compile what is not there, and print each stage before it; print nothing if all is there."""
-    from fasaco_edge.kernels.cache import cache_folder, missing_from  # noqa: PLC0415
-
-    if missing_from(cache_folder()):
+    """Compile what is not there, and say so and why; say nothing if all is there."""
+    logging.basicConfig(level=logging.WARNING, handlers=[_ToDaemon()])
+    folder = cache_folder()
+    if folder is None:
+        return
+    if why := missing_from(folder):
+        if not sys.argv[1:]:
+            _say(REASON, why)
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
         warm_up(_begin_stage)
+
+
+class _ToDaemon(logging.Handler):
+    """Says to the daemon what is logged here."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        _say(WARNING, record.getMessage())
+
+
+def _say(word: str, text: str) -> None:
+    print(f"{word}\t{' '.join(text.splitlines())}", flush=True)
 
 
 def _begin_stage(stage: str) -> None:
@@ -86,7 +134,12 @@ def _begin_stage(stage: str) -> None:
 
     The compiler keeps 570 MB in the end; what it has compiled is loaded in a second.
     """
-    print(stage, flush=True)
+    from fasaco_edge.kernels.jit import KEPT  # noqa: PLC0415
+
+    if KEPT.failure:
+        # What this process compiles is lost with it: the daemon does that, with its first map.
+        sys.exit(0)
+    _say(STAGE, stage)
     if resident_mb() > MOST_MB and sys.argv[1:] != [stage]:
         os.execv(sys.executable, python_program(MODULE, stage))
 

@@ -23,12 +23,12 @@ DOUBTFUL = 40
 
 
 @contextmanager
-def service(folder: Path, **sections) -> Iterator[tuple[Daemon, Manager]]:
+def service(folder: Path, *, env=None, **sections) -> Iterator[tuple[Daemon, Manager]]:
     """A daemon with a service manager, once it is ready."""
     manager = Manager(folder)
-    env = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": str(int(1e6 * WATCHDOG_S))}
+    told = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": str(int(1e6 * WATCHDOG_S))}
     try:
-        with daemon_process(folder, env=env, **sections) as running:
+        with daemon_process(folder, env=told | (env or {}), **sections) as running:
             manager.wait("READY=1", 100.0)
             yield running, manager
     finally:
