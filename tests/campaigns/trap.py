@@ -25,14 +25,13 @@ from fasaco_edge.recording.quota import next_run
 NOBODY = 65534
 IN_OPEN, IN_ISDIR, IN_Q_OVERFLOW = 0x20, 0x4000_0000, 0x4000
 EVENT = struct.Struct("iIII")
-# Of the standard library, of what is installed, and of ours.
+# Of the standard library, of what is installed, and of ours. (Python does not even begin with other
+# modules in the place of those that it needs for itself.)
 MODULES = (
-    "abc", "argparse", "encodings", "importlib", "io", "json", "logging", "os", "pathlib",
-    "platform", "random", "re", "runpy", "site", "ssl", "struct", "sysconfig", "tempfile",
-    "typing", "venv", "zipfile", "fasaco_edge", "llvmlite", "msgspec", "numba", "numpy",
-    "PIL", "pip", "pyarrow",
-    "rerun", "rerun_bindings", "rich", "sitecustomize", "usercustomize", "wheelhouse", "yaml",
-    "zenoh",
+    "argparse", "json", "logging", "pathlib", "platform", "random", "runpy", "ssl", "struct",
+    "sysconfig", "tempfile", "typing", "venv", "zipfile", "fasaco_edge", "llvmlite", "msgspec",
+    "numba", "numpy", "PIL", "pip", "pyarrow", "rerun", "rerun_bindings", "rich", "sitecustomize",
+    "usercustomize", "wheelhouse", "yaml", "zenoh",
 )  # fmt: skip
 SECRET = "root's alone\n"
 _EPOCH = datetime.fromtimestamp(0, UTC)
@@ -81,7 +80,7 @@ class Trap:
             "HOME": str(self.home),
             "TMPDIR": str(self.tmp),
             "PYTHONPATH": str(self.work),
-            "PYTHONSTARTUP": str(self.work / "os.py"),
+            "PYTHONSTARTUP": str(self.work / "json.py"),
             "PYTHONUSERBASE": str(self.home / ".local"),
             "BASH_ENV": hook,
             "ENV": hook,
