@@ -80,7 +80,7 @@ def card_rows(told: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
     return [
         ("robot", told["robot"] or "not told"),
-        ("began", told["began"].replace("T", " ").replace("Z", " UTC")),
+        ("began", _began(told["began"])),
         ("duration", clock(told["duration_s"])),
         ("map", size),
         ("version", told["version"] or "not told"),
@@ -184,3 +184,9 @@ def _count(value: float | None, unit: str = "") -> str:
         return NOT_KNOWN
     text = f"{value:,}" if isinstance(value, int) else f"{value:,.1f}"
     return f"{text} {unit}".rstrip()
+
+
+def _began(told: str) -> str:
+    """Return when it began; before this program was, no clock can have been right."""
+    when = told.replace("T", " ").replace("Z", " UTC")
+    return when if told >= "2024" else f"{when}, by a clock that was not set"

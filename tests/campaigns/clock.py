@@ -151,6 +151,9 @@ class Campaign:
         self.check("the quota's order is the true one", [p.name for p in ours] == order, ours)
         size_mb = sum(path.stat().st_size for path in ours) / 1e6
         self.check("the quota holds", size_mb <= MOST_MB, f"{size_mb:.1f} MB")
+        if early := [path for path in ours if "-1970" in path.name]:
+            told = self.command("review", str(early[-1])).stdout
+            self.check("review tells of a clock that was not set", "was not set" in told, told)
         most_s = time.monotonic() - began + SLACK_S
         for path in ours:
             length_s = read_summary(path).duration_s
