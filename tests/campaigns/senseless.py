@@ -99,14 +99,14 @@ class Senseless:
             for name, make in self._interludes().items():
                 if count >= due[name]:
                     due[name] = count + self._every[name]
-                    yield make()
+                    yield from make()
 
-    def _interludes(self) -> dict[str, Callable[[], Event]]:
+    def _interludes(self) -> dict[str, Callable[[], Iterator[Event]]]:
         return {
-            "reload": lambda: {"do": "reload", "sections": self._changeable()},
+            "reload": lambda: iter([{"do": "reload", "sections": self._changeable()}]),
             "restart": self._restart,
-            "router": lambda: {"do": "router", "away_s": self._rng.choice([0.0, 0.3, 1.5])},
-            "checkpoint": lambda: {"do": "checkpoint", "map": self._honest_map()},
+            "router": lambda: iter([{"do": "router", "away_s": self._rng.choice([0.0, 0.3, 1.5])}]),
+            "checkpoint": lambda: iter([{"do": "checkpoint", "map": self._honest_map()}]),
         }
 
     # Poses.
@@ -232,12 +232,12 @@ class Senseless:
 
     def _map_at_limits(self) -> Iterator[Event]:
         """Put corner and resolution to their limits, one ulp inside and one beyond."""
-        rows, cols = (self._rng.choice([1, 2, 50, 300]) for _ in range(2))
+        rows, cols = (self._rng.choice([1, 2, 50, 100, 300]) for _ in range(2))
         finest, coarsest = (
             [float(value) for value in _around32(limit)]
             for limit in (MIN_RESOLUTION_M, MAX_RESOLUTION_M)
         )
-        resolution = self._rng.choice([0.05, 0.05, *finest, *coarsest])
+        resolution = self._rng.choice([0.05] * 6 + finest + coarsest)
         event = self._map_event(rows, cols, resolution, self._rng.choice(list(CONTENTS)))
         corners = _around(MAX_COORDINATE_M)
         span = max(rows, cols) * resolution
@@ -248,6 +248,8 @@ class Senseless:
         yield self._show(event)
         for _ in range(self._rng.randint(1, 10)):
             yield self._pose(*_point_on(event, self._rng.random(), self._rng.random()))
+        yield {"do": "wait", "s": self._rng.choice([0.02, 0.2])}
+        yield from self._drive()
 
     def _show(self, event: Event) -> Event:
         self._map = event
@@ -358,8 +360,9 @@ class Senseless:
             for _ in range(40):
                 yield {"do": "command", "document": {"command": self._rng.choice(COMMANDS)}}
 
-    def _restart(self) -> Event:
+    def _restart(self) -> Iterator[Event]:
         """End the daemon and start another one; the maps that are latched stand meanwhile."""
+        yield from self._rng.choice([self._behave, self._another_map, self._map_at_limits])()
         sections = self._changeable()
         sections["robot"] |= {
             "tool_width_m": self._rng.choice([0.3] * 6 + [0.1, 0.5, 1.0]),
@@ -367,7 +370,7 @@ class Senseless:
         }
         sections["mission"]["autostart"] = self._rng.random() < 0.8
         ros = {"kind": self._rng.choice(["bridge", "rmw_zenoh"]), "pose": "tf"}
-        return {
+        yield {
             "do": "restart",
             "kill": self._rng.random() < 0.5,
             "fresh": self._rng.random() < 0.1,
