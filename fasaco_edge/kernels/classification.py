@@ -4,7 +4,7 @@ Most of a map is open floor or unknown: one look at a summed-area table spares t
 at each pixel under the robot. A table as large as the map would neither fit into the
 cache nor be at the cost of what has changed, so each tile has its own, of the pixels
 around the cells that are to be classified. The tables spare work and decide nothing:
-where they do not hold the answer, ``footprint`` finds it.
+where they do not hold the answer, it is found row by row of the disc, or by ``footprint``.
 """
 
 from typing import NamedTuple
@@ -18,7 +18,6 @@ from fasaco_edge.kernels.footprint import (
     Placement,
     Thresholds,
     centre,
-    disc_state,
     lane_is_free,
     reach_of,
 )
@@ -26,6 +25,7 @@ from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
 from fasaco_edge.kernels.pixel_sums import (
     PixelSums,
     count_around,
+    disc_state,
     is_free,
     is_unknown,
     sum_up,
@@ -104,7 +104,7 @@ def _classify_states(
             ):
                 state = UNKNOWN
             else:
-                state = disc_state(pixels, x, y, radius, thresholds)
+                state = disc_state(pixels, x, y, radius, table)
             cells.states[row, col] = state
 
 

@@ -84,24 +84,6 @@ def reach_of(placement: Placement) -> float:
 
 
 @lean_kernel
-def disc_state(pixels: Pixels, x: float, y: float, radius: float, thresholds: Thresholds) -> int:
-    """Return the worst state under a disc: blocked before unknown before free."""
-    state = COVERABLE
-    for row in range(int(np.floor(y - radius)), int(np.floor(y + radius)) + 1):
-        dy = max(row - y, 0.0, y - row - 1)
-        for col in range(int(np.floor(x - radius)), int(np.floor(x + radius)) + 1):
-            dx = max(col - x, 0.0, x - col - 1)
-            if dx * dx + dy * dy >= radius * radius:
-                continue
-            pixel = pixel_state(pixels, row, col, thresholds)
-            if pixel == BLOCKED:
-                return BLOCKED
-            if pixel == UNKNOWN:
-                state = UNKNOWN
-    return state
-
-
-@lean_kernel
 def lane_is_free(
     pixels: Pixels,
     x: float,

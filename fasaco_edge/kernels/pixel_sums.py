@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.footprint import Pixels, Thresholds, state_of
 from fasaco_edge.kernels.jit import inlined, lean_kernel
-from fasaco_edge.kernels.states import COVERABLE, UNKNOWN
+from fasaco_edge.kernels.states import BLOCKED, COVERABLE, UNKNOWN
 
 # One sum counts two things: the pixels that are not free in its low bits, those that are
 # not unknown from here on.
@@ -91,3 +91,58 @@ def is_free(count: int) -> bool:
 def is_unknown(count: int) -> bool:
     """Tell whether a count is of unknown pixels alone."""
     return bool(count >= 0 and count >> KNOWN_BIT == 0)
+
+
+@inlined
+def _is_off(col: int, x: float, dy: float, radius: float) -> bool:
+    """Tell whether a disc leaves out the pixel of a column, its row being ``dy`` away."""
+    dx = max(col - x, 0.0, x - col - 1)
+    return bool(dx * dx + dy * dy >= radius * radius)
+
+
+@lean_kernel
+def disc_state(pixels: Pixels, x: float, y: float, radius: float, table: PixelSums) -> int:
+    """Return the worst state under a disc: blocked before unknown before free.
+
+    Row by row, each in four looks: pixels may be ever so much smaller than the robot. The table
+    has to span all of the map that the disc touches.
+    """
+    height, width = pixels.values.shape
+    last_row, last_col = pixels.row + height - 1, pixels.col + width - 1
+    first, last = int(np.floor(y - radius)), int(np.floor(y + radius))
+    # Beyond the map nothing is known; the rows next to it are the nearest to the disc.
+    below, above = max(y - pixels.row, 0.0), max(last_row + 1 - y, 0.0)
+    state = COVERABLE
+    if (first < pixels.row and below * below < radius * radius) or (
+        last > last_row and above * above < radius * radius
+    ):
+        state = UNKNOWN
+    for row in range(max(first, pixels.row), min(last, last_row) + 1):
+        dy = max(row - y, 0.0, y - row - 1)
+        if dy * dy >= radius * radius:
+            continue
+        half = np.sqrt(radius * radius - dy * dy)
+        # The root may be off by a rounding: the distance of the pixel itself decides.
+        left = max(int(np.floor(x - half)) - 1, int(np.floor(x - radius)))
+        right = min(int(np.floor(x + half)) + 1, int(np.floor(x + radius)))
+        while _is_off(left, x, dy, radius):
+            left += 1
+        while _is_off(right, x, dy, radius):
+            right -= 1
+        if left < pixels.col or right > last_col:
+            state = UNKNOWN
+        left, right = max(left, pixels.col), min(right, last_col)
+        if left > right:
+            continue
+        low = (row - table.row) * (table.width + 1) - table.col
+        high = low + table.width + 1
+        sums = table.sums
+        count = (
+            sums[high + right + 1] - sums[high + left] - sums[low + right + 1] + sums[low + left]
+        )
+        not_free, known = count & NOT_FREE, count >> KNOWN_BIT
+        if known + not_free > right + 1 - left:
+            return BLOCKED
+        if not_free > 0:
+            state = UNKNOWN
+    return state

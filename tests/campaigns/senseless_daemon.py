@@ -43,7 +43,7 @@ UNIT = Path(__file__).parents[2] / "deploy" / "fasaco-edge.service"
 # Of the loop's turns, so many may take over 100 ms.
 LATE_SHARE = 0.001
 # So long an answer, a state, a daemon or a router is waited for, on the slowest machine [s].
-PATIENCE_S = 60.0
+PATIENCE_S = 150.0
 # The maps that a path may name, and how many lattices of them are kept.
 MAPS_KEPT, LATTICES_KEPT = 400, 20
 # Larger maps are judged now and then only: the judge must not become the load.
@@ -94,6 +94,10 @@ class Judge:
         self._maps[event["stamp"]] = event
         while len(self._maps) > MAPS_KEPT:
             self._maps.popitem(last=False)
+
+    def forget(self) -> None:
+        """Forget what was heard of a daemon that is gone."""
+        self._heard.clear()
 
     def look(self) -> None:
         """Look at all that was heard since the last time."""
@@ -422,6 +426,7 @@ class Campaign:
             file.unlink()
         shutil.rmtree(self._folder / "state", ignore_errors=True)
         self._answers.clear()
+        self.judge.forget()
         self._another_mapper(stays=False)
         self._start({"mode": "client", "fresh": True, "sections": {}})
 
