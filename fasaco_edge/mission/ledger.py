@@ -24,7 +24,7 @@ JUMP_CELLS = 2.0
 
 TILE = 64
 
-# So many tiles a ledger holds at most, twice what the largest lattice takes: each takes 8 kB, and
+# So many tiles a ledger holds at most, 8 million cells, more than any path: each takes 8 kB, and
 # as much again as it was when it was last written. ``protocol/limits.yaml`` has the same number.
 MOST_TILES = 2048
 # Where there would be more the farthest go, this many at once.

@@ -67,3 +67,13 @@ def test_a_reset_lets_another_frame_count_at_once(tmp_path):
         client.wait_status(lambda status: status["map"]["frame"] == "odom")
         command(client, "start")
         client.wait_status(lambda status: status["state"] == "covering")
+
+
+def test_a_wrong_map_while_kernels_load_does_not_displace_the_right_one(tmp_path):
+    """Each is latched, and comes once."""
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+        client.put("map", map_bytes(HALL))
+        client.put("map", map_bytes(HALL, frame="odom"))
+        client.put("pose", pose_bytes(0.45, 0.45))
+        status = client.wait_status(lambda status: status["state"] == "covering")
+        assert status["map"]["frame"] == "map"
