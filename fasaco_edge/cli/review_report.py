@@ -16,12 +16,14 @@ from fasaco_edge.review.rows import (
     card_rows,
     clock,
     compared_rows,
-    ending,
     figure_rows,
     reason_rows,
     replan_rows,
+    setup_words,
+    verdicts,
 )
 from fasaco_edge.review.series import covered_share
+from fasaco_edge.review.setups import setup_differences
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,8 +40,10 @@ def print_review(review: Review, told: dict[str, Any]) -> None:
     from rich.text import Text
 
     console = terminal.out()
-    colour = {True: "green", False: "red", None: "yellow"}[told["complete"]]
-    console.print(f"{told['recording']}:", Text(ending(told), colour), style="bold")
+    colours = {True: "green", False: "red", None: "yellow"}
+    for complete, text in verdicts(told):
+        said = Text(text, colours[complete])
+        console.print(f"{told['recording']}:", said, style="bold", soft_wrap=True)
     console.print(terminal.figures(card_rows(told)))
     _print_curve(console, review)
     console.print(terminal.figures(figure_rows(told)))
@@ -85,6 +89,8 @@ def print_comparison(told: dict[str, Any], other: dict[str, Any]) -> None:
     """Print the figures of two documents side by side."""
     console = terminal.out()
     names = (told["recording"], other["recording"])
+    console.print(setup_words(told, other), style="bold", soft_wrap=True)
+    _print_table(console, "Set-up", ("", *names), setup_differences(told, other))
     rows = compared_rows(told, other)
     _print_table(console, "Two runs", ("", *names, "difference"), rows)
     kinds = dict.fromkeys((*told["replans_by_reason"], *other["replans_by_reason"]))

@@ -13,6 +13,7 @@ from fasaco_edge.recording.runcard import flat_settings
 from fasaco_edge.review.drive import milestones
 from fasaco_edge.review.moments import RECORDER_IN_ORDER, TROUBLES, Span
 from fasaco_edge.review.review import Review, seconds_by_state
+from fasaco_edge.review.setups import ANYWAY, do_compare, setup_differences
 from fasaco_edge.review.story import TakenPath
 
 
@@ -47,6 +48,19 @@ def document(review: Review) -> dict[str, Any]:
         "duration_s": round(review.duration_s, 3),
         "state": review.state or None,
         "complete": review.complete,
+        "orders": [
+            {
+                "ordered": order.ordered,
+                "at_s": _rounded(order.begin_s),
+                "until_s": _rounded(order.end_s),
+                "ended_by": order.ended_by or None,
+                "state": order.state or None,
+                "complete": order.complete,
+                "covered_cells": order.covered,
+                "coverable_cells": order.coverable,
+            }
+            for order in review.orders
+        ],
         "covered_cells": counts and counts.covered,
         "coverable_cells": counts and counts.coverable,
         "recovered_cells": counts and counts.recovered,
@@ -106,8 +120,19 @@ def troubles(review: Review) -> list[Span]:
 
 
 def side_by_side(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Return two documents and, of each number that both have the first less the second."""
-    return {"recording": dict(one), "against": dict(other), "difference": differences(one, other)}
+    """Return two documents, what differs in how they were set up, and of numbers the difference.
+
+    That is the first less the second, of each number that both have and that compares.
+    """
+    setup = setup_differences(one, other)
+    mine = one if do_compare(setup) else {name: one[name] for name in ANYWAY}
+    return {
+        "recording": dict(one),
+        "against": dict(other),
+        "setup": [{"what": what, "recording": this, "against": that} for what, this, that in setup],
+        "compare": do_compare(setup),
+        "difference": differences(mine, other),
+    }
 
 
 def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,8 +12,11 @@ FIELDS: Final = {
     "began": "when the recording began, UTC",
     "duration_s": "from its first entry to its last [s]",
     "state": "what the mission said last",
-    "complete": "whether the mission came to `done` with no reachable cell, or no cell of its "
-    "zones, left over",
+    "orders": "each order, in a chapter of its own: ordered (`command`, or `itself` for one nobody "
+    "gave while it was recorded), at_s, until_s, ended_by (`start` of another, `cancel`, `reset`; "
+    "null for the end of the recording), state, complete, covered_cells, coverable_cells",
+    "complete": "of the last order: whether the mission came to `done` with no reachable cell, or "
+    "no cell of its zones, left over",
     "covered_cells, coverable_cells": "at the end: cells that are reachable, those of them covered",
     "recovered_cells": "cells of these that were covered more than once",
     "unreachable_cells": "cells where the robot would fit but cannot come to",

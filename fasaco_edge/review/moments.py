@@ -16,6 +16,8 @@ STILL_RAD = 0.1
 # In these the robot has nothing to do, or not yet.
 AT_REST = ("idle", "waiting for map", "waiting for pose", "loading", "done", "silent")
 TROUBLES = ("degraded", "blocked", "silent")
+# What a command does is told so long after it at most [s].
+COMMAND_S = 1.5
 RECORDER_IN_ORDER = ("recording", "stopping")
 
 
@@ -112,21 +114,27 @@ def longest_gap(what: str, at_s: Sequence[float], during: Span) -> Moment | None
     return Moment(what, seconds, "s", since)
 
 
-def largest_drop(fractions: NDArray[np.float64], map_s: Sequence[float]) -> Moment | None:
+def largest_drop(
+    fractions: NDArray[np.float64], map_s: Sequence[float], command_s: Sequence[float] = ()
+) -> Moment | None:
     """Return by how much a new map made the covered share of what was known smaller, at most.
 
     Args:
         fractions: float64 (n, 2), when [s], and the covered share as the daemon told it.
         map_s: when maps and updates came [s].
+        command_s: when commands came [s]: what drops with one, no map has made smaller.
     """
-    drops = list(_drops(fractions, np.array(sorted(map_s))))
+    drops = list(_drops(fractions, np.array(sorted(map_s)), np.array(sorted(command_s))))
     return max(drops, key=lambda drop: drop.value, default=None)
 
 
-def _drops(fractions: NDArray[np.float64], map_s: NDArray[np.float64]) -> Iterator[Moment]:
+def _drops(
+    fractions: NDArray[np.float64], map_s: NDArray[np.float64], command_s: NDArray[np.float64]
+) -> Iterator[Moment]:
     for (since, before), (until, after) in pairwise(fractions.tolist()):
         maps = np.searchsorted(map_s, (since, until), side="right")
-        if after < before and maps[1] > maps[0]:
+        commands = np.searchsorted(command_s, (since - COMMAND_S, until), side="right")
+        if after < before and maps[1] > maps[0] and commands[1] == commands[0]:
             points = 100 * (before - after)
             note = f"from {100 * before:.1f} % to {100 * after:.1f} % of what was known"
             yield Moment("largest drop of coverage after a map", points, "%", until, note)

@@ -23,11 +23,13 @@ from fasaco_edge.review.rows import (
     card_rows,
     clock,
     compared_rows,
-    ending,
     figure_rows,
     reason_rows,
     replan_rows,
+    setup_words,
+    verdicts,
 )
+from fasaco_edge.review.setups import setup_differences
 from fasaco_edge.review.style import STYLE
 from fasaco_edge.review.svg import svg_of
 from fasaco_edge.text import Html, element, html
@@ -75,7 +77,7 @@ def page_of(review: Review, other: Review | None = None) -> str:
             *(_verdict(document, index, len(told)) for index, document in enumerate(told)),
             element("p", INTRODUCTION, class_="lead"),
         ),
-        *(_tiles(told[0]) if other is None else ()),
+        *(_tiles(told[0]) if other is None else (_setup(told),)),
         _maps(reviews, told),
         _section("Over time", *_charts(reviews, told)),
         _section("Figures", *_figures(told)),
@@ -103,8 +105,21 @@ def page_of(review: Review, other: Review | None = None) -> str:
 
 
 def _verdict(told: Mapping[str, Any], index: int, of: int) -> Html:
+    """Return a verdict for each order of a run."""
     who = (_mark(index), f"{told['recording']}: ") if of > 1 else ()
-    return element("p", *who, ending(told), class_=f"verdict {KINDS[told['complete']]}")
+    found = verdicts(told)
+    return html(
+        *(element("p", *who, text, class_=f"verdict {KINDS[complete]}") for complete, text in found)
+    )
+
+
+def _setup(told: Sequence[Mapping[str, Any]]) -> Html:
+    """Return what two runs were not set up alike with."""
+    one, other = told
+    rows = setup_differences(one, other)
+    names = ("", one["recording"], other["recording"])
+    table = (_table(names, rows),) if rows else ()
+    return _section("Do they compare?", element("p", setup_words(one, other)), *table)
 
 
 def _mark(index: int) -> Html:

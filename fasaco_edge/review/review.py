@@ -16,12 +16,10 @@ from fasaco_edge.recording.run_reading import RunRecord, Told
 from fasaco_edge.review.drive import Drive, WalkFigures, drive_over, first_covered, walk_figures
 from fasaco_edge.review.faults import Faults, faults_of
 from fasaco_edge.review.moments import Moment, Span, spans_of
+from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_still_true
 from fasaco_edge.review.replans import Replans
-from fasaco_edge.review.story import HeardStatus, Story
+from fasaco_edge.review.story import Story
 from fasaco_edge.review.worst import worst_moments
-
-# A coverage that comes so soon after a status [s] is still of the same step.
-SAME_STEP_S = 1.5
 
 Entered = tuple[float, str, str]
 """When [s] which state was entered, and why."""
@@ -90,15 +88,18 @@ class Review:
 
     @property
     def complete(self) -> bool | None:
-        """Whether the mission came to ``done`` with nothing missing; None where nobody can tell."""
+        """Whether the last order came to ``done``, nothing missing; None where nobody can tell."""
         if not self.state or (self.state == "done" and self.counts is None):
             return None
-        if self.state != "done" or self.counts is None:
+        if self.counts is None:
             return False
-        zones = self.story.statuses[-1].zones if self.story.statuses else ()
-        if zones:
-            return all(integer(z, "covered") == integer(z, "cells") for z in zones)
-        return self.counts.covered == self.counts.coverable > 0
+        last = self.story.statuses[-1] if self.story.statuses else None
+        return is_complete(self.state, last, self.counts.covered, self.counts.coverable)
+
+    @property
+    def orders(self) -> tuple[OrderChapter, ...]:
+        """What was ordered, and what came of each."""
+        return chapters(self.story, self.states, self.known_fractions, self.duration_s)
 
 
 def review_of(record: RunRecord, story: Story, missing: int) -> Review:
@@ -189,7 +190,7 @@ def _counts(
 ) -> CoverageCounts | None:
     """Return the daemon's own counts if its last status is still true, else those of the trail."""
     told = [status for status in story.statuses if status.coverage]
-    if told and _is_still_true(told[-1], fractions):
+    if told and is_still_true(told[-1], fractions):
         coverage = told[-1].coverage
         covered, coverable = integer(coverage, "covered"), integer(coverage, "coverable")
         if covered is not None and coverable is not None:
@@ -205,12 +206,6 @@ def _counts(
     return CoverageCounts(
         cover.covered, cover.coverable, cover.recovered, cover.unreachable, source="trail"
     )
-
-
-def _is_still_true(status: HeardStatus, fractions: NDArray[np.float64]) -> bool:
-    later = fractions[fractions[:, 0] > status.at_s + SAME_STEP_S]
-    then = fractions[fractions[:, 0] <= status.at_s + SAME_STEP_S]
-    return not len(later) or (len(then) > 0 and bool((later[:, 1] == then[-1, 1]).all()))
 
 
 def seconds_by_state(states: tuple[Span, ...]) -> dict[str, float]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fasaco_edge.review.drive import MILESTONES
+from fasaco_edge.review.setups import ANOTHER_PROBLEM, ANYWAY, do_compare, setup_differences
 from fasaco_edge.review.story import TakenPath
 
 Row = tuple[str, str, str, str]
@@ -59,6 +60,29 @@ def ending(told: Mapping[str, Any]) -> str:
     ended = all(part["ended"] for part in told["files"])
     how = "ended" if ended else "broke off"
     return f"not complete: the recording {how} when the mission was {told['state']}"
+
+
+def verdicts(told: Mapping[str, Any]) -> list[tuple[bool | None, str]]:
+    """Return a verdict for each order: whether it was completed, and that in words."""
+    orders = told["orders"]
+    if len(orders) < 2:
+        return [(told["complete"], ending(told))]
+    found = []
+    for number, order in enumerate(orders, 1):
+        span = f"{clock(order['at_s'])} to {clock(order['until_s'])}"
+        who = "ordered" if order["ordered"] == "command" else "begun by itself"
+        by = {"start": "another order", "cancel": "cancel", "reset": "reset", None: ""}
+        ended = by[order["ended_by"]]
+        how = {
+            True: "complete",
+            False: f"not complete: {order['state'] or 'nothing was told'}"
+            + (f" when {ended} came" if ended else " at the end of the recording"),
+            None: "not known whether it was completed",
+        }[order["complete"]]
+        cells = order["covered_cells"], order["coverable_cells"]
+        counted = "" if None in cells else f", {cells[0]} of {cells[1]} cells"
+        found.append((order["complete"], f"order {number}, {who}, {span}: {how}{counted}"))
+    return found
 
 
 def card_rows(told: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -127,9 +151,29 @@ def figure_rows(told: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def compared_rows(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[Row]:
-    """Return the figures of two runs side by side, and the first less the second."""
+    """Return the figures of two runs side by side, and where they compare, how they differ."""
     mine, theirs = ({figure.name: figure for figure in _figures(told)} for told in (one, other))
-    return [_compared(mine[name], theirs[name]) for name in mine if name in theirs]
+    compares = do_compare(setup_differences(one, other))
+    anyway = {name for name, member, _ in NUMBERS if member in ANYWAY}
+    return [
+        _compared(mine[name], theirs[name], compares=compares or name in anyway)
+        for name in mine
+        if name in theirs
+    ]
+
+
+def setup_words(one: Mapping[str, Any], other: Mapping[str, Any]) -> str:
+    """Return in a sentence whether two runs compare."""
+    setup = setup_differences(one, other)
+    if not setup:
+        return "Both were set up alike."
+    if do_compare(setup):
+        return "They were set up differently:"
+    another = ", ".join(name for name, _, _ in setup if name in ANOTHER_PROBLEM)
+    return (
+        f"These are not two runs of one problem: {another} differ. What hangs on that is shown, "
+        "and not compared."
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,8 +200,8 @@ def _figures(told: Mapping[str, Any]) -> Iterator[_Figure]:
         yield _Figure(name, _count(told[member], unit), told[member])
 
 
-def _compared(mine: _Figure, theirs: _Figure) -> Row:
-    if mine.value is None or theirs.value is None:
+def _compared(mine: _Figure, theirs: _Figure, *, compares: bool) -> Row:
+    if mine.value is None or theirs.value is None or not compares:
         return mine.name, mine.text, theirs.text, ""
     less = round(mine.value - theirs.value, 1)
     text = f"{less:+,d}" if isinstance(less, int) else f"{less:+,.1f}"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival
 from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.order import MissionOrder
 from fasaco_edge.mission.order_document import read_command
 from fasaco_edge.mission.polygons import Polygon
 from fasaco_edge.recording.fields import Json, integer, number, section, text
@@ -86,7 +87,8 @@ class Story:
     Attributes:
         pose_s, poses: when each pose came, and x [m], y [m], yaw [rad] of it.
         map_s: when each map and each update came.
-        paths, statuses, commands: in order.
+        paths, statuses: in order.
+        commands: when each came, its name, and what a ``start`` was to start.
         made: plans, by the turn log.
         grid: the map at the end, with all updates.
         keep_out: polygons of the last order.
@@ -100,7 +102,7 @@ class Story:
     map_s: list[float] = field(default_factory=list)
     paths: list[TakenPath] = field(default_factory=list)
     statuses: list[HeardStatus] = field(default_factory=list)
-    commands: list[tuple[float, str]] = field(default_factory=list)
+    commands: list[tuple[float, str, MissionOrder]] = field(default_factory=list)
     made: PlanLog = field(default_factory=PlanLog)
     grid: OccupancyGrid | None = None
     keep_out: tuple[Polygon, ...] = ()
@@ -182,7 +184,7 @@ class _Listener:
 
     def _command(self, arrival: Arrival) -> None:
         name, order = read_command(decode_json(arrival.sample.payload))
-        self.story.commands.append((self._now, name))
+        self.story.commands.append((self._now, name, order))
         if name == "start":
             self.story.keep_out = order.keep_out
 

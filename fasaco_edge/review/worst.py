@@ -41,7 +41,7 @@ def worst_moments(
     slowest = replans.slowest
     if slowest is not None and slowest.plan_ms is not None:
         found.append(Moment("slowest replan", slowest.plan_ms, "ms", slowest.at_s, slowest.reason))
-    found.append(largest_drop(fractions, story.map_s))
+    found.append(largest_drop(fractions, story.map_s, [at_s for at_s, _, _ in story.commands]))
     # A mission that was begun again has its moments each time: the worst one counts.
     worst: dict[str, Moment] = {}
     for moment in found:

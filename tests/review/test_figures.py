@@ -59,6 +59,9 @@ def test_only_a_map_makes_coverage_drop():
     drop = largest_drop(fractions, [1.5, 2.5])
     assert (drop.at_s, drop.value) == (2.0, pytest.approx(20.0))
     assert largest_drop(fractions, []) is None
+    # A `mission start` makes it drop, too: that is no map's doing.
+    assert largest_drop(fractions, [1.5, 3.5], [1.4]).at_s == 4.0
+    assert largest_drop(fractions, [1.5], [1.4]) is None
     assert largest_drop(np.zeros((0, 2)), [1.0]) is None
 
 

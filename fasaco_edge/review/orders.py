@@ -1,0 +1,140 @@
+"""The orders of a recording, one chapter each: when it held, and what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.mission.order import MissionOrder
+from fasaco_edge.recording.fields import integer
+from fasaco_edge.review.moments import Span
+from fasaco_edge.review.story import HeardStatus, Story
+
+# What comes so soon after a status [s] is still of the same step.
+SAME_STEP_S = 1.5
+ENDS = ("cancel", "reset")
+# In these an order is over, or there is none: the same one begins anew.
+OVER = ("done", "idle")
+
+
+@dataclass(frozen=True, slots=True)
+class OrderChapter:
+    """An order, from its command to the next one.
+
+    Attributes:
+        ordered: "command", or "itself" for one that nobody gave while it was recorded.
+        begin_s, end_s: while it held [s].
+        ended_by: "cancel" or "reset"; "start" where another took its place; "" for the end of
+            the recording.
+        state: of the mission, the last one; "" where nothing was told.
+        covered, coverable: cells by the last status; None where that is outdated.
+        complete: whether it came to ``done`` with nothing missing; None where nobody can tell.
+    """
+
+    ordered: str
+    begin_s: float
+    end_s: float
+    ended_by: str
+    state: str
+    covered: int | None
+    coverable: int | None
+    complete: bool | None
+
+
+def chapters(
+    story: Story, states: Sequence[Span], fractions: NDArray[np.float64], end_s: float
+) -> tuple[OrderChapter, ...]:
+    """Return the chapters of a recording, in order; one at least.
+
+    Args:
+        story: what its samples tell.
+        states: of the mission, in order.
+        fractions: float64 (n, 2), when [s], and the covered share as the daemon told it.
+        end_s: of the recording [s].
+    """
+    held = list(_held(story, states, end_s))
+    return tuple(
+        _chapter(story, states, fractions, *one)
+        for one in held
+        # Before the first command there may have been nothing.
+        if len(held) == 1 or one[0] == "command" or _has_begun(states, one[1], one[2])
+    )
+
+
+def is_complete(state: str, status: HeardStatus | None, covered: int, coverable: int) -> bool:
+    """Tell whether an order is carried out with nothing of it left over."""
+    if state != "done":
+        return False
+    zones = status.zones if status else ()
+    if zones:
+        return all(integer(zone, "covered") == integer(zone, "cells") for zone in zones)
+    return covered == coverable > 0
+
+
+def _held(
+    story: Story, states: Sequence[Span], end_s: float
+) -> Iterator[tuple[str, float, float, str]]:
+    """Yield who gave each order, from when to when it held [s], and what ended it."""
+    ordered, began, order = "itself", 0.0, None
+    is_open = True
+    for at_s, name, given in story.commands:
+        if name == "start" and is_open and _goes_on(order, given, _state_at(states, at_s)):
+            continue
+        if name == "start" or (name in ENDS and is_open):
+            if is_open:
+                yield ordered, began, at_s, name
+            ordered, began, order, is_open = "command", at_s, given, name == "start"
+    if is_open:
+        yield ordered, began, end_s, ""
+
+
+def _goes_on(order: MissionOrder | None, given: MissionOrder, state: str) -> bool:
+    return order is not None and order == given and state not in OVER
+
+
+def _state_at(states: Sequence[Span], at_s: float) -> str:
+    """Return the last state told before a time [s]; "" where none was."""
+    told = [span.name for span in states if span.begin_s < at_s and span.name != "silent"]
+    return told[-1] if told else ""
+
+
+def _has_begun(states: Sequence[Span], begin_s: float, end_s: float) -> bool:
+    idle = (*OVER, "loading", "waiting for map", "waiting for pose", "silent")
+    return any(
+        span.name not in idle and span.begin_s < end_s and span.end_s > begin_s for span in states
+    )
+
+
+def _chapter(
+    story: Story,
+    states: Sequence[Span],
+    fractions: NDArray[np.float64],
+    ordered: str,
+    begin_s: float,
+    end_s: float,
+    ended_by: str,
+) -> OrderChapter:
+    until = end_s if ended_by else float("inf")
+    state = _state_at(states, until)
+    told = [s for s in story.statuses if begin_s <= s.at_s < until and s.coverage]
+    own = fractions[(fractions[:, 0] >= begin_s) & (fractions[:, 0] < until)]
+    last = told[-1] if told and is_still_true(told[-1], own) else None
+    coverage: Mapping[str, Any] = last.coverage if last else {}
+    covered, coverable = integer(coverage, "covered"), integer(coverage, "coverable")
+    complete: bool | None = None
+    if state and state != "done":
+        complete = False
+    elif state and covered is not None and coverable is not None:
+        complete = is_complete(state, last, covered, coverable)
+    return OrderChapter(ordered, begin_s, end_s, ended_by, state, covered, coverable, complete)
+
+
+def is_still_true(status: HeardStatus, fractions: NDArray[np.float64]) -> bool:
+    """Tell whether the covered share stayed what it was when a status came."""
+    later = fractions[fractions[:, 0] > status.at_s + SAME_STEP_S]
+    then = fractions[fractions[:, 0] <= status.at_s + SAME_STEP_S]
+    return not len(later) or (len(then) > 0 and bool((later[:, 1] == then[-1, 1]).all()))

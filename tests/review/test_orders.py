@@ -1,0 +1,151 @@
+"""Each order of a recording has a verdict of its own; two runs compare where they can."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.mission.order_document import read_order
+from fasaco_edge.review.document import differences, side_by_side
+from fasaco_edge.review.moments import spans_of
+from fasaco_edge.review.orders import chapters
+from fasaco_edge.review.rows import compared_rows, setup_words, verdicts
+from fasaco_edge.review.story import HeardStatus, Story
+
+ALL = read_order({})
+KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]], "passes": 1}]})
+
+
+def told(*rows, commands=()):
+    """Return the chapters of a story of (time, state, covered, coverable)."""
+    statuses = [
+        HeardStatus(at_s, state, "", {"covered": covered, "coverable": coverable}, (), 0, {}, {})
+        for at_s, state, covered, coverable in rows
+    ]
+    states = spans_of([(at_s, state, "") for at_s, state, _, _ in rows], 100.0)
+    fractions = np.array([(at_s, covered / coverable) for at_s, _, covered, coverable in rows])
+    story = Story(statuses=statuses, commands=list(commands))
+    return chapters(story, states, fractions, 100.0)
+
+
+def test_a_mission_without_commands_is_one_order():
+    (order,) = told((0, "covering", 0, 60), (50, "done", 60, 60))
+    assert (order.ordered, order.begin_s, order.end_s) == ("itself", 0.0, 100.0)
+    assert (order.covered, order.coverable, order.complete) == (60, 60, True)
+
+
+def test_three_orders_have_three_verdicts():
+    orders = told(
+        (0, "covering", 0, 60),
+        (20, "done", 60, 60),
+        (30.1, "covering", 2, 20),
+        (40, "covering", 9, 20),
+        (50.1, "covering", 1, 60),
+        (90, "done", 52, 56),
+        commands=[(30, "start", KITCHEN), (45, "pause", ALL), (50, "start", ALL)],
+    )
+    assert [order.complete for order in orders] == [True, False, False]
+    assert [(order.covered, order.coverable) for order in orders] == [(60, 60), (9, 20), (52, 56)]
+    assert [order.ended_by for order in orders] == ["start", "start", ""]
+    document = {
+        "complete": False,
+        "orders": [
+            {
+                "ordered": order.ordered,
+                "at_s": order.begin_s,
+                "until_s": order.end_s,
+                "ended_by": order.ended_by or None,
+                "state": order.state,
+                "complete": order.complete,
+                "covered_cells": order.covered,
+                "coverable_cells": order.coverable,
+            }
+            for order in orders
+        ],
+    }
+    assert [text for _, text in verdicts(document)] == [
+        "order 1, begun by itself, 0:00.0 to 0:30.0: complete, 60 of 60 cells",
+        "order 2, ordered, 0:30.0 to 0:50.0: not complete: covering when another order came, "
+        "9 of 20 cells",
+        "order 3, ordered, 0:50.0 to 1:40.0: not complete: done at the end of the recording, "
+        "52 of 56 cells",
+    ]
+
+
+def test_the_same_order_sent_twice_goes_on_unless_it_is_over():
+    rows = ((0, "idle", 0, 60), (11, "covering", 5, 60), (50, "done", 60, 60))
+    twice = [(10, "start", ALL), (20, "start", ALL)]
+    assert [order.begin_s for order in told(*rows, commands=twice)] == [10]
+    anew = [(10, "start", ALL), (60, "start", ALL)]
+    assert [order.begin_s for order in told(*rows, commands=anew)] == [10, 60]
+
+
+@pytest.mark.parametrize("command", ["cancel", "reset"])
+def test_what_is_called_off_is_over(command):
+    rows = ((0, "covering", 5, 60), (20.1, "idle", 0, 60), (30.1, "covering", 0, 60))
+    commands = [(20, command, ALL), (30, "start", ALL), (90, command, ALL)]
+    orders = told(*rows, commands=commands)
+    assert [(o.begin_s, o.end_s, o.ended_by) for o in orders] == [
+        (0.0, 20, command),
+        (30, 90, command),
+    ]
+    assert [order.complete for order in orders] == [False, False]
+
+
+def run(**changes):
+    """Return as much of a document as two are compared by."""
+    config = {"robot.tool_width_m": 0.3, "robot.radius_m": 0.18, "planner.name": "fasaco"}
+    base = {
+        "recording": "run",
+        "robot": "maja",
+        "version": "1.0",
+        "config": config | changes.pop("config", {}),
+        "map": {"rows": 100, "cols": 200, "resolution_m": 0.05},
+        "orders": [{}],
+        "coverable_cells": 400,
+        "covered_cells": 400,
+        "complete": True,
+        "duration_s": 100.0,
+        "reached_s": None,
+        "faults_by_code": {},
+    }
+    names = (
+        *("recovered_cells", "unreachable_cells", "steps", "revisits", "turns_90", "turns_180"),
+        *("driven_m", "paths", "replans", "first_plan_ms", "replan_ms_p50", "replan_ms_p99"),
+        *("replan_ms_max", "plans", "plans_unused", "plan_ms_max", "attempts", "attempts_used"),
+        *("memory_mb_max", "recorder_memory_mb_max", "processor_percent_max", "threads_max"),
+        *("faults", "recorder_lost", "samples_missing"),
+    )
+    return base | dict.fromkeys(names, 3) | changes
+
+
+OFFICE = {"rows": 400, "cols": 600, "resolution_m": 0.05}
+
+
+@pytest.mark.parametrize(
+    ("other", "what", "compares"),
+    [
+        (run(), [], True),
+        (run(version="2.0", config={"planner.name": "stc"}), ["version", "planner"], True),
+        (run(config={"robot.tool_width_m": 0.5}, coverable_cells=144), ["tool width"], False),
+        (run(config={"robot.radius_m": 0.3}), ["robot radius"], False),
+        (run(map=OFFICE), ["building"], False),
+        (run(coverable_cells=900), ["building"], False),
+        (run(coverable_cells=410), [], True),
+        (run(orders=[{}, {}]), ["orders"], False),
+    ],
+)
+def test_what_differs_in_set_up_is_said_and_only_what_compares_is_compared(other, what, compares):
+    both = side_by_side(run(), other)
+    assert [difference["what"] for difference in both["setup"]] == what
+    assert both["compare"] is compares
+    assert ("steps" in both["difference"]) is compares
+    assert both["difference"]["faults"] == 0
+    rows = {row[0]: row for row in compared_rows(run(), other)}
+    assert rows["steps"][3] == ("0" if compares else "")
+    assert rows["messages refused"][3] == "0"
+    words = setup_words(run(), other)
+    assert ("not two runs of one problem" in words) is not compares
+    assert differences(run(), run())["steps"] == 0
