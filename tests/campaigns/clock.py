@@ -85,7 +85,8 @@ class Campaign:
     def look(self) -> None:
         """Look at the recordings' folder: what is gone has to be older than what is there."""
         there = {path.name for path in self.runs.glob("*.rrd")}
-        self.created += sorted(there - set(self.created))
+        # Of one recorder, so that of two which came since the last look the numbers tell.
+        self.created += sorted(there - set(self.created), key=_part)
         first = next((i for i, name in enumerate(self.created) if name in there), 0)
         gone = [name for name in self.created if name not in there]
         newer = [name for name in self.created[first:] if name not in there]
@@ -146,6 +147,7 @@ class Campaign:
 
     def check_parts(self, began: float) -> None:
         """Check what there is in the end."""
+        self.look()
         ours = [path for path, _ in oldest_first(self.runs, "robot")]
         order = [name for name in self.created if (self.runs / name).exists()]
         self.check("the quota's order is the true one", [p.name for p in ours] == order, ours)
@@ -282,6 +284,11 @@ def _gets_in(endpoint: str, shown: dict[str, Any]) -> bool:
         session.close()
         return any(reply.ok is not None for reply in found)
     return False
+
+
+def _part(name: str) -> tuple[str, int]:
+    run, _, number = name.removesuffix(".rrd").rpartition("-part")
+    return run, int(number)
 
 
 def _until(holds: Callable[[], bool], seconds: float) -> None:
