@@ -64,12 +64,13 @@ class Site:
             MapTooLarge: its lattice would be too large.
             MapTooFar: its lattice would reach too far from 0.
         """
+        counts_now = False
         if self.frames.counts not in ("", grid.frame):
             # It may be wanted later, if it is one that can be taken at all.
             lattice_window(
                 grid.geometry, self._config.footprint.cell_m, self._config.max_lattice_cells
             )
-            self.frames.hear_map(grid)
+            counts_now = self.frames.hear_map(grid)
             self.frames.refuse_map(grid)
         try:
             self._take_map(grid)
@@ -77,7 +78,7 @@ class Site:
             self._refused = str(error)
             raise
         self._patches_lost, self._refused = False, ""
-        return self.frames.hear_map(grid)
+        return self.frames.hear_map(grid) or counts_now
 
     def turn(self) -> bool:
         """Go on with map and pose of the frame that counts; return whether it is another map."""

@@ -1,5 +1,7 @@
 """Which frame counts, and that no single message in a wrong one ever decides it."""
 
+from dataclasses import replace
+
 import pytest
 
 from fasaco_edge.errors import WrongFrame
@@ -7,7 +9,7 @@ from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.mission.frames import PATIENCE_S
 from fasaco_edge.mission.ledger import LedgerMismatchError
 from fasaco_edge.mission.progress import State
-from tests.mission.world import Drive, building, patch, pose_at, started
+from tests.mission.world import CONFIG, Drive, building, patch, pose_at, started
 
 HALL = ("########", *("#......#",) * 4, "########")
 MAP, ODOM = MapReceived(building(*HALL)), MapReceived(building(*HALL, frame="odom"))
@@ -79,6 +81,15 @@ def test_the_state_says_which_frame_is_where():
     assert drive.mission.reason == "poses arrive in frame 'map', the map is in 'odom'"
 
 
+def test_a_lost_pose_is_told_with_the_frame_that_poses_come_in():
+    drive = Drive((1, 1), MAP, HERE, config=replace(CONFIG, lost_pose_s=3.0))
+    drive.plan()
+    told_for(drive, 5.0, THERE)
+    assert drive.mission.state is State.DEGRADED
+    assert drive.mission.reason.startswith("no pose for 3 s")
+    assert drive.mission.reason.endswith("poses arrive in frame 'odom', the map is in 'map'")
+
+
 def test_progress_is_set_aside_only_once_it_is_certain(driven):
     again = restarted(driven, ODOM, THERE)
     faults = told_for(again, PATIENCE_S - 1.5, ODOM, THERE)
@@ -142,6 +153,17 @@ def test_a_reset_gets_out_of_every_state(driven, wedge):
     again.tell(MAP, HERE)
     assert again.tell(HERE).faults == ()
     assert (again.mission.grid.frame, again.mission.pose.frame) == ("map", "map")
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_after_a_reset_the_next_map_and_pose_decide_in_any_order(driven, order):
+    driven.command("reset")
+    for event in (ODOM, THERE)[::order]:
+        driven.tell(event)
+    assert driven.mission.grid.frame == driven.mission.pose.frame == "odom"
+    assert driven.mission.snapshot().frame == "odom"
+    assert driven.visited == {(1, 1)}
+    assert driven.command("start").plan is not None
 
 
 def test_after_a_reset_the_map_need_not_come_again(driven):
