@@ -10,7 +10,10 @@ from contextlib import ExitStack, contextmanager
 import pytest
 import zenoh
 
+from fasaco_edge.daemon.checks import session
+from fasaco_edge.daemon.checks.finding import Level, Patient
 from fasaco_edge.daemon.claim import Stand, claims_in
+from fasaco_edge.daemon.config import BusConfig, DaemonConfig
 from tests.daemon.outsider import Ear, Outsider
 from tests.daemon.processes import daemon_process, free_endpoint
 from tests.daemon.rooms import map_bytes, pose_bytes, room
@@ -125,6 +128,11 @@ def test_of_two_begun_at_once_one_plans_and_the_other_follows_it(tmp_path, robot
             for _ in range(5):
                 assert outsider.ask("@rpc/status").json()["state"] != "blocked"
                 assert outsider.ask("@rpc/path").payload
+        config = DaemonConfig(bus=BusConfig(listen=(), connect=(endpoint,), mode="client"))
+        seen = session.peers(Patient(config))
+        assert seen.level is Level.WARN
+        assert seen.found.startswith("2 daemons have the name 'robot', of which one plans; ")
+        assert f"daemon {planner} plans" in seen.details
         second, first = sorted(daemons, key=waits, reverse=True)
         assert waits(second)
         assert not waits(first)

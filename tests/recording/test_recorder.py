@@ -19,6 +19,7 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.bus.arrival import PATH_DIGEST
+from fasaco_edge.bus.qos import QOS
 from fasaco_edge.errors import MissingExtra, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.input_log import PERIOD_NS as INPUT_PERIOD_NS
@@ -28,6 +29,7 @@ from fasaco_edge.recording.samples import RecordedSamples
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID
+from fasaco_edge.wire.status import encode_json
 from tests.recording.mission import CELL_M, COLS, ORIGIN, ROWS, Mission, building
 from tests.recording.recorders import bus_on_free_port, recorder_process
 
@@ -59,6 +61,9 @@ def recorded(tmp_path_factory):
         mission = Mission(bus)
         play(mission)
         bus.publisher(Keys().coverage, OCCUPANCY_GRID).put(b"\x00\x01\x00\x00not a map")
+        # A second daemon of the name, which waits: it is not this robot's state.
+        waits = {"state": "blocked", "claim": {"id": "1f", "stand": "waits"}}
+        bus.publisher(Keys().status, qos=QOS["status"]).put(encode_json(waits))
         mission.publish_status("done", 1.0, planning=False, latency_ms="none", errors=ERRORS)
         report = recorder.wait_until(lambda report: report["malformed"] > 0)
         assert bus.alive(f"{Keys().recorder}/alive")
@@ -98,6 +103,7 @@ def test_the_end_is_orderly(recorded):
     assert recorded.exit_code == 0
     assert recorded.summary.complete
     assert recorded.summary.states[-1] == "done"
+    assert "blocked" not in recorded.summary.states
     assert read_column(recorded.path, entities.RECORDER_STATE, "StateChange:state").values == [
         ["recording"],
         ["stopping"],

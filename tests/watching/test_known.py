@@ -65,6 +65,21 @@ def test_a_new_daemon_has_none_of_the_old_paths():
     assert len(known.path_ahead) == 0
 
 
+def test_a_second_daemon_is_noted_and_changes_nothing():
+    known = mid_mission()
+    before = known.report
+    for stand, reason in (("looks", "no map yet"), ("waits", "another daemon plans: 2f")):
+        claim = {"id": "1f", "stand": stand}
+        tell(known, "status", status(state="blocked", reason=reason, path=None, claim=claim))
+    assert known.report is before
+    assert len(known.path_ahead) == 12
+    assert known.journal.entries[-1].text == (
+        "a second daemon is blocked: another daemon plans: 2f"
+    )
+    tell(known, "status", status(state="paused", claim={"id": "2f", "stand": "plans"}))
+    assert known.report.state == "paused"
+
+
 def test_updates_are_laid_over_the_map():
     known = mid_mission()
     patch = MapPatch(Window(10, 20, 12, 22), np.full((2, 2), 100, np.int8))
