@@ -71,9 +71,10 @@ def run(args: argparse.Namespace) -> int:
         if passed_over and args.check:  # or else it has been logged
             err().print(f"{passed_over}: not used", soft_wrap=True)
         after = "" if args.check else f" after {seconds:.1f} s"
-        # Not ready after a run that compiled them: they could not be kept.
+        # Not ready after a run that compiled them: they could not be kept, which has been logged.
         ready = f"not ready: {missing};" if missing else f"ready{after}"
-        err().print(f"kernels {ready} in {folder}", soft_wrap=True)
+        to_do = ": `fasaco-edge warmup` compiles them" if missing and args.check else ""
+        err().print(f"kernels {ready} in {folder}{to_do}", soft_wrap=True)
     if args.prune and not args.json:
         err().print(f"removed {removed} folders of other versions, {freed_mb} MB")
     return exits.ERROR if missing and args.check else exits.OK

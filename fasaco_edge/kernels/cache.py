@@ -216,7 +216,7 @@ def missing_from(folder: Path, user: int | None = None) -> str:
     if not os.path.lexists(place):
         return _never(folder, user)
     try:
-        note = json.loads(read_sealed(place, user))
+        note = json.loads(bytes(read_sealed(place, user)))
     except UnsoundFileError as why_not:
         return f"the list of them {why_not}"
     for name in note["files"]:
@@ -230,7 +230,7 @@ def missing_from(folder: Path, user: int | None = None) -> str:
 def _never(folder: Path, user: int | None) -> str:
     try:
         for other in sorted(folder.glob(f"{_NOTE}*")):
-            compiled_for = json.loads(read_sealed(other, user))["processor"]
+            compiled_for = json.loads(bytes(read_sealed(other, user)))["processor"]
             return f"they were compiled for another processor, {compiled_for.partition(' ')[0]}"
     except (OSError, UnsoundFileError):
         pass  # it makes no difference

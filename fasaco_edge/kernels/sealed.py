@@ -32,12 +32,11 @@ class UnsoundFileError(Exception):
     """A file cannot be used; the text says why, without its name."""
 
 
-def seal(payload: bytes) -> bytes:
-    """Return the contents of a sealed file."""
-    return _WORD + hashlib.sha256(payload).hexdigest().encode() + b"\n" + payload
+def _head_of(payload: bytes | memoryview) -> bytes:
+    return _WORD + hashlib.sha256(payload).hexdigest().encode() + b"\n"
 
 
-def read_sealed(file: Path, user: int | None = None) -> bytes:
+def read_sealed(file: Path, user: int | None = None) -> memoryview:
     """Return what a sealed file holds, byte for byte as it was written.
 
     Args:
@@ -56,8 +55,8 @@ def read_sealed(file: Path, user: int | None = None) -> bytes:
         raise UnsoundFileError(f"cannot be read: {error.strerror}") from error
     except UntrustedFileError as why:
         raise UnsoundFileError(f"is not trusted: {why}") from why
-    payload = sealed[_HEAD:]
-    if sealed[:_HEAD] != seal(payload)[:_HEAD]:
+    payload = memoryview(sealed)[_HEAD:]
+    if sealed[:_HEAD] != _head_of(payload):
         raise UnsoundFileError("is damaged" if sealed else "is empty")
     return payload
 
@@ -72,7 +71,7 @@ def write_sealed(file: Path, payload: bytes) -> None:
     partial = file.with_name(f"{file.name}{PARTIAL}{os.getpid()}")
     try:
         remove(partial)  # of a process of the same number, that was killed
-        write_through(partial, seal(payload), mode=0o600)
+        write_through(partial, _head_of(payload) + payload, mode=0o600)
         if file.is_dir():
             remove(file)
         partial.replace(file)

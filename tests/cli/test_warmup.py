@@ -59,7 +59,10 @@ def test_a_check_tells_what_is_damaged_and_what_is_not_trusted(tmp_path, monkeyp
     zeroed(file)
     ended = fasaco_edge("warmup", "--check")
     assert ended.code == 1
-    assert ended.err == f"kernels not ready: {file.name} is damaged; in {folder}\n"
+    assert ended.err == (
+        f"kernels not ready: {file.name} is damaged; in {folder}: "
+        "`fasaco-edge warmup` compiles them\n"
+    )
     folder.chmod(0o777)
     temporary = tmp_path / "tmp"
     temporary.mkdir()
@@ -70,7 +73,7 @@ def test_a_check_tells_what_is_damaged_and_what_is_not_trusted(tmp_path, monkeyp
     not_used, not_ready = ended.err.splitlines()
     assert not_used == f"{folder} may be written by everybody: not used"
     assert not_ready.startswith("kernels not ready: they were never all compiled")
-    assert f"in {temporary}/" in not_ready
+    assert f" in {temporary}/" in not_ready
     assert list(temporary.iterdir()) == []
 
 
