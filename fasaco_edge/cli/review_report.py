@@ -24,6 +24,7 @@ from fasaco_edge.review.rows import (
 )
 from fasaco_edge.review.series import covered_share
 from fasaco_edge.review.setups import setup_differences
+from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -42,7 +43,7 @@ def print_review(review: Review, told: dict[str, Any]) -> None:
     console = terminal.out()
     colours = {True: "green", False: "red", None: "yellow"}
     for complete, text in verdicts(told):
-        said = Text(text, colours[complete])
+        said = Text(one_line(text), colours[complete])
         console.print(f"{told['recording']}:", said, style="bold", soft_wrap=True)
     console.print(terminal.figures(card_rows(told)))
     _print_curve(console, review)
