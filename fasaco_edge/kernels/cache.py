@@ -13,6 +13,7 @@ folder does, and where there is none either, nothing is kept.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import hashlib
 import json
 import logging
@@ -39,6 +40,8 @@ ROOM_MB = 20
 _FOLDER = re.compile(r"kernels-[0-9a-f]{12}$")
 _NOTE = "complete-"
 KERNEL_SUFFIX = ".kernel"
+# Then the number of the process that made it, and what nobody foresees.
+_FRESH = "fasaco-edge-of-"
 _TOLD: set[str] = set()
 
 
@@ -167,8 +170,9 @@ def _fresh_folder() -> Path | None:
     for base in _temporary():
         if why_unusable(base / _name()):
             continue
+        _clear(base)
         try:
-            made = Path(tempfile.mkdtemp(prefix="fasaco-edge-", dir=base))
+            made = Path(tempfile.mkdtemp(prefix=f"{_FRESH}{os.getpid()}-", dir=base))
             (folder := made / _name()).mkdir(0o700)
         except OSError:
             continue
@@ -177,6 +181,15 @@ def _fresh_folder() -> Path | None:
         os.environ["NUMBA_CACHE_DIR"] = str(folder)
         return folder
     return None
+
+
+def _clear(base: Path) -> None:
+    """Remove the folders of processes that were killed."""
+    for left in base.glob(f"{_FRESH}*"):
+        maker = left.name.removeprefix(_FRESH).partition("-")[0]
+        with contextlib.suppress(OSError):  # somebody else may be doing it
+            if left.lstat().st_uid == os.geteuid() and not Path("/proc", maker).exists():
+                shutil.rmtree(left)
 
 
 def _remove(folder: Path, maker: int) -> None:

@@ -162,6 +162,7 @@ def test_where_the_temporary_name_is_taken_a_fresh_folder_lasts_as_long_as_its_p
     taken = Path(installed.tell().folder)
     assert taken.parent == tmp
     os.chown(taken, NOBODY, NOBODY)
+    (tmp / "fasaco-edge-of-4194305-left").mkdir()  # by one that was killed
     child = (
         "import json, subprocess, sys; "
         "inner = subprocess.run([sys.executable, '-c', "
