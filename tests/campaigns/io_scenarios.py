@@ -36,6 +36,8 @@ from tests.recording.kill_campaign import driving
 from tests.recording.recorders import bus_on_free_port
 
 DRIVEN, MESSAGES = 6, 60
+# To compile all kernels takes a minute; on a busy computer, many.
+COMPILE_S = 900.0
 STATE, RECORDINGS, CACHE = "state", "recordings", "cache"
 
 Completed = subprocess.CompletedProcess[str]
@@ -240,7 +242,7 @@ def _command(folder: Path, environment: dict[str, str], *words: str) -> Complete
             env=environment,
             capture_output=True,
             text=True,
-            timeout=180,
+            timeout=COMPILE_S,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
