@@ -40,10 +40,13 @@ class TransformLoop(FasacoError):
 
 
 class MapTooLarge(FasacoError):
-    """The map, or the lattice over it, is beyond the configured limit."""
+    """The map, or the lattice over it, is beyond the configured limit, or its pixels too small."""
 
     code = "map_too_large"
-    hint = "check the map's resolution and origin; larger cells or map.max_lattice_cells may help"
+    hint = (
+        "check the map's resolution and origin; map.max_pixels, larger cells or "
+        "map.max_lattice_cells may help"
+    )
 
 
 class MapTooFar(FasacoError):

@@ -7,9 +7,11 @@ passed over. Those stay in order.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -53,17 +55,42 @@ class Spacing:
     followers: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Queue:
+    """How much of a kind may wait: a full queue loses its oldest, never its newest.
+
+    Attributes:
+        length: items at most.
+        size: of all together at most [bytes]; one alone may be larger.
+    """
+
+    length: int
+    size: float = math.inf
+
+
+def _weightless(_: object) -> int:
+    return 0
+
+
 class Mailbox(Generic[Item]):
     """Collects items of several kinds until the loop takes them all.
 
     Of a kind only the newest is kept, unless it was declared ``queued`` with the
-    length of its queue; a full queue loses its oldest.
+    room of its queue; ``size_of`` tells what an item takes of that [bytes].
     """
 
-    def __init__(self, queued: dict[str, int], spacing: Spacing | None = None) -> None:
+    def __init__(
+        self,
+        queued: Mapping[str, Queue],
+        spacing: Spacing | None = None,
+        size_of: Callable[[Item], int] = _weightless,
+    ) -> None:
         self._changed = threading.Condition()
         self._newest: dict[str, Item] = {}
-        self._queued = {kind: deque[Item](maxlen=length) for kind, length in queued.items()}
+        self._queued = {kind: deque[Item]() for kind in queued}
+        self._rooms = dict(queued)
+        self._sizes = dict.fromkeys(queued, 0)
+        self._size_of = size_of
         self._lost = dict.fromkeys(queued, 0)
         self._spacing = spacing
         self._free_at = float("-inf")
@@ -79,8 +106,12 @@ class Mailbox(Generic[Item]):
             # Who waits learns of the first that is held back; the others need not wake it.
             if not queue or kind not in self._held(time.monotonic()):
                 self._changed.notify()
-            self._lost[kind] += len(queue) == queue.maxlen
             queue.append(item)
+            self._sizes[kind] += self._size_of(item)
+            room = self._rooms[kind]
+            while len(queue) > room.length or (len(queue) > 1 and self._sizes[kind] > room.size):
+                self._sizes[kind] -= self._size_of(queue.popleft())
+                self._lost[kind] += 1
 
     def take(self, timeout_s: float) -> list[tuple[str, Item]]:
         """Return everything there is as (kind, item); wait up to ``timeout_s`` [s] for it.
@@ -101,6 +132,7 @@ class Mailbox(Generic[Item]):
             for kind in ready:
                 items.extend((kind, item) for item in self._queued[kind])
                 self._queued[kind].clear()
+                self._sizes[kind] = 0
             if self._spacing is not None and self._spacing.kind in ready:
                 self._free_at = now + self._spacing.seconds
             return items

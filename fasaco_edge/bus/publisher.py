@@ -34,7 +34,7 @@ class Publisher:
             self._publisher.undeclare()
             self._publisher = self._latched()
 
-    def put(self, payload: bytes, attachment: bytes = b"") -> None:
+    def put(self, payload: bytes | zenoh.ZBytes, attachment: bytes = b"") -> None:
         """Send ``payload``."""
         self._publisher.put(payload, attachment=attachment or None)
 

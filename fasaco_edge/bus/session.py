@@ -24,7 +24,16 @@ from fasaco_edge.bus.encodings import JSON, schema_of
 from fasaco_edge.bus.latched import Asker, LatchedSubscription, Subscription
 from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.qos import VOLATILE, Qos
-from fasaco_edge.bus.queries import Question, Reply, Request, reply_of, request_of, send
+from fasaco_edge.bus.queries import (
+    Question,
+    Reply,
+    Request,
+    Shared,
+    reply_of,
+    request_of,
+    send,
+    size_of,
+)
 from fasaco_edge.bus.roll import Roll
 from fasaco_edge.bus.session_config import session_config
 from fasaco_edge.errors import BusUnavailable
@@ -52,14 +61,62 @@ class BusSettings:
     secured: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
-@dataclass(frozen=True, slots=True)
 class Sample:
-    """A message as it came off the bus; ``schema`` is empty where none was sent."""
+    """A message as it came off the bus.
 
-    key: str
-    payload: bytes
-    schema: str = ""
-    attachment: bytes = b""
+    Payload and attachment stay in Zenoh's buffers until they are asked for: of a message that a
+    newer one makes worthless before, nothing is copied.
+
+    Attributes:
+        key: what it was published on.
+        schema: the type its publisher names; "" for none.
+        size: of payload and attachment together [bytes].
+    """
+
+    __slots__ = ("_attachment", "_payload", "key", "schema", "size")
+
+    def __init__(
+        self,
+        key: str,
+        payload: bytes | zenoh.ZBytes,
+        schema: str = "",
+        attachment: bytes | zenoh.ZBytes = b"",
+    ) -> None:
+        self.key = key
+        self.schema = schema
+        self.size = len(payload) + len(attachment)
+        self._payload = payload
+        self._attachment = attachment
+
+    @property
+    def payload(self) -> bytes:
+        """The message itself."""
+        if not isinstance(self._payload, bytes):
+            self._payload = self._payload.to_bytes()
+        return self._payload
+
+    @property
+    def attachment(self) -> bytes:
+        """What came beside it."""
+        if not isinstance(self._attachment, bytes):
+            self._attachment = self._attachment.to_bytes()
+        return self._attachment
+
+    def as_type(self, schema: str) -> Sample:
+        """Return it as a message of another type."""
+        return Sample(self.key, self._payload, schema, self._attachment)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sample) and self._told() == other._told()
+
+    def __hash__(self) -> int:
+        return hash(self._told())
+
+    def __repr__(self) -> str:
+        return f"Sample({self.key!r}, {self.size} bytes, {self.schema!r})"
+
+    def _told(self) -> tuple[str, bytes, str, bytes]:
+        return self.key, self.payload, self.schema, self.attachment
 
 
 @dataclass(slots=True)
@@ -134,7 +191,7 @@ class Bus:
         return subscription
 
     def serve(
-        self, key: str, answer: Callable[[Request], Reply | None], complete: bool = True
+        self, key: str, answer: Callable[[Request], Reply | Shared | None], complete: bool = True
     ) -> None:
         """Answer queries on ``key``, on a Zenoh thread; None leaves one to others.
 
@@ -148,11 +205,19 @@ class Bus:
 
         self._serve(key, receive, complete=complete)
 
-    def take_questions(self, key: str, receive: Callable[[Question], None]) -> None:
-        """Call ``receive`` with each query on ``key``, on a Zenoh thread; to be answered later."""
+    def take_questions(
+        self, key: str, receive: Callable[[Question], None], most_bytes: int, too_long: Reply
+    ) -> None:
+        """Call ``receive`` with each query on ``key``, on a Zenoh thread; to be answered later.
+
+        One of more than ``most_bytes`` has ``too_long`` for an answer at once: what waits is held.
+        """
 
         def take(query: zenoh.Query) -> None:
-            receive(Question(query, key))
+            if size_of(query) > most_bytes:
+                send(query, key, too_long)
+            else:
+                receive(Question(query, key))
 
         self._serve(key, take, complete=True)
 
@@ -274,10 +339,8 @@ def _config(settings: BusSettings) -> zenoh.Config:
 
 
 def _sample(sample: zenoh.Sample) -> Sample:
-    attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
-    return Sample(
-        str(sample.key_expr), sample.payload.to_bytes(), schema_of(sample.encoding), attachment
-    )
+    attachment = b"" if sample.attachment is None else sample.attachment
+    return Sample(str(sample.key_expr), sample.payload, schema_of(sample.encoding), attachment)
 
 
 def _first_line(error: Exception) -> str:

@@ -7,13 +7,14 @@ import threading
 from collections.abc import Callable
 from functools import partial
 
-from fasaco_edge.bus.queries import Reply, Request
+from fasaco_edge.bus.queries import Reply, Request, Shared
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import BadQuery, FasacoError, NotYet
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.status import encode_error
 
 NEWEST = "newest"
+Said = Reply | Shared
 
 
 def error_reply(error: FasacoError) -> Reply:
@@ -21,10 +22,10 @@ def error_reply(error: FasacoError) -> Reply:
     return Reply(encode_error(error), is_error=True)
 
 
-def answering(answer: Callable[[Request], Reply]) -> Callable[[Request], Reply]:
+def answering(answer: Callable[[Request], Said]) -> Callable[[Request], Said]:
     """Return ``answer`` such that an error it raises is the answer."""
 
-    def answered(request: Request) -> Reply:
+    def answered(request: Request) -> Said:
         try:
             return answer(request)
         except FasacoError as error:
@@ -56,9 +57,9 @@ class LastSamples:
 
     def __init__(self, bus: Bus, keys: Keys) -> None:
         self._lock = threading.Lock()
-        self._last: dict[str, Reply] = {}
+        self._last: dict[str, Said] = {}
         # Of the newest full plan: by cohort, and the newest; and the number of its request.
-        self._trails: dict[str, Reply] = {}
+        self._trails: dict[str, Said] = {}
         self._plan = 0
         for name in ("path", "status", "coverage"):
             answer = answering(partial(self._answer, name))
@@ -67,19 +68,19 @@ class LastSamples:
         for key in (keys.rpc("pheromone"), keys.pheromone):
             bus.serve(key, answering(self._trail))
 
-    def keep(self, topic: str, reply: Reply) -> None:
+    def keep(self, topic: str, reply: Said) -> None:
         """Keep what was said on ``topic``."""
         with self._lock:
             self._last[topic] = reply
 
-    def keep_trail(self, plan: int, cohort: int, reply: Reply) -> None:
+    def keep_trail(self, plan: int, cohort: int, reply: Said) -> None:
         """Keep the trail that ``cohort`` of plan ``plan`` has left."""
         with self._lock:
             if plan != self._plan:
                 self._plan, self._trails = plan, {}
             self._trails[str(cohort)] = self._trails[NEWEST] = reply
 
-    def _answer(self, topic: str, request: Request) -> Reply:
+    def _answer(self, topic: str, request: Request) -> Said:
         check(request)
         with self._lock:
             reply = self._last.get(topic)
@@ -87,7 +88,7 @@ class LastSamples:
             raise NotYet(f"there is no {topic} yet")
         return reply
 
-    def _trail(self, request: Request) -> Reply:
+    def _trail(self, request: Request) -> Said:
         check(request, "cohort")
         cohort = request.parameters.get("cohort", NEWEST)
         if cohort != NEWEST:

@@ -16,10 +16,13 @@ from fasaco_edge.mission.events import Answer, CommandReceived
 from fasaco_edge.mission.order import EVERYTHING_ONCE, MissionOrder
 from fasaco_edge.mission.order_document import CommandName, read_command
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.limits import MAX_JSON_BYTES
 from fasaco_edge.wire.status import decode_json, encode_json
 
 # A robot whose path changes all the time drives badly: it is planned anew no more often [s].
 REPLAN_PERIOD_S = 1.0
+# A document of JSON, and its question.
+QUERY_BYTES = MAX_JSON_BYTES + 4096
 
 
 class Commands:
@@ -33,8 +36,10 @@ class Commands:
         self._decided: list[Answer] = []
         self._replan_key = keys.rpc("replan")
         self._replanned_at = float("-inf")
+        too_long = error_reply(BadQuery(f"a query must have at most {QUERY_BYTES} bytes"))
         for name in ("mission", "replan"):
-            bus.take_questions(keys.rpc(name), partial(mailbox.post, "command"))
+            post = partial(mailbox.post, "command")
+            bus.take_questions(keys.rpc(name), post, QUERY_BYTES, too_long)
 
     def take(self, items: Sequence[tuple[str, object]], now: float) -> list[CommandReceived]:
         """Return the commands in ``items``; what is none is answered at once."""

@@ -25,6 +25,7 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.limits import MAX_GRID_CELLS
 from fasaco_edge.wire.pose_decoding import PoseDecoder
 
 Metres = Annotated[float, Meta(gt=0, le=10)]
@@ -82,10 +83,14 @@ class BusConfig(Section, frozen=True):
 
 
 class MapConfig(Section, frozen=True):
-    """What in an occupancy grid is free and occupied [percent], and the largest lattice."""
+    """What in an occupancy grid is free and occupied [percent], the largest map and lattice.
+
+    For what they take of memory see ``daemon.memory``.
+    """
 
     free_at_most: Percent = 25
     occupied_at_least: Percent = 65
+    max_pixels: Annotated[int, Meta(ge=1, le=MAX_GRID_CELLS)] = 25_000_000
     max_lattice_cells: Annotated[int, Meta(ge=1, le=100_000_000)] = 500_000
 
 

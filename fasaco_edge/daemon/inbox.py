@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Spacing
 from fasaco_edge.bus.session import Bus, Sample
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.daemon.memory import most_bytes, queues
+from fasaco_edge.errors import FasacoError, MalformedMessage, MapTooLarge
 from fasaco_edge.mission.events import (
     Event,
     MapReceived,
@@ -24,11 +25,10 @@ from fasaco_edge.wire.pose_decoding import PoseDecoder
 # From one map to the next that is taken in, at least [s]: a flood of maps, by mistake or malice,
 # must not take a core. No mapper is that fast.
 MAP_SPACING_S = 0.05
+TOO_LONG = "too long"
+MAPS = ("map", "map_update")
 # Updates without their map come in swarms; it is asked for no more often than this [s].
 ASK_FOR_MAP_S = 2.0
-
-# Samples that wait for the loop, as ``protocol/limits.yaml`` has it.
-QUEUES = {"map": 4, "map_update": 256, "tf_static": 256, "pose": 1024, "command": 16}
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,16 +39,41 @@ class Received:
     at: float
 
 
-def make_mailbox(map_spacing_s: float = MAP_SPACING_S) -> Mailbox[object]:
+@dataclass(frozen=True, slots=True)
+class TooLong:
+    """A sample that was let go as it came: of what kind, how long it was, and might be [bytes]."""
+
+    kind: str
+    size: int
+    most: int
+
+
+def make_mailbox(max_pixels: int, map_spacing_s: float = MAP_SPACING_S) -> Mailbox[object]:
     """Return the mailbox of a daemon; a replay, whose clock is another, spaces nothing.
 
     Poses are queued: each tells what the tool passed over. Some seconds of them
     are plenty. A map does not clear what was before it: it may be broken. An update
     patches the map before it, so it waits with that.
     """
-    return Mailbox(
-        {**QUEUES, "snapshot": 8}, Spacing("map", map_spacing_s, followers=("map_update",))
-    )
+    spacing = Spacing("map", map_spacing_s, followers=("map_update",))
+    return Mailbox(queues(max_pixels), spacing, _size_of)
+
+
+def _size_of(item: object) -> int:
+    return item.sample.size if isinstance(item, Received) else 0
+
+
+def poster(mailbox: Mailbox[object], kind: str, max_pixels: int) -> Callable[[Sample], None]:
+    """Return what posts samples of a kind, on a Zenoh thread; one that is too long is let go."""
+    most = most_bytes(kind, max_pixels)
+
+    def post(sample: Sample) -> None:
+        if sample.size > most:
+            mailbox.post(TOO_LONG, TooLong(kind, sample.size, most))
+        else:
+            mailbox.post(kind, Received(sample, time.monotonic()))
+
+    return post
 
 
 class Inbox:
@@ -58,6 +83,7 @@ class Inbox:
         bus, keys: where the native keys are heard.
         mailbox: where all samples wait.
         poses: decodes poses.
+        max_pixels: the most that a map, or an update, may have.
         maps: other subscriptions that maps come by.
     """
 
@@ -67,13 +93,18 @@ class Inbox:
         keys: Keys,
         mailbox: Mailbox[object],
         poses: PoseDecoder,
+        max_pixels: int,
         maps: Sequence[Subscription] = (),
     ) -> None:
         self._poses = poses
+        self._max_pixels = max_pixels
         self._asked_for_map_at = float("-inf")
-        self._maps = [bus.subscribe(keys.map, _poster(mailbox, "map"), latched=True), *maps]
+        self._maps = [
+            bus.subscribe(keys.map, poster(mailbox, "map", max_pixels), latched=True),
+            *maps,
+        ]
         for kind, key in (("map_update", keys.map_update), ("pose", keys.pose)):
-            bus.subscribe(key, _poster(mailbox, kind))
+            bus.subscribe(key, poster(mailbox, kind, max_pixels))
 
     def ask_for_map(self, now: float) -> None:
         """Ask whoever publishes the map, and keeps the newest for late joiners, for it."""
@@ -92,6 +123,7 @@ class Inbox:
         lost too.
         """
         events, faults, map_at = self._newest_map(items)
+        faults.extend(_fault(item) for _, item in items if isinstance(item, TooLong))
         for kind, item in items:
             if not isinstance(item, Received) or kind == "map":
                 continue
@@ -119,7 +151,7 @@ class Inbox:
         for kind, item in reversed(items):
             if kind == "map" and isinstance(item, Received):
                 try:
-                    grid = decode_occupancy_grid(item.sample.payload)
+                    grid = decode_occupancy_grid(item.sample.payload, self._max_pixels)
                     return [MapReceived(grid)], faults, item.at
                 except FasacoError as error:
                     faults.append(_bare(error))
@@ -128,7 +160,7 @@ class Inbox:
     def _event(self, kind: str, sample: Sample) -> Event | None:
         """Return the event in a sample; None for transforms that tell no new pose."""
         if kind == "map_update":
-            return PatchReceived(decode_map_update(sample.payload))
+            return PatchReceived(decode_map_update(sample.payload, self._max_pixels))
         is_static = kind == "tf_static"
         pose = self._poses.decode(sample.payload, sample.schema, is_static=is_static)
         return None if pose is None else PoseReceived(pose)
@@ -141,5 +173,7 @@ def _bare(error: FasacoError) -> FasacoError:
     return error.with_traceback(None)
 
 
-def _poster(mailbox: Mailbox[object], kind: str) -> Callable[[Sample], None]:
-    return lambda sample: mailbox.post(kind, Received(sample, time.monotonic()))
+def _fault(told: TooLong) -> FasacoError:
+    kind = told.kind.replace("_", " ")
+    text = f"a {kind} of {told.size} bytes was let go: it may have at most {told.most}"
+    return MapTooLarge(text) if told.kind in MAPS else MalformedMessage(text)

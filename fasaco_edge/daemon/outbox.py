@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.qos import QOS
-from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.queries import Reply, Shared
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.answers import LastSamples
 from fasaco_edge.daemon.faults import Gate
@@ -65,12 +65,12 @@ class Outbox:
     def _say_path(
         self, xy: NDArray[np.float64], frame: str, stamp_ns: int, about: dict[str, Any]
     ) -> None:
-        payload = encode_path(xy, headings(xy), frame, stamp_ns)
         attachment = encode_json(about)
-        self._last.keep("path", Reply(payload, schemas.PATH, attachment))
-        self._path.put(payload, attachment)
+        path = Shared.of(encode_path(xy, headings(xy), frame, stamp_ns), schemas.PATH, attachment)
+        self._last.keep("path", path)
+        self._path.put(path.payload, attachment)
         if self._ros is not None:
-            self._ros.path.put(payload)
+            self._ros.path.put(path)
 
     def forget(self) -> None:
         """Keep no path and no coverage for those who join late: another daemon has them."""
@@ -104,11 +104,11 @@ class Outbox:
         self.gate.let_out("coverage", lambda: self._say_coverage(grid))
 
     def _say_coverage(self, grid: OccupancyGrid) -> None:
-        payload = encode_occupancy_grid(grid)
-        self._last.keep("coverage", Reply(payload, schemas.OCCUPANCY_GRID))
-        self._coverage.put(payload)
+        coverage = Shared.of(encode_occupancy_grid(grid), schemas.OCCUPANCY_GRID)
+        self._last.keep("coverage", coverage)
+        self._coverage.put(coverage.payload)
         if self._ros is not None:
-            self._ros.coverage.put(payload)
+            self._ros.coverage.put(coverage)
 
     def pheromone(self, seen: Observed, frame: str) -> None:
         """Keep the pheromone field, and publish it if anyone listens."""

@@ -20,7 +20,8 @@ LOG = logging.getLogger(__name__)
 CHANGEABLE = frozenset(
     {
         "planner",
-        "map",
+        "map.free_at_most",
+        "map.occupied_at_least",
         "robot.speed_m_s",
         "robot.quarter_turn_s",
         "mission.retries",

@@ -82,9 +82,11 @@ class Replay:
         self, config: DaemonConfig, run: RecordedRun | None = None, work: int | None = None
     ) -> None:
         self._run = run or RecordedRun()
-        self._mailbox = make_mailbox(map_spacing_s=0.0)
+        self._mailbox = make_mailbox(config.map.max_pixels, map_spacing_s=0.0)
         bus = SilentBus()
-        self._inbox = Inbox(bus, config.keys(), self._mailbox, config.poses())
+        self._inbox = Inbox(
+            bus, config.keys(), self._mailbox, config.poses(), config.map.max_pixels
+        )
         self._heard = {*bus.heard, COMMAND}
         self.mission, loader, planner = load_mission(config, self._mailbox)
         self.plans = ReplayPlanner(planner, self._run, config.planner.budget_s, work)

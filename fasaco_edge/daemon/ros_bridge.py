@@ -8,14 +8,14 @@ changes keys, attachments and tokens alone.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.qos import QOS
+from fasaco_edge.bus.queries import Shared
 from fasaco_edge.bus.session import Bus, Sample
-from fasaco_edge.daemon.inbox import Received
+from fasaco_edge.daemon.inbox import poster
 from fasaco_edge.daemon.ros_config import RosConfig
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, attachment, gid_of
 
@@ -28,10 +28,13 @@ class RosBridge:
         path, coverage: where to publish them.
     """
 
-    def __init__(self, bus: Bus, config: RosConfig, mailbox: Mailbox[object]) -> None:
+    def __init__(
+        self, bus: Bus, config: RosConfig, mailbox: Mailbox[object], max_pixels: int
+    ) -> None:
         self._bus = bus
         self._config = config
         self._mailbox = mailbox
+        self._max_pixels = max_pixels
         self._node = RosNode(config.domain, bus.id, config.namespace, config.node)
         self._endpoints = 0
         if config.kind == "rmw_zenoh":
@@ -44,7 +47,11 @@ class RosBridge:
         self.coverage = self._publisher(config.coverage_grid, "coverage")
 
     def _subscribe(self, kind: str, topic: RosTopic) -> Subscription:
-        post = _poster(self._mailbox, kind, topic.schema)
+        take = poster(self._mailbox, kind, self._max_pixels)
+
+        def post(sample: Sample) -> None:
+            take(sample.as_type(topic.schema))  # ROS names no type beside a sample
+
         if self._config.kind == "bridge":
             return self._bus.subscribe(topic.bridge_key, post, topic.latched, topic.depth)
         key = topic.rmw_key(self._config.domain, any_hash=True)
@@ -78,18 +85,8 @@ class RosPublisher:
         """Keep nothing of what was said for those who join late."""
         self._publisher.forget()
 
-    def put(self, payload: bytes) -> None:
+    def put(self, said: Shared) -> None:
         """Send a message."""
         self._count += 1
         beside = attachment(self._count, time.time_ns(), self._gid) if self._gid else b""
-        self._publisher.put(payload, beside)
-
-
-def _poster(mailbox: Mailbox[object], kind: str, schema: str) -> Callable[[Sample], None]:
-    """Return what posts samples as messages of type ``schema``: ROS names none beside them."""
-
-    def post(sample: Sample) -> None:
-        named = Sample(sample.key, sample.payload, schema, sample.attachment)
-        mailbox.post(kind, Received(named, time.monotonic()))
-
-    return post
+        self._publisher.put(said.payload, beside)

@@ -73,8 +73,9 @@ class TurnReplay:
 
     def __init__(self, config: DaemonConfig, record: TurnRecord) -> None:
         self._record = record
-        mailbox = make_mailbox()
-        self._inbox = Inbox(SilentBus(), config.keys(), mailbox, config.poses())
+        max_pixels = config.map.max_pixels
+        mailbox = make_mailbox(max_pixels)
+        self._inbox = Inbox(SilentBus(), config.keys(), mailbox, config.poses(), max_pixels)
         self.mission, loader, self._planner = load_mission(config, mailbox)
         cell_m, ledger = config.robot.tool_width_m, record.beginning.ledger
         disk = NoDisk(decode_ledger(ledger, cell_m) if ledger else None)

@@ -24,12 +24,12 @@ from fasaco_edge.grid.lattice import (
     Footprint,
     lattice_window,
     pixels_of,
-    placement_on,
+    placement_of,
 )
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.changes import Box, mark_stale
 from fasaco_edge.kernels.classification import Cells, classify_cells
-from fasaco_edge.kernels.footprint import Placement, reach_of
+from fasaco_edge.kernels.footprint import Placement, Thresholds, reach_of
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -98,19 +98,20 @@ class LatticeChange:
                 names them; no others are looked at. None for any.
 
         Raises:
-            MapTooLarge: the new lattice would have more than ``max_cells`` cells.
+            MapTooLarge: the new lattice would have more than ``max_cells`` cells, or the pixels
+                are too small.
         """
         window = lattice_window(grids[1].geometry, footprint.cell_m, max_cells)
-        stale = _stale_cells(grids, lattice, window, footprint, within)
+        placement = placement_of(grids[1].geometry, footprint)
+        stale = _stale_cells(grids, lattice, window, placement, footprint.thresholds, within)
         if window == lattice.window and not stale.any():
             return cls(lattice, lattice, np.empty((0, 2), np.int32))
         old_states = carried(lattice.states, lattice.window, window)
         old_steps = carried(lattice.steps, lattice.window, window)
         states, steps = old_states.copy(), old_steps.copy()
-        raster, _ = grids[1].geometry.on_raster()
         classify_cells(
             pixels_of(grids[1]),
-            placement_on(raster, footprint.cell_m, footprint.robot_radius_m),
+            placement,
             footprint.thresholds,
             Cells(states, steps, stale, window.row0, window.col0),
         )
@@ -172,13 +173,12 @@ def _stale_cells(
     grids: tuple[OccupancyGrid, OccupancyGrid],
     lattice: CoverageLattice,
     window: Window,
-    footprint: Footprint,
+    placement: Placement,
+    thresholds: Thresholds,
     within: Window | None,
 ) -> NDArray[np.bool_]:
     """Return which cells of the new window must be classified anew, bool (rows, cols)."""
     before, after = grids
-    raster, _ = after.geometry.on_raster()
-    placement = placement_on(raster, footprint.cell_m, footprint.robot_radius_m)
     regions = regions_to_compare(before, after, window, placement, within)
     if regions is None:
         return np.ones((window.rows, window.cols), np.bool_)
@@ -188,7 +188,7 @@ def _stale_cells(
             pixels_of(before),
             pixels_of(after),
             Box(region.row0, region.col0, region.row1, region.col1),
-            footprint.thresholds,
+            thresholds,
             placement,
             stale,
             window.row0,

@@ -19,7 +19,7 @@ from fasaco_edge.grid.geometry import FARTHEST_M, GridGeometry, Raster, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.classification import Cells, classify_cells
 from fasaco_edge.kernels.directions import EAST, NORTH, SOUTH, WEST
-from fasaco_edge.kernels.footprint import Pixels, Placement, Thresholds
+from fasaco_edge.kernels.footprint import Pixels, Placement, Thresholds, reach_of
 from fasaco_edge.kernels.states import BLOCKED, COVERABLE, UNKNOWN
 
 __all__ = ["BLOCKED", "COVERABLE", "UNKNOWN", "Cell", "CoverageLattice", "Footprint"]
@@ -30,6 +30,10 @@ MAX_LATTICE_CELLS = 4_000_000
 
 # Indices of cells are int32, and sums of two of them, too.
 MOST_INDEX = 2**30
+
+# How many pixels robot and tool may reach over: beyond that, the tables by which a map is looked
+# through take more memory than the map itself, see ``kernels.classification``.
+MOST_REACH_PX = 400
 
 # A robot exactly as wide as a corridor fits; float32 resolutions on the wire
 # must not decide otherwise.
@@ -89,15 +93,14 @@ class CoverageLattice:
         """Return the lattice over all of ``grid``.
 
         Raises:
-            MapTooLarge: it would have more than ``max_cells`` cells.
+            MapTooLarge: it would have more than ``max_cells`` cells, or the pixels are too small.
             MapTooFar: it would reach too far from 0, see ``lattice_window``.
         """
         window = lattice_window(grid.geometry, footprint.cell_m, max_cells)
+        placement = placement_of(grid.geometry, footprint)
         shape = window.rows, window.cols
         states, steps = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
         cells = Cells(states, steps, np.ones(shape, np.bool_), window.row0, window.col0)
-        raster, _ = grid.geometry.on_raster()
-        placement = placement_on(raster, footprint.cell_m, footprint.robot_radius_m)
         classify_cells(pixels_of(grid), placement, footprint.thresholds, cells)
         return cls(window, footprint.cell_m, states, steps)
 
@@ -180,6 +183,25 @@ def pixels_of(grid: OccupancyGrid) -> Pixels:
     cells.flags.writeable = False
     _, shown = grid.geometry.on_raster()
     return Pixels(cells, shown.row0, shown.col0)
+
+
+def placement_of(geometry: GridGeometry, footprint: Footprint) -> Placement:
+    """Return where the lattice's cells and a robot lie on a map's raster.
+
+    Raises:
+        MapTooLarge: the pixels are too small for so large a robot.
+    """
+    raster, _ = geometry.on_raster()
+    placement = placement_on(raster, footprint.cell_m, footprint.robot_radius_m)
+    reach = reach_of(placement)
+    # A negated comparison, so that NaN is caught too.
+    if not reach <= MOST_REACH_PX:
+        finest = geometry.resolution * reach / MOST_REACH_PX
+        raise MapTooLarge(
+            f"a map of pixels of {geometry.resolution:g} m: tool and robot reach over {reach:.0f} "
+            f"of them, more than {MOST_REACH_PX}; they must be {1.01 * finest:.2g} m or larger"
+        )
+    return placement
 
 
 def placement_on(raster: Raster, cell_m: float, robot_radius_m: float = 0.0) -> Placement:

@@ -227,5 +227,7 @@ class Site:
             return None
         reachable = self.ground.reachable if self.ground else None
         visits = ledger.visits(self.lattice.window)
-        free_m2 = self._free_area.out_of_reach_m2(self.grid, self.lattice, reachable)
+        free_m2 = self._free_area.out_of_reach_m2(
+            self.grid, self.map_revision, self.lattice, reachable
+        )
         return Coverage.of(self.lattice, reachable, visits, free_m2)

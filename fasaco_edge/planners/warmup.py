@@ -12,8 +12,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 from fasaco_edge.kernels.areas import cells_beside, find_areas
-from fasaco_edge.kernels.changes import Box
-from fasaco_edge.kernels.free_pixels import tally_free
+from fasaco_edge.kernels.free_pixels import count_free_beside
 from fasaco_edge.kernels.jit import note_all_compiled
 from fasaco_edge.kernels.polygons import add_near, count_in, turn_inside
 from fasaco_edge.kernels.reach import update_reach
@@ -78,8 +77,8 @@ def _take_changes_in(grid: OccupancyGrid, lattice: CoverageLattice, footprint: F
     steps, reachable = change.after.steps, np.ones((4, 5), np.bool_)
     update_reach(steps, steps, change.cells.copy(), reachable, 0, 0)
     raster, _ = grid.geometry.on_raster()
-    place, counts = placement_on(raster, footprint.cell_m), np.zeros((4, 5), np.int32)
-    tally_free(pixels_of(grid), pixels_of(grown), Box(0, 0, 4, 5), 25, place, counts, 0, 0)
+    place = placement_on(raster, footprint.cell_m)
+    count_free_beside(pixels_of(grown), 25, place, reachable, 0, 0)
 
 
 def _take_areas(lattice: CoverageLattice) -> None:

@@ -40,7 +40,7 @@ class Inbox:
 
     def post(self, topic: str, sample: Sample) -> None:
         """Leave a sample; safe from any thread, never waits for the writer."""
-        size = len(sample.payload)
+        size = sample.size
         with self._changed:
             # Stamped here, so that of samples on several threads none is before an earlier one.
             arrival = self._stamp(topic, sample)
@@ -72,5 +72,5 @@ class Inbox:
     def _forget(self, topics: frozenset[str]) -> None:
         self._lost.update(arrival.topic for arrival in self._waiting if arrival.topic in topics)
         kept = deque(arrival for arrival in self._waiting if arrival.topic not in topics)
-        self._bytes = sum(len(arrival.sample.payload) for arrival in kept)
+        self._bytes = sum(arrival.sample.size for arrival in kept)
         self._waiting = kept

@@ -14,6 +14,7 @@ from typing import Final
 
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
 from fasaco_edge.bus.sample_codec import Numbered, SampleEncoder
+from fasaco_edge.bus.session import Sample
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.recording.fields import section
 from fasaco_edge.recording.journal import Journal
@@ -116,7 +117,8 @@ def _path_digest(arrival: Arrival) -> Arrival:
     payload = arrival.sample.payload
     with contextlib.suppress(MalformedMessage):
         payload = decode_path(payload).xy.tobytes()
-    sample = replace(arrival.sample, payload=digest(payload))
+    before = arrival.sample
+    sample = Sample(before.key, digest(payload), before.schema, before.attachment)
     return replace(arrival, topic=PATH_DIGEST, sample=sample)
 
 

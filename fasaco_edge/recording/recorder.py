@@ -12,7 +12,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
@@ -174,7 +173,7 @@ class Recorder:
     ) -> None:
         def post(sample: Sample) -> None:
             # As the daemon has it: ROS names no type beside a sample.
-            self._inbox.post(topic, replace(sample, schema=schema) if schema else sample)
+            self._inbox.post(topic, sample.as_type(schema) if schema else sample)
 
         self._bus.subscribe(key, post, latched, depth)
 

@@ -6,18 +6,29 @@ import threading
 from functools import partial
 from typing import Self
 
-from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.mailbox import Mailbox, Queue
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.watching.known import Token
 from fasaco_edge.wire.keys import VERSION, Keys
+from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 
 # Each counts: states and revisions are noted, updates lie on each other.
-QUEUED = {"token": 256, "status": 64, "path": 64, "map_update": 256, "command": 16}
+QUEUED = {
+    "token": Queue(256),
+    "status": Queue(64),
+    "path": Queue(64, MAX_MESSAGE_BYTES),
+    "map_update": Queue(256, MAX_MESSAGE_BYTES),
+    "command": Queue(16),
+}
 LATCHED = ("map", "path", "coverage", "status")
 RETRY_S = 0.5
 # So long the end may wait for a host that does not answer.
 END_S = 0.5
+
+
+def _size_of(item: object) -> int:
+    return item.size if isinstance(item, Sample) else 0
 
 
 class Feed:
@@ -31,7 +42,7 @@ class Feed:
         self.trouble = ""
         self._settings = settings
         self._keys = keys
-        self._mailbox: Mailbox[object] = Mailbox(QUEUED)
+        self._mailbox: Mailbox[object] = Mailbox(QUEUED, size_of=_size_of)
         self._ended = threading.Event()
         self._bus: Bus | None = None
         self._lock = threading.Lock()

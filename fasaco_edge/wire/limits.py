@@ -33,4 +33,7 @@ MAX_PATH_POSES: Final = 1_000_000
 MAX_TRANSFORMS: Final = 4096
 """In one tf message, and frames that are remembered."""
 
+MAX_POSE_BYTES: Final = 1_048_576
+"""Longest pose or tf message."""
+
 MAX_JSON_BYTES: Final = 1_048_576

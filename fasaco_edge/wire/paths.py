@@ -7,6 +7,7 @@ multiple of eight: with one frame name in all of them, they are the records of a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,9 @@ from fasaco_edge.wire.limits import MAX_PATH_POSES
 from fasaco_edge.wire.refusal import refuse
 from fasaco_edge.wire.schemas import PATH
 from fasaco_edge.wire.strings import encoded_string
+
+# So many poses are worked out at a time.
+BLOCK_POSES = 16_384
 
 LEAST_POSE_BYTES = 72
 """Of a PoseStamped with an empty frame: stamp 8, length 4, NUL 1, padding 3, floats 56."""
@@ -67,18 +71,21 @@ def encode_path(
     writer = CdrWriter(PATH)
     if xy.ndim != 2 or xy.shape[1] != 2 or yaw.shape != (len(xy),):
         refuse(writer.message, "poses", "points (n, 2), yaws (n,)", f"{xy.shape}, {yaw.shape}")
-    poses = planar_poses(xy, yaw)
-    check_poses(poses, writer.message, _pose_field)
-    _check_count(len(poses), MAX_PATH_POSES)
+    _check_count(len(xy), MAX_PATH_POSES)
     write_header(writer, frame, stamp_ns)
-    writer.uint32(len(poses), "length of poses")
+    writer.uint32(len(xy), "length of poses")
     text = encoded_string(frame, writer.message, "header.frame_id")
-    for some in (poses[:1], poses[1:]):
-        records = np.zeros(len(some), _record(writer.position, len(text)))
+    for first, last in ((0, min(len(xy), 1)), (1, len(xy))):
+        records = np.zeros(max(last - first, 0), _record(writer.position, len(text)))
         records["sec"], records["nanosec"] = divmod(stamp_ns, SECOND_NS)
         records["length"] = len(text)
         records["frame"] = np.frombuffer(text, np.uint8)
-        records["pose"] = some
+        # A path of half a million poses is some 40 MB: beside the message, only a block of it.
+        for start in range(first, last, BLOCK_POSES):
+            stop = min(start + BLOCK_POSES, last)
+            poses = planar_poses(xy[start:stop], yaw[start:stop])
+            check_poses(poses, writer.message, partial(_pose_field, first=start))
+            records["pose"][start - first : stop - first] = poses
         writer.array(records)
     return writer.payload()
 
@@ -152,8 +159,8 @@ def _record(start: int, frame_size: int) -> np.dtype[np.void]:
     )
 
 
-def _pose_field(index: int) -> str:
-    return f"poses[{index}].pose"
+def _pose_field(index: int, first: int = 0) -> str:
+    return f"poses[{first + index}].pose"
 
 
 def _check_count(count: int, max_poses: int) -> None:

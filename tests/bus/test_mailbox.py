@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.bus.mailbox import LatestSlot, Mailbox, Spacing
+from fasaco_edge.bus.mailbox import LatestSlot, Mailbox, Queue, Spacing
 
 
 def mailbox(length=3):
-    return Mailbox({"update": length})
+    return Mailbox({"update": Queue(length)})
 
 
 def test_of_a_kind_only_the_newest_is_kept():
@@ -39,6 +39,38 @@ def test_a_full_queue_loses_its_oldest_and_says_how_many():
     assert box.take(0) == [("update", 2), ("update", 3), ("update", 4)]
     assert box.take_lost("update") == 2
     assert box.take_lost("update") == 0
+
+
+def weighed(length, size):
+    return Mailbox({"update": Queue(length, size)}, size_of=len)
+
+
+def test_a_queue_holds_no_more_bytes_than_it_may_but_its_newest():
+    box = weighed(9, 10)
+    for number in range(1, 7):
+        box.post("update", bytes(number))
+    assert [len(item) for _, item in box.take(0)] == [6]
+    assert box.take_lost("update") == 5
+    for _ in range(3):
+        box.post("update", bytes(4))
+    assert [len(item) for _, item in box.take(0)] == [4, 4]
+    box.post("update", bytes(99))
+    assert [len(item) for _, item in box.take(0)] == [99]
+    box.post("update", b"")
+    assert [len(item) for _, item in box.take(0)] == [0]
+    assert box.take_lost("update") == 1
+
+
+@given(st.lists(st.integers(0, 9), max_size=30), st.integers(1, 5), st.integers(0, 20))
+def test_what_a_queue_loses_is_its_oldest(sizes, length, size):
+    box = weighed(length, size)
+    for number in sizes:
+        box.post("update", bytes(number))
+    kept = [len(item) for _, item in box.take(0)]
+    assert kept == sizes[len(sizes) - len(kept) :]
+    assert box.take_lost("update") == len(sizes) - len(kept)
+    assert len(kept) <= length
+    assert sum(kept) <= size or len(kept) == 1
 
 
 def test_an_empty_mailbox_is_waited_for_no_longer_than_asked():
@@ -124,7 +156,8 @@ SPACING_S = 0.2
 
 def spaced():
     return Mailbox(
-        {"map": 2, "update": 9, "pose": 9}, Spacing("map", SPACING_S, followers=("update",))
+        {"map": Queue(2), "update": Queue(9), "pose": Queue(9)},
+        Spacing("map", SPACING_S, followers=("update",)),
     )
 
 
@@ -152,7 +185,7 @@ def test_of_a_flood_few_are_taken_and_the_newest_always():
 
 
 def test_where_nothing_is_spaced_everything_is_taken_at_once():
-    box = Mailbox({"map": 2}, Spacing("map", 0.0))
+    box = Mailbox({"map": Queue(2)}, Spacing("map", 0.0))
     for number in range(100):
         box.post("map", number)
         assert box.take(0) == [("map", number)]

@@ -168,7 +168,8 @@ def changed(samples: Samples, index: int, change: Callable[[bytes], bytes]) -> S
     """Change the bytes of one."""
     result = list(samples)
     sample = samples[index].sample
-    result[index] = replace(samples[index], sample=replace(sample, payload=change(sample.payload)))
+    another = Sample(sample.key, change(sample.payload), sample.schema, sample.attachment)
+    result[index] = replace(samples[index], sample=another)
     return result
 
 

@@ -27,6 +27,7 @@ from tests.daemon.rooms import (
 )
 
 MAP = map_bytes(pillared_room())
+MAX_PIXELS = 1_000_000
 UPDATE = update_bytes(pillared_room(), 1.0, 1.0, 2.0, 2.0)
 
 
@@ -34,8 +35,8 @@ class Arrivals:
     """A mailbox with its inbox; samples come in one after the other."""
 
     def __init__(self, bus):
-        self.mailbox = make_mailbox(map_spacing_s=0.0)
-        self.inbox = Inbox(bus, Keys(), self.mailbox, PoseDecoder(POSE_STAMPED, None))
+        self.mailbox = make_mailbox(MAX_PIXELS, map_spacing_s=0.0)
+        self.inbox = Inbox(bus, Keys(), self.mailbox, PoseDecoder(POSE_STAMPED, None), MAX_PIXELS)
         self.clock = 0.0
 
     def post(self, kind, payload):

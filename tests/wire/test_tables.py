@@ -12,7 +12,7 @@ import fasaco_edge
 from fasaco_edge.bus import session_config
 from fasaco_edge.bus.qos import QOS, VOLATILE, Qos
 from fasaco_edge.daemon.commands import REPLAN_PERIOD_S
-from fasaco_edge.daemon.inbox import QUEUES
+from fasaco_edge.daemon.memory import QUEUES
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission import order
 from fasaco_edge.mission.ledger import MOST_TILES

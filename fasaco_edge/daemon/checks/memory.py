@@ -6,9 +6,10 @@ import re
 from pathlib import Path
 
 from fasaco_edge.daemon.checks.finding import Finding, Level, Patient
+from fasaco_edge.daemon.memory import afforded, limits_mib, needed_bytes
 
 # A daemon with a plan of a large building takes less; what is free should do for it.
-WANTED_MB = 300
+WANTED_MB = 350
 PI_CMDLINES = ("boot/firmware/cmdline.txt", "boot/cmdline.txt")
 
 
@@ -31,9 +32,12 @@ def memory(patient: Patient) -> Finding:
     if free_mb < WANTED_MB:
         to_do = "end what else runs, or plan with larger cells (robot.tool_width_m)"
         return Finding(Level.WARN, f"{found}; the daemon may want {WANTED_MB} MB", to_do, details)
-    if limit and limit / 1e6 < WANTED_MB:
-        to_do = f"systemctl edit fasaco-edge, MemoryMax={WANTED_MB}M or more"
-        found += f"; the unit's limit is {limit / 1e6:.0f} MB"
+    if limit and limit < needed_bytes(patient.config):
+        high, most = limits_mib(patient.config)
+        smaller = afforded(patient.config, limit).map
+        found += f"; the unit's limit is {limit / 1e6:.0f} MB: maps of no more than "
+        found += f"{smaller.max_pixels} pixels and {smaller.max_lattice_cells} cells are taken"
+        to_do = f"systemctl edit fasaco-edge: MemoryHigh={high}M, MemoryMax={most}M"
         return Finding(Level.WARN, found, to_do, details)
     return Finding(Level.OK, found, details=details)
 

@@ -1,0 +1,130 @@
+"""The memory contract: what may wait, what the largest map may take, and the limit that follows.
+
+A daemon whose maps have at most P pixels, on a lattice of at most C cells, takes at most
+
+    BASE_BYTES + MAPS * P + CELL_BYTES * C
+
+whatever comes in, how often, and at what resolution; ``MemoryHigh=`` of its unit is that for the
+default configuration, ``MemoryMax=`` a tenth more, and under another limit the daemon takes no
+larger maps than that affords (``afforded``). A test holds the units to this file, and one measures.
+
+A pixel is a byte, and lies at worst nine times in memory, with updates as large as the map:
+
+* in Zenoh, while a message is put together, once, and once as it is handed over;
+* in the mailbox, where of maps and of updates no more waits than the largest takes, twice;
+* in the turn, as a map and an update taken, twice, and a moment longer in Zenoh's buffers, once;
+* as the mission's map, while another is compared with it and patched, twice.
+
+What comes in larger pieces is let go as it comes, by its size alone. Nothing else grows with the
+pixels: kernels look at a map tile by tile, and a tile has a bound, see ``grid.lattice``. Of a
+lattice's cells it is the path that takes most: some 80 bytes a pose, twice while it is sent.
+
+Measured (``python -m tests.campaigns.memory``, x86-64): a mission on a small map 195 MB, a path of
+440,000 cells 127 MB more, maps of 25 million pixels at 20 Hz 75 MB more, each followed by an
+update of all of it 240 MB.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from msgspec import structs
+
+from fasaco_edge.bus.mailbox import Queue
+from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.daemon.security_config import HEADER_BYTES
+from fasaco_edge.wire.limits import MAX_POSE_BYTES
+
+MB = 1_000_000
+MIB = 1 << 20
+# Interpreter, numpy, Zenoh, compiler and kernels, and what a plan takes for itself.
+BASE_BYTES = 210 * MB
+MAPS = 9
+CELL_BYTES = 330
+# MemoryMax= above MemoryHigh=, beyond which the system only slows a service down.
+SPARE = 1.1
+
+# What is tried under any limit: a small flat.
+LEAST_PIXELS, LEAST_CELLS = 250_000, 10_000
+
+# Samples that wait for the loop, as ``protocol/limits.yaml`` has it; one more, and the oldest is
+# lost.
+QUEUES = {"map": 4, "map_update": 256, "tf_static": 256, "pose": 1024, "command": 16}
+# Of these kinds no more than so much waits, either.
+QUEUED_BYTES = 8 * MAX_POSE_BYTES
+
+
+def map_bytes(max_pixels: int) -> int:
+    """Return how long a map or an update may be that has ``max_pixels`` at most [bytes]."""
+    return max_pixels + HEADER_BYTES
+
+
+def most_bytes(kind: str, max_pixels: int) -> int:
+    """Return how long one sample of a kind may be [bytes]."""
+    return map_bytes(max_pixels) if kind in ("map", "map_update") else MAX_POSE_BYTES
+
+
+def queues(max_pixels: int) -> dict[str, Queue]:
+    """Return what may wait of each kind."""
+    sizes = dict.fromkeys(("map", "map_update"), map_bytes(max_pixels))
+    rooms = {kind: Queue(length, sizes.get(kind, QUEUED_BYTES)) for kind, length in QUEUES.items()}
+    return {**rooms, "snapshot": Queue(8)}
+
+
+def needed_bytes(config: DaemonConfig) -> int:
+    """Return what a daemon of this configuration takes at most [bytes]."""
+    return BASE_BYTES + MAPS * config.map.max_pixels + CELL_BYTES * config.map.max_lattice_cells
+
+
+def limits_mib(config: DaemonConfig) -> tuple[int, int]:
+    """Return what ``MemoryHigh=`` and ``MemoryMax=`` of its unit should be [MiB], in 16s."""
+    needed = needed_bytes(config) / MIB
+    high, most = (-(-int(mib + 1) // 16) * 16 for mib in (needed, SPARE * needed))
+    return high, most
+
+
+def afforded(config: DaemonConfig, limit: int | None) -> DaemonConfig:
+    """Return the configuration with maps and lattices no larger than ``limit`` [bytes] affords.
+
+    None is no limit. Both shrink alike; a small flat is always tried.
+    """
+    if limit is None or needed_bytes(config) <= limit:
+        return config
+    maps = config.map
+    share = max(limit - BASE_BYTES, 0) / (needed_bytes(config) - BASE_BYTES)
+    pixels = max(int(share * maps.max_pixels), min(LEAST_PIXELS, maps.max_pixels))
+    cells = max(int(share * maps.max_lattice_cells), min(LEAST_CELLS, maps.max_lattice_cells))
+    smaller = structs.replace(maps, max_pixels=pixels, max_lattice_cells=cells)
+    return structs.replace(config, map=smaller)
+
+
+def memory_limit(root: Path = Path("/")) -> int | None:
+    """Return the limit that control groups set this process [bytes]; None for none, or no telling.
+
+    That of the group itself and of those above it, as far as they can be seen from inside.
+    """
+    try:
+        groups = (root / "proc/self/cgroup").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return None
+    found = []
+    for line in groups:
+        _, controllers, place = line.split(":", 2)
+        if controllers not in ("", "memory"):
+            continue
+        top, name = ("sys/fs/cgroup/memory", "memory.limit_in_bytes") if controllers else (
+            "sys/fs/cgroup", "memory.max"
+        )  # fmt: skip
+        folder = root / top / place.lstrip("/")
+        for group in (folder, *folder.parents):
+            if group == root / "sys/fs":
+                break
+            try:
+                text = (group / name).read_text(encoding="ascii").strip()
+            except OSError:
+                continue
+            if text.isdecimal():
+                found.append(int(text))
+    # Version 1 says "none" as a number near 2^63.
+    limits = [limit for limit in found if limit < 1 << 60]
+    return min(limits, default=None)

@@ -1,0 +1,260 @@
+"""Maps of every size, resolution and rate against a daemon that may have only so much memory:
+
+python -m tests.campaigns.memory
+python -m tests.campaigns.memory --sides 1000,5000,8000 --rates 20 --limit-mb 400
+
+The daemon runs in a control group with its unit's MemoryMax=, where there is one to be had. It is
+to live, whatever comes: what it takes must fit into what ``fasaco_edge.daemon.memory`` says, what
+it does not take it must refuse with an error that names the number.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fasaco_edge.bench.daemon_process import warm_kernels
+from fasaco_edge.daemon.config import DaemonConfig, load_config
+from fasaco_edge.daemon.memory import afforded, needed_bytes
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.process_memory import peak_mb
+from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
+from tests.daemon import processes
+from tests.daemon.limited import Group, memory_group, unit_limit, why_not
+from tests.daemon.outsider import Outsider, open_client
+from tests.daemon.processes import Daemon, daemon_process
+from tests.daemon.rooms import map_bytes, pose_bytes, room
+
+SIDES = (1000, 2000, 4000, 5000, 8000)
+RESOLUTIONS = (0.0001, 0.02, 0.05)
+RATES = (1.0, 10.0, 20.0)
+KINDS = ("maps", "moving", "updates", "mappers")
+# Mappers that speak at once.
+MAPPERS = 3
+# A daemon is asked for its status so often before it counts as stuck.
+ANSWERS_S = 60.0
+
+
+@dataclass(frozen=True)
+class Flood:
+    """What is sent to one daemon.
+
+    Attributes:
+        kind: "maps" that differ in a pixel; "moving" ones, none on the raster of the one before;
+            "updates": each map followed by an update of all of it; "mappers": several at once.
+        side: of the square maps [pixels].
+        resolution: edge of a pixel [m].
+        rate: so many a second, if the link takes them.
+    """
+
+    kind: str
+    side: int
+    resolution: float
+    rate: float
+
+
+@dataclass
+class Row:
+    """What came of a flood.
+
+    Attributes:
+        outcome: "taken", "refused" or "ended".
+        error: what the daemon said last of what it refused.
+        sent, taken: maps.
+        peak_mb: the most the daemon was resident with.
+        needs_mb: the most it may be, by its configuration and limit.
+        broken: what it must not do, and did; "" for nothing.
+    """
+
+    kind: str
+    side: int
+    resolution: float
+    rate: float
+    outcome: str
+    sent: int
+    taken: int
+    peak_mb: float
+    needs_mb: float
+    error: str
+    broken: str
+
+
+def map_payload(flood: Flood, number: int) -> bytes:
+    """Return a hall; ``number`` tells it from others."""
+    pixels = np.zeros((flood.side, flood.side), np.int8)
+    pixels[[0, -1]] = pixels[:, [0, -1]] = 100
+    pixels[flood.side // 2, flood.side // 2 + 8 * number] = 100
+    x = 0.3 * flood.resolution * number if flood.kind == "moving" else 0.0
+    geometry = GridGeometry(flood.side, flood.side, flood.resolution, Pose2D(x, 0.0))
+    return encode_occupancy_grid(OccupancyGrid(geometry, pixels, "map", number))
+
+
+def update_payload(flood: Flood) -> bytes:
+    """Return an update of all of it."""
+    pixels = np.full((flood.side, flood.side), 0, np.int8)
+    return encode_map_update(MapPatch(Window(0, 0, flood.side, flood.side), pixels, "map", 9))
+
+
+def pour(flood: Flood, daemon: Daemon, outsider: Outsider, seconds: float) -> int:
+    """Send for so long; return how many maps that were."""
+    payloads = [map_payload(flood, number) for number in range(3)]
+    update = update_payload(flood) if flood.kind == "updates" else b""
+    sent, ends = 0, time.monotonic() + seconds
+    with ExitStack() as stack:
+        sessions = [outsider.session]
+        for _ in range(MAPPERS - 1 if flood.kind == "mappers" else 0):
+            session = open_client(daemon.endpoint)
+            stack.callback(session.close)
+            sessions.append(session)
+        while time.monotonic() < ends and daemon.process.poll() is None:
+            due = time.monotonic() + 1.0 / flood.rate
+            outsider.session, own = sessions[sent % len(sessions)], outsider.session
+            outsider.put("map", payloads[sent % 3])
+            if update:
+                outsider.put("map_update", update)
+            outsider.session = own
+            sent += 1
+            time.sleep(max(due - time.monotonic(), 0.0))
+    return sent
+
+
+def settled(outsider: Outsider, daemon: Daemon) -> dict[str, Any]:
+    """Return the status once the daemon has nothing to do any more."""
+    until, before = time.monotonic() + ANSWERS_S, ()
+    while daemon.process.poll() is None:
+        status = outsider.ask_status()
+        now = (status["map"]["revision"], status["errors"]["total"], status["plan"]["planning"])
+        if (now == before and not now[2]) or time.monotonic() > until:
+            return status
+        before = now
+        time.sleep(1.2)
+    return {}
+
+
+def run_flood(
+    flood: Flood,
+    folder: Path,
+    seconds: float,
+    group: Group | None,
+    limit: int | None,
+    **config: Any,
+) -> Row:
+    """Run a daemon on a small map, pour, and see what has become of it."""
+    program = (*group.program, *PROGRAM) if group else PROGRAM
+    processes.PROGRAM = program
+    try:
+        with daemon_process(folder, **config) as daemon, Outsider(daemon.endpoint) as outsider:
+            written = load_config(next(folder.glob("daemon*.yaml")))
+            needs = needed_bytes(afforded(written, limit))
+            outsider.put("map", map_bytes(room(8.0, 6.0)))
+            outsider.put("pose", pose_bytes(0.75, 0.75))
+            outsider.wait_status(lambda status: status["state"] == "covering")
+            before = settled(outsider, daemon)["map"]["revision"]
+            sent = pour(flood, daemon, outsider, seconds)
+            status = settled(outsider, daemon)
+            peak = peak_mb(daemon.pid) if status else 0.0
+    finally:
+        processes.PROGRAM = PROGRAM
+    row = Row(
+        **asdict(flood), outcome="ended", sent=sent, taken=0, peak_mb=peak,
+        needs_mb=round(needs / 1e6), error="", broken="the daemon has ended",
+    )  # fmt: skip
+    if status:
+        row.taken = status["map"]["revision"] - before
+        row.error = status["errors"]["last"]
+        row.outcome, row.broken = "taken" if row.taken else "refused", ""
+        if not row.taken and not any(letter.isdigit() for letter in row.error):
+            row.broken = "refused without a number"
+        elif peak > row.needs_mb:
+            row.broken = f"{peak:.0f} MB are more than it says"
+    return row
+
+
+PROGRAM = processes.PROGRAM
+
+
+def run_floods(
+    floods: Iterable[Flood], folder: Path, seconds: float, limit: int, **config: Any
+) -> Iterator[Row]:
+    """Yield what comes of each flood, each on a daemon of its own."""
+    reason = why_not()
+    for number, flood in enumerate(floods):
+        place = folder / str(number)
+        place.mkdir()
+        if reason:
+            yield run_flood(flood, place, seconds, None, None, **config)
+            continue
+        with memory_group(limit) as group:
+            row = run_flood(flood, place, seconds, group, limit, **config)
+            if group.kills:
+                row.broken = f"killed at {limit >> 20} MiB"
+            yield row
+
+
+def line(row: Row) -> str:
+    """Return a row of the table."""
+    said = row.broken.upper() or (row.error if row.outcome == "refused" else "")
+    return (
+        f"{row.kind:8} {row.side:5} {row.resolution:7g} {row.rate:5g}  {row.outcome:8}"
+        f"{row.sent:5} {row.taken:6} {row.peak_mb:7.0f} {row.needs_mb:7.0f}  {said[:70]}"
+    )
+
+
+HEADER = "kind      side  m/pixel   Hz  outcome   sent  taken    peak   needs  [MB]"
+
+
+def _numbers(kind: type) -> Any:
+    return lambda text: tuple(kind(word) for word in text.split(","))
+
+
+def main() -> None:
+    """Run the campaign; exit code 1 if the daemon broke its word."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--sides", type=_numbers(int), default=SIDES, help="of the maps [pixels]")
+    parser.add_argument("--resolutions", type=_numbers(float), default=RESOLUTIONS, help="[m]")
+    parser.add_argument("--rates", type=_numbers(float), default=RATES, help="[Hz]")
+    parser.add_argument("--kinds", type=_numbers(str), default=KINDS, help=", ".join(KINDS))
+    parser.add_argument("--seconds", type=float, default=5.0, help="each flood takes")
+    parser.add_argument("--limit-mb", type=int, help="by default the unit's MemoryMax= [MiB]")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows there, too")
+    args = parser.parse_args()
+    limit = args.limit_mb << 20 if args.limit_mb else unit_limit()
+    warm_kernels()
+    print(
+        why_not() or f"limit {limit >> 20} MiB",
+        f"default needs {needed_bytes(DaemonConfig()) / 1e6:.0f} MB",
+    )
+    print(HEADER)
+    floods = [
+        Flood(*words) for words in product(args.kinds, args.sides, args.resolutions, args.rates)
+    ]
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for row in run_floods(floods, Path(folder), args.seconds, limit):
+            rows.append(row)
+            print(line(row), flush=True)
+    broken = sum(bool(row.broken) for row in rows)
+    print(
+        f"{len(rows)} floods, {broken} broken promises, most {max(r.peak_mb for r in rows):.0f} MB"
+    )
+    if args.json:
+        args.json.write_text(json.dumps([asdict(row) for row in rows], indent=1))
+    sys.exit(bool(broken))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,61 @@
+"""The memory campaign in short: under the unit's own limit, and measured where there is none."""
+
+from __future__ import annotations
+
+import pytest
+
+from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.daemon.memory import needed_bytes
+from tests.campaigns.memory import Flood, run_flood, run_floods
+from tests.daemon.limited import memory_group, unit_limit, why_not
+
+SMALL = {"map": {"max_pixels": 4_000_000, "max_lattice_cells": 60_000}}
+limited = pytest.mark.skipif(bool(why_not()), reason=why_not())
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize(
+    ("flood", "outcome", "error"),
+    [
+        (Flood("updates", 2000, 0.02, 20.0), "taken", ""),
+        (Flood("mappers", 2000, 0.03, 20.0), "taken", ""),
+        (Flood("maps", 3000, 0.02, 10.0), "refused", "9000104 bytes was let go: it may have at"),
+        (Flood("maps", 2000, 0.0003, 5.0), "refused", "must be 0.0012 m or larger"),
+        (Flood("maps", 2000, 0.05, 5.0), "refused", "exceeds 60000 cells"),
+    ],
+    ids=lambda value: value.kind if isinstance(value, Flood) else None,
+)
+def test_a_daemon_takes_no_more_than_it_says(tmp_path, flood, outcome, error):
+    row = run_flood(flood, tmp_path, 2.0, None, None, **SMALL)
+    assert row.broken == ""
+    assert row.outcome == outcome
+    assert error in row.error
+
+
+@limited
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(
+    "flood",
+    [
+        Flood("maps", 8000, 0.02, 20.0),
+        Flood("maps", 8000, 0.0001, 2.0),
+        Flood("updates", 5000, 0.03, 20.0),
+    ],
+    ids=["twenty", "fine", "updates"],
+)
+def test_a_daemon_lives_under_its_units_limit(tmp_path, flood):
+    (row,) = run_floods([flood], tmp_path, 3.0, unit_limit())
+    assert row.broken == ""
+
+
+@limited
+@pytest.mark.timeout(300)
+def test_under_a_smaller_limit_it_takes_smaller_maps_and_says_so(tmp_path):
+    limit = 400 << 20
+    with memory_group(limit) as group:
+        flood = Flood("maps", 5000, 0.03, 10.0)
+        row = run_flood(flood, tmp_path, 2.0, group, limit)
+        assert group.kills == 0
+    assert (row.outcome, row.broken) == ("refused", "")
+    log = next(tmp_path.glob("daemon*.log")).read_text()
+    assert f"may need {needed_bytes(DaemonConfig()) / 1e6:.0f}: no more than" in log

@@ -1,0 +1,121 @@
+"""The memory contract: one formula, and everything that names a number of it says the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec import structs
+
+from fasaco_edge.daemon.config import DaemonConfig, MapConfig
+from fasaco_edge.daemon.memory import (
+    BASE_BYTES,
+    CELL_BYTES,
+    LEAST_CELLS,
+    LEAST_PIXELS,
+    MAPS,
+    MIB,
+    QUEUES,
+    afforded,
+    limits_mib,
+    memory_limit,
+    most_bytes,
+    needed_bytes,
+    queues,
+)
+from fasaco_edge.grid.lattice import MOST_REACH_PX
+from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_POSE_BYTES
+from tests.daemon.limited import unit_limit
+
+ROOT = Path(__file__).parents[2]
+DEFAULT = DaemonConfig()
+
+
+def test_the_unit_has_what_the_daemon_needs():
+    high, most = limits_mib(DEFAULT)
+    assert (unit_limit("MemoryHigh"), unit_limit("MemoryMax")) == (high * MIB, most * MIB)
+    assert needed_bytes(DEFAULT) <= high * MIB < most * MIB
+    assert afforded(DEFAULT, unit_limit()) == DEFAULT
+
+
+def test_the_guides_say_the_formula():
+    guide = " ".join((ROOT / "deploy" / "README.md").read_text().split())
+    formula = f"{BASE_BYTES:,} + {MAPS} x map.max_pixels + {CELL_BYTES} x map.max_lattice_cells"
+    assert formula in guide
+    assert f"MemoryMax={limits_mib(DEFAULT)[1]}M" in guide
+    contract = " ".join((ROOT / "protocol" / "README.md").read_text().split())
+    maps = DEFAULT.map
+    assert f"`map.max_pixels` pixels ({maps.max_pixels:,}" in contract
+    assert f"`map.max_lattice_cells` cells ({maps.max_lattice_cells:,})" in contract
+    assert f"no more than {needed_bytes(DEFAULT) / 1e6:.0f} MB" in contract
+    assert f"more than {MOST_REACH_PX} of them" in contract
+    limits = (ROOT / "protocol" / "limits.yaml").read_text()
+    assert f"by default {maps.max_pixels}" in limits
+
+
+@given(st.integers(1, MAX_GRID_CELLS))
+def test_what_waits_for_the_loop_is_part_of_it(max_pixels):
+    rooms = queues(max_pixels)
+    waiting = sum(max(rooms[kind].size, most_bytes(kind, max_pixels)) for kind in QUEUES)
+    # The other shares of a pixel are for the turn and for Zenoh.
+    assert waiting <= BASE_BYTES / 4 + 2 * max_pixels
+    assert most_bytes("pose", max_pixels) == MAX_POSE_BYTES
+
+
+@given(st.integers(0, 4 << 30), st.integers(1, MAX_GRID_CELLS), st.integers(1, 4_000_000))
+def test_under_any_limit_no_more_is_taken_than_it_affords(limit, pixels, cells):
+    maps = MapConfig(max_pixels=pixels, max_lattice_cells=cells)
+    config = structs.replace(DEFAULT, map=maps)
+    smaller = afforded(config, limit)
+    least = BASE_BYTES + MAPS * LEAST_PIXELS + CELL_BYTES * LEAST_CELLS
+    assert needed_bytes(smaller) <= max(limit, least)
+    assert smaller.map.max_pixels <= pixels
+    assert smaller.map.max_lattice_cells <= cells
+    if needed_bytes(config) <= limit:
+        assert smaller is config
+    assert afforded(config, None) is config
+
+
+def written(root, files):
+    for path, text in files.items():
+        (root / path).parent.mkdir(parents=True, exist_ok=True)
+        (root / path).write_text(text)
+    return root
+
+
+@pytest.mark.parametrize(
+    ("files", "limit"),
+    [
+        ({}, None),
+        ({"proc/self/cgroup": "0::/a.slice/b.service\n"}, None),
+        (
+            {
+                "proc/self/cgroup": "0::/a.slice/b.service\n",
+                "sys/fs/cgroup/a.slice/b.service/memory.max": "max\n",
+                "sys/fs/cgroup/a.slice/memory.max": "800000000\n",
+            },
+            800_000_000,
+        ),
+        (
+            {
+                "proc/self/cgroup": "4:memory:/b.service\n3:cpu:/\n0::/\n",
+                "sys/fs/cgroup/memory/b.service/memory.limit_in_bytes": "671088640\n",
+                "sys/fs/cgroup/memory/memory.limit_in_bytes": "9223372036854771712\n",
+            },
+            671_088_640,
+        ),
+        # Inside a namespace of control groups the root is one's own group.
+        (
+            {
+                "proc/self/cgroup": "4:memory:/\n",
+                "sys/fs/cgroup/memory/memory.limit_in_bytes": "671088640\n",
+            },
+            671_088_640,
+        ),
+    ],
+    ids=["nowhere", "no files", "version 2", "version 1", "namespace"],
+)
+def test_the_limit_is_that_of_the_group_and_those_above(tmp_path, files, limit):
+    assert memory_limit(written(tmp_path, files)) == limit
