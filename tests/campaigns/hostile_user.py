@@ -197,6 +197,7 @@ def try_scripts_dry(campaign: Campaign) -> None:
     """Run install.sh and uninstall.sh where they change nothing."""
     release = releases.write_release(campaign.folder / "release", "1.0")
     environment = campaign.trap.environment
+    _try_make(campaign)
     for words in (
         (release / "install.sh", "--dry-run", "--no-start"),
         (release / "uninstall.sh", "--dry-run"),
@@ -215,6 +216,26 @@ def try_scripts_dry(campaign: Campaign) -> None:
             )
         if done.returncode:
             campaign.violations.append(f"{words}: {done.stderr}")
+
+
+def _try_make(campaign: Campaign) -> None:
+    """Run the README's first command, in a tree of one's own: there PYTHONPATH may say."""
+    if shutil.which("make") is None or not (installed.CHECKOUT / ".venv/.installed").exists():
+        return
+    environment = campaign.trap.environment.items()
+    make = ("make", "--directory", str(installed.CHECKOUT), "--assume-old=pyproject.toml")
+    with campaign.judged("make demo"):
+        done = subprocess.run(
+            [*make, "demo", "ARGS=--help"],
+            cwd=campaign.trap.work,
+            env={name: value for name, value in environment if not name.startswith("PYTHON")},
+            umask=0,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    if "fasaco-edge demo" not in done.stdout:
+        campaign.violations.append(f"make demo: {done.stdout}{done.stderr}")
 
 
 def try_scripts(campaign: Campaign) -> None:
