@@ -71,7 +71,7 @@ class Campaign:
         program.write_text(PROGRAM.format(python=sys.executable))
         program.chmod(0o755)
         self.program = str(program)
-        self.own_cache = {"NUMBA_CACHE_DIR": str(CACHE_FOLDER.parent)}
+        self.own_cache = {"NUMBA_CACHE_DIR": str(Path(CACHE_FOLDER).parent)}
 
     @contextmanager
     def judged(self, what: str) -> Iterator[None]:
@@ -81,7 +81,7 @@ class Campaign:
             yield
         self.counted["runs"] += 1
         faults = {
-            "loaded": self.trap.loaded(),
+            "loaded": sorted(set(self.trap.loaded())),
             "opened": sorted(map(str, opened)),
             "changed": self.trap.changed_secrets(before),
             "open to everybody": self.trap.open_to_all(self.folder),
@@ -248,7 +248,7 @@ def try_scripts(campaign: Campaign) -> None:
     place.mkdir()
     with bare_robot(place, folders) as robot:
         # In the lab's own folder: what is bound into it is read-only.
-        trap = Trap(Path(f"{robot.root}{shown}"))
+        trap = Trap(Path(f"{robot.root}{shown}"), Path(CACHE_FOLDER))
         inside = {
             name: value.replace(str(robot.root), "") for name, value in trap.environment.items()
         }
@@ -348,7 +348,7 @@ def run_campaign(folder: Path, say: Callable[[str], None], *, short: bool) -> Ca
     place = folder / "trap"
     own = folder / "own"
     own.mkdir(mode=0o700)
-    campaign = Campaign(own, Trap(place), not short, say)
+    campaign = Campaign(own, Trap(place, Path(CACHE_FOLDER)), not short, say)
     try_alone(campaign)
     try_together(campaign)
     try_scripts_dry(campaign)

@@ -48,15 +48,15 @@ class _Payload:
 
 
 class Trap:
-    """A trap in ``place``, which everybody can reach.
+    """A trap in ``place``, which everybody can reach; ``kernels``: a cache to lay one like.
 
     Attributes:
         work, home, tmp, state: where root is lured to.
         secrets: files of root's that links in the trap point to.
     """
 
-    def __init__(self, place: Path) -> None:
-        self.place = place
+    def __init__(self, place: Path, kernels: Path) -> None:
+        self.place, self._kernels = place, kernels
         self.work, self.home, self.tmp, self.state = (
             place / name for name in ("work", "home", "tmp", "state")
         )
@@ -115,10 +115,10 @@ class Trap:
         payload = pickle.dumps(_Payload(self._code("kernel")))
         name = f"kernels-{code_digest()}"
         for base in (self.home / ".cache/fasaco-edge" / name, self.tmp / f"fasaco-edge-0-{name}"):
-            for folder in (base, base / "kernels_0123456789"):
-                for file in ("search.look-1.py311.nbi", "search.look-1.py311.1.nbc", "a.kernel"):
-                    self._write(folder / file, payload)
-            self._write(base / "complete-0123456789ab.json", '{"processor": "", "files": {}}')
+            for file in (path for path in self._kernels.rglob("*") if path.is_file()):
+                is_list = file.suffix == ".json"
+                content = file.read_bytes() if is_list else payload
+                self._write(base / file.relative_to(self._kernels), content)
 
     def _lay_links(self) -> None:
         """Lay links where files will be written whose names are known beforehand."""
