@@ -5,6 +5,9 @@ second, for as long as the session lives: publishers that are gone, and on behal
 that were undeclared. This one asks those publishers that are there, which it knows by their
 tokens, each at most once a second, and no more than so many of them: the questions that are open,
 and what is remembered, have a bound, whoever comes and goes.
+
+For the same reason it asks for the tokens, too, and does not subscribe to them: each key that was
+ever told to a subscriber stays in the memory of its session, and of the router before it.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import zenoh
 
@@ -22,6 +26,10 @@ import zenoh
 ASK_PERIOD_S = 1.0
 # A large map on a slow link takes its time [s]; nobody is asked anew meanwhile.
 ANSWER_S = 10.0
+# Who is there is told by routers [s].
+TOKENS_S = 2.0
+# Of a flood of tokens no more are looked at.
+MOST_TOKENS = 1024
 # Publishers of one key that are asked; what more of them publish is heard all the same.
 MOST_PUBLISHERS = 16
 # Of so many publishers it is remembered what they said last.
@@ -84,12 +92,10 @@ class LatchedSubscription(Subscription):
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._open = 0
         self._wants_all = True
+        self._tokens = f"{key}/@adv/pub/**"
+        self._look_at = 0.0
+        self._is_looking = False
         super().__init__(session.declare_subscriber(key, self._hear))
-        self._tokens = session.liveliness().declare_subscriber(
-            f"{key}/@adv/pub/**",
-            zenoh.handlers.Callback(self._note, indirect=False),
-            history=True,
-        )
         asker.add(self)
 
     def ask(self) -> None:
@@ -98,14 +104,10 @@ class LatchedSubscription(Subscription):
             self._wants_all = True
         self._asker.wake()
 
-    def release(self) -> None:
-        """Let go of what Zenoh has given."""
-        super().release()
-        del self._tokens
-
     def ask_who_is_due(self, now: float) -> float:
         """Ask, on the asker's thread; return when there is more to ask [s, monotonic]."""
         questions: list[tuple[str, _Publisher | None]] = []
+        self._look(now)
         with self._lock:
             if self._wants_all:
                 self._wants_all = False
@@ -116,10 +118,13 @@ class LatchedSubscription(Subscription):
                     publisher.ask_at = now + ASK_PERIOD_S
                 elif now >= publisher.ask_at and not publisher.is_asked:
                     publisher.ask_at, publisher.is_asked = now + ASK_PERIOD_S, True
-                    questions.append((f"{publisher.key}?{self._missing(name)}", publisher))
+                    # One key for all where it can be: of each Zenoh remembers something.
+                    key = self._caches if len(self._there) == 1 else publisher.key
+                    questions.append((f"{key}?{self._missing(name)}", publisher))
             again = bool(questions) and questions[0][1] is None
             self._open += len(questions)
-            next_at = min((p.ask_at for p in self._there.values()), default=float("inf"))
+            waiting = [p.ask_at for p in self._there.values() if not p.is_asked]
+            next_at = min((self._look_at, *waiting))
         for selector, asked in questions:
             self._put(selector, asked, again=again)
         return next_at
@@ -153,22 +158,43 @@ class LatchedSubscription(Subscription):
                 accept_replies=zenoh.ReplyKeyExpr.ANY,
             )
 
-    def _note(self, token: zenoh.Sample) -> None:
-        """Note a publisher's token, on a Zenoh thread."""
-        key = str(token.key_expr)
-        name = "/".join(key.rpartition("/@adv/pub/")[2].split("/")[:2])
+    def _look(self, now: float) -> None:
+        """Ask for the tokens of the publishers that are there."""
         with self._lock:
-            if token.kind == zenoh.SampleKind.DELETE:
+            if now < self._look_at or self._is_looking:
+                return
+            self._look_at, self._is_looking = now + ASK_PERIOD_S, True
+        found, wrong = dict[str, str](), list[zenoh.Reply]()
+
+        def take(reply: zenoh.Reply) -> None:
+            if reply.ok is None:
+                wrong.append(reply)
+            elif len(found) < MOST_TOKENS:
+                key = str(reply.ok.key_expr)
+                found["/".join(key.rpartition("/@adv/pub/")[2].split("/")[:2])] = key
+
+        answered: Any = zenoh.handlers.Callback
+        end = answered(take, lambda: self._see(found, is_whole=not wrong), indirect=False)
+        try:
+            self._session.liveliness().get(self._tokens, end, timeout=TOKENS_S)
+        except zenoh.ZError:  # a session that ends
+            self._is_looking = False
+
+    def _see(self, found: dict[str, str], *, is_whole: bool) -> None:
+        """Take account of who is there, and of who is gone if all were told."""
+        with self._lock:
+            self._is_looking = False
+            for name in [name for name in self._there if is_whole and name not in found]:
                 # One that comes back under its name may count from 0 again.
-                self._there.pop(name, None)
+                del self._there[name]
                 self._last.pop(name, None)
-                return
-            if name in self._there or len(self._there) >= MOST_PUBLISHERS:
-                return
+            came = [name for name in found if name not in self._there]
             # Those that were there before answer the first question, and are not asked twice.
             waits_s = ASK_PERIOD_S if self._wants_all or self._open else 0.0
-            self._there[name] = _Publisher(key, time.monotonic() + waits_s)
-        self._asker.wake()
+            for name in came[: MOST_PUBLISHERS - len(self._there)]:
+                self._there[name] = _Publisher(found[name], time.monotonic() + waits_s)
+        if came:
+            self._asker.wake()
 
     def _hear(self, sample: zenoh.Sample) -> None:
         """Take what is published, on a Zenoh thread."""
@@ -177,6 +203,8 @@ class LatchedSubscription(Subscription):
             if not name or not (sample.source_info or name in self._last or name in self._there):
                 self._receive(sample)  # of a publisher that keeps nothing
                 return
+            if sample.source_info and not mark and self._last.get(name):
+                del self._last[name]  # it was started anew under the same name
             last = self._last.get(name)
             is_gap = name in self._there and _leaves_gap(name, mark, last)
             if self._depth > 1 and (self._open or is_gap):
