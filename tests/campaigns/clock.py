@@ -143,7 +143,9 @@ class Campaign:
         for number, unit in AGE.findall(told):
             age_s = float(number) * UNIT_S[unit]
             self.check("ages that watch shows", age_s <= 1.1 * most_s, f"{number} {unit}: {told}")
-        self.check("watch is not taken in", "silent" not in told, told)
+        # (A recorder that a busy machine holds up for ten seconds is silent, too, rightly.)
+        taken_in = re.search("daemon is silent|silent for|gone for", told)
+        self.check("watch is not taken in", taken_in is None, told)
 
     def check_parts(self, began: float) -> None:
         """Check what there is in the end."""
