@@ -37,16 +37,23 @@ def residual_of(payloads: Sequence[bytes], before: bytes) -> Residual:
         payloads: in order.
         before: what the first is told by; b"" for nothing, else as long as they are.
     """
-    rows = np.frombuffer(b"".join(payloads), np.uint8).reshape(len(payloads), len(payloads[0]))
-    differences = rows.copy()
-    differences[1:] ^= rows[:-1]
-    if before:
-        differences[0] ^= np.frombuffer(before, np.uint8)
-    flat = differences.T.ravel()
+    if len(payloads) == 1:
+        # As a rule a large one: what it takes is told in copies of it.
+        flat = np.frombuffer(payloads[0], np.uint8)
+        flat = flat ^ np.frombuffer(before, np.uint8) if before else flat
+    else:
+        rows = np.frombuffer(b"".join(payloads), np.uint8).reshape(len(payloads), len(payloads[0]))
+        differences = rows.copy()
+        differences[1:] ^= rows[:-1]
+        if before:
+            differences[0] ^= np.frombuffer(before, np.uint8)
+        flat = differences.T.ravel()
     changed = flat != 0
     if SPARSE * np.count_nonzero(changed) > flat.size:
         return Residual(flat.tobytes(), sparse=False)
-    edges = np.flatnonzero(np.diff(changed.view(np.int8), prepend=0, append=0))
+    edges = np.flatnonzero(changed[1:] != changed[:-1]) + 1
+    ends = [0] * int(changed[:1].any()), [flat.size] * int(changed[-1:].any())
+    edges = np.concatenate((ends[0], edges, ends[1])).astype(np.int64)
     # How many zeros, how many others, how many zeros ...; the low bytes of all stand together.
     runs = np.diff(edges, prepend=0).astype("<u4").view(np.uint8).reshape(-1, 4).T
     body = _COUNT.pack(len(edges)) + runs.tobytes() + flat[changed].tobytes()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +17,12 @@ Bounds = tuple[float, float, float, float]
 OCCUPIED_FROM = 50
 # Rasters further apart than this are not compared [pixels].
 RASTER_TOLERANCE_PX = 0.01
+BLOCK_PIXELS = 1_000_000
 
 
 def known_bounds(grid: OccupancyGrid) -> Bounds | None:
     """Return (x_min, y_min, x_max, y_max) [m] of what is known; None where nothing is."""
-    window = _window_of(grid.cells != UNKNOWN)
+    window = _window_of(grid.cells.shape, lambda rows: grid.cells[rows] != UNKNOWN)
     return _bounds(grid.geometry, window) if window else None
 
 
@@ -40,8 +42,13 @@ def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None
     if common is None:
         return None
     old, new = before.cells[common.slices_in(placed)], after.cells[common.slices_in(outer)]
-    was, is_now = old >= OCCUPIED_FROM, new >= OCCUPIED_FROM
-    window = _window_of((was != is_now) & (old != UNKNOWN) & (new != UNKNOWN))
+
+    def changed(rows: slice) -> NDArray[np.bool_]:
+        turned = (old[rows] >= OCCUPIED_FROM) != (new[rows] >= OCCUPIED_FROM)
+        marked: NDArray[np.bool_] = turned & (old[rows] != UNKNOWN) & (new[rows] != UNKNOWN)
+        return marked
+
+    window = _window_of(new.shape, changed)
     if window is None:
         return None
     row, col = common.row0, common.col0
@@ -70,11 +77,18 @@ def _raster_shift(before: GridGeometry, after: GridGeometry) -> tuple[int, int] 
     return round(row), round(col)
 
 
-def _window_of(marked: NDArray[np.bool_]) -> Window | None:
-    rows, cols = np.flatnonzero(marked.any(axis=1)), np.flatnonzero(marked.any(axis=0))
-    if not len(rows):
-        return None
-    return Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
+def _window_of(
+    shape: tuple[int, ...], marked: Callable[[slice], NDArray[np.bool_]]
+) -> Window | None:
+    """Return the window of what is marked, some rows at a time: a mask of all is another map."""
+    some, found = max(BLOCK_PIXELS // max(shape[1], 1), 1), None
+    for start in range(0, shape[0], some):
+        mask = marked(slice(start, start + some))
+        rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        if len(rows):
+            here = Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
+            found = Window.around(found, here.moved(start, 0))
+    return found
 
 
 def _bounds(geometry: GridGeometry, window: Window) -> Bounds:

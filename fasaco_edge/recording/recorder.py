@@ -10,6 +10,7 @@ import os
 import signal
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -137,8 +138,9 @@ class Recorder:
 
     def step(self, timeout_s: float) -> None:
         """Write what came within ``timeout_s`` [s], find out whether it is written, report."""
-        for arrival in self._inbox.take(timeout_s):
-            self._write(arrival)
+        arrivals = deque(self._inbox.take(timeout_s))
+        while arrivals:  # what is written is let go
+            self._write(arrivals.popleft())
             self._sync()
         self._inputs.note_lost(self._inbox.lost)
         self._journal.at(self._clock.now_ns())

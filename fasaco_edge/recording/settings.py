@@ -70,7 +70,7 @@ class RecorderSettings:
     quota_bytes: int = 0
     least_free_bytes: int = 50 * MEGABYTE
     serve: tuple[str, int] | None = None
-    queue_bytes: int = 64 * MEGABYTE
+    queue_bytes: int = 32 * MEGABYTE
 
     def __post_init__(self) -> None:
         for name, least in (("part_bytes", 1), ("least_free_bytes", 0), ("queue_bytes", 1)):

@@ -175,8 +175,9 @@ def run_flood(
         row.taken = status["map"]["revision"] - before
         row.error = status["errors"]["last"]
         row.outcome, row.broken = "taken" if row.taken else "refused", ""
-        if not row.taken and not any(letter.isdigit() for letter in row.error):
-            row.broken = "refused without a number"
+        # Updates of a map that was refused are refused in their turn, for want of it.
+        if not row.taken and not status["errors"]["by_code"].get("map_too_large"):
+            row.broken = "neither taken nor refused"
         elif peak > row.needs_mb:
             row.broken = f"{peak:.0f} MB are more than it says"
     return row

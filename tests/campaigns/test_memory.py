@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 
 from fasaco_edge.daemon.config import DaemonConfig
 from fasaco_edge.daemon.memory import needed_bytes
-from tests.campaigns.memory import Flood, run_flood, run_floods
-from tests.daemon.limited import memory_group, unit_limit, why_not
+from tests.campaigns.memory import Flood, pour, run_flood, run_floods
+from tests.daemon.limited import UNIT, memory_group, unit_limit, why_not
+from tests.daemon.outsider import Outsider
+from tests.daemon.processes import ENVIRONMENT, daemon_process
+from tests.daemon.rooms import map_bytes, pose_bytes, room
 
 SMALL = {"map": {"max_pixels": 4_000_000, "max_lattice_cells": 60_000}}
 limited = pytest.mark.skipif(bool(why_not()), reason=why_not())
@@ -59,3 +65,31 @@ def test_under_a_smaller_limit_it_takes_smaller_maps_and_says_so(tmp_path):
     assert (row.outcome, row.broken) == ("refused", "")
     log = next(tmp_path.glob("daemon*.log")).read_text()
     assert f"may need {needed_bytes(DaemonConfig()) / 1e6:.0f}: no more than" in log
+
+
+@limited
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("kind", ["maps", "updates"])
+def test_a_recorder_lives_under_its_units_limit(tmp_path, kind):
+    pytest.importorskip("rerun")
+    limit = unit_limit(unit=UNIT.with_name("fasaco-edge-recorder.service"))
+    program = [sys.executable, "-m", "fasaco_edge", "record", "--out", str(tmp_path / "out")]
+    with (
+        memory_group(limit) as group,
+        daemon_process(tmp_path) as daemon,
+        Outsider(daemon.endpoint) as outsider,
+    ):
+        words = [*group.program, *program, "--connect", daemon.endpoint]
+        recorder = subprocess.Popen(words, env=ENVIRONMENT)
+        try:
+            told = outsider.listen("recorder")
+            told.wait(lambda heard: heard.json()["state"] == "recording")
+            outsider.put("map", map_bytes(room(8.0, 6.0)))
+            outsider.put("pose", pose_bytes(0.75, 0.75))
+            pour(Flood(kind, 5000, 0.03, 20.0), daemon, outsider, 3.0)
+            told.wait(lambda heard: True, len(told.heard) + 2)  # it still speaks
+            assert recorder.poll() is None
+            assert group.kills == 0
+        finally:
+            recorder.kill()
+            recorder.wait()
