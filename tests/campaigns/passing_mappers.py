@@ -1,4 +1,4 @@
-"""Mappers that come, publish a map and go: ``passing_mappers.py COUNT ENDPOINT...``.
+"""Mappers that come, publish a map and go: ``passing_mappers.py COUNT ENDPOINT``.
 
 Each is a session of its own. After each a line says how many there were; every so many the process
 is killed by itself, with a session open.
@@ -26,12 +26,12 @@ STAY_S = 0.01
 
 
 def main() -> None:
-    count, endpoints = int(sys.argv[1]), sys.argv[2:]
+    count, endpoint = int(sys.argv[1]), sys.argv[2]
     payload = map_bytes(room(4.0, 3.0))
     for number in range(1, count + 1):
         config = {
             "mode": "client",
-            "connect": {"endpoints": [endpoints[number % len(endpoints)]], "timeout_ms": 5000},
+            "connect": {"endpoints": [endpoint], "timeout_ms": 5000},
             "scouting": {"multicast": {"enabled": False}},
             "timestamping": {"enabled": True},
             "transport": {"shared_memory": {"enabled": False}},
