@@ -91,7 +91,8 @@ class LatchedSubscription(Subscription):
         # Where several samples count, they wait for those before them, which were asked for.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._open = 0
-        self._wants_all = True
+        # Whether all are to be asked, and whether for what was heard already, too.
+        self._wants_all, self._wants_again = True, False
         self._tokens = f"{key}/@adv/pub/**"
         self._look_at = 0.0
         self._is_looking = False
@@ -101,7 +102,7 @@ class LatchedSubscription(Subscription):
     def ask(self) -> None:
         """Ask every publisher for its last samples, those heard already among them."""
         with self._lock:
-            self._wants_all = True
+            self._wants_all = self._wants_again = True
         self._asker.wake()
 
     def ask_who_is_due(self, now: float) -> float:
@@ -109,8 +110,9 @@ class LatchedSubscription(Subscription):
         questions: list[tuple[str, _Publisher | None]] = []
         self._look(now)
         with self._lock:
+            again = self._wants_again
             if self._wants_all:
-                self._wants_all = False
+                self._wants_all = self._wants_again = False
                 questions.append((f"{self._caches}?_max={self._depth}", None))
             for name, publisher in self._there.items():
                 if questions:
@@ -121,7 +123,6 @@ class LatchedSubscription(Subscription):
                     # One key for all where it can be: of each Zenoh remembers something.
                     key = self._caches if len(self._there) == 1 else publisher.key
                     questions.append((f"{key}?{self._missing(name)}", publisher))
-            again = bool(questions) and questions[0][1] is None
             self._open += len(questions)
             waiting = [p.ask_at for p in self._there.values() if not p.is_asked]
             next_at = min((self._look_at, *waiting))

@@ -165,6 +165,18 @@ def test_where_several_samples_count_they_come_in_order(bus, endpoint):
     assert heard == list(range(heard[0], 2000))
 
 
+def test_what_is_published_while_somebody_subscribes_comes_once(bus, endpoint):
+    with publishing(endpoint) as publisher:
+        for number in range(30):
+            samples = Queue()
+            bus.subscribe(KEY, samples.put, latched=True)
+            publisher.put(b"%d" % number)
+            while taken(samples, 1) != [b"%d" % number]:
+                pass  # that of the round before
+            time.sleep(0.1)  # what comes twice comes at once
+            assert samples.empty()
+
+
 def test_a_flood_of_publishers_is_not_asked(bus, endpoint):
     samples = Queue()
     with publishing(endpoint) as honest:

@@ -14,7 +14,7 @@ from fasaco_edge.cli import main
     [
         (None, "No such file or directory"),
         ("hello", "this is no recording"),
-        ("RRF2 and then nothing", "Failed to read"),
+        ("RRF2 and then nothing", "holds no samples"),
     ],
 )
 def test_what_is_no_recording_is_named(tmp_path, capsys, content, told):

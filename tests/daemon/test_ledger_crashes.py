@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from fasaco_edge.daemon import durable
+from fasaco_edge import durable
 from fasaco_edge.daemon.ledger_codec import encode_ledger
 from fasaco_edge.daemon.ledger_file import LedgerFile
 from tests.daemon.ledgers import CELL_M, NAMES, contents, lane, load, names
