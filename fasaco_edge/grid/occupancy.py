@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import PatchWithoutBase
+from fasaco_edge.errors import FasacoError, PatchWithoutBase
 from fasaco_edge.grid.geometry import GridGeometry, Window
 
 UNKNOWN = -1
@@ -43,11 +44,27 @@ class OccupancyGrid:
             view.flags.writeable = False
             object.__setattr__(self, "cells", view)
 
-    def patched(self, patch: MapPatch) -> OccupancyGrid:
-        """Return this map with ``patch`` laid over it.
+    def patched(self, *patches: MapPatch) -> OccupancyGrid:
+        """Return this map with ``patches`` laid over it, one after the other; at one copy of it.
 
         Raises:
-            PatchWithoutBase: the patch does not lie inside this map, or is in another frame.
+            PatchWithoutBase: one does not lie inside this map, or is in another frame.
+        """
+        for patch in patches:
+            self.check_patch(patch)
+        if not patches:
+            return self
+        cells = self.cells.copy()
+        for patch in patches:
+            window = patch.window
+            cells[window.row0 : window.row1, window.col0 : window.col1] = patch.cells
+        return OccupancyGrid(self.geometry, cells, self.frame, patches[-1].stamp_ns)
+
+    def check_patch(self, patch: MapPatch) -> None:
+        """Check that a patch can be laid over this map.
+
+        Raises:
+            PatchWithoutBase: it does not lie inside this map, or is in another frame.
         """
         window = patch.window
         rows, cols = self.cells.shape
@@ -58,9 +75,22 @@ class OccupancyGrid:
             )
         if patch.frame != self.frame:
             raise PatchWithoutBase(f"update in frame {patch.frame!r}, map in {self.frame!r}")
-        cells = self.cells.copy()
-        cells[window.row0 : window.row1, window.col0 : window.col1] = patch.cells
-        return OccupancyGrid(self.geometry, cells, self.frame, patch.stamp_ns)
+
+
+def fitting(
+    grid: OccupancyGrid, patches: Iterable[MapPatch]
+) -> tuple[list[MapPatch], list[FasacoError]]:
+    """Return which of some patches can be laid over a map, and why the others cannot."""
+    fit: list[MapPatch] = []
+    misfits: list[FasacoError] = []
+    for patch in patches:
+        try:
+            grid.check_patch(patch)
+        except PatchWithoutBase as error:
+            misfits.append(error.with_traceback(None))
+        else:
+            fit.append(patch)
+    return fit, misfits
 
 
 @dataclass(frozen=True, slots=True, eq=False)

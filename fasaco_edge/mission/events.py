@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -87,6 +88,28 @@ Event = (
     | PlanBroken
     | CommandReceived
 )
+
+
+@dataclass(frozen=True, slots=True)
+class PatchRun:
+    """Map updates with nothing between them: laid over the map together, at one copy of it."""
+
+    patches: tuple[MapPatch, ...]
+
+
+def in_runs(events: Iterable[Event]) -> Iterator[Event | PatchRun]:
+    """Yield events in order, updates of the map as runs."""
+    run: list[MapPatch] = []
+    for event in events:
+        if isinstance(event, PatchReceived):
+            run.append(event.patch)
+            continue
+        if run:
+            yield PatchRun(tuple(run))
+            run = []
+        yield event
+    if run:
+        yield PatchRun(tuple(run))
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,11 @@ changes nothing, whenever it comes.
 
 from __future__ import annotations
 
-from fasaco_edge.errors import WrongFrame
+from collections.abc import Sequence
+
+from fasaco_edge.errors import FasacoError, WrongFrame
 from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, fitting
 
 # So long map and poses come in another frame alone before that counts [s].
 PATIENCE_S = 10.0
@@ -46,16 +48,21 @@ class Frames:
         self.counts, self._is_open = grid.frame, False
         return True
 
-    def hear_patch(self, patch: MapPatch) -> bool:
-        """Lay an update over the map of a frame that does not count; return whether it is one.
+    def hear_patches(self, patches: Sequence[MapPatch]) -> tuple[list[MapPatch], list[FasacoError]]:
+        """Lay updates over the map of a frame that does not count.
 
-        Raises:
-            PatchWithoutBase: it does not fit that map.
+        Returns:
+            Those of the frame that does; and why the others are not the mission's.
         """
-        if self.counts in ("", patch.frame) or patch.frame not in self._maps:
-            return False
-        self._maps[patch.frame] = self._maps[patch.frame].patched(patch)
-        return True
+        others = [frame for frame in self._maps if self.counts not in ("", frame)]
+        faults: list[FasacoError] = []
+        for frame in others:
+            theirs = [patch for patch in patches if patch.frame == frame]
+            fit, misfits = fitting(self._maps[frame], theirs)
+            self._maps[frame] = self._maps[frame].patched(*fit)
+            wrong = f"map update in frame {frame!r}, the mission's is {self.counts!r}"
+            faults += [*misfits, *(WrongFrame(wrong) for _ in fit)]
+        return [patch for patch in patches if patch.frame not in others], faults
 
     def hear_pose(self, stamped: StampedPose, now: float) -> bool:
         """Note a pose; return whether its frame counts from now on [s], and did not before."""

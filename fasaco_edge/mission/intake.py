@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.assignment import CommandError
 from fasaco_edge.mission.events import (
     Answer,
@@ -11,7 +14,7 @@ from fasaco_edge.mission.events import (
     Event,
     MapReceived,
     PatchesLost,
-    PatchReceived,
+    PatchRun,
     PathUpdate,
     PlanBroken,
     PlanReady,
@@ -28,7 +31,7 @@ class Intake:
         answers: to the commands taken so far.
         forgotten: whether one of them was to forget what is covered.
         stopped: an empty path that is due unless a later one follows; None for none.
-        faults: what went wrong with events that were taken all the same.
+        faults: what went wrong, also with events that were taken all the same.
     """
 
     def __init__(self, parts: Parts) -> None:
@@ -38,7 +41,7 @@ class Intake:
         self.faults: list[FasacoError] = []
         self._parts = parts
 
-    def take(self, event: Event) -> PathUpdate | None:
+    def take(self, event: Event | PatchRun) -> PathUpdate | None:
         """Take one event; return a path that is due at once.
 
         Raises:
@@ -49,9 +52,8 @@ class Intake:
                 if self._parts.site.take_map(grid):
                     self._begin_in(grid.frame)
                 self._look_at_map()
-            case PatchReceived(patch):
-                self._parts.site.take_patch(patch)
-                self._look_at_map()
+            case PatchRun(patches):
+                self._take_patches(patches)
             case PatchesLost(count):
                 self._parts.site.lose_patches(count)
             case PoseReceived(pose):
@@ -65,6 +67,12 @@ class Intake:
             case CommandReceived():
                 self._obey(event)
         return None
+
+    def _take_patches(self, patches: Sequence[MapPatch]) -> None:
+        is_other, faults = self._parts.site.take_patches(patches)
+        self.faults += faults
+        if is_other:
+            self._look_at_map()
 
     def _look_at_map(self) -> None:
         """See what a new map changed; raise LedgerMismatchError where it is another building's."""

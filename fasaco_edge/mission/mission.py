@@ -16,7 +16,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.assignment import Assignment
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.events import Decision, Event, PathUpdate
+from fasaco_edge.mission.events import Decision, Event, PathUpdate, in_runs
 from fasaco_edge.mission.intake import Intake
 from fasaco_edge.mission.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.parts import Parts
@@ -67,21 +67,20 @@ class Mission:
         """
         self._parts.now = self._parts.route.now = now
         intake = Intake(self._parts)
-        faults: list[FasacoError] = []
         path: PathUpdate | None = None
-        for event in events:
+        for event in in_runs(events):
             try:
                 path = intake.take(event) or path
             except FasacoError as error:
                 # Its traceback would hold the map until garbage is collected.
-                faults.append(error.with_traceback(None))
+                intake.faults.append(error.with_traceback(None))
         decision = self._pilot.decide()
         paths = [update for update in (intake.stopped, path, decision.path) if update is not None]
         self.state, self.reason = self._pilot.told()
         return replace(
             decision,
             path=max(paths, key=lambda update: update.revision, default=None),
-            faults=(*faults, *intake.faults),
+            faults=tuple(intake.faults),
             answers=tuple(intake.answers),
             forgotten=intake.forgotten,
         )

@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from fasaco_edge.errors import MapTooFar, MapTooLarge, PatchWithoutBase, WrongFrame
+from collections.abc import Sequence
+
+from fasaco_edge.errors import (
+    FasacoError,
+    MapTooFar,
+    MapTooLarge,
+    PatchWithoutBase,
+    WrongFrame,
+)
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import StampedPose, Window
 from fasaco_edge.grid.lattice import (
@@ -12,7 +20,7 @@ from fasaco_edge.grid.lattice import (
     CoverageLattice,
     lattice_window,
 )
-from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, fitting
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.frames import Frames
 from fasaco_edge.mission.free_area import FreeArea
@@ -91,22 +99,23 @@ class Site:
             self.pose = self.frames.pose_in(grid.frame)
         return is_other
 
-    def take_patch(self, patch: MapPatch) -> None:
-        """Take a map update in.
+    def take_patches(self, patches: Sequence[MapPatch]) -> tuple[bool, list[FasacoError]]:
+        """Take map updates in that came one after the other, as one: a map is copied and looked at
+        once, however many there are.
 
-        Raises:
-            PatchWithoutBase: it does not fit the map there is.
-            WrongFrame: it fits one that does not count.
+        Returns:
+            Whether the map is another now; why some could not be laid over it.
         """
-        if self.frames.hear_patch(patch):
-            raise WrongFrame(
-                f"map update in frame {patch.frame!r}, the mission's is {self.frames.counts!r}"
-            )
+        own, faults = self.frames.hear_patches(patches)
         if self.grid is None or self._patches_lost:
             why = "updates before it were lost" if self._patches_lost else "there is no map yet"
-            raise PatchWithoutBase(f"map update refused: {why}")
-        self._take_map(self.grid.patched(patch), patch.window)
-        self.frames.hear_map(self.grid)
+            return False, faults + [PatchWithoutBase(f"map update refused: {why}") for _ in own]
+        fit, misfits = fitting(self.grid, own)
+        if fit:
+            within = Window.around(*(patch.window for patch in fit))
+            self._take_map(self.grid.patched(*fit), within)
+            self.frames.hear_map(self.grid)
+        return bool(fit), faults + misfits
 
     def lose_patches(self, count: int) -> None:
         """Note that updates were lost; always raises PatchWithoutBase, which says so."""

@@ -39,6 +39,16 @@ def test_a_patch_makes_a_new_map():
     assert (patched.geometry, patched.frame, patched.stamp_ns) == (base.geometry, "map", 5)
 
 
+def test_patches_lie_one_over_the_other():
+    base = grid(np.zeros((4, 5)))
+    over = [patch(Window(1, 2, 3, 5)), patch(Window(2, 0, 4, 3), value=50)]
+    one_by_one = base.patched(over[0]).patched(over[1])
+    assert np.array_equal(base.patched(*over).cells, one_by_one.cells)
+    assert base.patched() is base
+    with pytest.raises(PatchWithoutBase):
+        base.patched(over[0], patch(Window(0, 0, 5, 5)))
+
+
 @pytest.mark.parametrize(
     "window",
     [Window(0, 0, 5, 5), Window(-1, 0, 1, 1), Window(3, 4, 4, 6), Window(9, 9, 10, 10)],

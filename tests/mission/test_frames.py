@@ -53,6 +53,17 @@ def test_one_map_in_another_frame_costs_nothing(driven):
     assert again.mission.ledger.frame == "map"
 
 
+def test_updates_of_another_map_are_laid_over_that_one(driven):
+    updates = [patch("#", at=(2, col), frame="odom") for col in (2, 3, 5)]
+    driven.tell(ODOM)
+    faults = driven.tell(*updates, patch("##", at=(2, 7), frame="odom")).faults
+    assert sorted(fault.code for fault in faults) == ["patch_without_base", *["wrong_frame"] * 3]
+    faults = told_for(driven, 2 * PATIENCE_S, THERE)
+    expected = MAP.grid.patched(*(replace(one.patch, frame="map") for one in updates))
+    assert driven.mission.grid.frame == "odom"
+    assert (driven.mission.grid.cells == expected.cells).all()
+
+
 @pytest.mark.parametrize("first", [(ODOM,), (ODOM, HERE), (HERE, ODOM)])
 def test_map_and_pose_decide_not_who_came_first(first):
     drive = Drive((1, 1))

@@ -354,6 +354,22 @@ def test_an_update_that_does_not_fit_is_a_fault():
     drive.finish()
 
 
+def test_updates_that_come_together_cost_one_map():
+    """A flood of small ones on a large map held the loop up for seconds, a copy for each."""
+    drive, others = started(*ROOM), started(*ROOM)
+    updates = [patch("#", at=(2, col)) for col in (2, 4, 2)] + [patch(".", at=(2, 4))]
+    revision = drive.mission.map_revision
+    misfit = patch("#", at=(0, 6))
+    faults = drive.tell(*updates[:2], misfit, *updates[2:]).faults
+    assert [type(fault) for fault in faults] == [PatchWithoutBase]
+    assert drive.mission.map_revision == revision + 1
+    for update in updates:
+        others.tell(update)
+    assert np.array_equal(drive.mission.grid.cells, others.mission.grid.cells)
+    assert drive.mission.coverage() == others.mission.coverage()
+    drive.finish()
+
+
 def test_after_lost_updates_only_a_full_map_counts():
     drive = started(*ROOM)
     fault = fault_of(drive, PatchesLost(3))

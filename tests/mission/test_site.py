@@ -32,7 +32,7 @@ def take_something_in(draw, site, whole, zones):
             row, col = draw(st.integers(0, rows - 1)), draw(st.integers(0, cols - 1))
             window = Window(row, col, min(row + 5, rows), min(col + 5, cols))
             cells = repainted(draw, site.grid).cells[row : row + 5, col : col + 5]
-            site.take_patch(MapPatch(window, cells.copy()))
+            site.take_patches([MapPatch(window, cells.copy())])
         case "jump":
             whole = displaced(draw, whole)
             site.take_map(whole)
