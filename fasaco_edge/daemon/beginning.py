@@ -8,19 +8,21 @@ from typing import TYPE_CHECKING
 from fasaco_edge.daemon.keeping import Keeping
 from fasaco_edge.daemon.loading import Loader
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, fitting
 from fasaco_edge.mission.assignment import CommandError
 from fasaco_edge.mission.events import (
     Answer,
     CommandReceived,
     Event,
     MapReceived,
-    PatchReceived,
+    PatchesLost,
+    PatchRun,
     PoseReceived,
+    in_runs,
 )
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.worker import PlanningWorker
-    from fasaco_edge.grid.occupancy import OccupancyGrid
     from fasaco_edge.mission.mission import Mission
 
 
@@ -29,8 +31,9 @@ class Beginning:
 
     Attributes:
         assignment: what the mission will have to do.
-        held: of the newest two frames each the newest map with the updates after it, and the
-            newest pose: which of them counts is for the mission to find.
+        held: of the newest two frames each the newest map, with the updates after it laid over it,
+            and the newest pose: which of them counts is for the mission to find. That updates were
+            lost stays, until there is another map. It may be held for long, and does not grow.
     """
 
     def __init__(
@@ -45,50 +48,68 @@ class Beginning:
 
     @property
     def stage(self) -> str:
-        """What is being loaded; "" for nothing."""
-        return self._loader.stage if self._loader else ""
+        """What is being loaded; "" for nothing, or nothing more."""
+        return self._loader.stage if self._loader and not self._loader.is_done else ""
+
+    def end(self) -> None:
+        """Let go of what is loaded, or is being loaded: another takes its place."""
+        if self._loader is not None:
+            self._loader.drop()
 
     def take(self, events: Sequence[Event]) -> list[FasacoError]:
         """Hold events; return those that are of no use, and why."""
         faults: list[FasacoError] = []
-        for event in events:
+        for event in in_runs(events):
             match event:
                 case MapReceived(grid):
                     self._drop(lambda held: not _is_pose(held), grid.frame)
+                    self.held.append(event)
                 case PoseReceived(pose):
                     self._drop(_is_pose, pose.frame)
-                case _ if not any(isinstance(held, MapReceived) for held in self.held):
-                    faults.append(PatchWithoutBase("map update refused: there is no map yet"))
-                    continue
-            self.held.append(event)
+                    self.held.append(event)
+                case PatchRun(patches):
+                    faults += self._lay(patches)
+                case PatchesLost(count):
+                    faults.append(PatchWithoutBase(f"{count} map updates were lost"))
+                    if self._maps() and not self._has_lost:
+                        self.held.append(event)
         return faults
+
+    def _maps(self) -> dict[str, int]:
+        """Return where in ``held`` the map of each frame is."""
+        held = enumerate(self.held)
+        return {one.grid.frame: place for place, one in held if isinstance(one, MapReceived)}
+
+    @property
+    def _has_lost(self) -> bool:
+        return any(isinstance(held, PatchesLost) for held in self.held)
+
+    def _lay(self, patches: Sequence[MapPatch]) -> list[FasacoError]:
+        """Lay updates over the maps held; return why some cannot be."""
+        maps = self._maps()
+        if not maps or self._has_lost:
+            why = "updates before it were lost" if maps else "there is no map yet"
+            return [PatchWithoutBase(f"map update refused: {why}") for _ in patches]
+        faults: list[FasacoError] = []
+        newest = next(reversed(maps))
+        for frame, place in maps.items():
+            # One of neither frame misfits the newest map.
+            theirs = [p for p in patches if (p.frame if p.frame in maps else newest) == frame]
+            grid = self._grid_at(place)
+            fit, misfits = fitting(grid, theirs)
+            self.held[place] = MapReceived(grid.patched(*fit))
+            faults += misfits
+        return faults
+
+    def _grid_at(self, place: int) -> OccupancyGrid:
+        held = self.held[place]
+        assert isinstance(held, MapReceived)
+        return held.grid
 
     def load(self) -> None:
         """Begin to load what plans, once there is a map."""
-        if self._loader is None and any(isinstance(held, MapReceived) for held in self.held):
+        if self._loader is None and self._maps():
             self._loader = self._load()
-
-    def condense(self) -> list[FasacoError]:
-        """Put updates into their map: what is held for long must not grow. Return what misfits."""
-        faults: list[FasacoError] = []
-        grid: OccupancyGrid | None = None
-        kept: list[Event] = []
-        for event in self.held:
-            match event:
-                case MapReceived():
-                    grid = event.grid
-                case PatchReceived() if grid is not None:
-                    try:
-                        grid = grid.patched(event.patch)
-                    except FasacoError as error:
-                        faults.append(error.with_traceback(None))
-                case PoseReceived():
-                    kept.append(event)
-                case _ if grid is not None:
-                    faults.append(PatchWithoutBase("map update refused: some before it were lost"))
-                    grid = None
-        self.held = [*([MapReceived(grid)] if grid is not None else []), *kept]
-        return faults
 
     def _drop(self, kind: Callable[[Event], bool], frame: str) -> None:
         """Drop of a kind what is in this frame, and all but the newest of the other frames."""
@@ -131,8 +152,6 @@ def _frame(event: Event) -> str:
     match event:
         case MapReceived(grid):
             return grid.frame
-        case PatchReceived(patch):
-            return patch.frame
         case PoseReceived(pose):
             return pose.frame
     return ""  # it lies in none

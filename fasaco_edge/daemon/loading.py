@@ -27,6 +27,7 @@ class Loader:
         self._config = config
         self._mailbox = mailbox
         self._loaded: tuple[Mission, PlanningWorker] | None = None
+        self._is_dropped = False
         threading.Thread(target=self._run, name="loader", daemon=True).start()
 
     def poll(self) -> tuple[Mission, PlanningWorker] | None:
@@ -35,9 +36,22 @@ class Loader:
             raise self.error
         return self._loaded
 
+    @property
+    def is_done(self) -> bool:
+        """Whether all is loaded, or went wrong."""
+        return self._loaded is not None or self.error is not None
+
+    def drop(self) -> None:
+        """Let the worker go, now or once it is there: nobody will ask for it."""
+        self._is_dropped = True
+        if self._loaded is not None:
+            self._loaded[1].disown()
+
     def _run(self) -> None:
         try:
             self._loaded = self._load()
+            if self._is_dropped:
+                self._loaded[1].disown()
         except BaseException as error:
             self.error = error
         self._mailbox.post("loaded", None)

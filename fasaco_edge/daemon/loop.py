@@ -47,8 +47,6 @@ LOG = logging.getLogger(__name__)
 TICK_S = 0.1
 # A mission that breaks again within so long broke on the map it has [s].
 SOON_S = 60.0
-# While another daemon plans, so many updates of the map gather before they are put into it.
-MOST_HELD = 64
 
 
 class Loop:
@@ -195,6 +193,9 @@ class Loop:
         if self._mission is not None and self._worker is not None:
             self._worker.disown()
             self._keeping.take_back(self._mission)
+        else:
+            self._keeping.first = self._beginning.assignment
+            self._beginning.end()
         self._mission = self._worker = None
         self._maps = MapClock()
         self._beginning = Beginning(self._keeping, self._load, held)
@@ -204,8 +205,6 @@ class Loop:
         """Hold ``events`` until there is a mission; once it is there, they are all that was."""
         self._refuse(self._beginning.take(events))
         if self._claim.waits:
-            if len(self._beginning.held) > MOST_HELD:
-                self._refuse(self._beginning.condense())
             return None
         self._beginning.load()
         loaded = self._beginning.loaded() if self._claim.stand is Stand.PLANS else None

@@ -9,11 +9,15 @@ from contextlib import ExitStack, contextmanager
 
 import pytest
 import zenoh
+from msgspec import convert
 
 from fasaco_edge.daemon.checks import session
 from fasaco_edge.daemon.checks.finding import Level, Patient
 from fasaco_edge.daemon.claim import Stand, claims_in
 from fasaco_edge.daemon.config import BusConfig, DaemonConfig
+from fasaco_edge.daemon.memory import needed_bytes
+from fasaco_edge.process_memory import peak_mb
+from tests.campaigns.memory import Flood, map_payload, update_payload
 from tests.daemon.outsider import Ear, Outsider
 from tests.daemon.processes import daemon_process, free_endpoint
 from tests.daemon.rooms import map_bytes, pose_bytes, room
@@ -270,6 +274,30 @@ def test_a_flood_of_claims_is_survived(tmp_path, robot_at):
         flood.session.close()
         robot.wait_claims(1)
         robot.wait_path(heard)
+
+
+def test_one_that_waits_holds_no_more_than_its_maps(tmp_path):
+    """Updates of all of a map, while it waits and while it loads: each was held."""
+    side = 2000
+    maps = {"max_pixels": side * side, "max_lattice_cells": 50_000}
+    flood = Flood("updates", side, 0.05, 20.0)
+    config = {"map": maps, "robot": {"tool_width_m": 1.0, "radius_m": 0.5}}
+    with daemon_process(tmp_path, **config) as running, Outsider(running.endpoint) as outsider:
+        claim = f"{PREFIX}/claim/0/plans"
+        token = outsider.session.liveliness().declare_token(claim)
+        outsider.wait_status(lambda status: status["state"] == "blocked")
+        outsider.put("map", map_payload(flood, 0))
+        for _ in range(60):
+            outsider.put("map_update", update_payload(flood))
+            time.sleep(0.02)
+        outsider.ask_status()
+        assert peak_mb(running.pid) < 88 + 9 * side * side / 1e6
+        token.undeclare()
+        outsider.put("pose", pose_bytes(20.0, 20.0))
+        outsider.wait_status(lambda status: status["state"] == "covering")
+        # Taken as it was held: no more maps than one.
+        assert outsider.ask_status()["map"]["revision"] <= 2
+        assert peak_mb(running.pid) < needed_bytes(convert(config, DaemonConfig)) / 1e6
 
 
 def test_two_names_are_none_of_each_others_business(tmp_path):

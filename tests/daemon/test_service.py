@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import time
@@ -123,6 +124,35 @@ def test_a_wrong_file_changes_nothing(tmp_path, planning):
         rewritten(running, planner={"ants": 200})
         manager.wait("READY=1")
         assert "refused" not in manager.wait("STATUS=", 5.0)
+
+
+def test_one_that_waits_for_another_reads_its_configuration_again(tmp_path):
+    """It had begun to load for a latched map when it saw the other, and never said it was done."""
+    with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
+        outsider.put("map", map_bytes(pillared_room()))
+        claim = f"{outsider.prefix}/claim/0/plans"
+        token = outsider.session.liveliness().declare_token(claim)
+        outsider.wait_status(lambda status: status["state"] == "blocked")
+        rewritten(running, planner={"seed": 7})
+        manager.wait("RELOADING=1", 100.0)
+        manager.wait("READY=1")
+        token.undeclare()
+        outsider.put("pose", pose_bytes(1.0, 1.0))
+        status = outsider.wait_status(lambda status: status["state"] == "covering")
+        assert status["config"]["planner"]["seed"] == 7
+
+
+def test_an_order_from_before_the_first_map_outlives_a_reload(tmp_path):
+    with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
+        zone = {"name": "hall", "polygon": [[0.4, 0.4], [2.0, 0.4], [2.0, 2.0], [0.4, 2.0]]}
+        order = json.dumps({"command": "start", "order": {"zones": [zone]}})
+        (reply,) = outsider.session.get(f"{outsider.prefix}/@rpc/mission", payload=order)
+        assert reply.ok is not None
+        rewritten(running, planner={"seed": 7})
+        manager.wait("RELOADING=1")
+        manager.wait("READY=1")
+        status = outsider.wait_status(lambda status: status["config"]["planner"]["seed"] == 7)
+        assert [one["name"] for one in status["mission"]["zones"]] == ["hall"]
 
 
 def test_without_a_service_manager_a_closed_terminal_ends_it(tmp_path):
