@@ -77,9 +77,13 @@ def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
         rf"{re.escape(robot)}(?(order)|(?:-(?P<again>\d+))?))-part(?P<number>\d+)\.rrd"
     )
     found, last = [], dict[str, float]()
-    for path in folder.iterdir():
-        match = named.fullmatch(path.name)
-        if match and path.is_file() and not path.is_symlink():
+    matches = {path: match for path in folder.iterdir() if (match := named.fullmatch(path.name))}
+    runs = {match["run"] for match in matches.values()}
+    for path, match in matches.items():
+        # The number behind the name may be the end of another robot's: ours is the second of two.
+        if match["again"] and f"{match['when']}-{robot}" not in runs:
+            continue
+        if path.is_file() and not path.is_symlink():
             status = path.stat()
             found.append((match, path, status.st_size))
             written = max(_time(match["when"]), status.st_mtime)
