@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.cli import terminal
-from fasaco_edge.review.curve import curve
+from fasaco_edge.review.curve import EIGHTHS, PLAIN_EIGHTHS, curve
 from fasaco_edge.review.document import troubles
 from fasaco_edge.review.rows import (
     MOST_REPLANS,
@@ -117,7 +117,8 @@ def _print_curve(console: Console, review: Review) -> None:
     at_s, shares = covered_share(review)
     if not len(at_s):
         return
-    lines = curve(at_s, shares, review.duration_s, PLOT_WIDTH, PLOT_HEIGHT)
+    marks = EIGHTHS if console.encoding.startswith("utf") else PLAIN_EIGHTHS
+    lines = curve(at_s, shares, review.duration_s, PLOT_WIDTH, PLOT_HEIGHT, marks)
     labels = ["100 %", *[""] * (PLOT_HEIGHT - 2), "0 %"]
     console.print(Text("Coverage over time", "bold"), "of the cells coverable at the end")
     for label, line in zip(labels, lines, strict=True):

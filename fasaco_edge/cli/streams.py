@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
+from io import TextIOWrapper
 from typing import Any, TextIO, cast
 
 from fasaco_edge.text import json_line, lines
@@ -39,6 +40,9 @@ def clean_streams() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, CleanStream):
+            # What the locale has no character for is shown as an escape: names are anybody's.
+            if isinstance(stream, TextIOWrapper):
+                stream.reconfigure(errors="backslashreplace")
             setattr(sys, name, cast("TextIO", CleanStream(stream)))
 
 

@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-EIGHTHS = " ▁▂▃▄▅▆▇█"
+EIGHTHS, PLAIN_EIGHTHS = " ▁▂▃▄▅▆▇█", " ..::++##"
 
 
 def curve(
-    at_s: NDArray[np.float64], shares: NDArray[np.float64], end_s: float, width: int, height: int
+    at_s: NDArray[np.float64],
+    shares: NDArray[np.float64],
+    end_s: float,
+    width: int,
+    height: int,
+    marks: str = EIGHTHS,
 ) -> list[str]:
     """Return the lines of a picture of a share that changes at some times, the top one first.
 
@@ -18,6 +23,7 @@ def curve(
         shares: float64 (n,), what it was from then on, 0 to 1; before the first time it is 0.
         end_s: the right end of the picture [s]; the left one is 0.
         width, height: of the picture [characters].
+        marks: nine characters, from an empty one to a full one.
     """
     places = (np.arange(width) + 1) / width * end_s
     index = np.searchsorted(at_s, places, side="right")
@@ -27,6 +33,6 @@ def curve(
     eighths[(levels > 0) & (eighths == 0)] = 1
     eighths[(levels < 1) & (eighths == 8 * height)] -= 1
     return [
-        "".join(EIGHTHS[min(max(eighth - 8 * row, 0), 8)] for eighth in eighths.tolist())
+        "".join(marks[min(max(eighth - 8 * row, 0), 8)] for eighth in eighths.tolist())
         for row in reversed(range(height))
     ]

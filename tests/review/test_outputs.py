@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import re
+import shutil
+import subprocess
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -23,7 +25,7 @@ from fasaco_edge.review.page import page_of
 from fasaco_edge.review.picture import SIZE, draw_review
 from fasaco_edge.review.reading import read_review
 from fasaco_edge.review.review import CoverageCounts, review_of
-from tests.cli.commands import fasaco_edge
+from tests.cli.commands import ENVIRONMENT, PROGRAM, fasaco_edge
 from tests.review.test_parts import run_told
 
 VOID = ("meta", "img")
@@ -176,6 +178,21 @@ def test_what_begins_like_a_formula_is_text_to_a_table(review, tmp_path):
     with (tmp_path / "states.csv").open(encoding="utf-8", newline="") as file:
         told = [row["state"] for row in csv.DictReader(file)]
     assert told == ["'=1+1", "'+1+1", "'-1+1", "'@sum", "-1.5e-3", "a\\nb", "ok"]
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_a_terminal_of_few_characters_is_told_everything(parts, tmp_path, encoding):
+    """The curve is of ASCII there, and what a name has besides is escaped."""
+    odd = shutil.copytree(parts[0].parent, tmp_path / "räum\u2192")
+    words = [*PROGRAM, "review", *map(str, odd.glob("*.rrd")), "--json"]
+    env = ENVIRONMENT | {"PYTHONIOENCODING": encoding}
+    for command in (words, words[:-1]):
+        ended = subprocess.run(command, check=False, capture_output=True, env=env)
+        assert ended.returncode == 0, ended.stderr
+    told = ended.stdout.decode(encoding)
+    assert "Coverage over time" in told
+    assert "##" in told
+    assert "\\u25" not in told
 
 
 def test_the_command_writes_them(parts, tmp_path):
