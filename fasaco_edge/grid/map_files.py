@@ -109,7 +109,7 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
     try:
         # Mapped first, so that a header that promises too much costs nothing.
         array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (OSError, ValueError, EOFError, OverflowError) as error:
+    except (OSError, ValueError, EOFError, OverflowError, TypeError) as error:
         raise MapFileError(f"{path}: not readable as a .npy file: {error}") from error
     if not isinstance(array, np.ndarray):
         array.close()
@@ -119,7 +119,9 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
             f"{path}: expected a bool array of two dimensions, got {array.dtype} {array.shape}"
         )
     check_size(path, array.shape[1], array.shape[0])
-    return np.array(array)
+    # A bool of another program may be any byte but 0; kernels look at its lowest bit alone.
+    cells: NDArray[np.bool_] = np.ascontiguousarray(array).view(np.uint8) != 0
+    return cells
 
 
 def find_map(name_or_path: str | Path) -> Path:

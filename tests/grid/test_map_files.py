@@ -311,6 +311,14 @@ def test_other_arrays_are_refused(tmp_path, array):
         read_coverage_grid(tmp_path / "grid.npy")
 
 
+def test_any_byte_but_zero_of_a_coverage_grid_is_true(tmp_path):
+    cells = np.array([[0, 1], [2, 255]], np.uint8)
+    np.save(tmp_path / "grid.npy", np.asfortranarray(cells).view(bool))
+    read = read_coverage_grid(tmp_path / "grid.npy")
+    np.testing.assert_array_equal(read.view(np.uint8), cells != 0)
+    assert read.flags.c_contiguous
+
+
 def _npy_header(shape):
     text = f"{{'descr': '|b1', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text
@@ -326,6 +334,7 @@ def _npy_header(shape):
         _npy_header("(100000, 100000)"),
         _npy_header(f"({10**30}, 1)"),
         _npy_header("(-1, -1)") + b"\1",
+        _npy_header("(True, 2)") + b"\1\1",
     ],
 )
 def test_no_coverage_grid(tmp_path, content):
