@@ -12,6 +12,7 @@ from fasaco_edge.cli import main
 from fasaco_edge.daemon.checks.finding import Check, Finding, Level
 from fasaco_edge.daemon.checks.report import findings
 from fasaco_edge.daemon.checks.table import CHECKS
+from fasaco_edge.errors import BadConfiguration
 from tests.cli.commands import fasaco_edge
 from tests.daemon.certificates import authority, needs_openssl
 
@@ -178,6 +179,14 @@ def test_user_and_password(doctor, tmp_path):
     assert broken["identity"]["found"] == f"{dictionary}, line 2: no name:password"
     assert "sesame" not in json.dumps([told, broken])
     assert "one" not in broken["identity"]["details"]
+
+
+def test_what_a_check_cannot_do_without_is_told_with_what_to_do():
+    def look(patient):
+        raise BadConfiguration("there is no home folder", hint="set one")
+
+    (_, (_, found)) = findings(None, (Check("state", look),))
+    assert found == Finding(Level.WARN, "there is no home folder", "set one")
 
 
 def test_one_more_check_is_one_more_line():

@@ -11,7 +11,7 @@ from fasaco_edge.daemon.checks.finding import Check, Finding, Level, Patient
 from fasaco_edge.daemon.checks.table import CHECKS
 from fasaco_edge.daemon.checks.unit import find_unit
 from fasaco_edge.daemon.config import DaemonConfig, load_config
-from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.errors import BadConfiguration, FasacoError
 
 # For all together: a disk, a network or somebody on the bus may not answer.
 PATIENCE_S = 2.0
@@ -29,6 +29,8 @@ class _Looking:
     def _look(self) -> None:
         try:
             self._found = self._check.look(self._patient)
+        except FasacoError as error:
+            self._found = Finding(Level.WARN, str(error), error.hint)
         except Exception as error:
             # What is wrong with a computer may be what nobody thought of.
             said = f"could not be found out: {type(error).__name__}: {error}"
