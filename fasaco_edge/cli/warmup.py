@@ -17,7 +17,8 @@ The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. 
 these very sources, for one numba, llvmlite and Python, and for one processor; a daemon that finds
 none compiles it itself, with its first map. Each file is checked before it is used: one that is
 damaged is compiled again. A folder that others than root and you may write, or could put another
-in place of, is not used, but a temporary one.
+in place of, is not used, but a temporary one: `chmod go-w` on what is named mends that. A relative
+$XDG_CACHE_HOME counts as none; a user without a home has the temporary folder, too.
 exit codes: 0 all is there, 1 (--check) it is not
 
 examples:

@@ -64,10 +64,18 @@ def wanted_folder(environ: Mapping[str, str] = os.environ) -> Path:
     """Return the folder for compiled kernels, where it will do.
 
     It is in the user's cache, or in ``NUMBA_CACHE_DIR``, where set (a systemd CacheDirectory, say).
+    A user without a home has the temporary folder that others fall back to.
     """
-    given = environ.get("NUMBA_CACHE_DIR")
-    home = environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    base, name = Path(os.path.abspath(given or f"{home}/fasaco-edge")), _name()
+    name, given = _name(), environ.get("NUMBA_CACHE_DIR")
+    if not given:
+        # A relative one would be another in each working folder; so would a ``~`` that no home
+        # stands for, which expanduser leaves as it is: a container's user has no home.
+        homes = environ.get("XDG_CACHE_HOME", ""), os.path.expanduser("~/.cache")
+        home = next(filter(os.path.isabs, homes), None)
+        if home is None:
+            return _straight_in(Path(os.path.abspath(tempfile.gettempdir())), name)
+        given = f"{home}/fasaco-edge"
+    base = Path(os.path.abspath(given))
     if base.name.endswith(name):
         return base  # handed down by a process that has it
     return (base.parent if _FOLDER.match(base.name) else base) / name
@@ -155,8 +163,13 @@ def _places(wanted: Path) -> Iterator[Path]:
     if given := os.environ.get("RUNTIME_DIRECTORY", "").partition(":")[0]:
         yield Path(given) / wanted.name
     for base in _temporary()[:1]:
-        # Straight in the sticky folder, where nobody else can move it away.
-        yield base / f"fasaco-edge-{os.geteuid()}-{wanted.name}"
+        if wanted.parent != base:
+            yield _straight_in(base, wanted.name)
+
+
+def _straight_in(base: Path, name: str) -> Path:
+    """Return this user's folder in a sticky one, where nobody else can move it away."""
+    return base / f"fasaco-edge-{os.geteuid()}-{name}"
 
 
 def _temporary() -> list[Path]:

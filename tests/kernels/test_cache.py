@@ -14,6 +14,8 @@ from fasaco_edge.kernels import cache
 from tests.kernels.harm import NOBODY, needs_root
 from tests.kernels.installations import ALL_LOADED, Installation, told_by
 
+HOMES = ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR", "RUNTIME_DIRECTORY")
+
 
 @pytest.fixture
 def installed(tmp_path):
@@ -60,6 +62,45 @@ def test_the_users_cache_is_the_default(tmp_path, monkeypatch):
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     assert cache.cache_folder().parent == tmp_path / "home" / ".cache" / "fasaco-edge"
+
+
+@needs_root
+@pytest.mark.parametrize("relative", [None, "cache", "~/cache"])
+def test_no_cache_is_laid_into_the_working_folder(tmp_path, tmp, monkeypatch, relative):
+    """As by a container's user, who has neither a name nor a home, in a folder of its own."""
+    nameless = 987_654
+    work = tmp_path / "work"
+    work.mkdir()
+    os.chown(work, nameless, nameless)
+    for folder in (tmp_path, *tmp_path.parents[:-2]):
+        folder.chmod(folder.stat().st_mode | 0o011)
+    environ = {name: value for name, value in os.environ.items() if name not in HOMES}
+    if relative is not None:
+        environ["XDG_CACHE_HOME"] = relative
+    name = f"kernels-{cache.code_digest()}"
+    monkeypatch.setattr(cache, "_name", lambda: name)
+    # Forked off: it needs to read nothing more of a place that may be root's alone.
+    if not (child := os.fork()):
+        try:
+            os.chdir(work)
+            os.setuid(nameless)
+            os.environ.clear()
+            os.environ.update(environ)
+            folder = cache.cache_folder()
+            os._exit(int(folder is None or folder.parent != tmp))
+        finally:
+            os._exit(2)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert not any(work.iterdir())
+    assert [made.name for made in tmp.iterdir()] == [f"fasaco-edge-{nameless}-{name}"]
+
+
+def test_a_relative_user_cache_counts_as_none(tmp_path, monkeypatch):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    for relative in ("cache", "./cache", "~/cache"):
+        monkeypatch.setenv("XDG_CACHE_HOME", relative)
+        assert cache.wanted_folder().parent == tmp_path / "home" / ".cache" / "fasaco-edge"
 
 
 def test_a_child_process_uses_the_same_cache(tmp_path, tmp, monkeypatch):
