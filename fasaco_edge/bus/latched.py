@@ -34,6 +34,9 @@ MOST_TOKENS = 1024
 MOST_PUBLISHERS = 16
 # Of so many publishers it is remembered what they said last.
 MOST_REMEMBERED = 64
+# What waits for the samples before it waits no longer where it is more than that [bytes]: who does
+# not answer must not fill the memory.
+HELD_BYTES = 8_000_000
 _SEQUENCE_NUMBERS = 1 << 32
 
 Receive = Callable[[zenoh.Sample], None]
@@ -90,6 +93,7 @@ class LatchedSubscription(Subscription):
         self._last = OrderedDict[str, int]()
         # Where several samples count, they wait for those before them, which were asked for.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
+        self._held_bytes = 0
         self._open = 0
         # Whether all are to be asked, and whether for what was heard already, too.
         self._wants_all, self._wants_again = True, False
@@ -225,7 +229,9 @@ class LatchedSubscription(Subscription):
 
     def _hold(self, name: str, mark: int, sample: zenoh.Sample) -> None:
         self._held.append((name, mark, sample))
-        if len(self._held) > MOST_PUBLISHERS * self._depth:
+        self._held_bytes += len(sample.payload)
+        is_full = len(self._held) > MOST_PUBLISHERS * self._depth
+        if is_full or self._held_bytes > HELD_BYTES:
             self._deliver_held()
         elif not self._open and name in self._there:
             self._there[name].ask_at = 0.0
@@ -233,6 +239,7 @@ class LatchedSubscription(Subscription):
 
     def _deliver_held(self) -> None:
         held, self._held = sorted(self._held, key=lambda one: one[:2]), []
+        self._held_bytes = 0
         for name, mark, sample in held:
             if _is_newer(mark, self._last.get(name)):
                 self._deliver(name, mark, sample)

@@ -165,6 +165,26 @@ def test_where_several_samples_count_they_come_in_order(bus, endpoint):
     assert heard == list(range(heard[0], 2000))
 
 
+def test_what_waits_for_an_answer_has_a_bound(bus, endpoint, monkeypatch):
+    """A publisher that does not answer, and another one that sends megabytes meanwhile."""
+    monkeypatch.setattr(latched, "ANSWER_S", 1000.0)
+    asked, samples = [], Queue()
+    with open_client(endpoint) as silent, publishing(endpoint, cache=100) as publisher:
+        held = zenoh.handlers.Callback(asked.append, indirect=False)
+        queryable = silent.declare_queryable(f"{KEY}/@adv/**", held)
+        time.sleep(0.5)
+        bus.subscribe(KEY, samples.put, latched=True, history=100)
+        until(lambda: asked)
+        size = latched.HELD_BYTES // 4
+        for number in range(6):
+            publisher.put(bytes([number]) * size)
+        until(lambda: samples.qsize() >= 4)
+        assert [payload[0] for payload in taken(samples, 4)] == [0, 1, 2, 3]
+        for query in asked:
+            query.drop()
+        queryable.undeclare()
+
+
 def test_what_is_published_while_somebody_subscribes_comes_once(bus, endpoint):
     with publishing(endpoint) as publisher:
         for number in range(30):
