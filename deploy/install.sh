@@ -50,7 +50,7 @@ TEXT
 }
 
 WHEELS='' RECORDING=yes PYTHON=/usr/bin/python3 START=yes ROLLBACK=''
-SCRATCH='' BUILDING='' SWITCHING_FROM='' SWITCHING_TO='' SINCE=0
+SCRATCH='' ALONE='' BUILDING='' SWITCHING_FROM='' SWITCHING_TO='' SINCE=0
 
 read_words() {
     while [[ $# -gt 0 ]]; do
@@ -168,7 +168,8 @@ tidy() {
         (roll_back) || true
     fi
     [[ ! $BUILDING ]] || rm -rf "$BUILDING"
-    [[ ! -d $PREFIX ]] || rmdir --ignore-fail-on-non-empty "$PREFIX" 2>/dev/null || true
+    # An empty one may be that of another install.sh, which has locked it and begins.
+    [[ ! $ALONE || ! -d $PREFIX ]] || rmdir --ignore-fail-on-non-empty "$PREFIX" 2>/dev/null || true
     [[ ! $SCRATCH ]] || rm -rf "$SCRATCH"
     exit "$code"
 }
@@ -185,6 +186,7 @@ main() {
     trap 'exit 143' TERM
     [[ $DRY_RUN ]] || mkdir -p "$PREFIX"
     require_to_be_alone
+    [[ $DRY_RUN ]] || ALONE=yes
     if [[ $ROLLBACK ]]; then return_to_previous; else install_version; fi
 }
 
