@@ -267,10 +267,11 @@ def _daemon(folder: Path, bus: dict[str, Any]) -> Iterator[Daemon]:
 
 @contextmanager
 def _recorder(folder: Path, endpoint: str) -> Iterator[subprocess.Popen[bytes]]:
+    # What it remembers of the part it writes goes with that; a look sees many.
+    recording = {"part_min": 0.5}
+    bus = {"mode": "client", "listen": [], "connect": [endpoint]}
     config = folder / "recorder.yaml"
-    config.write_text(
-        yaml.safe_dump({"bus": {"mode": "client", "listen": [], "connect": [endpoint]}})
-    )
+    config.write_text(yaml.safe_dump({"bus": bus, "recording": recording}))
     (folder / "recordings").mkdir()
     command = [*PROGRAM, "record", "--config", str(config), "--out", str(folder / "recordings")]
     with (folder / "recorder.log").open("wb") as log:
