@@ -145,6 +145,18 @@ class Assignment:
             return replace(Assignment.by_itself(), paused=self.paused)
         return self if self.order is None else Assignment.none(f"{why}: the order was dropped")
 
+    def anywhere(self, why: str) -> Assignment:
+        """Return what is left of it in another frame, before anything was covered.
+
+        To cover everything means the same there; zones do not.
+        """
+        has_places = self.order is not None and (
+            bool(self.order.keep_out) or any(zone.polygon for zone in self.order.zones)
+        )
+        if self.order is None or self.standing or has_places:
+            return self.elsewhere(why)
+        return Assignment(self.order, paused=self.paused)
+
     def _started(self, order: MissionOrder) -> Assignment:
         same = self.order is not None and order == replace(
             self.order, keep_covered=order.keep_covered

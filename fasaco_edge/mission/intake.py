@@ -101,7 +101,11 @@ class Intake:
         """Let a frame count; raise LedgerMismatchError where there is progress in another."""
         parts = self._parts
         is_other_map = parts.site.turn()
+        before = parts.log.ledger.frame
         misfit = parts.log.move_to(frame)
+        if misfit is None and before not in ("", frame):
+            why = f"map and poses are in frame {frame!r} now, no more in {before!r}"
+            parts.take_order(parts.agenda.assignment.anywhere(why))
         if is_other_map or misfit is not None:
             self._leave(f"map and poses are in frame {frame!r} now")
             parts.watch.map_came(parts.now)

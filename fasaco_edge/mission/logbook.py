@@ -86,7 +86,7 @@ class Logbook:
             self._resumed.forget(inside)
 
     def move_to(self, frame: str) -> LedgerMismatchError | None:
-        """Lie in ``frame`` from now on; where it lay in another begin anew, and say so."""
+        """Lie in ``frame`` from now on; begin anew, and say so, if another holds covered cells."""
         was = self.ledger.frame
         if was in ("", frame):
             self.ledger.frame = frame
@@ -94,6 +94,8 @@ class Logbook:
         cells = self.ledger.snapshot().cells
         self.ledger, self._resumed = CoverageLedger(self._cell_m, frame), None
         self._parted_at = None
+        if not cells:
+            return None
         misfit = LedgerMismatchError(
             f"the ledger of {cells} covered cells lies in frame {was!r}, the map in {frame!r}"
         )

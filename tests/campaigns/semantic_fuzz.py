@@ -53,6 +53,7 @@ class Findings:
         text = "".join(traceback.format_exception(error, limit=-6))
         file = self._folder / f"semantic_fuzz-{seed}-{len(self.texts)}.json"
         document = {"seed": seed, "found": text, "events": [*self.recent, event]}
+        self._folder.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(document))
         last = "\n".join(f"  {json.dumps(each)[:300]}" for each in [*self.recent, event][-5:])
         self.texts.append(f"seed {seed}: {text}\nthe last events, more in {file}:\n{last}")

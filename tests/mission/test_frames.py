@@ -202,3 +202,25 @@ def test_frames_without_end_are_not_all_held():
     frames = drive.mission._parts.site.frames
     assert len(frames._maps) == len(frames._poses) == 2
     drive.finish()
+
+
+def test_an_order_for_everything_outlives_a_frame_in_which_nothing_was_covered():
+    """Only what is bound to places in the frame before means nothing any more."""
+    drive = Drive((1, 1), ODOM, pose_at(90, 90, frame="odom"))
+    drive.command("reset")
+    drive.command("start")
+    faults = drive.tell(MAP, HERE).faults
+    assert [fault for fault in faults if not isinstance(fault, WrongFrame)] == []
+    assert drive.mission.ledger.frame == "map"
+    drive.tell(HERE, after=2.0)  # a robot that had to stop stands a moment
+    assert drive.request is not None, drive.mission.reason
+
+
+def test_an_order_of_zones_is_dropped_with_the_frame_they_lie_in():
+    drive = Drive((1, 1), ODOM, pose_at(90, 90, frame="odom"))
+    drive.command("reset")
+    corners = [[0.3, 0.3], [1.0, 0.3], [1.0, 1.0], [0.3, 1.0]]
+    drive.command("start", {"keep_out": [corners]})
+    drive.tell(MAP, HERE)
+    assert drive.mission.state is State.IDLE
+    assert "no more in 'odom': the order was dropped" in drive.mission.reason
