@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import fcntl
 import os
+import re
 from contextlib import suppress
 from pathlib import Path
 
@@ -57,7 +58,7 @@ class Part:
             self.stream.set_sinks(rr.FileSink(f"/proc/self/fd/{self._lock}"))
         except RuntimeError as error:
             os.close(self._lock)
-            raise OSError(str(error)) from error
+            raise _disk_error(error, path) from error
 
     @property
     def size(self) -> int:
@@ -120,6 +121,14 @@ class Part:
         file = os.fstat(self._lock)
         others = {int(name) for name in os.listdir("/proc/self/fd")} - {self._lock}
         return any(_is_same_file(descriptor, file) for descriptor in others)
+
+
+def _disk_error(error: RuntimeError, path: Path) -> OSError:
+    """Return what the computer said, which rerun tells in words: "... (os error 28)"."""
+    number = re.search(r"\(os error (\d+)\)", str(error))
+    if number is None:
+        return OSError(str(error))
+    return OSError(int(number[1]), os.strerror(int(number[1])), str(path))
 
 
 def _is_same_file(descriptor: int, file: os.stat_result) -> bool:

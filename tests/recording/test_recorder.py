@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import runpy
 import signal
@@ -24,6 +25,7 @@ from fasaco_edge.errors import MissingExtra, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.input_log import PERIOD_NS as INPUT_PERIOD_NS
 from fasaco_edge.recording.journal import FLUSH_PERIOD_NS
+from fasaco_edge.recording.part import Part
 from fasaco_edge.recording.reading import SCALAR, RecordingSummary, read_column, read_summary
 from fasaco_edge.recording.samples import RecordedSamples
 from fasaco_edge.wire.keys import Keys
@@ -258,6 +260,15 @@ def tiny_disk(tmp_path):
         pytest.skip("no right to mount a disk")
     yield disk
     subprocess.run(["umount", "--lazy", str(disk)], check=True)
+
+
+def test_a_disk_that_is_full_from_the_beginning_is_no_wrong_configuration(tiny_disk):
+    with (tiny_disk / "ballast").open("wb", buffering=0) as ballast, suppress(OSError):
+        while ballast.write(bytes(1024)):
+            pass
+    with pytest.raises(OSError, match="No space left on device") as caught:
+        Part(tiny_disk / "a.rrd", "a")
+    assert caught.value.errno == errno.ENOSPC
 
 
 def wait_robot(folder: Path) -> None:
