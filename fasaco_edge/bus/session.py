@@ -139,7 +139,7 @@ class Bus:
         self._served: list[_Served] = []
         # What others hold, too: nothing of Zenoh's may be left to the last garbage collection,
         # in which its threads and the interpreter may wait for each other for ever.
-        self._lent: list[Publisher | Subscription | Roll] = []
+        self._lent: list[Publisher | Subscription] = []
         self._asker = Asker()
 
     def __enter__(self) -> Self:
@@ -262,9 +262,7 @@ class Bus:
 
     def roll(self, key: str) -> Roll:
         """Keep account of the liveliness tokens that match ``key``."""
-        roll = Roll(self._session, key)
-        self._lent.append(roll)
-        return roll
+        return Roll(self._session, key)
 
     def is_in_touch(self) -> bool:
         """Tell whether others can be heard: somebody is connected, or could be at any time."""

@@ -20,6 +20,8 @@ LOG = logging.getLogger(__name__)
 
 # Two that start at the same moment see each other's tokens within this [s].
 SETTLE_S = 0.2
+# So often it is asked who is there, as long as one plans [s]; else at each turn of the loop.
+ASK_PERIOD_S = 1.0
 # After a router was away, so long until all others have found it again, too [s].
 REJOIN_S = 3.0
 # A session that says nothing for this long is taken for dead by the others: Zenoh's lease [s].
@@ -131,7 +133,8 @@ class NameClaim:
         self._roll = bus.roll(keys.claims)
         self._token = bus.token(keys.claim(bus.id, Stand.WAITS))
         self._others: dict[str, Stand] = {}
-        self._version = -1
+        self._version = 0
+        self._is_settled = False
         self._stands_back = False
 
     @property
@@ -168,13 +171,16 @@ class NameClaim:
         The token follows with ``show``: once what was said before is taken back.
         """
         before = self._claim.stand
-        self._roll.check_if_due()
-        if not self._roll.is_whole:
+        is_settled = self._is_settled and not self._claim.doubts(now)
+        self._roll.ask(ASK_PERIOD_S if is_settled else 0.0)
+        if not self._roll.version:
             return False
         if self._roll.version != self._version:
             self._version = self._roll.version
             self._others = claims_in(self._roll.there())
             self._others.pop(self._bus.id, None)
+            # Where nobody plans, somebody soon will.
+            self._is_settled = Stand.PLANS in (self._claim.stand, *self._others.values())
         self._claim.decide(self._others, now, in_touch=self._bus.is_in_touch())
         if self._claim.hears_of_yielding:
             LOG.warning("another daemon of this name planned, too, and has yielded to this one")
