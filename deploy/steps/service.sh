@@ -116,15 +116,11 @@ prune() {
     done
 }
 
-# drop_version VERSION: its folder, and what was compiled for it. numba names folders of compiled
-# code after the place of the sources.
+# drop_version VERSION: its folder. Kernels belong to sources, not to a version: what no version
+# needs any more `fasaco-edge warmup --prune` removes.
 drop_version() {
-    local sources
     # Else half of it may be left after a loss of power, and take itself for complete.
     rm -f "$PREFIX/$1/INSTALLED"
     [[ ! -d $PREFIX/$1 ]] || sync "$PREFIX/$1"
-    for sources in "$PREFIX/$1"/lib/python3.*/site-packages/fasaco_edge/kernels; do
-        rm -rf "$KERNELS"/kernels-*/"kernels_$(printf '%s' "$sources" | sha1sum | cut -d ' ' -f 1)"
-    done
     rm -rf "${PREFIX:?}/$1"
 }

@@ -60,8 +60,8 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Watch until told to stop."""
     from fasaco_edge.cli.logs import say_why
-    from fasaco_edge.cli.nobody import NobodyAnswersError
     from fasaco_edge.cli.terminal import out
+    from fasaco_edge.errors import FasacoError
     from fasaco_edge.watching import live
     from fasaco_edge.watching.feed import Feed
     from fasaco_edge.watching.known import Known
@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
                 live.watch_in_lines(feed, known)
             sys.stdout.flush()
             code = exits.OK
-        except NobodyAnswersError as error:
+        except FasacoError as error:
             say_why(error)
             code = exits.ERROR
         except OSError:

@@ -23,7 +23,6 @@ from fasaco_edge.bus.session import Sample
 from fasaco_edge.daemon.ledger_codec import LedgerFileError, decode_ledger
 from fasaco_edge.daemon.ledger_file import LedgerFile
 from fasaco_edge.errors import UnreadableRecording
-from fasaco_edge.recording.reading import read_summary
 from fasaco_edge.recording.repair import repair_folder
 from fasaco_edge.wire.keys import Keys
 from tests.campaigns.services import START_S, Service, service
@@ -33,6 +32,7 @@ from tests.daemon.outsider import Outsider
 from tests.daemon.processes import ENVIRONMENT, PROGRAM, free_endpoint
 from tests.daemon.test_commands import command
 from tests.recording.kill_campaign import driving
+from tests.recording.reading import read_summary
 from tests.recording.recorders import bus_on_free_port
 
 DRIVEN, MESSAGES = 6, 60

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.reading import read_column, read_summary
 from tests.recording.kill_campaign import driving
+from tests.recording.reading import read_column, read_summary
 from tests.recording.recorders import bus_on_free_port, recorder_process
 
 DISK = "size=24m"

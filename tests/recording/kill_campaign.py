@@ -22,10 +22,10 @@ from pathlib import Path
 
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.reading import read_column
 from fasaco_edge.recording.repair import repair_folder
 from fasaco_edge.recording.samples import RecordedSamples
 from tests.recording.mission import Mission
+from tests.recording.reading import read_column
 from tests.recording.recorders import bus_on_free_port, recorder_process
 
 GOAL_LOST_S = 1.0

@@ -9,8 +9,8 @@ pytest.importorskip("rerun")
 from fasaco_edge.recording.blueprint import build_blueprint
 from fasaco_edge.recording.curves import PERIOD_NS, Curves
 from fasaco_edge.recording.journal import Journal
-from fasaco_edge.recording.reading import SCALAR, read_column
 from fasaco_edge.recording.room import Room
+from tests.recording.reading import SCALAR, read_column
 
 SECOND_NS = 1_000_000_000
 

@@ -26,13 +26,13 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.input_log import PERIOD_NS as INPUT_PERIOD_NS
 from fasaco_edge.recording.journal import FLUSH_PERIOD_NS
 from fasaco_edge.recording.part import Part
-from fasaco_edge.recording.reading import SCALAR, RecordingSummary, read_column, read_summary
 from fasaco_edge.recording.samples import RecordedSamples
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID
 from fasaco_edge.wire.status import encode_json
 from tests.recording.mission import CELL_M, COLS, ORIGIN, ROWS, Mission, building
+from tests.recording.reading import SCALAR, RecordingSummary, read_column, read_summary
 from tests.recording.recorders import bus_on_free_port, recorder_process
 
 ERRORS = {"total": 2, "last": "", "by_code": {"malformed_message": 2, "no code": 3}}

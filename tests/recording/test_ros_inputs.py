@@ -13,7 +13,6 @@ pytest.importorskip("rerun")
 from fasaco_edge.cli.record import ros_config
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.reading import read_summary
 from fasaco_edge.recording.samples import RecordedSamples
 from fasaco_edge.review.reading import read_review
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, TF_MESSAGE
@@ -21,6 +20,7 @@ from tests.daemon.outsider import Outsider
 from tests.daemon.processes import daemon_process
 from tests.daemon.rooms import map_bytes, pillared_room
 from tests.daemon.ros_robot import GRID, Naming, ros_robot
+from tests.recording.reading import read_summary
 
 WAY = [(0.75 + 0.05 * step, 0.75) for step in range(20)]
 

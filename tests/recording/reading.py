@@ -126,7 +126,7 @@ def _texts(path: Path, entity: str, component: str) -> tuple[str, ...]:
     return tuple(str(value[0]) for value in read_column(path, entity, component).values)
 
 
-def _wall_ns(batch: Any) -> NDArray[np.int64]:  # noqa: ANN401 - pyarrow has no types
+def _wall_ns(batch: Any) -> NDArray[np.int64]:
     wall: NDArray[np.int64] = batch.column(entities.WALL).to_numpy(False).astype(np.int64)
     return wall
 
