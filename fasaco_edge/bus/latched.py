@@ -91,6 +91,9 @@ class LatchedSubscription(Subscription):
         self._there: dict[str, _Publisher] = {}
         # By publisher, the number or time of what was heard of it last.
         self._last = OrderedDict[str, int]()
+        # Likewise by clock, of those that may keep nothing: what a cache answers with is compared
+        # with it, and nothing that is published, for no token tells when such a clock is set back.
+        self._unlisted = OrderedDict[str, int]()
         # Where several samples count, they wait for those before them, which were asked for.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._held_bytes = 0
@@ -198,6 +201,8 @@ class LatchedSubscription(Subscription):
             waits_s = ASK_PERIOD_S if self._wants_all or self._open else 0.0
             for name in came[: MOST_PUBLISHERS - len(self._there)]:
                 self._there[name] = _Publisher(found[name], time.monotonic() + waits_s)
+                if name in self._unlisted:
+                    _remember(self._last, name, self._unlisted.pop(name))
         if came:
             self._asker.wake()
 
@@ -205,14 +210,21 @@ class LatchedSubscription(Subscription):
         """Take what is published, on a Zenoh thread."""
         name, mark = _origin(sample)
         with self._lock:
-            if not name or not (sample.source_info or name in self._last or name in self._there):
-                self._receive(sample)  # of a publisher that keeps nothing
+            waits = self._depth > 1 and bool(self._open or self._wants_all)
+            if not name:
+                self._receive(sample)
+                return
+            is_listed = sample.source_info or name in self._last or name in self._there
+            if not is_listed and not waits:
+                # Of a publisher that keeps nothing, or of one that is not yet found.
+                _remember(self._unlisted, name, mark)
+                self._receive(sample)
                 return
             if sample.source_info and not mark and self._last.get(name):
                 del self._last[name]  # it was started anew under the same name
             last = self._last.get(name)
             is_gap = name in self._there and _leaves_gap(name, mark, last)
-            if self._depth > 1 and (self._open or is_gap):
+            if waits or (self._depth > 1 and is_gap):
                 self._hold(name, mark, sample)
             elif _is_newer(mark, last):
                 self._deliver(name, mark, sample)
@@ -221,7 +233,7 @@ class LatchedSubscription(Subscription):
         """Take an answer; ``again``: also one that was heard already, if nothing came after it."""
         name, mark = _origin(sample)
         with self._lock:
-            last = self._last.get(name)
+            last = self._last.get(name, self._unlisted.get(name))
             if self._depth > 1:
                 self._hold(name, mark, sample)
             elif _is_newer(mark, last) or (again and mark == last):
@@ -241,14 +253,12 @@ class LatchedSubscription(Subscription):
         held, self._held = sorted(self._held, key=lambda one: one[:2]), []
         self._held_bytes = 0
         for name, mark, sample in held:
-            if _is_newer(mark, self._last.get(name)):
+            if _is_newer(mark, self._last.get(name, self._unlisted.get(name))):
                 self._deliver(name, mark, sample)
 
     def _deliver(self, name: str, mark: int, sample: zenoh.Sample) -> None:
-        self._last[name] = mark
-        self._last.move_to_end(name)
-        if len(self._last) > MOST_REMEMBERED:
-            self._last.popitem(last=False)
+        self._unlisted.pop(name, None)
+        _remember(self._last, name, mark)
         self._receive(sample)
 
 
@@ -300,6 +310,14 @@ class Asker:
                 subscriptions = list(self._subscriptions)
             now = time.monotonic()
             next_at = min((one.ask_who_is_due(now) for one in subscriptions), default=float("inf"))
+
+
+def _remember(marks: OrderedDict[str, int], name: str, mark: int) -> None:
+    """Note the last mark of a name; those noted the longest ago are forgotten."""
+    marks[name] = mark
+    marks.move_to_end(name)
+    if len(marks) > MOST_REMEMBERED:
+        marks.popitem(last=False)
 
 
 def _origin(sample: zenoh.Sample) -> tuple[str, int]:

@@ -188,8 +188,9 @@ def test_what_waits_for_an_answer_has_a_bound(bus, endpoint, monkeypatch):
         queryable.undeclare()
 
 
-def test_what_is_published_while_somebody_subscribes_comes_once(bus, endpoint):
-    with publishing(endpoint) as publisher:
+@pytest.mark.parametrize("numbered", [True, False])
+def test_what_is_published_while_somebody_subscribes_comes_once(bus, endpoint, numbered):
+    with publishing(endpoint, numbered) as publisher:
         for number in range(30):
             samples = Queue()
             bus.subscribe(KEY, samples.put, latched=True)
@@ -197,6 +198,36 @@ def test_what_is_published_while_somebody_subscribes_comes_once(bus, endpoint):
             while taken(samples, 1) != [b"%d" % number]:
                 pass  # that of the round before
             time.sleep(0.1)  # what comes twice comes at once
+            assert samples.empty()
+
+
+@pytest.mark.parametrize("numbered", [True, False])
+def test_a_publisher_heard_before_it_is_found_is_heard_once(bus, endpoint, numbered):
+    """It publishes on a link that stands, before its token is looked for."""
+    samples = Queue()
+    subscription = bus.subscribe(KEY, samples.put, latched=True)
+    with publishing(endpoint, numbered) as publisher:
+        time.sleep(0.3)  # by then what it publishes reaches the subscriber at once
+        publisher.put(b"one")
+        assert taken(samples, 1) == [b"one"]
+        until(lambda: subscription._there)
+        time.sleep(1.5 * latched.ASK_PERIOD_S)
+        assert samples.empty()
+
+
+@pytest.mark.parametrize("numbered", [True, False])
+def test_what_was_said_before_is_heard_before_what_is_said_meanwhile(bus, endpoint, numbered):
+    with publishing(endpoint, numbered, cache=10) as publisher:
+        for number in range(30):
+            samples = Queue()
+            publisher.put(b"%d" % number)
+            bus.subscribe(KEY, samples.put, latched=True, history=10)
+            publisher.put(b"%d and more" % number)
+            heard = taken(samples, 1)
+            while heard[-1] != b"%d and more" % number:
+                heard += taken(samples, 1)
+            assert heard[-2:] == [b"%d" % number, b"%d and more" % number]
+            time.sleep(0.1)
             assert samples.empty()
 
 
