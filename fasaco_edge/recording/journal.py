@@ -26,6 +26,8 @@ LOG = logging.getLogger(__name__)
 FLUSH_PERIOD_NS = 900_000_000
 # While nothing can be written, how often to look whether it can again.
 RETRY_PERIOD_NS = 1_000_000_000
+# Each part that was given up has left threads and memory behind: the next tries take their time.
+MOST_DOUBLINGS = 5
 # Rerun's own queue has no bound: no more than this may wait in it between two flushes.
 FLUSH_BYTES = 8_000_000
 FLUSH_TIMEOUT_S = 0.5
@@ -74,7 +76,9 @@ class Journal:
             folder.mkdir(parents=True, exist_ok=True)
             self._begin_part()
         except OSError as error:
-            raise BadConfiguration(f"cannot record into {folder}: {error}") from error
+            if not self._abandoned:
+                raise BadConfiguration(f"cannot record into {folder}: {error}") from error
+            self._enter(JournalState.STALLED, f"no part: {error}")
 
     @property
     def path(self) -> Path | None:
@@ -188,7 +192,8 @@ class Journal:
         elif self._is_flushed(self._part):
             self._keep_room(self._part, now_ns)
         recording = self.state is JournalState.RECORDING
-        self._next_flush_ns = now_ns + (FLUSH_PERIOD_NS if recording else RETRY_PERIOD_NS)
+        retry_ns = RETRY_PERIOD_NS << min(len(self._abandoned), MOST_DOUBLINGS)
+        self._next_flush_ns = now_ns + (FLUSH_PERIOD_NS if recording else retry_ns)
 
     def close(self) -> bool:
         """End the part in order; False where the disk holds rerun's writer up."""
@@ -276,7 +281,12 @@ class Journal:
         number = self._parts + 1
         path = self._folder / f"{self._recording_id}-part{number}.rrd"
         part = Part(path, self._recording_id)
-        self._part, self._parts, self._part_until_ns = part, number, None
+        self._parts = number
+        if part.refused:
+            part.abandon()
+            self._abandoned.append(part)
+            raise OSError(f"{path.name}: {part.refused}")
+        self._part, self._part_until_ns = part, None
         self._standing.begin(part.stream)
 
     def _enter(self, state: JournalState, reason: str) -> None:

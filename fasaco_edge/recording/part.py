@@ -6,6 +6,8 @@ import enum
 import fcntl
 import os
 import re
+import threading
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -18,6 +20,8 @@ from fasaco_edge.recording.sdk import rr
 
 # Rows gather until the journal flushes, or at most this long [s].
 FLUSH_TICK_S = 10.0
+# How long the disk may take for the first message of a part.
+BEGIN_TIMEOUT_S = 10.0
 
 
 class Flush(enum.Enum):
@@ -36,12 +40,16 @@ class Part:
 
     Rerun's logging calls never fail: what became of the data only ``flush`` can tell.
 
+    Attributes:
+        refused: why the disk has not taken the first message; then only ``abandon`` is left to do.
+
     Raises:
         OSError: the file cannot be made.
     """
 
     def __init__(self, path: Path, recording_id: str) -> None:
         self.path = path
+        self.refused = ""
         self._flushed_bytes = 0
         # Held while the part is written, so that no other recorder repairs it.
         self._lock = _locked(path)
@@ -51,14 +59,39 @@ class Part:
             batcher_config=rr.ChunkBatcherConfig(flush_tick=FLUSH_TICK_S),
         )
         self.stream.set_log_time_enabled(False)
-        try:
-            # Without a blueprint: one given here is written before the call returns, which
-            # on a stalled disk is never.
-            # By its descriptor: what has that name may be another file by now.
-            self.stream.set_sinks(rr.FileSink(f"/proc/self/fd/{self._lock}"))
-        except RuntimeError as error:
+        self._attach()
+
+    def _attach(self) -> None:
+        """Let rerun write to the file.
+
+        Its call waits until the first message is on the disk: for ever, if the disk refuses that or
+        stalls (rerun 0.41). So it is made on a thread, which stays behind then.
+        """
+        errors = list[RuntimeError]()
+
+        def attach() -> None:
+            try:
+                # Without a blueprint: one given here is written before the call returns, too.
+                # By its descriptor: what has that name may be another file by now.
+                self.stream.set_sinks(rr.FileSink(f"/proc/self/fd/{self._lock}"))
+            except RuntimeError as error:
+                errors.append(error)
+
+        thread = threading.Thread(target=attach, name="part-begins", daemon=True)
+        thread.start()
+        deadline = time.monotonic() + BEGIN_TIMEOUT_S
+        while not self.refused:
+            thread.join(0.02)
+            if not thread.is_alive():
+                break
+            # The file's header is written before there is a writer.
+            if self.size and not self._has_writer():
+                self.refused = "its first message cannot be written"
+            elif time.monotonic() > deadline:
+                self.refused = f"its first message waits for the disk for {BEGIN_TIMEOUT_S:.0f} s"
+        if errors:
             os.close(self._lock)
-            raise _disk_error(error, path) from error
+            raise _disk_error(errors[0], self.path) from errors[0]
 
     @property
     def size(self) -> int:

@@ -54,6 +54,8 @@ def test_a_failure_is_written_as_it_is_read():
         "orders:open:1:EIO",
         "orders:read:2:EIO",
         "orders:sync:1:EIO+",
+        "recorder:write:2:ENOSPC",  # the first message of a part
+        "recorder:write:4:EIO",
         "recorder:write:9:ENOSPC",
         "recorder:folder:1:EIO",
     ],
