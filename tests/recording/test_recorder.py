@@ -193,7 +193,8 @@ def test_a_malformed_sample_costs_that_sample(recorded):
     assert recorded.report["malformed"] == 1
     assert recorded.report["lost"] == 0
     lines = read_column(recorded.path, entities.BUS_LOG, "TextLog:text").values
-    assert Keys().coverage in lines[0][0]
+    # The other daemon's status may overtake it: statuses go first on the bus.
+    assert sum(Keys().coverage in line for (line,) in lines) == 1
 
 
 def test_the_report_tells_what_is_going_on(recorded):
