@@ -11,6 +11,7 @@ from fasaco_edge.bus.mailbox import Mailbox, Spacing
 from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.daemon.memory import most_bytes, queues
 from fasaco_edge.errors import FasacoError, MalformedMessage, MapTooLarge
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.events import (
     Event,
     MapReceived,
@@ -119,43 +120,52 @@ class Inbox:
     ) -> tuple[list[Event], list[FasacoError]]:
         """Return the events in ``items``; a malformed sample costs that sample alone.
 
-        A map that can be read makes the updates before it worthless, those that were
-        lost too.
+        Of each frame the newest map that can be read counts, and makes the updates of that
+        frame before it worthless, those that were lost too.
         """
-        events, faults, map_at = self._newest_map(items)
+        maps, faults = self._newest_maps(items)
+        events = list[Event](map(MapReceived, (grid for grid, _ in maps.values())))
+        map_at = {frame: at for frame, (_, at) in maps.items()}
         faults.extend(_fault(item) for _, item in items if isinstance(item, TooLong))
         for kind, item in items:
             if not isinstance(item, Received) or kind == "map":
                 continue
-            if kind == "map_update" and item.at < map_at:
-                patches_lost = 0  # they were older still
-                continue
-            if kind == "map_update" and patches_lost:
-                events.append(PatchesLost(patches_lost))
-                patches_lost = 0
             try:
                 event = self._event(kind, item.sample)
-                if event is not None:
-                    events.append(event)
             except FasacoError as error:
                 faults.append(_bare(error))
+                continue
+            if isinstance(event, PatchReceived):
+                if item.at < map_at.get(event.patch.frame, float("-inf")):
+                    patches_lost = 0  # they were older still
+                    continue
+                if patches_lost:
+                    events.append(PatchesLost(patches_lost))
+                    patches_lost = 0
+            if event is not None:
+                events.append(event)
         if patches_lost:
             events.append(PatchesLost(patches_lost))
         return events, faults
 
-    def _newest_map(
+    def _newest_maps(
         self, items: Sequence[tuple[str, object]]
-    ) -> tuple[list[Event], list[FasacoError], float]:
-        """Return the newest map that can be read, if any, and when it came in."""
+    ) -> tuple[dict[str, tuple[OccupancyGrid, float]], list[FasacoError]]:
+        """Return by frame the newest map that can be read, and when it came in, in that order.
+
+        Which frame counts is for the mission to find, and a map may come only once.
+        """
+        maps: dict[str, tuple[OccupancyGrid, float]] = {}
         faults: list[FasacoError] = []
         for kind, item in reversed(items):
             if kind == "map" and isinstance(item, Received):
                 try:
                     grid = decode_occupancy_grid(item.sample.payload, self._max_pixels)
-                    return [MapReceived(grid)], faults, item.at
                 except FasacoError as error:
                     faults.append(_bare(error))
-        return [], faults, float("-inf")
+                else:
+                    maps.setdefault(grid.frame, (grid, item.at))
+        return dict(reversed(maps.items())), faults
 
     def _event(self, kind: str, sample: Sample) -> Event | None:
         """Return the event in a sample; None for transforms that tell no new pose."""

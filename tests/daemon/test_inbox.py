@@ -90,6 +90,26 @@ def test_a_map_makes_the_updates_before_it_worthless(arrivals):
     assert arrivals.decode() == ([MapReceived], [])
 
 
+def test_maps_of_two_frames_that_come_together_are_both_taken(arrivals):
+    """A latched map comes once, and which of the frames counts is not known here."""
+    arrivals.post("map", map_bytes(pillared_room(), frame="odom"))
+    arrivals.post("map", MAP)
+    arrivals.post("map", map_bytes(pillared_room(), frame="odom", stamp_ns=7))
+    events, faults = arrivals.events()
+    maps = [(event.grid.frame, event.grid.stamp_ns) for event in events]
+    assert maps == [("map", 1), ("odom", 7)]
+    assert faults == []
+
+
+def test_a_map_leaves_the_updates_of_another_frame_alone(arrivals):
+    arrivals.post("map_update", UPDATE)
+    arrivals.post("map_update", update_bytes(pillared_room(), 1.0, 1.0, 2.0, 2.0, frame="odom"))
+    arrivals.post("map", map_bytes(pillared_room(), frame="odom"))
+    events, faults = arrivals.events()
+    assert [type(event) for event in events] == [MapReceived, PatchReceived]
+    assert (events[1].patch.frame, faults) == ("map", [])
+
+
 def test_a_broken_map_costs_no_update(arrivals):
     """Updates have no revision: one that went missing unseen would leave the map wrong."""
     arrivals.post("map_update", UPDATE)
