@@ -37,6 +37,9 @@ CRATE = (2.4, 1.2, 2.7, 1.5)
 CRATE_S = (8.0, 25.0)
 # What is commanded when [simulated s].
 COMMANDS = ((14.0, "pause"), (16.0, "resume"), (19.0, "replan"))
+# From the first path to the first command, at least [s]: when the daemon took what a recording
+# tells no more exactly than that.
+DRIVES_S = 0.5
 # Simulated seconds per second.
 SPEED = 16.0
 TIMEOUT_S = 250.0
@@ -144,6 +147,8 @@ class MappingRobot:
     def _is_time(self) -> bool:
         """Tell whether the next command is due; one that waits for its first path gets none."""
         if not self._commands or 1e-9 * self._world.stamp_ns < self._commands[0][0]:
+            return False
+        if not self.notes or time.monotonic() - self.notes[0][0] < DRIVES_S:
             return False
         return self._commands[0][1] == "resume" or self.status.get("state") == "covering"
 
