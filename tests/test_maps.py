@@ -10,8 +10,8 @@ import yaml
 
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import builtin_maps, find_map, read_map, suggested_start
+from fasaco_edge.host.resources import folder
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.resources import folder
 
 MAPS = folder("maps")
 NAMES = [name for name, _ in builtin_maps()]

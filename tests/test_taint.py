@@ -27,22 +27,22 @@ import zenoh.ext
 pytest.importorskip("rerun")
 
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival
-from fasaco_edge.bus.sample_codec import SampleEncoder
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.part import Part
 from fasaco_edge.recording.sdk import rr
+from fasaco_edge.recording.write.part import Part
+from fasaco_edge.samples.codec import SampleEncoder
 from fasaco_edge.text import json_line
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import RPC_NAMES
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
-from tests.cli.commands import ENVIRONMENT, PROGRAM, TIMEOUT_S
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process, free_endpoint
-from tests.daemon.rooms import map_bytes, pose_bytes, room
+from tests.support.commands import ENVIRONMENT, PROGRAM, TIMEOUT_S
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process, free_endpoint
+from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.test_text import HIDDEN
 from tests.wire.schemas import NAMES, schema
 

@@ -16,13 +16,12 @@ from fasaco_edge.bench.benchmark import (
     seconds,
     seconds_above_zero,
 )
-from fasaco_edge.bench.building import building, robot_pose, with_crate
-from fasaco_edge.bench.daemon_process import DaemonProcess, MapSource, warm_kernels
-from fasaco_edge.bench.machine import machine, peak_mb
-from fasaco_edge.bench.placement import cpu_seconds
-from fasaco_edge.bench.spread import Spread, document, median, text
-from fasaco_edge.process_memory import has_loaded, resident_mb
-from fasaco_edge.process_memory import peak_mb as peak_mb_of
+from fasaco_edge.bench.machine import cpu_seconds, machine, peak_mb
+from fasaco_edge.bench.processes import DaemonProcess, MapSource, warm_kernels
+from fasaco_edge.bench.workload import building, robot_pose, with_crate
+from fasaco_edge.drawing.spread import Spread, document, median, text
+from fasaco_edge.host.processes import has_loaded, resident_mb
+from fasaco_edge.host.processes import peak_mb as peak_mb_of
 
 GOAL_READY_S, GOAL_IDLE_MB, GOAL_IDLE_PERCENT, GOAL_WARM_MB = 1.5, 60.0, 0.5, 200.0
 MEASURES = (

@@ -18,13 +18,12 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds_above_zero,
 )
-from fasaco_edge.bench.covering_robot import CoveringRobot, robot_beside
-from fasaco_edge.bench.daemon_process import DaemonProcess, warm_kernels
-from fasaco_edge.bench.machine import machine, peak_mb
-from fasaco_edge.bench.placement import cpu_seconds, place, weighed
-from fasaco_edge.bench.spread import percentile
-from fasaco_edge.child_process import python_program
+from fasaco_edge.bench.machine import cpu_seconds, machine, peak_mb, place, weighed
+from fasaco_edge.bench.processes import DaemonProcess, warm_kernels
+from fasaco_edge.bench.workload import CoveringRobot, robot_beside
+from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.errors import ProcessEnded
+from fasaco_edge.host.processes import python_program
 
 # As the daemon's unit has it.
 NICENESS, WEIGHT = 10, 20

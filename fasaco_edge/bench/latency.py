@@ -10,13 +10,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seconds
-from fasaco_edge.bench.building import building, robot_pose, with_crate
-from fasaco_edge.bench.daemon_process import DaemonProcess, MapSource, warm_kernels
 from fasaco_edge.bench.machine import machine, peak_mb
-from fasaco_edge.bench.recorder_process import recorder_beside
-from fasaco_edge.bench.spread import percentile
+from fasaco_edge.bench.processes import DaemonProcess, MapSource, recorder_beside, warm_kernels
+from fasaco_edge.bench.workload import building, robot_pose, with_crate
+from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.process_memory import peak_mb as peak_mb_of
+from fasaco_edge.host.processes import peak_mb as peak_mb_of
 
 GOAL_REST_P99_MS = 20.0
 GOAL_RECORDER_RATIO = 1.05

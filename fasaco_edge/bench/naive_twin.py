@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
-from fasaco_edge.resources import folder
+from fasaco_edge.host.resources import folder
 
 MODULE = "fasaco_edge_naive_twins"
 

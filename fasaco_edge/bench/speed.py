@@ -19,7 +19,7 @@ from fasaco_edge.bench.benchmark import (
 from fasaco_edge.bench.grid_options import add_grid_options, grid_names
 from fasaco_edge.bench.machine import machine, peak_mb
 from fasaco_edge.bench.naive_twin import naive_file
-from fasaco_edge.bench.spread import Spread, document
+from fasaco_edge.drawing.spread import Spread, document
 
 if TYPE_CHECKING:
     from fasaco_edge.bench.colony_timing import Timing

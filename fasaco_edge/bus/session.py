@@ -20,21 +20,19 @@ from typing import Any, Self
 
 import zenoh
 
-from fasaco_edge.bus.encodings import JSON, schema_of
 from fasaco_edge.bus.latched import Asker, LatchedSubscription, Subscription
-from fasaco_edge.bus.publisher import Publisher
-from fasaco_edge.bus.qos import VOLATILE, Qos
+from fasaco_edge.bus.publisher import JSON, VOLATILE, Publisher, Qos, schema_of
 from fasaco_edge.bus.queries import (
     Question,
     Reply,
     Request,
+    Roll,
     Shared,
     reply_of,
     request_of,
     send,
     size_of,
 )
-from fasaco_edge.bus.roll import Roll
 from fasaco_edge.bus.session_config import session_config
 from fasaco_edge.errors import BusUnavailable
 

@@ -15,7 +15,6 @@ from fasaco_edge.cli import (
     check_config,
     demo,
     doctor,
-    exits,
     maps,
     mission,
     plan,
@@ -27,10 +26,11 @@ from fasaco_edge.cli import (
     warmup,
     watch,
 )
-from fasaco_edge.cli.arguments import with_negative_pairs
-from fasaco_edge.cli.logs import begin_logging, say_why
-from fasaco_edge.cli.parent import end_with_parent
-from fasaco_edge.cli.streams import clean_streams
+from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.arguments import with_negative_pairs
+from fasaco_edge.cli.console.logs import begin_logging, say_why
+from fasaco_edge.cli.console.signals import end_with_parent
+from fasaco_edge.cli.console.streams import clean_streams
 from fasaco_edge.errors import BadConfiguration, DiskFailed, FasacoError
 
 COMMANDS = (
@@ -47,11 +47,15 @@ _PASSING = frozenset(
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the process's exit code."""
-    words = sys.argv[1:] if argv is None else argv
+    return run_command(_parser(), sys.argv[1:] if argv is None else argv)
+
+
+def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
+    """Run the command that ``parser`` finds in ``words``; each error is told, and is a code."""
     # Whatever the caller's mask is: what is written here, no other user may change.
     os.umask(os.umask(0o022) | 0o022)
     clean_streams()
-    args = _parser().parse_args(with_negative_pairs(words))
+    args = parser.parse_args(with_negative_pairs(words))
     begin_logging(args.log_level)
     if args.with_parent is not None:
         end_with_parent(args.with_parent)
@@ -84,6 +88,15 @@ def _parser() -> argparse.ArgumentParser:
         epilog="Begin with `fasaco-edge demo`. Each command explains itself with --help.",
     )
     parser.add_argument("--version", action="version", version=f"fasaco-edge {__version__}")
+    common = common_options()
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    for module in COMMANDS:
+        module.add_to(commands, common)
+    return parser
+
+
+def common_options() -> argparse.ArgumentParser:
+    """Return a parser of the options that all commands take."""
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument(
         "--log-level",
@@ -93,10 +106,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     # For the processes that other commands start: they end when those do.
     common.add_argument("--with-parent", type=int, metavar="PID", help=argparse.SUPPRESS)
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for module in COMMANDS:
-        module.add_to(commands, common)
-    return parser
+    return common
 
 
 def _may_pass(error: BaseException | None) -> bool:

@@ -6,11 +6,11 @@ import argparse
 import re
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli import asking, exits
+from fasaco_edge.cli.console import asking, exits
 from fasaco_edge.wire.keys import RPC_NAMES
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.cli.console.arguments import Subparsers
 
 EPILOG = """\
 examples:

@@ -9,13 +9,13 @@ import yaml
 
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.cli import mission_view
-from fasaco_edge.cli.streams import print_json
-from fasaco_edge.cli.terminal import figures, out
+from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.console.terminal import figures, out
 from fasaco_edge.wire import coverage, schemas
+from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
-from fasaco_edge.wire.status import decode_json
 
 
 def print_answer(reply: Reply) -> None:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import argparse
 import textwrap
+from collections.abc import Sequence
 from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.bench.table import BENCHMARKS
-from fasaco_edge.cli import exits
-from fasaco_edge.cli.streams import print_json
+from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from fasaco_edge.bench.benchmark import Benchmark, Report
-    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.cli.console.arguments import Subparsers
 
 WIDTH = 80
 
@@ -30,17 +31,26 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command and its benchmarks."""
     parser = commands.add_parser(
         "bench",
-        help="measure speed, footprint, codecs, latency, walks, missions, scale and Table I",
+        help="measure speed, footprint, latency and jitter on this machine",
         description="Measure this installation on this machine.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    add_benchmarks(parser, BENCHMARKS, common)
+
+
+def add_benchmarks(
+    parser: argparse.ArgumentParser,
+    benchmarks: Sequence[Benchmark[Any]],
+    common: argparse.ArgumentParser,
+) -> None:
+    """Add each benchmark to ``parser``, as a command of its own."""
     parser.set_defaults(
         command=run, benchmark=None, usage=parser, log_level="warning", with_parent=None
     )
-    benchmarks = parser.add_subparsers(title="benchmarks", metavar="BENCHMARK")
-    for benchmark in BENCHMARKS:
-        _add(benchmark, benchmarks, common)
+    commands = parser.add_subparsers(title="benchmarks", metavar="BENCHMARK")
+    for benchmark in benchmarks:
+        _add(benchmark, commands, common)
 
 
 def _add(
@@ -67,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     if args.benchmark is None:
         args.usage.print_help()
         return 0
-    from fasaco_edge.cli import terminal
+    from fasaco_edge.cli.console import terminal
 
     samples, interrupted = _measure(args.benchmark, args)
     report: Report = args.benchmark.report(args, samples)
@@ -87,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _measure(benchmark: Benchmark[Any], args: argparse.Namespace) -> tuple[list[Any], bool]:
     """Return the samples, and whether somebody did not want to wait for all of them."""
-    from fasaco_edge.cli.terminal import progress
+    from fasaco_edge.cli.console.terminal import progress
 
     samples: list[Any] = []
     with progress() as bar:
@@ -105,7 +115,7 @@ def _measure(benchmark: Benchmark[Any], args: argparse.Namespace) -> tuple[list[
 
 
 def _print(report: Report, interrupted: bool) -> None:
-    from fasaco_edge.cli import terminal
+    from fasaco_edge.cli.console import terminal
 
     console = terminal.out()
     for shown in report.tables:

@@ -6,13 +6,13 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli import exits
-from fasaco_edge.cli.streams import print_json
+from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
-    from fasaco_edge.daemon.config import DaemonConfig
-    from fasaco_edge.daemon.config_faults import Fault
+    from fasaco_edge.cli.console.arguments import Subparsers
+    from fasaco_edge.config.config import DaemonConfig
+    from fasaco_edge.config.reading import Fault
 
 EPILOG = """\
 It reads the file as the daemon does and starts nothing. It looks at no file that the
@@ -50,7 +50,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check, and tell."""
-    from fasaco_edge.daemon.config import inspect_config
+    from fasaco_edge.config.config import inspect_config
 
     config, found = inspect_config(args.file)
     faults = sorted(found, key=lambda fault: fault.line or 0)
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     elif args.show:
         import yaml
 
-        from fasaco_edge.daemon.about import config_document
+        from fasaco_edge.daemon.loop.answers import config_document
 
         print(yaml.safe_dump(config_document(config), sort_keys=False), end="")
     else:
@@ -87,7 +87,7 @@ def _document(
         ],
     }
     if args.show:
-        from fasaco_edge.daemon.about import config_document
+        from fasaco_edge.daemon.loop.answers import config_document
 
         document["config"] = config_document(config) if config is not None else None
     return document
@@ -95,7 +95,7 @@ def _document(
 
 def _print(file: Path, faults: list[Fault]) -> None:
     """Print a line for each fault, as compilers do, and each hint that is not everybody's."""
-    from fasaco_edge.cli.terminal import out
+    from fasaco_edge.cli.console.terminal import out
     from fasaco_edge.errors import BadConfiguration
 
     console = out()

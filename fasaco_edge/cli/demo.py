@@ -7,10 +7,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.arguments import DEFAULT_CELL_M, DEFAULT_RADIUS_M
+from fasaco_edge.cli.console.arguments import DEFAULT_CELL_M, DEFAULT_RADIUS_M
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.cli.console.arguments import Subparsers
 
 RUNS = Path("runs")
 
@@ -52,14 +52,14 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the mission; 0 if every reachable cell was covered."""
+    from fasaco_edge.cli.console.arguments import writing
+    from fasaco_edge.cli.console.terminal import err
     from fasaco_edge.cli.demo_mission import DemoMission
     from fasaco_edge.cli.demo_summary import print_summary, summarise
-    from fasaco_edge.cli.outputs import writing
-    from fasaco_edge.cli.terminal import err
     from fasaco_edge.cli.warmup import compile_kernels
     from fasaco_edge.errors import BadConfiguration
     from fasaco_edge.grid.map_files import find_map
-    from fasaco_edge.own_files import make_own_folder
+    from fasaco_edge.host.files import make_own_folder
 
     find_map(args.map)
     if not args.speed > 0:

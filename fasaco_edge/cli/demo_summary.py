@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.demo_mission import Ending
-from fasaco_edge.cli.streams import print_json
-from fasaco_edge.drawing import draw_mission
+from fasaco_edge.drawing.mission import draw_mission
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.ground import Ground, anchor_cell
-from fasaco_edge.mission.ledger import CoverageLedger
+from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.map.reachable_area import Ground, anchor_cell
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +66,7 @@ def summarise(args: argparse.Namespace, out: Path, ending: Ending) -> dict[str, 
 
 def print_summary(summary: dict[str, Any], *, as_json: bool) -> None:
     """Print a table, or JSON."""
-    from fasaco_edge.cli import terminal
+    from fasaco_edge.cli.console import terminal
 
     if as_json:
         print_json(summary)

@@ -9,12 +9,12 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli import exits
-from fasaco_edge.cli.streams import print_json
+from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
-    from fasaco_edge.daemon.checks.finding import Finding
+    from fasaco_edge.cli.console.arguments import Subparsers
+    from fasaco_edge.doctor.finding import Finding
 
 EPILOG = """\
 Nothing is started or changed: it joins the bus for a second, listens, and asks. Run it as the user
@@ -70,8 +70,8 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Look, and report."""
-    from fasaco_edge.daemon.checks.finding import Level
-    from fasaco_edge.daemon.checks.report import findings
+    from fasaco_edge.doctor.finding import Level
+    from fasaco_edge.doctor.report import findings
 
     found = list(findings(args.config, recordings=args.recordings))
     if args.json:
@@ -104,7 +104,7 @@ def _document(found: list[tuple[str, Finding]]) -> dict[str, object]:
 def _print(found: list[tuple[str, Finding]]) -> None:
     from rich.text import Text
 
-    from fasaco_edge.cli.terminal import out
+    from fasaco_edge.cli.console.terminal import out
 
     console = out()
     wide = max(len(name) for name, _ in found)

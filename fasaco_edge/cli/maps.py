@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.cli.console.arguments import Subparsers
 
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
@@ -23,7 +23,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print name and purpose of each map."""
-    from fasaco_edge.cli.terminal import figures, out
+    from fasaco_edge.cli.console.terminal import figures, out
     from fasaco_edge.grid.map_files import builtin_maps
 
     out().print(figures(builtin_maps()))

@@ -6,12 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fasaco_edge.cli import exits
-from fasaco_edge.cli.asking import add_question, ask
-from fasaco_edge.cli.streams import print_json
+from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.asking import add_question, ask
+from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.cli.console.arguments import Subparsers
 
 EPILOG = """\
 examples:
@@ -103,7 +103,7 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Ask, and show the answer."""
     from fasaco_edge.cli.mission_view import show
-    from fasaco_edge.wire.status import decode_json, encode_json
+    from fasaco_edge.wire.json_text import decode_json, encode_json
 
     asked: dict[str, Any] = {"command": args.mission_command}
     if args.mission_command == "start":
@@ -118,8 +118,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _order(args: argparse.Namespace) -> dict[str, Any]:
     """Return the order as a document, checked: what is wrong is told without a daemon."""
-    from fasaco_edge.mission.order import OrderError
-    from fasaco_edge.mission.order_document import order_document, read_order
+    from fasaco_edge.mission.orders.order import OrderError, order_document, read_order
 
     options = {
         "zones": args.zone,
@@ -146,8 +145,8 @@ def _order(args: argparse.Namespace) -> dict[str, Any]:
 def _read(path: Path) -> object:
     import json
 
-    from fasaco_edge.mission.order import OrderError
-    from fasaco_edge.plain_yaml import load, read_bounded
+    from fasaco_edge.host.plain_yaml import load, read_bounded
+    from fasaco_edge.mission.orders.order import OrderError
 
     try:
         text = read_bounded(path)

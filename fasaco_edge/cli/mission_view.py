@@ -6,8 +6,8 @@ from typing import Any
 
 from rich.table import Table
 
-from fasaco_edge.cli.terminal import figures, out
-from fasaco_edge.watching import phrases
+from fasaco_edge.cli.console.terminal import figures, out
+from fasaco_edge.watch import phrases
 
 
 def show(report: dict[str, Any]) -> None:

@@ -10,19 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fasaco_edge.cli import exits
-from fasaco_edge.cli.interrupts import ctrl_c_asks
+from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.signals import ctrl_c_asks
 from fasaco_edge.cli.plan_options import ANYWHERE, EPILOG, HOME, add_options, check, settle
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.grid.lattice import Cell, CoverageLattice
     from fasaco_edge.grid.occupancy import OccupancyGrid
     from fasaco_edge.planners.colony import ColonyConfig
     from fasaco_edge.planners.path import CoveragePath
-    from fasaco_edge.planners.planner import StoppingCriterion
+    from fasaco_edge.planners.planner import Interrupt, StoppingCriterion
     from fasaco_edge.planners.problem import CoverageProblem
-    from fasaco_edge.planners.stopping import Interrupt
     from fasaco_edge.planners.work import SearchProgress
 
 
@@ -42,12 +41,12 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, print the figures, write what was asked for."""
-    from fasaco_edge.cli.outputs import check_output, writing
-    from fasaco_edge.cli.plan_figures import draw, figures_of, print_figures
+    from fasaco_edge.cli.console.arguments import check_output, writing
+    from fasaco_edge.cli.plan_output import draw, figures_of, print_figures
     from fasaco_edge.cli.warmup import compile_kernels
     from fasaco_edge.grid.map_files import find_map
     from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
-    from fasaco_edge.planners.stopping import Interrupt
+    from fasaco_edge.planners.planner import Interrupt
 
     settle(args)
     check(args)
@@ -118,8 +117,8 @@ def _plan(
 
     A planner that knows no lower bound is given one, for its path and for ``--target-gap``.
     """
-    from fasaco_edge.cli.plan_progress import watching
-    from fasaco_edge.planners.bound import lower_bound_steps
+    from fasaco_edge.cli.plan_output import watching
+    from fasaco_edge.planners.graph import lower_bound_steps
     from fasaco_edge.planners.planner import ignore
     from fasaco_edge.planners.table import planner_of
 
@@ -151,7 +150,7 @@ def _plan(
 
 def _criteria(args: argparse.Namespace, asked: Interrupt) -> dict[str, StoppingCriterion]:
     """Return what ends the search early, by its name; a budget begins to run here."""
-    from fasaco_edge.planners.stopping import GapReached, TimeBudget
+    from fasaco_edge.planners.planner import GapReached, TimeBudget
 
     criteria: dict[str, StoppingCriterion] = {"Ctrl-C": asked}
     if args.target_gap is not None:

@@ -6,7 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-from fasaco_edge.cli.arguments import (
+from fasaco_edge.cli.console.arguments import (
     DEFAULT_CELL_M,
     DEFAULT_RADIUS_M,
     pair_of_floats,

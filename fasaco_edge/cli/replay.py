@@ -9,15 +9,15 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fasaco_edge.cli.streams import print_json
+from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
-    from fasaco_edge.daemon.replay import Replay, ReplayStep
-    from fasaco_edge.daemon.replay_run import RecordedRun
-    from fasaco_edge.daemon.turn_replay import TurnReplay
-    from fasaco_edge.mission.events import PathUpdate
-    from fasaco_edge.recording.samples import RecordedSamples
+    from fasaco_edge.cli.console.arguments import Subparsers
+    from fasaco_edge.mission.core.events import PathUpdate
+    from fasaco_edge.recording.read.samples import RecordedSamples
+    from fasaco_edge.replay.replay import Replay, ReplayStep
+    from fasaco_edge.replay.stand_ins import RecordedRun
+    from fasaco_edge.replay.turn_replay import TurnReplay
 
 DESCRIPTION = """\
 Play the samples of a recording to the mission again, through the same code that the
@@ -69,14 +69,14 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay."""
-    from fasaco_edge.cli import terminal
-    from fasaco_edge.cli.turn_summary import turn_rows, turn_summary
-    from fasaco_edge.daemon.config import load_config
-    from fasaco_edge.daemon.replay import Replay
-    from fasaco_edge.daemon.replay_run import read_run
-    from fasaco_edge.daemon.turn_record import read_turns
-    from fasaco_edge.daemon.turn_replay import TurnReplay
-    from fasaco_edge.recording.samples import RecordedSamples
+    from fasaco_edge.cli.console import terminal
+    from fasaco_edge.config.config import load_config
+    from fasaco_edge.recording.read.samples import RecordedSamples
+    from fasaco_edge.replay.replay import Replay
+    from fasaco_edge.replay.stand_ins import read_run
+    from fasaco_edge.replay.summary import turn_rows, turn_summary
+    from fasaco_edge.replay.turn_record import read_turns
+    from fasaco_edge.replay.turn_replay import TurnReplay
 
     samples = RecordedSamples(args.recordings)
     recorded = read_run(samples)
@@ -130,7 +130,7 @@ def _document(step: ReplayStep) -> dict[str, Any]:
 
 def _path(update: PathUpdate) -> dict[str, Any]:
     from fasaco_edge.bus.arrival import digest
-    from fasaco_edge.daemon.status import plan_figures
+    from fasaco_edge.daemon.loop.status import plan_figures
 
     return {
         "revision": update.revision,

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.streams import print_json
+from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.review.review import Review
 
 DESCRIPTION = """\
@@ -60,7 +60,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Review."""
-    from fasaco_edge.cli.outputs import check_output, writing
+    from fasaco_edge.cli.console.arguments import check_output, writing
     from fasaco_edge.cli.review_report import print_comparison, print_review
     from fasaco_edge.review.document import document, side_by_side
 
@@ -91,14 +91,14 @@ def run(args: argparse.Namespace) -> int:
         with writing(args.export):
             export(review, args.export)
     if args.view:
-        from fasaco_edge.recording.viewing import view
+        from fasaco_edge.recording.read.viewing import view
 
         view([*args.recordings, *(args.against or ())])
     return 0
 
 
 def _read(paths: Sequence[Path], name: str) -> Review:
-    from fasaco_edge.cli import terminal
+    from fasaco_edge.cli.console import terminal
     from fasaco_edge.review.reading import read_review
 
     with terminal.progress() as bar:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from fasaco_edge.cli import terminal
+from fasaco_edge.cli.console import terminal
+from fasaco_edge.review.charts import covered_share
 from fasaco_edge.review.curve import EIGHTHS, PLAIN_EIGHTHS, curve
 from fasaco_edge.review.document import troubles
 from fasaco_edge.review.rows import (
@@ -22,7 +23,6 @@ from fasaco_edge.review.rows import (
     setup_words,
     verdicts,
 )
-from fasaco_edge.review.series import covered_share
 from fasaco_edge.review.setups import setup_differences
 from fasaco_edge.text import one_line
 

@@ -10,10 +10,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli import exits
+from fasaco_edge.cli.console import exits
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.cli.console.arguments import Subparsers
 
 EPILOG = """\
 Without a file the daemon answers at tcp/127.0.0.1:7447 (where a router listens
@@ -64,7 +64,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve."""
-    from fasaco_edge.daemon.config import load_config
+    from fasaco_edge.config.config import load_config
     from fasaco_edge.daemon.service import run_daemon
 
     read = partial(load_config, args.config)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fasaco_edge.cli.arguments import (
+from fasaco_edge.cli.console.arguments import (
     DEFAULT_RADIUS_M,
     add_robot_on_bus,
     client_settings,
@@ -16,7 +16,7 @@ from fasaco_edge.cli.arguments import (
 )
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.simulation.node import Progress
 
 
@@ -55,7 +55,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Drive until told to stop."""
-    from fasaco_edge.cli.outputs import check_output, writing
+    from fasaco_edge.cli.console.arguments import check_output, writing
     from fasaco_edge.cli.places import start_point
     from fasaco_edge.grid.geometry import Pose2D
     from fasaco_edge.grid.map_files import find_map, read_map
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _report(progress: Progress) -> None:
     """Overwrite one line of a terminal; say nothing into a file."""
-    from fasaco_edge.cli.terminal import err
+    from fasaco_edge.cli.console.terminal import err
 
     console = err()
     if console.is_terminal:

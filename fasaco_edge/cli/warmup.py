@@ -6,11 +6,11 @@ import argparse
 import time
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli import exits
-from fasaco_edge.cli.streams import print_json
+from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.arguments import Subparsers
+    from fasaco_edge.cli.console.arguments import Subparsers
 
 EPILOG = """\
 The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Code in it is for
@@ -50,7 +50,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compile or check, and say where."""
-    from fasaco_edge.cli.terminal import err
+    from fasaco_edge.cli.console.terminal import err
     from fasaco_edge.kernels import cache
 
     seconds = 0.0 if args.check else compile_kernels()
@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
 def compile_kernels() -> float:
     """Compile or load every kernel with a progress bar; return the seconds it took."""
-    from fasaco_edge.cli.terminal import progress
+    from fasaco_edge.cli.console.terminal import progress
 
     started = time.monotonic()
     with progress() as bar:

@@ -7,15 +7,15 @@ import os
 import sys
 from typing import TYPE_CHECKING, NoReturn
 
-from fasaco_edge.cli import exits
-from fasaco_edge.cli.arguments import add_robot_on_bus, client_settings, seconds
+from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.arguments import add_robot_on_bus, client_settings, seconds
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fasaco_edge.cli.arguments import Subparsers
-    from fasaco_edge.watching.feed import Feed
-    from fasaco_edge.watching.known import Known
+    from fasaco_edge.cli.console.arguments import Subparsers
+    from fasaco_edge.watch.feed import Feed
+    from fasaco_edge.watch.known import Known
 
 EPILOG = """\
 examples:
@@ -59,12 +59,12 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Watch until told to stop."""
-    from fasaco_edge.cli.logs import say_why
-    from fasaco_edge.cli.terminal import out
+    from fasaco_edge.cli.console.logs import say_why
+    from fasaco_edge.cli.console.terminal import out
     from fasaco_edge.errors import FasacoError
-    from fasaco_edge.watching import live
-    from fasaco_edge.watching.feed import Feed
-    from fasaco_edge.watching.known import Known
+    from fasaco_edge.watch import live
+    from fasaco_edge.watch.feed import Feed
+    from fasaco_edge.watch.known import Known
     from fasaco_edge.wire.keys import Keys
 
     keys, console, known = Keys(args.robot, args.base), out(), Known(args.robot)
@@ -100,11 +100,11 @@ def _leave(code: int) -> NoReturn:
 
 
 def _once(args: argparse.Namespace, feed: Feed, known: Known, console: Console) -> None:
-    from fasaco_edge.cli.nobody import NobodyAnswersError
+    from fasaco_edge.cli.console.asking import NobodyAnswersError
     from fasaco_edge.errors import BusUnavailable
-    from fasaco_edge.watching.live import look_once, print_json
-    from fasaco_edge.watching.page import Page
-    from fasaco_edge.watching.phrases import steady_now
+    from fasaco_edge.watch.live import look_once, print_json
+    from fasaco_edge.watch.page import Page
+    from fasaco_edge.watch.phrases import steady_now
 
     if not look_once(feed, known, args.timeout):
         if known.trouble:

@@ -16,11 +16,10 @@ import sys
 import threading
 import time
 
-from fasaco_edge.child_process import python_program
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.errors import ProcessEnded
+from fasaco_edge.host.processes import python_program, resident_mb
 from fasaco_edge.kernels.cache import cache_folder, missing_from
-from fasaco_edge.process_memory import resident_mb
 
 LOG = logging.getLogger(__name__)
 

@@ -32,8 +32,8 @@ from pathlib import Path
 from msgspec import structs
 
 from fasaco_edge.bus.mailbox import Queue
-from fasaco_edge.daemon.config import DaemonConfig
-from fasaco_edge.daemon.security_config import HEADER_BYTES
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.security import HEADER_BYTES
 from fasaco_edge.wire.limits import MAX_POSE_BYTES
 
 MB = 1_000_000

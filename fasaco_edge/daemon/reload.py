@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.errors import BadConfiguration
 

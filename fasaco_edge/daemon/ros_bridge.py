@@ -11,12 +11,11 @@ import time
 
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.bus.publisher import Publisher
-from fasaco_edge.bus.qos import QOS
+from fasaco_edge.bus.publisher import QOS, Publisher
 from fasaco_edge.bus.queries import Shared
 from fasaco_edge.bus.session import Bus, Sample
-from fasaco_edge.daemon.inbox import poster
-from fasaco_edge.daemon.ros_config import RosConfig
+from fasaco_edge.config.ros import RosConfig
+from fasaco_edge.daemon.loop.inbox import poster
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, attachment, gid_of
 
 

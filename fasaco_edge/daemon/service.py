@@ -9,25 +9,25 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from fasaco_edge.bus.qos import QOS
+from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import Bus, open_bus
-from fasaco_edge.daemon.about import serve_about
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
-from fasaco_edge.daemon.commands import Commands
 from fasaco_edge.daemon.compiling import KernelCompiler
-from fasaco_edge.daemon.config import DaemonConfig
-from fasaco_edge.daemon.inbox import Inbox, make_mailbox
-from fasaco_edge.daemon.ledger_writer import LedgerWriter, open_ledger
-from fasaco_edge.daemon.loop import Loop
+from fasaco_edge.daemon.ledger.writer import LedgerWriter, open_ledger
+from fasaco_edge.daemon.loop.answers import serve_about
+from fasaco_edge.daemon.loop.commands import Commands
+from fasaco_edge.daemon.loop.inbox import Inbox, make_mailbox
+from fasaco_edge.daemon.loop.loop import Loop
+from fasaco_edge.daemon.loop.outbox import Outbox
+from fasaco_edge.daemon.loop.turn_log import TurnLog
+from fasaco_edge.daemon.loop.watchdog import Vitals
 from fasaco_edge.daemon.memory import afforded, memory_limit, needed_bytes
 from fasaco_edge.daemon.notify import ServiceManager
-from fasaco_edge.daemon.outbox import Outbox
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
-from fasaco_edge.daemon.turn_log import TurnLog
-from fasaco_edge.daemon.vitals import Vitals
-from fasaco_edge.process_memory import return_soon
+from fasaco_edge.host.processes import return_soon
 
 LOG = logging.getLogger(__name__)
 

@@ -13,12 +13,12 @@ import msgspec
 
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, Sample
-from fasaco_edge.child_process import python_program
-from fasaco_edge.daemon.client_security import client_words
-from fasaco_edge.daemon.config import DaemonConfig
-from fasaco_edge.daemon.endpoints import from_here
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.credentials import client_words
+from fasaco_edge.config.endpoints import from_here
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire.status import decode_json
+from fasaco_edge.host.processes import python_program
+from fasaco_edge.wire.json_text import decode_json
 
 LOG = logging.getLogger(__name__)
 

@@ -9,7 +9,7 @@ from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.plot import Plot
 from fasaco_edge.drawing.sheet import KeyEntry
 from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
-from fasaco_edge.kernels.walks import reachable_from
+from fasaco_edge.kernels.lattice.reach import reachable_from
 
 
 def draw_visits(

@@ -27,9 +27,9 @@ from fasaco_edge.grid.lattice import (
     placement_of,
 )
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.kernels.changes import Box, mark_stale
-from fasaco_edge.kernels.classification import Cells, classify_cells
-from fasaco_edge.kernels.footprint import Placement, Thresholds, reach_of
+from fasaco_edge.kernels.lattice.changes import Box, mark_stale
+from fasaco_edge.kernels.lattice.classification import Cells, classify_cells
+from fasaco_edge.kernels.lattice.footprint import Placement, Thresholds, reach_of
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import MapTooFar, MapTooLarge
 from fasaco_edge.grid.geometry import FARTHEST_M, GridGeometry, Raster, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.kernels.classification import Cells, classify_cells
-from fasaco_edge.kernels.directions import EAST, NORTH, SOUTH, WEST
-from fasaco_edge.kernels.footprint import Pixels, Placement, Thresholds, reach_of
-from fasaco_edge.kernels.states import BLOCKED, COVERABLE, UNKNOWN
+from fasaco_edge.kernels.cells import BLOCKED, COVERABLE, EAST, NORTH, SOUTH, UNKNOWN, WEST
+from fasaco_edge.kernels.lattice.classification import Cells, classify_cells
+from fasaco_edge.kernels.lattice.footprint import Pixels, Placement, Thresholds, reach_of
 
 __all__ = ["BLOCKED", "COVERABLE", "UNKNOWN", "Cell", "CoverageLattice", "Footprint"]
 

@@ -29,8 +29,8 @@ from fasaco_edge.grid.geometry import (
 )
 from fasaco_edge.grid.map_image import MapImage, check_size, read_image
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from fasaco_edge.plain_yaml import PlainYamlError, load, read_bounded
-from fasaco_edge.resources import folder
+from fasaco_edge.host.plain_yaml import PlainYamlError, load, read_bounded
+from fasaco_edge.host.resources import folder
 from fasaco_edge.text import shown
 
 MODES = ("trinary", "scale", "raw")

@@ -26,14 +26,14 @@ from collections.abc import Callable, Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
 
-from fasaco_edge.durable import make_folder, sync_folder
+from fasaco_edge.host.durable import make_folder, sync_folder
+from fasaco_edge.host.files import why_not_trusted
 from fasaco_edge.kernels.sealed import UnsoundFileError, read_sealed, sweep, write_sealed
-from fasaco_edge.trust import why_not_trusted
 
 LOG = logging.getLogger(__name__)
 
 KERNELS = Path(__file__).parent
-KERNEL_SOURCES = sorted(KERNELS.glob("*.py"))
+KERNEL_SOURCES = sorted(KERNELS.rglob("*.py"))
 COMPILERS = ("numba", "llvmlite")
 # What the code of all kernels takes, twice over [MB].
 ROOM_MB = 20
@@ -43,6 +43,11 @@ KERNEL_SUFFIX = ".kernel"
 # Then the number of the process that made it, and what nobody foresees.
 _FRESH = "fasaco-edge-of-"
 _TOLD: set[str] = set()
+
+
+def kernel_module(source: Path) -> str:
+    """Return the name of a kernel source below ``fasaco_edge.kernels``, as ``ants.colony``."""
+    return ".".join(source.relative_to(KERNELS).with_suffix("").parts)
 
 
 def sources_digest() -> str:

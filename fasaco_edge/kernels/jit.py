@@ -19,7 +19,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol, TypeVar, cast
 
-from fasaco_edge.kernels.cache import KERNEL_SUFFIX, KERNELS, cache_folder, note_complete
+from fasaco_edge.kernels.cache import (
+    KERNEL_SUFFIX,
+    KERNELS,
+    cache_folder,
+    kernel_module,
+    note_complete,
+)
 from fasaco_edge.kernels.sealed import UnsoundFileError, read_sealed, write_sealed
 
 # numba takes settings from .numba_config.yaml in the working folder, which may be anybody's: at
@@ -104,7 +110,7 @@ class _KernelCache:
         self.cache_path = str(folder)
         self._folder = folder
         code = function.__code__
-        self._name = f"{Path(code.co_filename).stem}.{function.__qualname__}"
+        self._name = f"{kernel_module(Path(code.co_filename))}.{function.__qualname__}"
         self._line = code.co_firstlineno
 
     def load_overload(self, signature: object, target: _Target) -> object:
@@ -153,7 +159,8 @@ def _compiled(function: Kernel, compiler: Callable[[Kernel], object]) -> Kernel:
     """Return what compiles ``function`` when it is called, or loads what is kept."""
     compiled = compiler(function)
     # The folder's name stands for all that the code comes from: for these files, and no closures.
-    is_named = Path(function.__code__.co_filename).parent == KERNELS and not function.__closure__
+    is_ours = KERNELS in Path(function.__code__.co_filename).parents
+    is_named = is_ours and not function.__closure__
     if is_named and CACHE_FOLDER is not None and not numba.config.DISABLE_JIT:
         cast(_Dispatcher, compiled)._cache = _KernelCache(function, CACHE_FOLDER)
     return cast(Kernel, compiled)

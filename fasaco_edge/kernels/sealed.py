@@ -7,8 +7,9 @@ that has the digest of all that follows, and is looked at before a byte of it is
     fasaco-edge sealed 9f86d081...\\n
     what is in it
 
-That tells harm, not malice, which could write the digest, too: ``fasaco_edge.trust`` says who could
-have written the file. Reading needs no right to write: the rule is the same in a folder of root's.
+That tells harm, not malice, which could write the digest, too: ``fasaco_edge.host.files`` says
+who could have written the file. Reading needs no right to write: the rule is the same in a folder
+of root's.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ import os
 import shutil
 from pathlib import Path
 
-from fasaco_edge.durable import write_through
-from fasaco_edge.trust import UntrustedFileError, read_trusted
+from fasaco_edge.host.durable import write_through
+from fasaco_edge.host.files import UntrustedFileError, read_trusted
 
 _WORD = b"fasaco-edge sealed "
 _HEX = 64

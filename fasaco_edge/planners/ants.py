@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.colony import Rules, deposit, settle, walk_ants
-from fasaco_edge.kernels.search import Graph
+from fasaco_edge.kernels.ants.colony import Rules, deposit, settle, walk_ants
+from fasaco_edge.kernels.ants.growth import Graph
 from fasaco_edge.planners.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.cost import MICROSECONDS
 from fasaco_edge.planners.graph import flat_end, flat_start, scratch_for

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fasaco_edge.kernels.kicks import KickRules
+from fasaco_edge.kernels.local_search.perturbation import KickRules
 from fasaco_edge.planners.cost import CoverageCost
 
 # The temperatures of an annealing: from 1.5 down to 0.2.

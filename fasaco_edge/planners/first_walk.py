@@ -7,13 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.colony import FEWEST_OPEN, Rules, walk_ants
+from fasaco_edge.kernels.ants.colony import FEWEST_OPEN, Rules, walk_ants
+from fasaco_edge.kernels.ants.growth import Graph
 from fasaco_edge.kernels.costs import walk_cost
-from fasaco_edge.kernels.search import Graph
+from fasaco_edge.planners.baselines import SpanningTree, spiral_stc, zigzag
 from fasaco_edge.planners.graph import flat_cells, flat_end, flat_start, scratch_for
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stc import SpanningTree
-from fasaco_edge.planners.sweeps import spiral_stc, zigzag
 
 # An ant of this velocity goes straight on as long as it can.
 STRAIGHT_ON = 64

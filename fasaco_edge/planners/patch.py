@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.holes import rays
-from fasaco_edge.kernels.kicks import (
+from fasaco_edge.kernels.local_search.holes import rays
+from fasaco_edge.kernels.local_search.parity import JUMPS, Tally
+from fasaco_edge.kernels.local_search.perturbation import (
     KICKS,
     PROPOSALS,
     KickRules,
@@ -16,10 +17,17 @@ from fasaco_edge.kernels.kicks import (
     remember,
     touch_up,
 )
-from fasaco_edge.kernels.local_search import improve
-from fasaco_edge.kernels.parity import JUMPS, Tally
-from fasaco_edge.kernels.regions import AFTER, Box, cut_ground, cut_walk, put_back
-from fasaco_edge.kernels.walk_array import COST, FRAME, LENGTH, Ground, Prices, Walk, recount
+from fasaco_edge.kernels.local_search.proposals import improve
+from fasaco_edge.kernels.local_search.regions import AFTER, Box, cut_ground, cut_walk, put_back
+from fasaco_edge.kernels.local_search.walk_array import (
+    COST,
+    FRAME,
+    LENGTH,
+    Ground,
+    Prices,
+    Walk,
+    recount,
+)
 from fasaco_edge.planners.work import SearchWork
 
 EVERYWHERE = np.empty(0, np.int32)

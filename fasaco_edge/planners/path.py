@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.kernels.walks import shortest_walk
+from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.work import NO_WORK, SearchWork, gap_to
 

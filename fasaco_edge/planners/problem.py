@@ -17,7 +17,7 @@ from fasaco_edge.errors import (
     StartOutsideMap,
 )
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
-from fasaco_edge.kernels.walks import reachable_from
+from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 
 

@@ -11,16 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.costs import walk_cost
-from fasaco_edge.kernels.regions import Box
-from fasaco_edge.kernels.walk_array import Prices
+from fasaco_edge.kernels.local_search.regions import Box
+from fasaco_edge.kernels.local_search.walk_array import Prices
 from fasaco_edge.planners.ants import Colony, group_size, snapshot_of, streams_of
-from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import MICROSECONDS
 from fasaco_edge.planners.effort import effort_for
 from fasaco_edge.planners.first_walk import first_walks
-from fasaco_edge.planners.framed import FramedGround
-from fasaco_edge.planners.graph import cells_of, graph_of
+from fasaco_edge.planners.graph import FramedGround, cells_of, graph_of, lower_bound_steps
 from fasaco_edge.planners.observation import Observer
 from fasaco_edge.planners.patch import Patch
 from fasaco_edge.planners.path import CoveragePath

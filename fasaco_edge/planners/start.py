@@ -9,7 +9,7 @@ import numpy as np
 from fasaco_edge.errors import NothingToCover, StartBlocked
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.map_files import suggested_start
-from fasaco_edge.kernels.walks import reachable_from
+from fasaco_edge.kernels.lattice.reach import reachable_from
 
 
 def start_cell(lattice: CoverageLattice, map_file: Path) -> Cell:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from fasaco_edge.planners.baselines import SpanningTree, spiral_stc, zigzag
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import CoveragePlanner
-from fasaco_edge.planners.stc import SpanningTree
-from fasaco_edge.planners.sweeps import spiral_stc, zigzag
 
 # Each alone, as the paper has them. Each is made from the colony's configuration and
 # a number of threads; what has no ants needs neither.

@@ -11,14 +11,14 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
-from fasaco_edge.kernels.areas import cells_beside, find_areas
-from fasaco_edge.kernels.free_pixels import count_free_beside
 from fasaco_edge.kernels.jit import note_all_compiled
-from fasaco_edge.kernels.polygons import add_near, count_in, turn_inside
-from fasaco_edge.kernels.reach import update_reach
-from fasaco_edge.planners.bound import lower_bound_steps
+from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
+from fasaco_edge.kernels.lattice.pixels import count_free_beside
+from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
+from fasaco_edge.kernels.lattice.reach import update_reach
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.graph import lower_bound_steps
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ignore, never

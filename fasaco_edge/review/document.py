@@ -7,9 +7,9 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
-from fasaco_edge.bench.spread import percentile
+from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.runcard import flat_settings
+from fasaco_edge.recording.scene.runcard import flat_settings
 from fasaco_edge.review.drive import milestones
 from fasaco_edge.review.moments import RECORDER_IN_ORDER, TROUBLES, Span
 from fasaco_edge.review.review import Review, seconds_by_state

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
-from fasaco_edge.mission.ground import Ground, anchor_cell
-from fasaco_edge.mission.ledger import JUMP_CELLS, CoverageLedger
-from fasaco_edge.mission.progress import Coverage
+from fasaco_edge.mission.coverage.ledger import JUMP_CELLS, CoverageLedger
+from fasaco_edge.mission.coverage.progress import Coverage
+from fasaco_edge.mission.map.reachable_area import Ground, anchor_cell
 
 MILESTONES = (50, 90, 99, 100)
 """Shares of the cells that can be covered at the end [percent]."""

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.review.charts import covered_share
 from fasaco_edge.review.review import Review
-from fasaco_edge.review.series import covered_share
 from fasaco_edge.text import one_line
 
 FORMULA = re.compile(r"[=@]|[+-](?![\d.]+(e[+-]?\d+)?\Z)")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fields import integer
-from fasaco_edge.recording.run_reading import RunRecord
+from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.moments import RECORDER_IN_ORDER
 from fasaco_edge.review.story import Story
 

@@ -1,14 +1,24 @@
-"""What of a mission is worth a second look: states and how long they lasted, stands, gaps."""
+"""What of a mission is worth a second look: states and how long they lasted, stands, gaps.
+
+Why and how fast plans were made anew.
+
+The worst moments of a mission, one of each kind.
+"""
 
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fasaco_edge.drawing.spread import percentile
+from fasaco_edge.review.story import Story, TakenPath
 
 # Less than this is no drive, and no turn on the spot.
 STILL_M = 0.05
@@ -138,3 +148,102 @@ def _drops(
             points = 100 * (before - after)
             note = f"from {100 * before:.1f} % to {100 * after:.1f} % of what was known"
             yield Moment("largest drop of coverage after a map", points, "%", until, note)
+
+
+# "path blocked at cell (2, 3)" is of the kind "path blocked".
+_DETAIL = re.compile(r":| at cell|,| \d")
+# As ``mission.ground.GroundChange`` says them.
+_MAP = "map: "
+_CHANGES = ("more", "fewer", "passages changed")
+
+
+@dataclass(frozen=True, slots=True)
+class Replans:
+    """The paths that were planned, the first apart from those that came later.
+
+    Attributes:
+        first: the first planned path.
+        later: all others, in order, without the first ones of a daemon that was started again.
+    """
+
+    first: TakenPath | None
+    later: tuple[TakenPath, ...]
+
+    @classmethod
+    def of(cls, paths: Sequence[TakenPath]) -> Replans:
+        """Sort out ``paths``; those that no plan was needed for are none."""
+        planned = [path for path in paths if path.planner]
+        later = [after for before, after in pairwise(planned) if after.revision > before.revision]
+        return cls(planned[0] if planned else None, tuple(later))
+
+    @property
+    def by_reason(self) -> dict[str, int]:
+        """How many there were of each kind of reason, the most frequent first."""
+        return dict(Counter(kind_of(path.reason) for path in self.later).most_common())
+
+    @property
+    def spread_by_reason(self) -> dict[str, tuple[float | None, float | None]]:
+        """The median and the slowest [ms] of each kind of reason, the most frequent first."""
+        took: dict[str, list[float]] = {kind: [] for kind in self.by_reason}
+        for path in self.later:
+            if path.plan_ms is not None:
+                took[kind_of(path.reason)].append(path.plan_ms)
+        return {kind: (percentile(ms, 50), percentile(ms, 100)) for kind, ms in took.items()}
+
+    def slowest_first(self, most: int) -> list[TakenPath]:
+        """Return up to ``most`` of them, those that took longest first."""
+        return sorted(self.later, key=lambda path: -(path.plan_ms or 0.0))[:most]
+
+    @property
+    def slowest(self) -> TakenPath | None:
+        """The one that took longest."""
+        timed = [path for path in self.later if path.plan_ms is not None]
+        return max(timed, key=lambda path: path.plan_ms or 0.0, default=None)
+
+    def milliseconds(self, percent: float) -> float | None:
+        """Return a percentile of what they took [ms], by nearest rank."""
+        return percentile([p.plan_ms for p in self.later if p.plan_ms is not None], percent)
+
+
+def kind_of(reason: str) -> str:
+    """Return ``reason`` without its details; of a map, whether cells came or went."""
+    if reason.startswith(_MAP):
+        changes = [change for change in _CHANGES if change in reason]
+        cells = "" if "passages changed" in changes else "cells "
+        return _MAP + cells + " and ".join(changes) if changes else "map"
+    return _DETAIL.split(reason, maxsplit=1)[0].strip() or "no reason told"
+
+
+def worst_moments(
+    story: Story,
+    states: tuple[Span, ...],
+    replans: Replans,
+    fractions: NDArray[np.float64],
+) -> tuple[Moment, ...]:
+    """Return the worst of each kind of moment there was.
+
+    Args:
+        story: what the samples tell.
+        states: of the mission, in order.
+        replans: plans made anew.
+        fractions: float64 (n, 2), when [s] and the covered share as the daemon told it.
+    """
+    found: list[Moment | None] = []
+    for during in under_way(states):
+        found += [
+            longest_stand(story.times, story.trail, during, states),
+            longest_gap("longest time without a pose", story.pose_s, during),
+            longest_gap("longest time without a map", story.map_s, during),
+        ]
+    slowest = replans.slowest
+    if slowest is not None and slowest.plan_ms is not None:
+        found.append(Moment("slowest replan", slowest.plan_ms, "ms", slowest.at_s, slowest.reason))
+    found.append(largest_drop(fractions, story.map_s, [at_s for at_s, _, _ in story.commands]))
+    # A mission that was begun again has its moments each time: the worst one counts.
+    worst: dict[str, Moment] = {}
+    for moment in found:
+        if moment is not None and (
+            moment.what not in worst or moment.value > worst[moment.what].value
+        ):
+            worst[moment.what] = moment
+    return tuple(worst.values())

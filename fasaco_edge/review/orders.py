@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.mission.order import MissionOrder
+from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.recording.fields import integer
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.story import HeardStatus, Story

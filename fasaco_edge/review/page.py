@@ -10,7 +10,7 @@ import io
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from fasaco_edge.bench.chart import COLOURS, Panel
+from fasaco_edge.drawing.chart import COLOURS, Panel
 from fasaco_edge.review.charts import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.document import document, troubles
 from fasaco_edge.review.picture import draw_map
@@ -30,8 +30,7 @@ from fasaco_edge.review.rows import (
     verdicts,
 )
 from fasaco_edge.review.setups import setup_differences
-from fasaco_edge.review.style import STYLE
-from fasaco_edge.review.svg import svg_of
+from fasaco_edge.review.svg import STYLE, svg_of
 from fasaco_edge.text import Html, element, html
 
 MAP_ROOM = (1000, 700)

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from fasaco_edge.bench.chart import draw_panels
-from fasaco_edge.drawing import draw_mission, palette
-from fasaco_edge.mission.ledger import JUMP_CELLS
+from fasaco_edge.drawing import palette
+from fasaco_edge.drawing.chart import draw_panels
+from fasaco_edge.drawing.mission import draw_mission
+from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.review.charts import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.rows import clock

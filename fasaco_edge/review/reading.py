@@ -7,8 +7,8 @@ from itertools import count
 from pathlib import Path
 from typing import TypeVar
 
-from fasaco_edge.recording.run_reading import count_frames, read_run_record
-from fasaco_edge.recording.samples import RecordedSamples
+from fasaco_edge.recording.read.run import count_frames, read_run_record
+from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.review.review import Review, review_of
 from fasaco_edge.review.story import gather
 

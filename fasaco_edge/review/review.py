@@ -9,17 +9,15 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import MapTooLarge
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
-from fasaco_edge.mission.zones import kept_out, without
+from fasaco_edge.mission.orders.zones import kept_out, without
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fields import integer, number, section
-from fasaco_edge.recording.run_reading import RunRecord, Told
+from fasaco_edge.recording.read.run import RunRecord, Told
 from fasaco_edge.review.drive import Drive, WalkFigures, drive_over, first_covered, walk_figures
 from fasaco_edge.review.faults import Faults, faults_of
-from fasaco_edge.review.moments import Moment, Span, spans_of
+from fasaco_edge.review.moments import Moment, Replans, Span, spans_of, worst_moments
 from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_still_true
-from fasaco_edge.review.replans import Replans
 from fasaco_edge.review.story import Story
-from fasaco_edge.review.worst import worst_moments
 
 Entered = tuple[float, str, str]
 """When [s] which state was entered, and why."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
-from fasaco_edge.kernels.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
+from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
 from fasaco_edge.simulation.config import SimulationConfig
 
 Point = tuple[float, float]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.qos import QOS
+from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import StartBlocked, StartOutsideMap
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.kernels.raycast import disc_is_free
+from fasaco_edge.kernels.lattice.raycast import disc_is_free
 from fasaco_edge.simulation.config import SimulationConfig
 from fasaco_edge.simulation.joining import joined
 from fasaco_edge.simulation.mapper import Mapper

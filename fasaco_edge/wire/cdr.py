@@ -1,4 +1,8 @@
-"""Plain CDR, little endian: what ROS 2 and its Zenoh bridges put on the wire.
+"""The one way a message is refused: which field, what was expected, what came.
+
+Strings as CDR has them: UTF-8 with one NUL, at the end.
+
+Plain CDR, little endian: what ROS 2 and its Zenoh bridges put on the wire.
 
 Sources: OMG DDS-RTPS 2.5, clause 10 (encapsulation header); OMG CORBA 3.4, clause 9.3
 (transfer syntax); OMG DDS-XTypes 1.3, clause 7.6.3.1.2 (the header's padding count).
@@ -15,9 +19,43 @@ from typing import Any, NoReturn, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
-from fasaco_edge.wire.refusal import refuse
-from fasaco_edge.wire.strings import decoded_string, encoded_string
+
+
+def refuse(message: str, field: str, expected: str, got: object) -> NoReturn:
+    """Raise MalformedMessage: ``message: field must be expected, got got``."""
+    raise MalformedMessage(f"{message}: {field} must be {expected}, got {got}")
+
+
+def encoded_string(value: str, message: str, field: str) -> bytes:
+    """Return ``value`` in UTF-8 with its NUL.
+
+    Raises:
+        MalformedMessage: it is too long, holds a NUL, or has no UTF-8.
+    """
+    try:
+        text = value.encode()
+    except UnicodeEncodeError as error:
+        refuse(message, field, "UTF-8", f"{value!r} ({error.reason})")
+    if len(text) > MAX_STRING_BYTES or 0 in text:
+        refuse(message, field, f"at most {MAX_STRING_BYTES} bytes without NUL", repr(value))
+    return text + b"\0"
+
+
+def decoded_string(text: bytes, message: str, field: str) -> str:
+    """Return the string in ``text``, its NUL included.
+
+    Raises:
+        MalformedMessage: it has no NUL at its end, another before, or is no UTF-8.
+    """
+    if text.find(0) != len(text) - 1:
+        refuse(message, field, "a string with one NUL, at its end", repr(text))
+    try:
+        return text[:-1].decode()
+    except UnicodeDecodeError as error:
+        refuse(message, field, "UTF-8", f"{text!r} ({error.reason})")
+
 
 ENCAPSULATION = b"\x00\x01\x00\x00"
 HEADER_SIZE = len(ENCAPSULATION)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.kernels import states as cell
+from fasaco_edge.kernels import cells as cell
 
 UNKNOWN = -1
 TO_COVER = 0

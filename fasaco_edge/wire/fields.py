@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter
+from fasaco_edge.wire.cdr import CdrReader, CdrWriter, encoded_string, refuse
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
     MAX_GRID_TILT,
@@ -20,8 +20,6 @@ from fasaco_edge.wire.limits import (
     MIN_RESOLUTION_M,
     QUATERNION_TOLERANCE,
 )
-from fasaco_edge.wire.refusal import refuse
-from fasaco_edge.wire.strings import encoded_string
 
 SECOND_NS = 1_000_000_000
 POSE_FLOATS = 7

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import OCCUPIED, UNKNOWN, MapPatch, OccupancyGrid
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter
+from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
 from fasaco_edge.wire.fields import (
     read_cells,
     read_grid_geometry,
@@ -19,7 +19,6 @@ from fasaco_edge.wire.fields import (
     write_header,
 )
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
-from fasaco_edge.wire.refusal import refuse
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, OCCUPANCY_GRID_UPDATE
 
 # Of a map update: its corner and its size.

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter
+from fasaco_edge.wire.cdr import CdrReader, CdrWriter, encoded_string, refuse
 from fasaco_edge.wire.fields import (
     POSE_FLOATS,
     SECOND_NS,
@@ -23,9 +23,7 @@ from fasaco_edge.wire.fields import (
     yaw_of,
 )
 from fasaco_edge.wire.limits import MAX_PATH_POSES
-from fasaco_edge.wire.refusal import refuse
 from fasaco_edge.wire.schemas import PATH
-from fasaco_edge.wire.strings import encoded_string
 
 # So many poses are worked out at a time.
 BLOCK_POSES = 16_384

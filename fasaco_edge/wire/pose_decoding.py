@@ -5,8 +5,7 @@ from __future__ import annotations
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.wire.poses import decode_pose
 from fasaco_edge.wire.schemas import TF_MESSAGE
-from fasaco_edge.wire.tf import decode_transforms
-from fasaco_edge.wire.transforms import TransformTree
+from fasaco_edge.wire.transforms import TransformTree, decode_transforms
 
 DEFAULT_FRAMES = ("map", "base_link")
 

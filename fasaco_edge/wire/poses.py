@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter
+from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
 from fasaco_edge.wire.fields import read_header, read_pose, write_header, write_pose
-from fasaco_edge.wire.refusal import refuse
 from fasaco_edge.wire.schemas import ODOMETRY, POSE_STAMPED, POSE_WITH_COVARIANCE_STAMPED
 
 COVARIANCE_FLOATS = 36

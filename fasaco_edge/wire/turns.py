@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire.status import encode_json
+from fasaco_edge.wire.json_text import encode_json
 
 
 class Beginning(msgspec.Struct, frozen=True):

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.bench.daemon_process import DaemonProcess
+from fasaco_edge.bench.processes import DaemonProcess
 from fasaco_edge.errors import ProcessEnded
-from fasaco_edge.process_memory import has_loaded, peak_mb, resident_mb
+from fasaco_edge.host.processes import has_loaded, peak_mb, resident_mb
 
 
 def test_daemon_is_gone_after_the_block():

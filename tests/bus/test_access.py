@@ -9,7 +9,7 @@ import yaml
 import zenoh
 
 from fasaco_edge.bus import access
-from fasaco_edge.resources import folder
+from fasaco_edge.host.resources import folder
 
 README = (folder("protocol") / "README.md").read_text()
 PREFIX = "fasaco/@v1/robot"

@@ -13,11 +13,11 @@ import zenoh
 import zenoh.ext
 
 from fasaco_edge.bus import latched
-from fasaco_edge.bus.qos import QOS
+from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import BusSettings, open_bus
-from tests.daemon.outsider import open_client
-from tests.daemon.processes import free_endpoint
-from tests.daemon.router import router_process
+from tests.support.outsider import open_client
+from tests.support.processes import free_endpoint
+from tests.support.router import router_process
 
 KEY = "test/@v1/key"
 TIMEOUT_S = 20.0

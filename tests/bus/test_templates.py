@@ -11,9 +11,9 @@ import zenoh
 
 from fasaco_edge.bus import access
 from fasaco_edge.bus.session_config import session_config
-from fasaco_edge.daemon.client_security import read_client_security
-from fasaco_edge.daemon.config import load_config
-from fasaco_edge.resources import folder
+from fasaco_edge.config.config import load_config
+from fasaco_edge.config.credentials import read_client_security
+from fasaco_edge.host.resources import folder
 
 FOLDER = folder("protocol") / "config"
 TEMPLATES = sorted(FOLDER.glob("*.json5"))

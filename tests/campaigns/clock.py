@@ -31,15 +31,15 @@ import numpy as np
 import yaml
 import zenoh
 
-from fasaco_edge.bench.daemon_process import warm_kernels
-from fasaco_edge.recording.quota import oldest_first
+from fasaco_edge.bench.processes import warm_kernels
+from fasaco_edge.recording.write.quota import oldest_first
 from tests.campaigns.shifted_clock import ShiftedClock
-from tests.daemon.certificates import Authority, authority
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import ENVIRONMENT, PROGRAM, Daemon, daemon_process, free_endpoint
-from tests.daemon.rooms import map_bytes, pose_bytes
-from tests.daemon.secured import transport
-from tests.recording.reading import read_summary
+from tests.support.certificates import Authority, authority
+from tests.support.outsider import Outsider
+from tests.support.processes import ENVIRONMENT, PROGRAM, Daemon, daemon_process, free_endpoint
+from tests.support.recording_reading import read_summary
+from tests.support.rooms import map_bytes, pose_bytes
+from tests.support.secured import transport
 
 YEAR_S = 365 * 86_400.0
 BOOT_1970_S = 12.0

@@ -31,12 +31,12 @@ from typing import Any
 import yaml
 import zenoh
 
-from fasaco_edge.bench.daemon_process import warm_kernels
+from fasaco_edge.bench.processes import warm_kernels
 from fasaco_edge.daemon.claim import Stand, claims_in
 from tests.campaigns import passing_mappers
 from tests.campaigns.services import show
-from tests.daemon.outsider import Outsider, open_client
-from tests.daemon.processes import (
+from tests.support.outsider import Outsider, open_client
+from tests.support.processes import (
     ENVIRONMENT,
     PROGRAM,
     Daemon,
@@ -44,8 +44,8 @@ from tests.daemon.processes import (
     free_endpoint,
     resident_mb,
 )
-from tests.daemon.rooms import map_bytes, pose_bytes, room
-from tests.daemon.router import router_process
+from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.router import router_process
 
 PREFIX = "fasaco/@v1/robot"
 LATCHED = ("map", "status", "path", "coverage", "recorder")

@@ -27,12 +27,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fasaco_edge.bench.daemon_process import warm_kernels
+from fasaco_edge.bench.processes import warm_kernels
 from fasaco_edge.kernels.jit import CACHE_FOLDER
 from tests.campaigns.trap import NOBODY, Trap
-from tests.daemon.processes import free_endpoint
 from tests.deploy import installed, lab, releases
 from tests.deploy.installing import Robot, bare_robot
+from tests.support.processes import free_endpoint
 
 PROGRAM = """\
 #!{python} -I
@@ -150,7 +150,7 @@ def try_alone(campaign: Campaign) -> None:
     campaign.run("plan", "flat", "--budget", "0.2")
     if campaign.slow:
         campaign.run("plan", "flat", "--budget", "0.2", cache=False)
-        campaign.run("bench", "codec", ends=(0, 1))
+        campaign.run("bench", "speed", ends=(0, 1))
     # Where to is foreseen, and is a link of somebody's: it says so, and does nothing.
     campaign.run("demo", ends=(78,))
     if campaign.slow:

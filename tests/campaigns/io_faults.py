@@ -30,7 +30,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from fasaco_edge.cli import exits
+from fasaco_edge.cli.console import exits
 from tests.campaigns.file_calls import Failure, Kind, Watch, why_not
 from tests.campaigns.io_scenarios import SCENARIOS, WrongError
 from tests.campaigns.services import show

@@ -20,20 +20,20 @@ from pathlib import Path
 import yaml
 
 from fasaco_edge.bus.session import Sample
-from fasaco_edge.daemon.ledger_codec import LedgerFileError, decode_ledger
-from fasaco_edge.daemon.ledger_file import LedgerFile
+from fasaco_edge.daemon.ledger.codec import LedgerFileError, decode_ledger
+from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.errors import UnreadableRecording
-from fasaco_edge.recording.repair import repair_folder
+from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.wire.keys import Keys
+from tests.campaigns.kill_recorder import driving
 from tests.campaigns.services import START_S, Service, service
-from tests.daemon.hall import begin, drive, lanes
-from tests.daemon.ledgers import CELL_M, Cell, contents, lane, visits_of
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import ENVIRONMENT, PROGRAM, free_endpoint
 from tests.daemon.test_commands import command
-from tests.recording.kill_campaign import driving
-from tests.recording.reading import read_summary
-from tests.recording.recorders import bus_on_free_port
+from tests.support.hall import begin, drive, lanes
+from tests.support.ledgers import CELL_M, Cell, contents, lane, visits_of
+from tests.support.outsider import Outsider
+from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
+from tests.support.recorders import bus_on_free_port
+from tests.support.recording_reading import read_summary
 
 DRIVEN, MESSAGES = 6, 60
 # To compile all kernels takes a minute; on a busy computer, many.

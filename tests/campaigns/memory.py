@@ -24,18 +24,18 @@ from typing import Any
 
 import numpy as np
 
-from fasaco_edge.bench.daemon_process import warm_kernels
-from fasaco_edge.daemon.config import DaemonConfig, load_config
+from fasaco_edge.bench.processes import warm_kernels
+from fasaco_edge.config.config import DaemonConfig, load_config
 from fasaco_edge.daemon.memory import afforded, needed_bytes
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.process_memory import peak_mb
+from fasaco_edge.host.processes import peak_mb
 from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
-from tests.daemon import processes
-from tests.daemon.limited import Group, memory_group, unit_limit, why_not
-from tests.daemon.outsider import Outsider, open_client
-from tests.daemon.processes import Daemon, daemon_process
-from tests.daemon.rooms import map_bytes, pose_bytes, room
+from tests.support import processes
+from tests.support.limited import Group, memory_group, unit_limit, why_not
+from tests.support.outsider import Outsider, open_client
+from tests.support.processes import Daemon, daemon_process
+from tests.support.rooms import map_bytes, pose_bytes, room
 
 SIDES = (1000, 2000, 4000, 5000, 8000)
 RESOLUTIONS = (0.0001, 0.02, 0.05)

@@ -15,8 +15,8 @@ import time
 import zenoh
 import zenoh.ext
 
-from tests.daemon.outsider import MAP
-from tests.daemon.rooms import map_bytes, room
+from tests.support.outsider import MAP
+from tests.support.rooms import map_bytes, room
 
 KEY = "fasaco/@v1/robot/map"
 # One in so many does not say goodbye.

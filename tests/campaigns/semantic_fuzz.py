@@ -22,7 +22,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from fasaco_edge.bench.daemon_process import warm_kernels
+from fasaco_edge.bench.processes import warm_kernels
 from tests.campaigns.senseless import SILENT, Event, Senseless
 from tests.campaigns.senseless_daemon import LATE_SHARE, Campaign
 from tests.campaigns.senseless_mission import MissionTrial

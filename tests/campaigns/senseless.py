@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.mission.order import FARTHEST_M, MOST_KEEP_OUT, MOST_PASSES, MOST_ZONES
+from fasaco_edge.mission.orders.order import FARTHEST_M, MOST_KEEP_OUT, MOST_PASSES, MOST_ZONES
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
     MAX_RESOLUTION_M,

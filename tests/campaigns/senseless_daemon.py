@@ -24,17 +24,17 @@ import zenoh
 import zenoh.ext
 
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
-from fasaco_edge.mission.ground import Ground
-from fasaco_edge.process_memory import peak_mb, resident_mb
+from fasaco_edge.host.processes import peak_mb, resident_mb
+from fasaco_edge.mission.map.reachable_area import Ground
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from tests.campaigns import raw_messages
 from tests.campaigns.senseless import SILENT, Event, pixels_of
-from tests.daemon.managing import Manager
-from tests.daemon.processes import Daemon, daemon_process, free_endpoint
-from tests.daemon.router import router_process
+from tests.support.managing import Manager
+from tests.support.processes import Daemon, daemon_process, free_endpoint
+from tests.support.router import router_process
 from tests.wire.schemas import check
 
 PREFIX = "fasaco/@v1/robot"

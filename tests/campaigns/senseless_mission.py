@@ -18,15 +18,14 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from fasaco_edge.daemon.config import DaemonConfig
-from fasaco_edge.daemon.ledger_codec import decode_ledger, encode_ledger
-from fasaco_edge.daemon.mission_report import mission_report
-from fasaco_edge.daemon.outbox import headings
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
+from fasaco_edge.daemon.loop.mission_report import mission_report
+from fasaco_edge.daemon.loop.outbox import headings
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
-from fasaco_edge.mission.assignment import Assignment
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.events import (
+from fasaco_edge.mission.core.events import (
     CommandReceived,
     Decision,
     MapReceived,
@@ -36,15 +35,17 @@ from fasaco_edge.mission.events import (
     PlanRequest,
     PoseReceived,
 )
-from fasaco_edge.mission.mission import Mission
-from fasaco_edge.mission.order_document import read_command
+from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.orders.assignment import Assignment
+from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.observation import ColonySnapshot
-from fasaco_edge.planners.stopping import Noted
+from fasaco_edge.planners.planner import Noted
 from fasaco_edge.planners.table import planner_of
 from fasaco_edge.planners.work import SearchProgress
-from fasaco_edge.wire.coverage import coverage_grid
+from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import (
+    coverage_grid,
     decode_map_update,
     decode_occupancy_grid,
     encode_occupancy_grid,
@@ -53,7 +54,6 @@ from fasaco_edge.wire.paths import decode_path, encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
 from fasaco_edge.wire.pose_decoding import PoseDecoder
 from fasaco_edge.wire.schemas import TF_MESSAGE
-from fasaco_edge.wire.status import encode_json
 from tests.campaigns import raw_messages
 from tests.campaigns.senseless import Event, pixels_of
 

@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.daemon.processes import ENVIRONMENT, PROGRAM
+from tests.support.processes import ENVIRONMENT, PROGRAM
 
 # As the unit has it; so a run that never gets ready ends.
 START_S = 180.0

@@ -10,7 +10,7 @@ import pytest
 
 from tests.campaigns.file_calls import Failure, Kind, Watch, why_not
 from tests.campaigns.io_faults import failures_of, outcome_of
-from tests.daemon.processes import ENVIRONMENT
+from tests.support.processes import ENVIRONMENT
 
 pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not())
 

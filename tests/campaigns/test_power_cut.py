@@ -12,7 +12,7 @@ import pytest
 from tests.campaigns import power_cut
 from tests.campaigns.file_calls import Kind, Watch, why_not
 from tests.campaigns.power_states import Bytes, Cut, Disk, Names, cuts_of
-from tests.daemon.ledgers import contents
+from tests.support.ledgers import contents
 
 pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not())
 

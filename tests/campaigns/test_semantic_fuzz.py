@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fasaco_edge.mission.ground import Ground
+from fasaco_edge.mission.map.reachable_area import Ground
 from fasaco_edge.wire.paths import encode_path
 from tests.campaigns.semantic_fuzz import (
     Findings,

@@ -20,7 +20,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from fasaco_edge.kernels.cache import code_digest
-from fasaco_edge.recording.quota import next_run
+from fasaco_edge.recording.write.quota import next_run
 
 NOBODY = 65534
 IN_OPEN, IN_ISDIR, IN_Q_OVERFLOW = 0x20, 0x4000_0000, 0x4000

@@ -7,10 +7,10 @@ import json
 import pytest
 
 from fasaco_edge.wire.keys import RPC_NAMES
-from tests.cli.commands import fasaco_edge
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process
-from tests.daemon.rooms import map_bytes, pose_bytes, room
+from tests.support.commands import fasaco_edge
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import map_bytes, pose_bytes, room
 
 SAID = {
     "path": "first plan",

@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from fasaco_edge.cli import main
-from fasaco_edge.daemon.config import load_config
+from fasaco_edge.config.config import load_config
 from fasaco_edge.errors import BadConfiguration
-from tests.cli.commands import fasaco_edge
+from tests.support.commands import fasaco_edge
 
 EXAMPLE = Path(__file__).parents[2] / "deploy" / "fasaco-edge.yaml"
 WRONG = """\

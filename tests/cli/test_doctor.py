@@ -9,12 +9,11 @@ import pytest
 import yaml
 
 from fasaco_edge.cli import main
-from fasaco_edge.daemon.checks.finding import Check, Finding, Level
-from fasaco_edge.daemon.checks.report import findings
-from fasaco_edge.daemon.checks.table import CHECKS
+from fasaco_edge.doctor.finding import Check, Finding, Level
+from fasaco_edge.doctor.report import CHECKS, findings
 from fasaco_edge.errors import BadConfiguration
-from tests.cli.commands import fasaco_edge
-from tests.daemon.certificates import authority, needs_openssl
+from tests.support.certificates import authority, needs_openssl
+from tests.support.commands import fasaco_edge
 
 OF_CONFIG = [check.name for check in CHECKS if not check.of_machine]
 ROLES = {"mapper": ["slam"], "operator": ["boss"]}

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from fasaco_edge.cli.journal import JournalHandler, encode_entry, is_journal, message_id
+from fasaco_edge.cli.console.logs import JournalHandler, encode_entry, is_journal, message_id
 
 
 def decode(entry: bytes) -> dict[str, str]:

@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from fasaco_edge.cli.log_limit import OneOfAKind
+from fasaco_edge.cli.console.logs import OneOfAKind
 
 
 class Storm:

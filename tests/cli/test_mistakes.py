@@ -10,10 +10,10 @@ import time
 import numpy as np
 import pytest
 
-from fasaco_edge.bench import placement
+from fasaco_edge.bench import machine as placement
 from fasaco_edge.cli import main
-from tests.cli.commands import ENVIRONMENT, PROGRAM, fasaco_edge
-from tests.daemon.processes import free_endpoint
+from tests.support.commands import ENVIRONMENT, PROGRAM, fasaco_edge
+from tests.support.processes import free_endpoint
 
 NOBODY = "tcp/127.0.0.1:1"
 
@@ -200,8 +200,8 @@ def test_a_demo_whose_daemon_refuses_shows_why(folder):
 
 def test_a_recorder_without_a_folder_says_so(folder):
     pytest.importorskip("rerun")
-    from tests.daemon.outsider import Outsider
-    from tests.daemon.processes import daemon_process
+    from tests.support.outsider import Outsider
+    from tests.support.processes import daemon_process
 
     endpoint = free_endpoint()
     with daemon_process(folder, bus={"listen": [endpoint]}), Outsider(endpoint):

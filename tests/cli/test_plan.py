@@ -16,8 +16,8 @@ from fasaco_edge.grid.map_files import write_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.names import PLANNER_NAMES
 from fasaco_edge.simulation.config import SimulationConfig
-from tests.cli.commands import fasaco_edge
-from tests.daemon.rooms import coverable_cells, pillared_room
+from tests.support.commands import fasaco_edge
+from tests.support.rooms import coverable_cells, pillared_room
 
 KEYS = {
     *(

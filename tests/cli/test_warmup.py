@@ -8,16 +8,17 @@ import subprocess
 import sys
 
 from fasaco_edge.kernels.cache import code_digest
-from tests.cli.commands import ENVIRONMENT, fasaco_edge
 from tests.kernels.harm import zeroed
 from tests.kernels.installations import fill_with
+from tests.support.commands import ENVIRONMENT, fasaco_edge
 
 COUNT = """
 import importlib
-from fasaco_edge.kernels.cache import KERNEL_SOURCES
+from fasaco_edge.kernels.cache import KERNEL_SOURCES, kernel_module
 from fasaco_edge.planners.warmup import warm_up
 warm_up()
-modules = [importlib.import_module(f"fasaco_edge.kernels.{file.stem}") for file in KERNEL_SOURCES]
+modules = [importlib.import_module(f"fasaco_edge.kernels.{kernel_module(file)}")
+           for file in KERNEL_SOURCES]
 kernels = {id(k): k for m in modules for k in vars(m).values() if hasattr(k, "stats")}.values()
 print(sum(sum(kernel.stats.cache_misses.values()) for kernel in kernels))
 """

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.daemon.ledger_file import LedgerFile
-from tests.daemon.ledgers import lane
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import Daemon, daemon_process
+from fasaco_edge.daemon.ledger.file import LedgerFile
+from tests.support.ledgers import lane
+from tests.support.outsider import Outsider
+from tests.support.processes import Daemon, daemon_process
 
 
 @pytest.fixture(scope="module")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fasaco_edge.daemon.beginning import Beginning
-from fasaco_edge.daemon.keeping import Keeping
+from fasaco_edge.daemon.ledger.writer import Keeping
+from fasaco_edge.daemon.startup import Beginning
 from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.mission.events import MapReceived, PatchesLost, PatchReceived, PoseReceived
+from fasaco_edge.mission.core.events import MapReceived, PatchesLost, PatchReceived, PoseReceived
 
 SIDE = 8
 GEOMETRY = GridGeometry(SIDE, SIDE, 0.1, Pose2D(0.0, 0.0))

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from tests.cli.commands import fasaco_edge
-from tests.daemon.hall import begin, drive, lanes
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import Daemon, daemon_process
-from tests.daemon.rooms import TOOL_M, cells_of, map_bytes, pose_bytes, room
 from tests.daemon.test_mission import about, planned
+from tests.support.commands import fasaco_edge
+from tests.support.hall import begin, drive, lanes
+from tests.support.outsider import Outsider
+from tests.support.processes import Daemon, daemon_process
+from tests.support.rooms import TOOL_M, cells_of, map_bytes, pose_bytes, room
 
 # Lanes 3 and 4 of the hall, columns 1 to 4.
 KITCHEN = {"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5], [0.3, 1.5]]}
@@ -208,8 +208,8 @@ def test_reset_keeps_the_ledger_aside(tmp_path):
 def test_an_order_that_cannot_be_read_moves_no_robot(tmp_path):
     from dataclasses import replace
 
-    from fasaco_edge.daemon.ledger_file import LedgerFile
-    from tests.daemon.ledgers import lane
+    from fasaco_edge.daemon.ledger.file import LedgerFile
+    from tests.support.ledgers import lane
 
     (tmp_path / "state").mkdir()
     LedgerFile(tmp_path / "state", "robot").write(replace(lane(5), note='{"version":9}'))

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge.kernels.cache import cache_folder, missing_from
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import ENVIRONMENT, PROGRAM, free_endpoint
-from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes
 from tests.daemon.test_service import Manager, service
 from tests.kernels.harm import HARMS, kernel_files, mark_of, other_pickle
+from tests.support.outsider import Outsider
+from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes
 
 
 @pytest.fixture

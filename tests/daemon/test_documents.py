@@ -8,9 +8,9 @@ import sys
 
 import pytest
 
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process
-from tests.daemon.rooms import cells_of, coverable_cells, map_bytes, pose_bytes, room
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import cells_of, coverable_cells, map_bytes, pose_bytes, room
 from tests.wire.readme_tables import PROTOCOL, load
 from tests.wire.schemas import check
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 
 from fasaco_edge.bus.session import BusSettings, open_bus
-from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.supervisor import FIRST_PAUSE_S, RecorderSupervisor
-from tests.daemon.processes import free_endpoint
+from tests.support.processes import free_endpoint
 
 
 def test_a_recorder_that_cannot_be_started_is_tried_again(tmp_path, monkeypatch):

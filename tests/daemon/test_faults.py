@@ -8,14 +8,14 @@ import time
 
 import pytest
 
-from fasaco_edge.bus.qos import QOS
+from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import BusSettings, open_bus
-from fasaco_edge.daemon.inbox import ASK_FOR_MAP_S
+from fasaco_edge.daemon.loop.inbox import ASK_FOR_MAP_S
 from fasaco_edge.errors import MalformedMessage
-from tests.daemon.fuzz_campaign import KINDS, run_campaign
-from tests.daemon.mutations import GOOD, REFUSES, mutant
-from tests.daemon.outsider import Outsider
-from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, room, update_bytes
+from tests.campaigns.fuzz_daemon import KINDS, run_campaign
+from tests.support.map_mutations import GOOD, REFUSES, mutant
+from tests.support.outsider import Outsider
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes, room, update_bytes
 
 # The full campaign, ten thousand, is a command: see fuzz_campaign.py.
 SAMPLES = 600

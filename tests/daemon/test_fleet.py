@@ -8,10 +8,10 @@ import time
 import pytest
 
 from fasaco_edge.bus.session import BusSettings, open_bus
-from tests.daemon.outsider import Outsider, open_client
-from tests.daemon.processes import daemon_process, free_endpoint
-from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, room
 from tests.daemon.test_security import SILENCE_S
+from tests.support.outsider import Outsider, open_client
+from tests.support.processes import daemon_process, free_endpoint
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes, room
 
 # One name begins with the other, and one is a word of the contract.
 FLEET = ("r1", "r10", "map")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import time
 
-from tests.daemon.hall import HALL, begin, drive, lanes
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process
-from tests.daemon.rooms import map_bytes, pose_bytes
+from tests.support.hall import HALL, begin, drive, lanes
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import map_bytes, pose_bytes
 
 
 def command(client, name):

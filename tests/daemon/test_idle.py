@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import Daemon, daemon_process, mapped_files, resident_mb
-from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
+from tests.support.outsider import Outsider
+from tests.support.processes import Daemon, daemon_process, mapped_files, resident_mb
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
 
 IDLE_MB = 60.0
 

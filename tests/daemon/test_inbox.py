@@ -8,16 +8,16 @@ import weakref
 import pytest
 
 from fasaco_edge.bus.session import BusSettings, Sample, open_bus
-from fasaco_edge.daemon.inbox import Inbox, Received, make_mailbox
+from fasaco_edge.daemon.loop.inbox import Inbox, Received, make_mailbox
 from fasaco_edge.errors import MalformedMessage, PatchWithoutBase
 from fasaco_edge.grid.lattice import Footprint
-from fasaco_edge.mission.events import MapReceived, PatchesLost, PatchReceived, PoseReceived
-from fasaco_edge.mission.mission import Mission, MissionConfig
+from fasaco_edge.mission.core.events import MapReceived, PatchesLost, PatchReceived, PoseReceived
+from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.pose_decoding import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
-from tests.daemon.processes import free_endpoint
-from tests.daemon.rooms import (
+from tests.support.processes import free_endpoint
+from tests.support.rooms import (
     RADIUS_M,
     TOOL_M,
     map_bytes,

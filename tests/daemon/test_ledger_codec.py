@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.daemon.ledger_codec import (
+from fasaco_edge.daemon.ledger.codec import (
     MOST_BYTES,
     LedgerFileError,
     decode_ledger,
     encode_ledger,
 )
-from fasaco_edge.mission.ledger import MOST_TILES, LedgerMismatchError
-from tests.daemon.ledgers import CELL_M, contents, driven, lane
+from fasaco_edge.mission.coverage.ledger import MOST_TILES, LedgerMismatchError
+from tests.support.ledgers import CELL_M, contents, driven, lane
 
 CELLS = st.tuples(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
 

@@ -17,11 +17,11 @@ from typing import Any
 
 import pytest
 
-from fasaco_edge import durable
-from fasaco_edge.daemon.ledger_codec import encode_ledger
-from fasaco_edge.daemon.ledger_file import LedgerFile
-from tests.daemon.ledgers import CELL_M, NAMES, contents, lane, load, names
-from tests.daemon.processes import ENVIRONMENT
+from fasaco_edge.daemon.ledger.codec import encode_ledger
+from fasaco_edge.daemon.ledger.file import LedgerFile
+from fasaco_edge.host import durable
+from tests.support.ledgers import CELL_M, NAMES, contents, lane, load, names
+from tests.support.processes import ENVIRONMENT
 
 
 class Death(BaseException):
@@ -180,8 +180,8 @@ def test_a_whole_new_one_is_not_overwritten_while_it_is_the_newest(written, monk
 WRITES = """
 import sys
 from pathlib import Path
-from fasaco_edge.daemon.ledger_file import LedgerFile
-from tests.daemon.ledgers import lane
+from fasaco_edge.daemon.ledger.file import LedgerFile
+from tests.support.ledgers import lane
 file = LedgerFile(Path(sys.argv[1]), "robot")
 for length in range(1, 100_000):
     file.write(lane(length))

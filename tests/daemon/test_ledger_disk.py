@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.daemon.ledger_writer import RETRY_S
-from tests.daemon.hall import begin, drive, lanes, wait_written
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import STOP_S, Daemon, daemon_process
+from fasaco_edge.daemon.ledger.writer import RETRY_S
+from tests.support.hall import begin, drive, lanes, wait_written
+from tests.support.outsider import Outsider
+from tests.support.processes import STOP_S, Daemon, daemon_process
 
 
 @pytest.fixture

@@ -11,15 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.daemon.ledger_codec import (
+from fasaco_edge.daemon.ledger.codec import (
     MOST_BYTES,
     LedgerFileError,
     decode_ledger,
     encode_ledger,
 )
-from fasaco_edge.daemon.ledger_file import KEPT_ASIDE, LedgerFile
-from fasaco_edge.mission.ledger import LedgerMismatchError
-from tests.daemon.ledgers import (
+from fasaco_edge.daemon.ledger.file import KEPT_ASIDE, LedgerFile
+from fasaco_edge.mission.coverage.ledger import LedgerMismatchError
+from tests.daemon.test_ledger_codec import enveloped
+from tests.support.ledgers import (
     CELL_M,
     NAMES,
     contents,
@@ -29,7 +30,6 @@ from tests.daemon.ledgers import (
     names,
     visits_of,
 )
-from tests.daemon.test_ledger_codec import enveloped
 
 
 def test_where_there_is_nothing_nothing_is_found(tmp_path):

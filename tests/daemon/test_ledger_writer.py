@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 
-from fasaco_edge.daemon import ledger_writer
-from fasaco_edge.daemon.ledger_codec import LedgerFileError, decode_ledger, encode_ledger
-from fasaco_edge.daemon.ledger_file import LedgerFile
-from fasaco_edge.daemon.ledger_writer import LedgerWriter, open_ledger
-from fasaco_edge.mission.ledger import LedgerMismatchError
-from tests.daemon.ledgers import CELL_M, contents, lane
+from fasaco_edge.daemon.ledger import writer as ledger_writer
+from fasaco_edge.daemon.ledger.codec import LedgerFileError, decode_ledger, encode_ledger
+from fasaco_edge.daemon.ledger.file import LedgerFile
+from fasaco_edge.daemon.ledger.writer import LedgerWriter, open_ledger
+from fasaco_edge.mission.coverage.ledger import LedgerMismatchError
+from tests.support.ledgers import CELL_M, contents, lane
 
 DEADLINE_S = 60.0
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import structs
 
-from fasaco_edge.daemon.config import DaemonConfig, MapConfig
+from fasaco_edge.config.config import DaemonConfig, MapConfig
 from fasaco_edge.daemon.memory import (
     BASE_BYTES,
     CELL_BYTES,
@@ -27,7 +27,7 @@ from fasaco_edge.daemon.memory import (
 )
 from fasaco_edge.grid.lattice import MOST_REACH_PX
 from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_POSE_BYTES
-from tests.daemon.limited import unit_limit
+from tests.support.limited import unit_limit
 
 ROOT = Path(__file__).parents[2]
 DEFAULT = DaemonConfig()

@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process
-from tests.daemon.rooms import (
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import (
     FREE,
     RADIUS_M,
     RESOLUTION_M,

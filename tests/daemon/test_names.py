@@ -11,17 +11,17 @@ import pytest
 import zenoh
 from msgspec import convert
 
-from fasaco_edge.daemon.checks import session
-from fasaco_edge.daemon.checks.finding import Level, Patient
+from fasaco_edge.config.config import BusConfig, DaemonConfig
 from fasaco_edge.daemon.claim import Stand, claims_in
-from fasaco_edge.daemon.config import BusConfig, DaemonConfig
 from fasaco_edge.daemon.memory import needed_bytes
-from fasaco_edge.process_memory import peak_mb
+from fasaco_edge.doctor import session
+from fasaco_edge.doctor.finding import Level, Patient
+from fasaco_edge.host.processes import peak_mb
 from tests.campaigns.memory import Flood, map_payload, update_payload
-from tests.daemon.outsider import Ear, Outsider
-from tests.daemon.processes import daemon_process, free_endpoint
-from tests.daemon.rooms import map_bytes, pose_bytes, room
-from tests.daemon.router import router_process
+from tests.support.outsider import Ear, Outsider
+from tests.support.processes import daemon_process, free_endpoint
+from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.router import router_process
 
 PREFIX = "fasaco/@v1/robot"
 PATIENCE_S = 90.0

@@ -11,14 +11,14 @@ import pytest
 import zenoh
 
 from fasaco_edge import __version__
-from fasaco_edge.daemon.about import LEFT_OUT, config_document
-from fasaco_edge.daemon.config import BusConfig, DaemonConfig
+from fasaco_edge.config.config import BusConfig, DaemonConfig
+from fasaco_edge.daemon.loop.answers import LEFT_OUT, config_document
 from fasaco_edge.wire.keys import RPC_NAMES
 from fasaco_edge.wire.pheromone import decode_pheromone
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process
-from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes
 from tests.daemon.test_mission import about, covers, planned
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes
 
 ANTS = {"local_search": False, "ants": 24, "velocities": "8,4,1", "budget_s": 2.0}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from fasaco_edge.daemon.config import DaemonConfig
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.daemon.reload import (
     CHANGEABLE,

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.geometry import Pose2D
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process, free_endpoint, resident_mb
-from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, two_rooms, update_bytes
-from tests.daemon.ros_checks import check_attachment, check_path, is_walk
-from tests.daemon.ros_robot import (
+from tests.daemon.test_idle import IDLE_MB
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process, free_endpoint, resident_mb
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes, two_rooms, update_bytes
+from tests.support.ros_checks import check_attachment, check_path, is_walk
+from tests.support.ros_robot import (
     GRID,
     PATH,
     POSE,
@@ -25,7 +26,6 @@ from tests.daemon.ros_robot import (
     ros_robot,
     ros_router,
 )
-from tests.daemon.test_idle import IDLE_MB
 from tests.wire import oracle
 
 ROOM = pillared_room()

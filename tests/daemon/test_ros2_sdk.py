@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process
-from tests.daemon.ros_robot import GRID, PATH
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.ros_robot import GRID, PATH
 from tests.wire import oracle
 
 PYTHON = os.environ.get("ZENOH_ROS2_SDK_PYTHON", sys.executable)

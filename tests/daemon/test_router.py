@@ -9,10 +9,10 @@ import pytest
 import zenoh
 import zenoh.ext
 
-from tests.daemon.outsider import Ear, Outsider
-from tests.daemon.processes import daemon_process, free_endpoint
-from tests.daemon.rooms import WALL, fill, map_bytes, pose_bytes, room
-from tests.daemon.router import router_process
+from tests.support.outsider import Ear, Outsider
+from tests.support.processes import daemon_process, free_endpoint
+from tests.support.rooms import WALL, fill, map_bytes, pose_bytes, room
+from tests.support.router import router_process
 
 # On a quiet machine a late joiner has all after some milliseconds, and all is back after 0.3 s.
 LATE_S = 30.0

@@ -8,13 +8,13 @@ import time
 import pytest
 import zenoh
 
-from fasaco_edge.resources import folder
-from tests.daemon.certificates import authority, needs_openssl
-from tests.daemon.outsider import Outsider, open_client
-from tests.daemon.processes import daemon_process, free_endpoint
-from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes
-from tests.daemon.secured import transport
+from fasaco_edge.host.resources import folder
 from tests.daemon.test_security import PAUSE, SILENCE_S
+from tests.support.certificates import authority, needs_openssl
+from tests.support.outsider import Outsider, open_client
+from tests.support.processes import daemon_process, free_endpoint
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes
+from tests.support.secured import transport
 
 pytestmark = needs_openssl
 FLEET = ("r1", "r2")

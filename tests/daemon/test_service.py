@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.daemon.managing import Manager
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import Daemon, daemon_process
-from tests.daemon.rooms import fill, map_bytes, pillared_room, pose_bytes, two_rooms
+from tests.support.managing import Manager
+from tests.support.outsider import Outsider
+from tests.support.processes import Daemon, daemon_process
+from tests.support.rooms import fill, map_bytes, pillared_room, pose_bytes, two_rooms
 
 WATCHDOG_S = 1.0
 # Neither free nor occupied by the default thresholds.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process
-from tests.daemon.rooms import WALL, fill, map_bytes, pose_bytes, room
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import WALL, fill, map_bytes, pose_bytes, room
 
 
 def large_room(pillars: int) -> np.ndarray:

@@ -10,9 +10,9 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process, is_running
-from tests.daemon.rooms import map_bytes, pillared_room, pose_bytes, room
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process, is_running
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes, room
 
 # 400 x 400 cells of the tool's width [m].
 HUGE_M = 120.0

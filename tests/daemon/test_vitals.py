@@ -8,12 +8,12 @@ import time
 import numpy as np
 import pytest
 
-from fasaco_edge.daemon.vitals import LATE_S, TurnTimes, Vitals, status_line
-from fasaco_edge.daemon.worker import PlanningWorker
+from fasaco_edge.daemon.loop.watchdog import LATE_S, TurnTimes, Vitals, status_line
+from fasaco_edge.daemon.loop.worker import PlanningWorker
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.events import PlanRequest
+from fasaco_edge.mission.core.events import PlanRequest
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.problem import CoverageProblem
 

@@ -12,8 +12,8 @@ import sys
 from pathlib import Path
 
 from fasaco_edge.kernels.cache import cache_folder, missing_from
-from tests.daemon.processes import PROGRAM
 from tests.deploy.lab import Lab
+from tests.support.processes import PROGRAM
 
 HOME = "/opt/fasaco-edge"
 PYTHON = Path("/usr/bin/python3")

@@ -6,8 +6,8 @@
 import sys
 import time
 
-from tests.daemon.outsider import Outsider
-from tests.daemon.rooms import map_bytes, pose_bytes, room
+from tests.support.outsider import Outsider
+from tests.support.rooms import map_bytes, pose_bytes, room
 
 SIZE_M = 60.0
 STORM = 2000

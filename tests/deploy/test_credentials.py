@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.daemon.certificates import authority, needs_openssl
 from tests.deploy.recordings import recordings
 from tests.deploy.service import UNITS, Service, wait_for
+from tests.support.certificates import authority, needs_openssl
 
 LENT = {
     "root_ca": "$CREDENTIALS_DIRECTORY/ca.pem",

@@ -23,7 +23,7 @@ FIRST, SECOND, BROKEN, DYING = "1.0", "1.1", "1.2", "1.3"
 # Of the same version as the first, but not the same.
 OTHER = "other"
 CHANGES = {
-    BROKEN: {"fasaco_edge/daemon/config.py": "import nothing_of_that_name\n"},
+    BROKEN: {"fasaco_edge/config/config.py": "import nothing_of_that_name\n"},
     DYING: {"fasaco_edge/daemon/service.py": DIES},
     OTHER: {"fasaco_edge/_share/maps/README.md": "other maps\n"},
 }
@@ -86,7 +86,7 @@ def test_from_nothing_to_a_service_and_again_is_nothing_to_do(robot):
     assert robot.answers(FIRST)
     assert robot.run("systemctl", "is-enabled", "fasaco-edge").stdout == "enabled\n"
     compiled = robot.run("find", f"{PREFIX}/{FIRST}", "-name", "config.cpython-*.pyc").stdout
-    assert "fasaco_edge/daemon" in compiled
+    assert "fasaco_edge/config" in compiled
     pid = robot.run("systemctl", "show", "-P", "MainPID", "fasaco-edge").stdout
     before = robot.settled()
     assert robot.install(FIRST).stdout == f"nothing to do: version {FIRST} is installed\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from fasaco_edge.cli.journal import message_id
+from fasaco_edge.cli.console.logs import message_id
 from tests.deploy.service import Service
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge import __version__
-from tests.daemon.processes import is_running
 from tests.deploy.lab import booted, why_not
+from tests.support.processes import is_running
 
 MARK = "/etc/fasaco-edge-lab-was-here"
 BOOT_AND_WAIT = """\

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from tests.daemon.processes import STOP_S
 from tests.deploy.service import Service, wait_for
+from tests.support.processes import STOP_S
 
 WARM_S = 1.5
 IDLE_MB = 60.0

@@ -8,9 +8,9 @@ import subprocess
 
 import pytest
 
-from fasaco_edge.daemon.config import load_config
-from tests.daemon.processes import PROGRAM
+from fasaco_edge.config.config import load_config
 from tests.deploy.manual import MANUAL, blocks
+from tests.support.processes import PROGRAM
 
 DEPLOY = MANUAL.parent
 COMMANDS = [command for block in blocks() for command in block.commands]

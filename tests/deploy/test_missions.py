@@ -6,10 +6,10 @@ import time
 
 import pytest
 
-from tests.daemon.processes import STOP_S
 from tests.deploy.recordings import recordings
 from tests.deploy.robots import covered_m2, robot
 from tests.deploy.service import Service, wait_for
+from tests.support.processes import STOP_S
 
 ENDLESS = {"ants": 1_000_000, "budget_s": 3600.0, "local_search": False}
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from fasaco_edge.drawing import LabelledWalk, draw_pheromone, draw_walks, palette
+from fasaco_edge.drawing import palette
+from fasaco_edge.drawing.comparison import LabelledWalk, draw_walks
+from fasaco_edge.drawing.pheromone import draw_pheromone
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.observation import ColonySnapshot
 

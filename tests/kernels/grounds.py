@@ -12,10 +12,10 @@ import numpy as np
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.kernels.holes import rays
-from fasaco_edge.kernels.kicks import Memory
-from fasaco_edge.kernels.parity import Tally
-from fasaco_edge.kernels.walk_array import (
+from fasaco_edge.kernels.local_search.holes import rays
+from fasaco_edge.kernels.local_search.parity import Tally
+from fasaco_edge.kernels.local_search.perturbation import Memory
+from fasaco_edge.kernels.local_search.walk_array import (
     COST,
     FRAME,
     LENGTH,
@@ -26,7 +26,7 @@ from fasaco_edge.kernels.walk_array import (
     recount,
 )
 from tests import naive
-from tests.planners.grids import with_passages_closed
+from tests.support.grids import with_passages_closed
 
 GUARD, MARK = 64, 77
 

@@ -10,7 +10,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from fasaco_edge import durable, own_files, trust
+from fasaco_edge.host import durable, files
 from fasaco_edge.kernels import cache, jit, sealed
 from fasaco_edge.kernels.cache import KERNEL_SUFFIX, note_complete
 from tests.kernels.harm import kernel_files
@@ -132,8 +132,11 @@ def package_in(folder: Path) -> Path:
     package.mkdir(parents=True)
     for part in (package.parent / "__init__.py", package / "__init__.py"):
         part.touch()
-    for module in (durable, own_files, trust):
-        shutil.copy(module.__file__, package.parent)
+    host = package.parent / "host"
+    host.mkdir()
+    (host / "__init__.py").touch()
+    for module in (durable, files):
+        shutil.copy(module.__file__, host)
     for module in (jit, cache, sealed):
         shutil.copy(module.__file__, package)
     return package

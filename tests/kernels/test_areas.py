@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.areas import cells_beside, find_areas
+from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
 from tests import naive
 
 SHAPES = [(0, 0), (1, 1), (1, 9), (9, 1), (0, 5), (5, 0)]

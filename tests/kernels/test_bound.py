@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.kernels.bound import covering_bound
+from fasaco_edge.kernels.bound.bound import covering_bound
 from tests import naive
-from tests.planners.grids import ROOMS, lattice, with_passages_closed
+from tests.support.grids import ROOMS, lattice, with_passages_closed
 
 ANYWHERE = -1
 PLENTY = 10**6

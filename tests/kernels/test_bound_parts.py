@@ -7,11 +7,23 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.blocks import biconnected_blocks, wanted_first
-from fasaco_edge.kernels.islands import Sea, find_islands, measure_from, spanning_weight
-from fasaco_edge.kernels.matching import SINGLE, Bipartite, choose_independent, match, pairing_for
+from fasaco_edge.kernels.bound.blocks import (
+    Sea,
+    biconnected_blocks,
+    find_islands,
+    measure_from,
+    spanning_weight,
+    wanted_first,
+)
+from fasaco_edge.kernels.bound.matching import (
+    SINGLE,
+    Bipartite,
+    choose_independent,
+    match,
+    pairing_for,
+)
 from tests import naive
-from tests.planners.grids import problems
+from tests.support.grids import problems
 
 PLENTY = 10**6
 

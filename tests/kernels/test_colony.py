@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from fasaco_edge.kernels.colony import NEIGHBOUR, Rules, deposit, settle, walk_ants
+from fasaco_edge.kernels.ants.colony import NEIGHBOUR, Rules, deposit, settle, walk_ants
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.graph import graph_of, scratch_for
 from fasaco_edge.planners.problem import CoverageProblem
 from tests import naive
-from tests.planners.grids import lattice
+from tests.support.grids import lattice
 
 ALPHA, TAU0 = 0.25, 0.5
 STEP_US = 1_000_000

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.holes import rays
+from fasaco_edge.kernels.local_search.holes import rays
 from tests.kernels.grounds import Task, guarded, tasks
-from tests.planners.grids import ROOMS, lattice
+from tests.support.grids import ROOMS, lattice
 
 EAST, NORTH = 0, 1
 

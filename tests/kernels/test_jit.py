@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge.kernels import cache
-from tests.daemon.processes import ENVIRONMENT
 from tests.kernels.installations import ALL_LOADED, Installation, package_in
+from tests.support.processes import ENVIRONMENT
 
 ROOT = Path(__file__).parents[2]
 

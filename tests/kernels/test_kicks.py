@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.kicks import (
+from fasaco_edge.kernels.local_search.perturbation import (
     COOLING,
     KICKS,
     KickRules,
@@ -16,7 +16,7 @@ from fasaco_edge.kernels.kicks import (
     remember,
     touch_up,
 )
-from fasaco_edge.kernels.walk_array import COST, LENGTH
+from fasaco_edge.kernels.local_search.walk_array import COST, LENGTH
 from tests import naive
 from tests.kernels.grounds import (
     PRICES,
@@ -33,7 +33,7 @@ from tests.kernels.grounds import (
 )
 from tests.kernels.test_holes import Space, links_of, squares_of
 from tests.kernels.test_parity import chain_of
-from tests.planners.grids import ROOMS, lattice
+from tests.support.grids import ROOMS, lattice
 
 EVERY_CELL = 1 << 30
 

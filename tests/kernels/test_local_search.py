@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.costs import walk_cost
-from fasaco_edge.kernels.local_search import accepts, improve
+from fasaco_edge.kernels.local_search.proposals import accepts, improve
+from fasaco_edge.kernels.local_search.walk_array import COST, LENGTH
 from fasaco_edge.kernels.random import draw, index_of
-from fasaco_edge.kernels.walk_array import COST, LENGTH
 from tests.kernels.grounds import (
     PRICES,
     assert_sound,
@@ -23,7 +23,7 @@ from tests.kernels.grounds import (
     tasks,
     walk_on,
 )
-from tests.planners.grids import ROOMS, lattice
+from tests.support.grids import ROOMS, lattice
 
 EVERYWHERE = np.empty(0, np.int32)
 

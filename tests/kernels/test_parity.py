@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.local_search import improve
-from fasaco_edge.kernels.parity import (
+from fasaco_edge.kernels.local_search.parity import (
     NOWHERE,
     ODDS,
     SHORTEST,
@@ -24,7 +23,8 @@ from fasaco_edge.kernels.parity import (
     note_order,
     search_ways,
 )
-from fasaco_edge.kernels.walk_array import recount
+from fasaco_edge.kernels.local_search.proposals import improve
+from fasaco_edge.kernels.local_search.walk_array import recount
 from tests.kernels.grounds import (
     PRICES,
     assert_guards_hold,
@@ -39,7 +39,7 @@ from tests.kernels.grounds import (
     walk_on,
 )
 from tests.kernels.test_holes import Space, crossing, links_of, loops_of, squares_of
-from tests.planners.grids import ROOMS, lattice
+from tests.support.grids import ROOMS, lattice
 
 EVERYWHERE = np.empty(0, np.int32)
 FREE, FIXED_END = PRICES[0], PRICES[1]

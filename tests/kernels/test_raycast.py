@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
+from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
 
 FREE_AT_MOST = 25
 

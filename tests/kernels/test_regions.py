@@ -10,12 +10,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.costs import walk_cost
-from fasaco_edge.kernels.holes import rays
-from fasaco_edge.kernels.kicks import Memory, kick, remember
-from fasaco_edge.kernels.local_search import improve
-from fasaco_edge.kernels.parity import JUMPS, Tally
-from fasaco_edge.kernels.regions import AFTER, BEFORE, Box, cut_ground, cut_walk, put_back
-from fasaco_edge.kernels.walk_array import COST, FIXED, FRAME, LENGTH, Ground, Prices, Walk, recount
+from fasaco_edge.kernels.local_search.holes import rays
+from fasaco_edge.kernels.local_search.parity import JUMPS, Tally
+from fasaco_edge.kernels.local_search.perturbation import Memory, kick, remember
+from fasaco_edge.kernels.local_search.proposals import improve
+from fasaco_edge.kernels.local_search.regions import (
+    AFTER,
+    BEFORE,
+    Box,
+    cut_ground,
+    cut_walk,
+    put_back,
+)
+from fasaco_edge.kernels.local_search.walk_array import (
+    COST,
+    FIXED,
+    FRAME,
+    LENGTH,
+    Ground,
+    Prices,
+    Walk,
+    recount,
+)
 from tests.kernels.grounds import (
     PRICES,
     Task,
@@ -33,7 +49,7 @@ from tests.kernels.grounds import (
     walk_on,
 )
 from tests.kernels.test_kicks import rules_for
-from tests.planners.grids import lattice
+from tests.support.grids import lattice
 
 EVERYWHERE = np.empty(0, np.int32)
 

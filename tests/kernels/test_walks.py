@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.walks import reachable_from, shortest_walk
+from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk
 from tests import naive
-from tests.planners.grids import ROOMS, free, lattice, problems
+from tests.support.grids import ROOMS, free, lattice, problems
 
 
 def assert_legal(steps, walk):

@@ -3,11 +3,11 @@
 import pytest
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.mission.assignment import Assignment, CommandError
-from fasaco_edge.mission.events import MapReceived, PoseReceived
-from fasaco_edge.mission.order import OrderError
-from fasaco_edge.mission.progress import State
-from tests.mission.world import (
+from fasaco_edge.mission.core.events import MapReceived, PoseReceived
+from fasaco_edge.mission.coverage.progress import State
+from fasaco_edge.mission.orders.assignment import Assignment, CommandError
+from fasaco_edge.mission.orders.order import OrderError
+from tests.support.mission_world import (
     CONFIG,
     Drive,
     answer,

@@ -8,12 +8,12 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
-from fasaco_edge.mission.events import Decision, MapReceived
-from fasaco_edge.mission.fit import Fit, Verdict
-from fasaco_edge.mission.ground import Ground, anchor_cell
-from fasaco_edge.mission.ledger import CoverageLedger, LedgerMismatchError
-from fasaco_edge.mission.progress import State
-from tests.mission.world import CELL, Drive, building, patch, placed, pose_at, started
+from fasaco_edge.mission.core.events import Decision, MapReceived
+from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerMismatchError
+from fasaco_edge.mission.coverage.ledger_owner import Fit, Verdict
+from fasaco_edge.mission.coverage.progress import State
+from fasaco_edge.mission.map.reachable_area import Ground, anchor_cell
+from tests.support.mission_world import CELL, Drive, building, patch, placed, pose_at, started
 
 MAPS = ("office", "flat", "basement", "walled_grid", "warehouse")
 ROBOT = Footprint(0.3, 0.18)

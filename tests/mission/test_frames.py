@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 
 from fasaco_edge.errors import WrongFrame
-from fasaco_edge.mission.events import MapReceived
-from fasaco_edge.mission.frames import PATIENCE_S
-from fasaco_edge.mission.ledger import LedgerMismatchError
-from fasaco_edge.mission.progress import State
-from tests.mission.world import CONFIG, Drive, building, patch, pose_at, started
+from fasaco_edge.mission.core.events import MapReceived
+from fasaco_edge.mission.coverage.ledger import LedgerMismatchError
+from fasaco_edge.mission.coverage.progress import State
+from fasaco_edge.mission.map.frames import PATIENCE_S
+from tests.support.mission_world import CONFIG, Drive, building, patch, pose_at, started
 
 HALL = ("########", *("#......#",) * 4, "########")
 MAP, ODOM = MapReceived(building(*HALL)), MapReceived(building(*HALL, frame="odom"))

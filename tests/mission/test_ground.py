@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission import ground as ground_module
-from fasaco_edge.mission.ground import Ground, GroundChange, anchor_cell
-from fasaco_edge.mission.progress import FAR_CELLS, LOOK_AHEAD, DrivenPath
+from fasaco_edge.mission.coverage.progress import FAR_CELLS, LOOK_AHEAD, DrivenPath
+from fasaco_edge.mission.map import reachable_area as ground_module
+from fasaco_edge.mission.map.reachable_area import Ground, GroundChange, anchor_cell
 from tests import naive
-from tests.planners.grids import lattice, placed, problems, with_passages_closed
+from tests.support.grids import lattice, placed, problems, with_passages_closed
 
 
 def ground(*rows, at=(0, 0), cell=None):

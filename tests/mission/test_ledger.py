@@ -8,9 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.mission.events import MapReceived
-from fasaco_edge.mission.ledger import DROPPED_TILES, JUMP_CELLS, MOST_TILES, TILE, CoverageLedger
-from tests.mission.world import Drive, building, pose_at
+from fasaco_edge.mission.core.events import MapReceived
+from fasaco_edge.mission.coverage.ledger import (
+    DROPPED_TILES,
+    JUMP_CELLS,
+    MOST_TILES,
+    TILE,
+    CoverageLedger,
+)
+from tests.support.mission_world import Drive, building, pose_at
 
 CELL = 0.25
 

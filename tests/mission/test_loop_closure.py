@@ -9,8 +9,8 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.ledger import CoverageLedger
-from fasaco_edge.mission.loop_closure import Motion, doubtful, has_moved
+from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.map.loop_closure import Motion, doubtful, has_moved
 
 FOOTPRINT = Footprint(0.3, 0.15)
 HOME = Pose2D(0.0, 0.0)

@@ -9,16 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.mission.assignment import Assignment, CommandError, Stage
-from fasaco_edge.mission.order import EVERYTHING_ONCE, MissionOrder, OrderError, Zone
-from fasaco_edge.mission.order_document import (
+from fasaco_edge.host.resources import folder
+from fasaco_edge.mission.orders.assignment import Assignment, CommandError, Stage
+from fasaco_edge.mission.orders.order import (
+    EVERYTHING_ONCE,
+    MissionOrder,
+    OrderError,
+    Zone,
     command_document,
     command_schema,
     order_document,
     read_command,
     read_order,
 )
-from fasaco_edge.resources import folder
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
 KITCHEN = {"name": "kitchen", "polygon": SQUARE}

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.polygons import flaw
-from fasaco_edge.mission.zones import cells_inside, cells_near, counts_in, without
+from fasaco_edge.mission.orders.polygons import flaw
+from fasaco_edge.mission.orders.zones import cells_inside, cells_near, counts_in, without
 from tests import naive
 
 CELL_M = 0.3

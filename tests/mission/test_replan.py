@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.mission.assignment import Assignment, CommandError
-from fasaco_edge.mission.events import MapReceived
-from tests.mission.world import Drive, building, pose_at, started
+from fasaco_edge.mission.core.events import MapReceived
+from fasaco_edge.mission.orders.assignment import Assignment, CommandError
+from tests.support.mission_world import Drive, building, pose_at, started
 
 ROOM = ("........",) * 6
 

@@ -5,10 +5,19 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.mission.events import MapReceived, PoseReceived
-from fasaco_edge.mission.progress import State
-from fasaco_edge.mission.unreached import viewpoints
-from tests.mission.world import CELL, CONFIG, Drive, answer, building, patch, pose_at, rectangle
+from fasaco_edge.mission.core.events import MapReceived, PoseReceived
+from fasaco_edge.mission.coverage.progress import State
+from fasaco_edge.mission.coverage.unreached import viewpoints
+from tests.support.mission_world import (
+    CELL,
+    CONFIG,
+    Drive,
+    answer,
+    building,
+    patch,
+    pose_at,
+    rectangle,
+)
 
 RETRIES = replace(CONFIG, retries=2, retry_s=30.0)
 # A room behind a door in column 4.

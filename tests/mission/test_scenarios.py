@@ -10,17 +10,17 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.events import (
+from fasaco_edge.mission.core.events import (
     Decision,
     MapReceived,
     PatchesLost,
     PlanReady,
     PoseReceived,
 )
-from fasaco_edge.mission.pilot import PATIENCE_S
-from fasaco_edge.mission.progress import State
+from fasaco_edge.mission.core.executive import PATIENCE_S
+from fasaco_edge.mission.coverage.progress import State
 from fasaco_edge.planners.path import CoveragePath
-from tests.mission.world import (
+from tests.support.mission_world import (
     Drive,
     answer,
     building,

@@ -10,10 +10,10 @@ from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.ground import Ground
-from fasaco_edge.mission.site import Site
-from fasaco_edge.mission.zones import kept_out, without
-from tests.grid.maps import displaced, grid, occupancy_grids, part_of, repainted
+from fasaco_edge.mission.map.map_state import Site
+from fasaco_edge.mission.map.reachable_area import Ground
+from fasaco_edge.mission.orders.zones import kept_out, without
+from tests.support.maps import displaced, grid, occupancy_grids, part_of, repainted
 
 FOOTPRINT = Footprint(cell_m=0.2, robot_radius_m=0.08)
 ZONE = ((0.3, 0.3), (0.9, 0.3), (0.9, 0.8), (0.3, 0.8))

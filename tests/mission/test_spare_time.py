@@ -5,18 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.checking import check_walk
-from fasaco_edge.daemon.status import path_note
-from fasaco_edge.mission.events import MapReceived, PlanReady
-from fasaco_edge.mission.spare_time import SKIPPED_S, Attempt
-from fasaco_edge.planners.bound import lower_bound_steps
+from fasaco_edge.daemon.loop.status import path_note
+from fasaco_edge.mission.core.events import MapReceived, PlanReady
+from fasaco_edge.mission.core.spare_time import SKIPPED_S, Attempt
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.graph import lower_bound_steps
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.planner import never
+from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.repair import HELD_CELLS
-from fasaco_edge.planners.stopping import WorkLimit
 from fasaco_edge.planners.work import SearchWork
-from tests.mission.world import CONFIG, Drive, building, patch, pose_at
+from tests.benchmarks.judge import check_walk
+from tests.support.mission_world import CONFIG, Drive, building, patch, pose_at
 
 HALL = ["." * 12 for _ in range(12)]
 SHARE = 0.1

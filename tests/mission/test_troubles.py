@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.mission.assignment import Assignment
-from fasaco_edge.mission.events import CommandReceived, MapReceived
-from fasaco_edge.mission.mission import Mission
-from fasaco_edge.mission.order_document import read_order
-from fasaco_edge.mission.pilot import PATIENCE_S
-from fasaco_edge.mission.progress import State
-from tests.mission.world import (
+from fasaco_edge.mission.core.events import CommandReceived, MapReceived
+from fasaco_edge.mission.core.executive import PATIENCE_S
+from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.coverage.progress import State
+from fasaco_edge.mission.orders.assignment import Assignment
+from fasaco_edge.mission.orders.order import read_order
+from tests.support.mission_world import (
     CONFIG,
     Drive,
     answer,

@@ -9,15 +9,15 @@ import sys
 import numpy as np
 import pytest
 
-from fasaco_edge.daemon.mission_report import mission_report
+from fasaco_edge.daemon.loop.mission_report import mission_report
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.events import CommandReceived, MapReceived, PoseReceived
-from fasaco_edge.mission.mission import Mission, MissionConfig
-from fasaco_edge.mission.order import MissionOrder, Zone
-from fasaco_edge.mission.polygons import flaw
-from fasaco_edge.mission.unreached import MOST_AREAS, MOST_VIEWPOINTS, viewpoints
+from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PoseReceived
+from fasaco_edge.mission.core.mission import Mission, MissionConfig
+from fasaco_edge.mission.coverage.unreached import MOST_AREAS, MOST_VIEWPOINTS, viewpoints
+from fasaco_edge.mission.orders.order import MissionOrder, Zone
+from fasaco_edge.mission.orders.polygons import flaw
 
 FOOTPRINT = Footprint(0.3, 0.14)
 # Pixels of a chamber's side with one wall; it holds a few cells.

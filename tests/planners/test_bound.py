@@ -7,11 +7,10 @@ import pytest
 
 from fasaco_edge.bench.grids import read_grid
 from fasaco_edge.grid.map_files import builtin_maps
-from fasaco_edge.planners.bound import lower_bound_steps
+from fasaco_edge.planners.baselines import SpanningTree, spiral_stc, zigzag
+from fasaco_edge.planners.graph import lower_bound_steps
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stc import SpanningTree
-from fasaco_edge.planners.sweeps import spiral_stc, zigzag
-from tests.planners.grids import REFERENCE, lattice, placed, reference
+from tests.support.grids import REFERENCE, lattice, placed, reference
 
 MAPS = [name for name, _ in builtin_maps()]
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.kernels.colony import walk_cost
+from fasaco_edge.kernels.ants.colony import walk_cost
 from fasaco_edge.planners.cost import CoverageCost
 from tests import naive
 

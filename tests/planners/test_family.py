@@ -8,17 +8,16 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.planners.baselines import SpanningTree, spiral_stc, zigzag
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stc import SpanningTree
-from fasaco_edge.planners.sweeps import spiral_stc, zigzag
 from fasaco_edge.planners.table import PLANNERS
 from tests import naive
-from tests.planners.grids import ENDS, ROOMS, end_of, lattice, problems, reference
+from tests.support.grids import ENDS, ROOMS, end_of, lattice, problems, reference
 
 
 def assert_answers(problem, path):

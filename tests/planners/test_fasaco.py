@@ -14,12 +14,11 @@ from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
-from fasaco_edge.planners.planner import never
+from fasaco_edge.planners.planner import TimeBudget, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import TimeBudget, WorkLimit
 from fasaco_edge.planners.work import SearchProgress, SearchWork
 from tests import naive
-from tests.planners.grids import ENDS, ROOMS, end_of, lattice, problems, reference
+from tests.support.grids import ENDS, ROOMS, end_of, lattice, problems, reference
 
 HALL = lattice(*["." * 40] * 30)
 

@@ -6,7 +6,7 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 
-from fasaco_edge.daemon.config import PlannerConfig
+from fasaco_edge.config.config import PlannerConfig
 from fasaco_edge.errors import (
     EndBlocked,
     EndOutsideMap,
@@ -24,7 +24,7 @@ from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.table import PLANNERS
 from fasaco_edge.planners.warmup import STAGES, warm_up
-from tests.planners.grids import lattice, placed
+from tests.support.grids import lattice, placed
 
 GROUND = placed(lattice("..#", "..#", "###", "..."), -2, 5)
 

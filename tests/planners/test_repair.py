@@ -6,19 +6,17 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.bench.checking import check_walk
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.kernels.walks import reachable_from
+from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.effort import repair_for
-from fasaco_edge.planners.framed import FramedGround
-from fasaco_edge.planners.mending import mended
+from fasaco_edge.planners.graph import FramedGround
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.planner import never
+from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.repair import can_repair, repaired
-from fasaco_edge.planners.stopping import WorkLimit
+from fasaco_edge.planners.repair import can_repair, mended, repaired
 from fasaco_edge.planners.work import SearchWork
+from tests.benchmarks.judge import check_walk
 
 SHORT = WorkLimit(SearchWork(kicks=8))
 TURNS = CoverageCost(1.0, 1.5)

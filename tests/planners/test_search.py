@@ -7,19 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.bench.buildings import building
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.kernels.walk_array import FRAME
+from fasaco_edge.kernels.local_search.walk_array import FRAME
 from fasaco_edge.planners import regions
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
-from fasaco_edge.planners.framed import FramedGround
+from fasaco_edge.planners.graph import FramedGround
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.planner import never
+from fasaco_edge.planners.planner import AnyOf, GapReached, Interrupt, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import AnyOf, GapReached, Interrupt, WorkLimit
-from tests.planners.grids import ENDS, ROOMS, end_of, problems
-from tests.planners.searches import (
+from tests.benchmarks.buildings import building
+from tests.support.grids import ENDS, ROOMS, end_of, problems
+from tests.support.searches import (
     FEW_ANTS,
     TURNS,
     Watched,

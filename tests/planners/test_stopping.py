@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from fasaco_edge.planners.stopping import AnyOf, GapReached, Interrupt, TimeBudget, WorkLimit
+from fasaco_edge.planners.planner import AnyOf, GapReached, Interrupt, TimeBudget, WorkLimit
 from fasaco_edge.planners.work import SearchProgress, SearchWork
 
 

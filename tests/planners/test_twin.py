@@ -12,7 +12,7 @@ from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.work import SearchWork
 from tests import naive
-from tests.planners.grids import ENDS, ROOMS, end_of, problems
+from tests.support.grids import ENDS, ROOMS, end_of, problems
 
 VELOCITIES = {
     "1": (1,),

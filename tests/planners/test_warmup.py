@@ -9,13 +9,13 @@ import numpy as np
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.kernels.cache import KERNEL_SOURCES
-from fasaco_edge.mission.events import MapReceived, PatchReceived, PlanReady, PoseReceived
-from fasaco_edge.mission.mission import Mission, MissionConfig
+from fasaco_edge.kernels.cache import KERNEL_SOURCES, kernel_module
+from fasaco_edge.mission.core.events import MapReceived, PatchReceived, PlanReady, PoseReceived
+from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
-from fasaco_edge.planners.stopping import WorkLimit
+from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.warmup import STAGES, warm_up
 from fasaco_edge.planners.work import SearchWork
 from fasaco_edge.wire.maps import (
@@ -27,7 +27,10 @@ from fasaco_edge.wire.maps import (
 
 
 def compiled_signatures() -> set[str]:
-    modules = [importlib.import_module(f"fasaco_edge.kernels.{p.stem}") for p in KERNEL_SOURCES]
+    modules = [
+        importlib.import_module(f"fasaco_edge.kernels.{kernel_module(source)}")
+        for source in KERNEL_SOURCES
+    ]
     return {
         f"{name}{signature}"
         for module in modules

@@ -15,12 +15,12 @@ from rerun.chunk import RrdReader
 
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.anchor import NEAR_M, Anchor
-from fasaco_edge.recording.samples import RecordedSamples
+from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.recording.scene.anchor import NEAR_M, Anchor
 from fasaco_edge.wire.maps import decode_occupancy_grid
-from tests.recording import mission as made_up
-from tests.recording.reading import read_column
-from tests.recording.recorders import bus_on_free_port, recorder_process
+from tests.support import recorded_mission as made_up
+from tests.support.recorders import bus_on_free_port, recorder_process
+from tests.support.recording_reading import read_column
 
 UTM = (500_012.0, 5_500_034.0)
 DRAWN_FROM = (500_000.0, 5_500_000.0)

@@ -12,10 +12,10 @@ from PIL import Image
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.recording import archetypes
-from tests.recording import viewer
-from tests.recording.mission import Mission
-from tests.recording.recorders import bus_on_free_port, recorder_process
+from fasaco_edge.recording.scene import archetypes
+from tests.support import viewer
+from tests.support.recorded_mission import Mission
+from tests.support.recorders import bus_on_free_port, recorder_process
 
 pytestmark = pytest.mark.skipif(not viewer.drivers(), reason="no software renderer")
 

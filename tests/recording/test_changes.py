@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.recording.changes import changed_bounds, known_bounds, union
+from fasaco_edge.recording.scene.layers import changed_bounds, known_bounds, union
 
 
 def grid(cells, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> OccupancyGrid:

@@ -6,11 +6,11 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.recording.blueprint import build_blueprint
-from fasaco_edge.recording.curves import PERIOD_NS, Curves
-from fasaco_edge.recording.journal import Journal
-from fasaco_edge.recording.room import Room
-from tests.recording.reading import SCALAR, read_column
+from fasaco_edge.recording.scene.blueprint import build_blueprint
+from fasaco_edge.recording.scene.curves import PERIOD_NS, Curves
+from fasaco_edge.recording.write.journal import Journal
+from fasaco_edge.recording.write.quota import Room
+from tests.support.recording_reading import SCALAR, read_column
 
 SECOND_NS = 1_000_000_000
 

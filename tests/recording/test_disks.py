@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from tests.recording.disk_campaign import run_episodes, small_disk
+from tests.campaigns.recorder_disk import run_episodes, small_disk
 
 
 def test_each_full_disk_is_told_once_and_all_parts_are_readable(tmp_path):

@@ -17,16 +17,16 @@ pytest.importorskip("rerun")
 
 import pyarrow as pa
 
-from fasaco_edge.bus.sample_codec import _HEAD, WHOLE, SampleEncoder, _Lane
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.frames import MOST_CHUNK_BYTES, chunks
-from fasaco_edge.recording.part import Part
-from fasaco_edge.recording.repair import FRAME, HEADER_BYTES, scan_recording
-from fasaco_edge.recording.samples import RecordedSamples
+from fasaco_edge.recording.read.frames import MOST_CHUNK_BYTES, chunks
+from fasaco_edge.recording.read.repair import FRAME, HEADER_BYTES, scan_recording
+from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.recording.sdk import RrdReader, rr
+from fasaco_edge.recording.write.part import Part
 from fasaco_edge.review.reading import read_review
-from tests.bus.test_sample_codec import arrival
+from fasaco_edge.samples.codec import _HEAD, WHOLE, SampleEncoder, _Lane
+from tests.samples.test_codec import arrival
 
 RUN_ID = "20260101T000000Z-robot"
 BEGAN_NS = 1_767_225_600 * 10**9

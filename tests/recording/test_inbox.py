@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
-from fasaco_edge.recording.clock import RunClock
-from fasaco_edge.recording.inbox import BEHIND_SAMPLES, Inbox
+from fasaco_edge.recording.write.inbox import BEHIND_SAMPLES, Inbox, RunClock
 
 TOPICS = ["map", "map_update", "pose", "path", "coverage", "pheromone", "status"]
 

@@ -16,19 +16,19 @@ from fasaco_edge.bus.session import Sample
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.recording import input_log
-from fasaco_edge.recording.blueprint import build_blueprint
-from fasaco_edge.recording.input_log import InputLog
-from fasaco_edge.recording.journal import Journal, JournalState
-from fasaco_edge.recording.room import Room
-from fasaco_edge.recording.runcard import RunDescription
-from fasaco_edge.recording.samples import RecordedSamples
-from fasaco_edge.recording.scene import Scene
+from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.recording.scene.blueprint import build_blueprint
+from fasaco_edge.recording.scene.runcard import RunDescription
+from fasaco_edge.recording.scene.scene import Scene
+from fasaco_edge.recording.write import input_log
+from fasaco_edge.recording.write.input_log import InputLog
+from fasaco_edge.recording.write.journal import Journal, JournalState
+from fasaco_edge.recording.write.quota import Room
+from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.poses import decode_pose, encode_pose_stamped
 from fasaco_edge.wire.schemas import POSE_STAMPED
-from fasaco_edge.wire.status import encode_json
 
 SECOND_NS = 1_000_000_000
 BEGAN_NS = 1_700_000_000 * SECOND_NS

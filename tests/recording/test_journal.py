@@ -14,12 +14,11 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.errors import BadConfiguration, UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.blueprint import build_blueprint
-from fasaco_edge.recording.journal import FLUSH_PERIOD_NS, Journal, JournalState
-from fasaco_edge.recording.quota import Quota
-from fasaco_edge.recording.room import Room
+from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.sdk import rr
-from tests.recording.reading import read_column, read_summary
+from fasaco_edge.recording.write.journal import FLUSH_PERIOD_NS, Journal, JournalState
+from fasaco_edge.recording.write.quota import Quota, Room
+from tests.support.recording_reading import read_column, read_summary
 
 RUN = "run-1"
 

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from tests.recording.kill_campaign import GOAL_LOST_S, run_campaign
+from tests.campaigns.kill_recorder import GOAL_LOST_S, run_campaign
 
 # The goal itself is the campaign's to measure: this machine may have others to serve, too.
 PATIENCE_S = 9.0

@@ -11,11 +11,12 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.recording import archetypes, entities
-from fasaco_edge.recording.blueprint import build_blueprint
-from fasaco_edge.recording.journal import Journal
-from fasaco_edge.recording.layers import BURST_S, RATES, Layers, size_in_file
-from fasaco_edge.recording.room import Room
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.scene import archetypes
+from fasaco_edge.recording.scene.blueprint import build_blueprint
+from fasaco_edge.recording.scene.layers import BURST_S, RATES, Layers, size_in_file
+from fasaco_edge.recording.write.journal import Journal
+from fasaco_edge.recording.write.quota import Room
 
 SECOND_NS = 1_000_000_000
 RATE = RATES[entities.MAP]

@@ -12,9 +12,9 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.recording.live import serve_live
-from tests.recording.mission import Mission
-from tests.recording.recorders import bus_on_free_port, recorder_process
+from fasaco_edge.recording.write.live import serve_live
+from tests.support.recorded_mission import Mission
+from tests.support.recorders import bus_on_free_port, recorder_process
 
 
 def free_port() -> int:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.recording.quota import Quota, next_run, oldest_first
+from fasaco_edge.recording.write.quota import Quota, next_run, oldest_first
 
 AT_BOOT, LAST_WEEK, NEXT_YEAR = (
     datetime(year, month, 20, 10, tzinfo=UTC) for year, month in ((1970, 1), (2026, 11), (2027, 11))

@@ -20,20 +20,20 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.bus.arrival import PATH_DIGEST
-from fasaco_edge.bus.qos import QOS
+from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.errors import MissingExtra, UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.input_log import PERIOD_NS as INPUT_PERIOD_NS
-from fasaco_edge.recording.journal import FLUSH_PERIOD_NS
-from fasaco_edge.recording.part import Part
-from fasaco_edge.recording.samples import RecordedSamples
+from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.recording.write.input_log import PERIOD_NS as INPUT_PERIOD_NS
+from fasaco_edge.recording.write.journal import FLUSH_PERIOD_NS
+from fasaco_edge.recording.write.part import Part
+from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID
-from fasaco_edge.wire.status import encode_json
-from tests.recording.mission import CELL_M, COLS, ORIGIN, ROWS, Mission, building
-from tests.recording.reading import SCALAR, RecordingSummary, read_column, read_summary
-from tests.recording.recorders import bus_on_free_port, recorder_process
+from tests.support.recorded_mission import CELL_M, COLS, ORIGIN, ROWS, Mission, building
+from tests.support.recorders import bus_on_free_port, recorder_process
+from tests.support.recording_reading import SCALAR, RecordingSummary, read_column, read_summary
 
 ERRORS = {"total": 2, "last": "", "by_code": {"malformed_message": 2, "no code": 3}}
 FRAMES = 40
@@ -206,7 +206,7 @@ def test_the_report_tells_what_is_going_on(recorded):
 
 
 def test_recording_brings_no_compiler_along():
-    check = "import sys, fasaco_edge.recording.recorder; sys.exit('numba' in sys.modules)"
+    check = "import sys, fasaco_edge.recording.write.recorder; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0
 
 

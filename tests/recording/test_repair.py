@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.recording.repair import (
+from fasaco_edge.recording.read.repair import (
     HEADER_BYTES,
     MOST_ZEROS,
     repair_folder,

@@ -13,14 +13,14 @@ pytest.importorskip("rerun")
 from fasaco_edge.cli.record import ros_config
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.samples import RecordedSamples
+from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.review.reading import read_review
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, TF_MESSAGE
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process
-from tests.daemon.rooms import map_bytes, pillared_room
-from tests.daemon.ros_robot import GRID, Naming, ros_robot
-from tests.recording.reading import read_summary
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.recording_reading import read_summary
+from tests.support.rooms import map_bytes, pillared_room
+from tests.support.ros_robot import GRID, Naming, ros_robot
 
 WAY = [(0.75 + 0.05 * step, 0.75) for step in range(20)]
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.recording.fields import integer, number, section, text
-from fasaco_edge.recording.runcard import RunDescription
+from fasaco_edge.recording.scene.runcard import RunDescription
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=20),

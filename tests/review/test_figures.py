@@ -5,15 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fasaco_edge.recording.run_reading import RunRecord
+from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.curve import curve
 from fasaco_edge.review.drive import milestones, walk_figures
 from fasaco_edge.review.faults import faults_of
-from fasaco_edge.review.moments import Span, largest_drop, longest_gap, longest_stand, spans_of
-from fasaco_edge.review.plans import PlanLog
-from fasaco_edge.review.replans import kind_of
+from fasaco_edge.review.moments import (
+    Span,
+    kind_of,
+    largest_drop,
+    longest_gap,
+    longest_stand,
+    spans_of,
+)
 from fasaco_edge.review.rows import clock
-from fasaco_edge.review.story import Story
+from fasaco_edge.review.story import PlanLog, Story
 from fasaco_edge.wire.turns import Beginning, Decided, PlanTaken, Turn, TurnBatch
 
 ALL = Span("under way", 0.0, 100.0)

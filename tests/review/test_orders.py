@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.mission.order_document import read_order
+from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.review.document import differences, side_by_side
 from fasaco_edge.review.moments import spans_of
 from fasaco_edge.review.orders import chapters

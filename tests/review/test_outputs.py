@@ -25,8 +25,8 @@ from fasaco_edge.review.page import page_of
 from fasaco_edge.review.picture import SIZE, draw_review
 from fasaco_edge.review.reading import read_review
 from fasaco_edge.review.review import CoverageCounts, review_of
-from tests.cli.commands import ENVIRONMENT, PROGRAM, fasaco_edge
 from tests.review.test_parts import run_told
+from tests.support.commands import ENVIRONMENT, PROGRAM, fasaco_edge
 
 VOID = ("meta", "img")
 

@@ -10,17 +10,17 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.bus.qos import QOS
+from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.cli import main
 from fasaco_edge.errors import DifferentRuns, UnreadableRecording
 from fasaco_edge.review.document import document, side_by_side
 from fasaco_edge.review.reading import read_review
 from fasaco_edge.wire import schemas
+from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.paths import encode_path
-from fasaco_edge.wire.status import encode_json
-from tests.daemon.rooms import map_bytes, pose_bytes, room
-from tests.recording.recorders import bus_on_free_port, recorder_process
+from tests.support.recorders import bus_on_free_port, recorder_process
+from tests.support.rooms import map_bytes, pose_bytes, room
 
 CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "mission": {"lost_pose_s": 3.0}}
 # Three cells to the right and back, in the lowest row of the room.

@@ -10,15 +10,15 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.bench.checking import check_walk
+from fasaco_edge.review.charts import covered_share
 from fasaco_edge.review.document import document
 from fasaco_edge.review.drive import walk_figures
 from fasaco_edge.review.reading import read_review
-from fasaco_edge.review.series import covered_share
-from tests.cli.commands import fasaco_edge
-from tests.daemon.recorded import record_mission
-from tests.daemon.rooms import TOOL_M
+from tests.benchmarks.judge import check_walk
 from tests.review.naive import nearest_rank, passed_cells, quarter_turns
+from tests.support.commands import fasaco_edge
+from tests.support.recorded import record_mission
+from tests.support.rooms import TOOL_M
 
 BROKEN_POSES = 3
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fasaco_edge.bus.qos import QOS
+from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.errors import BadConfiguration, BusUnavailable
 from fasaco_edge.grid.geometry import Pose2D

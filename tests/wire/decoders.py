@@ -10,7 +10,7 @@ from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.poses import POSE_SCHEMAS, decode_pose
-from fasaco_edge.wire.tf import Transform, decode_transforms
+from fasaco_edge.wire.transforms import Transform, decode_transforms
 
 
 def decode_and_look(payload: bytes) -> tuple[Transform, ...]:

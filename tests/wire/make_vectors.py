@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from fasaco_edge.resources import folder
+from fasaco_edge.host.resources import folder
 from tests.wire.hostile_vectors import hostile_vectors
 from tests.wire.valid_vectors import valid_vectors
 

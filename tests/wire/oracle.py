@@ -9,7 +9,7 @@ import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.resources import folder
+from fasaco_edge.host.resources import folder
 from fasaco_edge.wire import schemas
 
 STORE = get_typestore(Stores.ROS2_JAZZY)

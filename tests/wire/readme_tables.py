@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from fasaco_edge.resources import folder
+from fasaco_edge.host.resources import folder
 
 PROTOCOL = folder("protocol")
 PREFIX = "{base}/@v1/{robot}/"

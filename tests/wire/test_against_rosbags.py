@@ -23,7 +23,7 @@ from fasaco_edge.wire.poses import (
     encode_pose_stamped,
     encode_pose_with_covariance_stamped,
 )
-from fasaco_edge.wire.tf import Transform, decode_transforms
+from fasaco_edge.wire.transforms import Transform, decode_transforms
 from tests.wire import oracle
 
 STAMP_NS = 1_700_000_000_987_654_321

@@ -15,11 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, NothingToCover
-from fasaco_edge.resources import folder
+from fasaco_edge.host.resources import folder
 from fasaco_edge.wire import coverage, limits, schemas
+from fasaco_edge.wire.json_text import decode_json, encode_error, encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.poses import POSE_SCHEMAS
-from fasaco_edge.wire.status import decode_json, encode_error, encode_json
 
 PROTOCOL = folder("protocol")
 TABLE = yaml.safe_load((PROTOCOL / "keys.yaml").read_text())
@@ -179,7 +179,7 @@ def test_error_reply() -> None:
 def test_reading_the_bus_needs_no_compiler() -> None:
     import subprocess
 
-    modules = ["maps", "poses", "tf", "paths", "pheromone", "coverage", "keys", "status"]
+    modules = ["maps", "poses", "transforms", "paths", "pheromone", "coverage", "keys", "json_text"]
     program = "; ".join(f"import fasaco_edge.wire.{module}" for module in modules)
     check = f"{program}; import sys; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0

@@ -10,10 +10,10 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.poses import encode_pose_stamped
-from tests.wire import coverage_fuzz
+from tests.campaigns import coverage_fuzz_wire as coverage_fuzz
+from tests.campaigns.fuzz_wire import run_campaign
 from tests.wire.decoders import DECODERS
 from tests.wire.encoders import ENCODERS
-from tests.wire.fuzz_campaign import run_campaign
 
 MUTATIONS = 2000
 POSE = schemas.POSE_STAMPED

@@ -9,8 +9,8 @@ import yaml
 import zenoh
 import zenoh.ext
 
-from fasaco_edge.daemon.ros_config import RosConfig
-from fasaco_edge.resources import folder
+from fasaco_edge.config.ros import RosConfig
+from fasaco_edge.host.resources import folder
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.ros_keys import (
     GID_BYTES,

@@ -9,7 +9,7 @@ import pytest
 from jsonschema import Draft202012Validator, ValidationError
 
 from fasaco_edge.errors import NotYet
-from fasaco_edge.wire.status import encode_error
+from fasaco_edge.wire.json_text import encode_error
 from tests.wire.readme_tables import PROTOCOL, load
 from tests.wire.schemas import NAMES, check, schema
 

@@ -19,13 +19,13 @@ import yaml
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.resources import folder
+from fasaco_edge.host.resources import folder
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.poses import decode_pose
-from tests.daemon.outsider import Outsider
-from tests.daemon.processes import daemon_process, free_endpoint
-from tests.daemon.rooms import map_bytes, pillared_room
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process, free_endpoint
+from tests.support.rooms import map_bytes, pillared_room
 from tests.wire.decoders import DECODERS
 from tests.wire.facts import facts_of, flat
 from tests.wire.mutations import mutant, seeds_of

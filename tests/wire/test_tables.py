@@ -10,12 +10,12 @@ import pytest
 
 import fasaco_edge
 from fasaco_edge.bus import session_config
-from fasaco_edge.bus.qos import QOS, VOLATILE, Qos
-from fasaco_edge.daemon.commands import REPLAN_PERIOD_S
+from fasaco_edge.bus.publisher import QOS, VOLATILE, Qos
+from fasaco_edge.daemon.loop.commands import REPLAN_PERIOD_S
 from fasaco_edge.daemon.memory import QUEUES
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.mission import order
-from fasaco_edge.mission.ledger import MOST_TILES
+from fasaco_edge.mission.coverage.ledger import MOST_TILES
+from fasaco_edge.mission.orders import order
 from fasaco_edge.wire import limits
 from fasaco_edge.wire.keys import RPC_NAMES, Keys
 from tests.wire import readme_tables

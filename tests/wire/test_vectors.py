@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.resources import folder
+from fasaco_edge.host.resources import folder
 from tests.wire.decoders import DECODERS
 from tests.wire.facts import facts_of, flat
 from tests.wire.make_vectors import files

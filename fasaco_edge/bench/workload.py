@@ -1,0 +1,138 @@
+"""A building to publish: halls of ten metres with doors, 50 m x 50 m as it comes from SLAM.
+
+A robot for a daemon to work for: it drives along its paths, and its map changes.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bench.processes import DaemonProcess, MapSource
+from fasaco_edge.bus.session import Bus, Sample
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
+from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid
+from fasaco_edge.wire.paths import decode_path
+
+RESOLUTION_M = 0.05
+HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
+# A crate further along each time, by less than its own width and back again.
+CRATE_PLACES, CRATE_STEP_PX = 12, 12
+
+
+def building(side_px: int = 1000) -> OccupancyGrid:
+    """Return a fully known building of ``side_px`` x ``side_px`` pixels of 0.05 m."""
+    cells = np.full((side_px, side_px), FREE, np.int8)
+    walls = range(0, side_px, HALL_PX)
+    for wall in walls:
+        cells[wall : wall + WALL_PX] = OCCUPIED
+        cells[:, wall : wall + WALL_PX] = OCCUPIED
+    for wall in walls[1:]:
+        for hall in walls:
+            door = slice(hall + (HALL_PX - DOOR_PX) // 2, hall + (HALL_PX + DOOR_PX) // 2)
+            cells[wall : wall + WALL_PX, door] = FREE
+            cells[door, wall : wall + WALL_PX] = FREE
+    cells[-WALL_PX:] = cells[:, -WALL_PX:] = OCCUPIED
+    geometry = GridGeometry(side_px, side_px, RESOLUTION_M, Pose2D(0.0, 0.0))
+    return OccupancyGrid(geometry, cells)
+
+
+def with_crate(grid: OccupancyGrid, number: int, stamp_ns: int) -> OccupancyGrid:
+    """Return the building with a crate in the hall farthest from the robot.
+
+    Crates of successive numbers stand at different places, so that each map gains
+    and loses coverable cells against the one before.
+    """
+    side = grid.geometry.rows
+    row, col = side - HALL_PX // 2, side - HALL_PX + 2 * CRATE_PX
+    col += CRATE_STEP_PX * (number % CRATE_PLACES)
+    cells = grid.cells.copy()
+    cells[row : row + CRATE_PX, col : col + CRATE_PX] = OCCUPIED
+    return replace(grid, cells=cells, stamp_ns=stamp_ns)
+
+
+def robot_pose(stamp_ns: int) -> StampedPose:
+    """Return a robot that stands in the building's first hall."""
+    return StampedPose(Pose2D(2.5, 2.5), stamp_ns=stamp_ns)
+
+
+POSES_HZ = 10
+SPEED_M_S = 0.5
+# A crate moves so often [s]: each time what is left of the path is planned anew.
+MAP_EVERY_S = 1.0
+
+
+class CoveringRobot:
+    """Drives; to be told of paths on Zenoh's threads, and to be ticked by one.
+
+    Attributes:
+        paths: how many it was given.
+    """
+
+    def __init__(self, source: MapSource) -> None:
+        self.paths = 0
+        self._source = source
+        self._building = building()
+        self._at = np.array([2.5, 2.5])
+        self._ahead: NDArray[np.float64] = np.empty((0, 2))
+        self._maps, self._map_due = 0, 0.0
+        self._lock = threading.Lock()
+
+    def take_path(self, sample: Sample) -> None:
+        """Drive this from now on."""
+        ahead = decode_path(sample.payload).xy
+        with self._lock:
+            self.paths += 1
+            self._ahead = ahead
+
+    def tick(self, now: float) -> None:
+        """Drive on for a period, and say where it is; now and then a map."""
+        with self._lock:
+            self._drive(SPEED_M_S / POSES_HZ)
+        x, y = self._at
+        self._source.forget_paths()
+        self._source.put_pose(StampedPose(Pose2D(x, y), stamp_ns=time.time_ns()))
+        if now >= self._map_due:
+            self._maps += 1
+            self._map_due = now + MAP_EVERY_S
+            self._source.put_map(with_crate(self._building, self._maps, time.time_ns()))
+
+    def _drive(self, metres: float) -> None:
+        while len(self._ahead) and metres > 0.0:
+            way = self._ahead[0] - self._at
+            left = float(np.hypot(*way))
+            if left > metres:
+                self._at = self._at + way * (metres / left)
+                return
+            self._at, self._ahead, metres = self._ahead[0], self._ahead[1:], metres - left
+
+
+@contextmanager
+def robot_beside(daemon: DaemonProcess, bus: Bus) -> Iterator[CoveringRobot]:
+    """Let a robot drive for the block, from the moment it has its first path."""
+    source = MapSource(daemon, bus)
+    robot = CoveringRobot(source)
+    bus.subscribe(daemon.keys.path, robot.take_path)
+    stamp_ns = time.time_ns()
+    source.put_pose(robot_pose(stamp_ns))
+    source.put_map(with_crate(building(), 0, stamp_ns))
+    source.wait_path(stamp_ns)
+    over = threading.Event()
+
+    def drive() -> None:
+        while not over.wait(1.0 / POSES_HZ):
+            robot.tick(time.monotonic())
+
+    thread = threading.Thread(target=drive, name="robot")
+    thread.start()
+    try:
+        yield robot
+    finally:
+        over.set()
+        thread.join()

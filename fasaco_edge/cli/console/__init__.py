@@ -1,0 +1,1 @@
+"""What all commands share: arguments, terminal, logs, exit codes, signals."""

@@ -1,0 +1,149 @@
+"""Arguments that several commands share, and how their texts are read.
+
+Files that commands write: looked at before the work begins, so that none is done in vain.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
+from fasaco_edge.wire.limits import MAX_COORDINATE_M
+
+if TYPE_CHECKING:
+    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from fasaco_edge.errors import BadConfiguration
+
+DEFAULT_CELL_M = 0.3
+DEFAULT_RADIUS_M = 0.18
+
+
+def pair_of_ints(text: str) -> tuple[int, int]:
+    """Read ``R,C``."""
+    try:
+        row, col = (int(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be row,column, got {text!r}") from None
+    return row, col
+
+
+def pair_of_floats(text: str) -> tuple[float, float]:
+    """Read ``X,Y``."""
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be x,y in metres, got {text!r}") from None
+    # A negated comparison, so that NaN is caught too.
+    if not (abs(x) <= MAX_COORDINATE_M and abs(y) <= MAX_COORDINATE_M):
+        raise argparse.ArgumentTypeError(f"must be within {MAX_COORDINATE_M:g} m of 0, got {text}")
+    return x, y
+
+
+def seconds(text: str) -> float:
+    """Read a time to wait [s]."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    # A negated comparison, so that NaN is caught too.
+    if not 0 < value <= 3600:
+        raise argparse.ArgumentTypeError(f"must be in (0, 3600] s, got {text!r}")
+    return value
+
+
+def with_negative_pairs(words: Sequence[str]) -> list[str]:
+    """Return the words of a command line with ``--start -1,2`` as ``--start=-1,2``.
+
+    argparse takes negative numbers for values, but ``-1,2`` for an option.
+    """
+    joined: list[str] = []
+    for word in words:
+        if (
+            joined
+            and joined[-1] in ("--start", "--start-xy", "--end", "--keep-out")
+            and re.match(r"-[\d.]", word)
+        ):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
+def add_robot_on_bus(parser: argparse.ArgumentParser) -> None:
+    """Add what names a robot on the bus and how to get there."""
+    parser.add_argument("--robot", default="robot", metavar="NAME", help="name of the robot")
+    parser.add_argument("--base", default="fasaco", metavar="KEY", help="what all keys begin with")
+    parser.add_argument(
+        "--connect",
+        action="append",
+        metavar="ENDPOINT",
+        help=f"Zenoh endpoint to connect to; may be repeated (default: {DEFAULT_ENDPOINT})",
+    )
+    parser.add_argument(
+        "--security",
+        metavar="FILE",
+        help="YAML file that shows who this is, where that is asked: `kind: tls` with "
+        "`tls: {root_ca: ..., certificate: ..., private_key: ...}`, or `kind: user` with "
+        "`user: {name: ..., password_file: ...}`",
+    )
+
+
+def client_settings(args: argparse.Namespace) -> BusSettings:
+    """Return the session settings of a process that joins a daemon or router.
+
+    Raises:
+        BadConfiguration: what shows who this is cannot be read.
+    """
+    connect = tuple(args.connect or (DEFAULT_ENDPOINT,))
+    if args.security is None:
+        return BusSettings("client", connect)
+    from fasaco_edge.config.credentials import read_client_security
+
+    security = read_client_security(args.security, connect)
+    security.warn_of_clock()
+    return BusSettings("client", connect, secured=security.of_client())
+
+
+def check_output(file: Path | None) -> None:
+    """Check that ``file`` can be written; None is no file at all.
+
+    Raises:
+        BadConfiguration: it is a folder, its folder is missing, or neither may be written to.
+    """
+    if file is None:
+        return
+    if file.is_dir():
+        raise _unwritable(file, "that is a folder")
+    if not file.parent.is_dir():
+        raise _unwritable(file, f"there is no folder {file.parent}")
+    if not os.access(file if file.exists() else file.parent, os.W_OK):
+        raise _unwritable(file, "no permission")
+
+
+@contextmanager
+def writing(file: Path) -> Iterator[None]:
+    """Name ``file`` where the block fails to write it, on a full disk, say.
+
+    Raises:
+        BadConfiguration: the block raised OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise _unwritable(file, error.strerror or str(error)) from error
+
+
+def _unwritable(file: Path, why: str) -> BadConfiguration:
+    return BadConfiguration(
+        f"cannot write {file}: {why}", hint="name a place that exists and can be written to"
+    )

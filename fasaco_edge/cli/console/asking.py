@@ -1,0 +1,85 @@
+"""What is said where no daemon answers.
+
+A question to a daemon on the bus, and what comes of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Any
+
+from fasaco_edge.cli.console.arguments import add_robot_on_bus, client_settings, seconds
+from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.text import one_line
+
+if TYPE_CHECKING:
+    from fasaco_edge.bus.queries import Reply
+
+
+class NobodyAnswersError(FasacoError):
+    """No daemon of that robot is on the bus."""
+
+    code = "nobody_answers"
+
+    def __init__(self, prefix: str, robots: Collection[str]) -> None:
+        names = one_line(", ".join(sorted(robots)))
+        there = f"there are {names}: give one as --robot" if names else "there is none"
+        super().__init__(
+            f"no daemon answers at {prefix}",
+            hint=f"of robots on this bus {there}; `fasaco-edge run` starts a daemon",
+        )
+
+
+TIMEOUT_S = 5.0
+
+
+class RefusedError(FasacoError):
+    """The daemon's answer is an error."""
+
+    def __init__(self, answer: dict[str, Any]) -> None:
+        super().__init__(
+            one_line(str(answer.get("message"))), hint=one_line(str(answer.get("hint", "")))
+        )
+        self.code = str(answer.get("code"))
+
+
+def add_question(parser: argparse.ArgumentParser) -> None:
+    """Add whom to ask, how long to wait, and how to show the answer."""
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    parser.add_argument(
+        "--timeout",
+        type=seconds,
+        default=TIMEOUT_S,
+        metavar="S",
+        help="how long to wait for the answer (default: %(default)s)",
+    )
+    add_robot_on_bus(parser)
+
+
+def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: bytes = b"") -> Reply:
+    """Ask; ``parameters`` as they stand behind ``?``.
+
+    Raises:
+        RefusedError: the answer is an error; with ``--json`` it is printed as it came.
+        NobodyAnswersError: there is no answer in time.
+        BusUnavailable: nobody listens at the endpoint.
+    """
+    from fasaco_edge.bus.session import open_bus
+    from fasaco_edge.wire.json_text import decode_json
+    from fasaco_edge.wire.keys import Keys
+
+    keys = Keys(args.robot, args.base)
+    selector = keys.rpc(name) + (f"?{parameters}" if parameters else "")
+    with open_bus(client_settings(args)) as bus:
+        replies = bus.get(selector, args.timeout, payload)
+        if not replies:
+            alive = bus.alive(f"{args.base}/@v1/*/alive")
+            raise NobodyAnswersError(keys.prefix, {key.split("/")[-2] for key in alive})
+    reply = replies[0]
+    if reply.is_error:
+        if args.json:
+            print_json(decode_json(reply.payload))
+        raise RefusedError(decode_json(reply.payload))
+    return reply

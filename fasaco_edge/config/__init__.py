@@ -1,0 +1,1 @@
+"""The daemon's configuration: typed sections, read and checked as a whole."""

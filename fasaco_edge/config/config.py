@@ -1,0 +1,215 @@
+"""The daemon's configuration: typed, checked as a whole, nothing repaired."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
+from fasaco_edge.config.credentials import with_credentials
+from fasaco_edge.config.reading import Fault, read_text, section_faults
+from fasaco_edge.config.ros import RosConfig
+from fasaco_edge.config.sections import MissionSettings, PlannerConfig, RecordingConfig, Section
+from fasaco_edge.config.security import SecurityConfig, security_faults
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.wire import schemas
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.limits import MAX_GRID_CELLS
+from fasaco_edge.wire.pose_decoding import PoseDecoder
+
+Metres = Annotated[float, Meta(gt=0, le=10)]
+Percent = Annotated[int, Meta(ge=0, le=100)]
+
+
+class RobotConfig(Section, frozen=True):
+    """The robot: its name on the bus, its size [m], and what driving takes it.
+
+    ``quarter_turn_s`` is a turn by 90 degrees on the spot [s], braking and starting
+    included; 0 looks for the fewest steps whatever the turns.
+    """
+
+    name: str = "robot"
+    radius_m: Metres = 0.18
+    tool_width_m: Metres = 0.3
+    speed_m_s: Annotated[float, Meta(gt=0, le=10)] = 0.25
+    quarter_turn_s: Annotated[float, Meta(ge=0, le=600)] = 1.5
+
+    def cost(self) -> CoverageCost:
+        """Return what a step and a turn cost.
+
+        Raises:
+            BadConfiguration: a step would take less than a millisecond or more than an hour.
+        """
+        return CoverageCost.for_robot(self.tool_width_m, self.speed_m_s, self.quarter_turn_s)
+
+
+class BusConfig(Section, frozen=True):
+    """How to join the bus, and who else may.
+
+    Beyond loopback nothing is listened on unless it stands here, and there nobody may speak
+    without a name (``security``), unless ``open_to_everyone`` says so.
+    """
+
+    base: str = "fasaco"
+    mode: Literal["peer", "client", "router"] = "peer"
+    listen: tuple[str, ...] = (DEFAULT_ENDPOINT,)
+    connect: tuple[str, ...] = ()
+    open_to_everyone: bool = False
+    security: SecurityConfig = SecurityConfig()
+
+    def settings(self, prefix: str, ros: RosConfig | None = None) -> BusSettings:
+        """Return these as settings of the session of a robot; its keys begin with ``prefix``.
+
+        ``ros`` has the keys it has besides.
+
+        Raises:
+            BadConfiguration: a file that shows who this is cannot be read.
+        """
+        part = self.security.of_daemon(prefix, ros.rights() if ros else None)
+        if self.open_to_everyone:
+            part |= self.security.thinned(prefix)
+        return BusSettings(self.mode, self.connect, self.listen, part)
+
+
+class MapConfig(Section, frozen=True):
+    """What in an occupancy grid is free and occupied [percent], the largest map and lattice.
+
+    For what they take of memory see ``daemon.memory``.
+    """
+
+    free_at_most: Percent = 25
+    occupied_at_least: Percent = 65
+    max_pixels: Annotated[int, Meta(ge=1, le=MAX_GRID_CELLS)] = 25_000_000
+    max_lattice_cells: Annotated[int, Meta(ge=1, le=100_000_000)] = 500_000
+
+
+class PoseConfig(Section, frozen=True):
+    """The type of a pose whose sender names none, as ROS 2's do not."""
+
+    schema: Literal[
+        "geometry_msgs/msg/PoseStamped",
+        "geometry_msgs/msg/PoseWithCovarianceStamped",
+        "nav_msgs/msg/Odometry",
+    ] = schemas.POSE_STAMPED
+
+
+class DaemonConfig(Section, frozen=True):
+    """The whole configuration; without ``ros2`` the daemon has nothing to do with ROS."""
+
+    robot: RobotConfig = RobotConfig()
+    bus: BusConfig = BusConfig()
+    map: MapConfig = MapConfig()
+    pose: PoseConfig = PoseConfig()
+    planner: PlannerConfig = PlannerConfig()
+    mission: MissionSettings = MissionSettings()
+    recording: RecordingConfig = RecordingConfig()
+    ros2: RosConfig | msgspec.UnsetType = msgspec.UNSET
+
+    def keys(self) -> Keys:
+        """Return the keys of this robot.
+
+        Raises:
+            BadConfiguration: a name does not fit into a key.
+        """
+        return Keys(robot=self.robot.name, base=self.bus.base)
+
+    def poses(self) -> PoseDecoder:
+        """Return what decodes poses, as they come by the native key or by ROS 2."""
+        frames = None
+        if self.ros2 and self.ros2.pose == "tf":
+            frames = (self.ros2.frames.map, self.ros2.frames.robot)
+        return PoseDecoder(self.pose.schema, frames)
+
+
+def load_config(path: Path | None) -> DaemonConfig:
+    """Read a YAML file; without one return the defaults.
+
+    Raises:
+        BadConfiguration: the file is missing, is no YAML, has unknown keys or
+            impossible values; the text names key, value and what is allowed.
+    """
+    config, faults = inspect_config(path)
+    if config is not None:
+        return config
+    first, *more = faults
+    where = f"{path}, line {first.line}" if first.line else str(path)
+    hint = first.error.hint
+    if more:
+        others = f"the {len(more)} others" if len(more) > 1 else "another one"
+        hint += f"; fasaco-edge check-config {path} tells {others}"
+    raise type(first.error)(f"{where}: {first.error}", hint=hint) from first.error
+
+
+def inspect_config(path: Path | None) -> tuple[DaemonConfig | None, tuple[Fault, ...]]:
+    """Read a YAML file; return the configuration, or None and all that is wrong.
+
+    What does not go together is only looked for where each value by itself is right.
+    """
+    if path is None:
+        return DaemonConfig(), ()
+    try:
+        text = read_text(path)
+    except BadConfiguration as error:
+        return None, (Fault("", error),)
+    faults = [*text.twice, *section_faults(DaemonConfig, text.document)]
+    if not faults:
+        config = msgspec.convert(with_credentials(text.document), DaemonConfig)
+        faults = [Fault(_named_in(error), error) for error in _together(config)]
+        if not faults:
+            return config, ()
+    return None, tuple(
+        replace(fault, line=fault.line or text.line_of(fault.key)) for fault in faults
+    )
+
+
+def _named_in(error: BadConfiguration) -> str:
+    """Return the key that an error begins with."""
+    match = re.match(r"[\w.\[\]]*", str(error))
+    return match[0] if match else ""
+
+
+def _together(config: DaemonConfig) -> Iterator[BadConfiguration]:
+    """Yield what no single value shows."""
+    low, high = config.map.free_at_most, config.map.occupied_at_least
+    if low >= high:
+        yield BadConfiguration(
+            f"map.free_at_most must be below map.occupied_at_least, got {low} and {high}"
+        )
+    bus = config.bus
+    if not (bus.listen or bus.connect):
+        yield BadConfiguration("bus.listen and bus.connect must not both be empty")
+    yield from security_faults(
+        bus.security, bus.listen, bus.connect, open_to_everyone=bus.open_to_everyone
+    )
+    if bus.security.roles.ros and not config.ros2:
+        yield BadConfiguration("bus.security.roles.ros: without a block ros2 there is no such role")
+    part_mb, quota_mb = config.recording.part_mb, config.recording.quota_mb
+    if 0 < quota_mb < 2 * part_mb:
+        yield BadConfiguration(
+            f"recording.quota_mb must be 0 or at least twice recording.part_mb, {2 * part_mb}, "
+            f"got {quota_mb}"
+        )
+    if "\0" in config.mission.state_dir:
+        yield BadConfiguration("mission.state_dir must be a path, got one with a NUL")
+    if config.ros2:
+        for error in config.ros2.faults():
+            yield BadConfiguration(f"ros2.{error}")
+    yield from _refused("bus.", lambda: Keys(base=config.bus.base))
+    yield from _refused("robot.name: ", lambda: Keys(robot=config.robot.name))
+    yield from _refused("robot: ", config.robot.cost)
+    yield from _refused("planner.", config.planner.colony)
+
+
+def _refused(before: str, make: Callable[[], object]) -> Iterator[BadConfiguration]:
+    """Yield why something cannot be made of the configuration, if so."""
+    try:
+        make()
+    except BadConfiguration as error:
+        yield BadConfiguration(before + str(error))

@@ -1,0 +1,180 @@
+"""Whether a certificate, its key and its CA fit together: tried, not read.
+
+Both sides of a TLS connection are played in memory with the same files. What is found wrong is
+what others would find wrong with who connects with them; and with who listens with them.
+
+How a process that joins a secured daemon or router shows who it is.
+
+Files that a service manager lends the service, see LoadCredential= in systemd.exec(5).
+
+Their folder has another name for each service, so that a configuration that several read can
+only say where to find it: ``$CREDENTIALS_DIRECTORY/key.pem``.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import ssl
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from fasaco_edge.config.security import SecurityConfig, TlsConfig, security_faults
+from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
+from fasaco_edge.host.plain_yaml import load, read_bounded
+
+ROUND_TRIPS = 8
+# X509_V_FLAG_NO_CHECK_TIME, for which ssl has no name.
+NO_CHECK_TIME = 0x20_0000
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What a certificate says.
+
+    Attributes:
+        name: its common name, by which roles are given.
+        hosts: the names and addresses by which others may connect to it.
+        begins: when it and its CA are valid.
+        ends: when it or its CA ends, whichever is first.
+    """
+
+    name: str
+    hosts: tuple[str, ...]
+    begins: datetime
+    ends: datetime
+
+
+def read_certificate(files: TlsConfig, *, listens: bool = True) -> Certificate:
+    """Return what the certificate says.
+
+    Args:
+        files: certificate, key and CA.
+        listens: whether others connect to whom it belongs, too.
+
+    Raises:
+        BadConfiguration: a file cannot be read, has ended, or does not fit the others.
+        ClockBeforeCertificate: by this computer's clock it is not valid yet.
+    """
+    try:
+        listening, connecting = _context(files, server=True), _context(files, server=False)
+        if not listens:
+            connecting.verify_mode = ssl.CERT_NONE
+        said = _shaken_hands(listening, connecting)
+        chain = [said, *listening.get_ca_certs()]
+    except ssl.SSLCertVerificationError as error:
+        raise BadConfiguration(f"{files.certificate}: {error.verify_message}") from error
+    except ssl.SSLError as error:
+        # Where a file holds no PEM, or the key is locked, there is no reason given.
+        reason = (error.reason or "not PEM, or a key with a password").lower().replace("_", " ")
+        together = f"{files.certificate}, {files.private_key} and {files.root_ca}"
+        raise BadConfiguration(f"{together} do not fit together: {reason}") from error
+    except OSError as error:
+        raise BadConfiguration(
+            f"{error.filename or files.certificate}: {error.strerror}"
+        ) from error
+    begins, ends = max(_times(chain, "notBefore")), min(_times(chain, "notAfter"))
+    now = datetime.now(UTC)
+    if now < begins:
+        raise ClockBeforeCertificate(
+            f"the clock says {now:%Y-%m-%d %H:%M} UTC, which is before the beginning of "
+            f"{files.certificate}, {begins:%Y-%m-%d %H:%M}: nobody can be connected with by it"
+        )
+    if now > ends:
+        raise BadConfiguration(f"{files.certificate}: certificate has expired, {ends:%Y-%m-%d}")
+    names = [value for part in said["subject"] for key, value in part if key == "commonName"]
+    return Certificate(
+        name=names[-1] if names else "",
+        hosts=tuple(value for _, value in said.get("subjectAltName", ())),
+        begins=begins,
+        ends=ends,
+    )
+
+
+def _times(chain: Sequence[Mapping[str, Any]], name: str) -> list[datetime]:
+    return [datetime.fromtimestamp(ssl.cert_time_to_seconds(one[name]), UTC) for one in chain]
+
+
+def _context(files: TlsConfig, *, server: bool) -> ssl.SSLContext:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER if server else ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname = False
+    context.verify_mode = ssl.CERT_REQUIRED
+    # Whether it is valid by now is told apart from whether it fits.
+    context.verify_flags |= NO_CHECK_TIME
+    # A key that needs a password must not make us ask for it.
+    context.load_cert_chain(files.certificate, files.private_key, password=lambda: "")
+    context.load_verify_locations(files.root_ca)
+    return context
+
+
+def _shaken_hands(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> dict[str, Any]:
+    """Return what the side that listens is shown."""
+    there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
+    client = connecting.wrap_bio(back, there)
+    server = listening.wrap_bio(there, back, server_side=True)
+    for _ in range(ROUND_TRIPS):
+        for side in (client, server):
+            with contextlib.suppress(ssl.SSLWantReadError):
+                side.do_handshake()
+    shown: dict[str, Any] | None = server.getpeercert()
+    assert shown is not None
+    return shown
+
+
+def read_client_security(words: str, connect: Sequence[str]) -> SecurityConfig:
+    """Return what ``--security`` says: a YAML file, or the same as JSON beginning with ``{``.
+
+    Raises:
+        BadConfiguration: it cannot be read, is incomplete, or does not fit the endpoints.
+    """
+    try:
+        text = words if words.startswith("{") else read_bounded(Path(words))
+        security = msgspec.convert(load(text) or {}, SecurityConfig)
+        for fault in security_faults(security, (), connect):
+            raise fault
+    except OSError as error:
+        raise BadConfiguration(f"--security: {words}: {error.strerror}") from error
+    except ValueError as error:
+        raise BadConfiguration(f"--security: {error}") from error
+    except BadConfiguration as error:
+        raise BadConfiguration(f"--security, --connect: {error}", hint=error.hint) from error
+    return security
+
+
+def client_words(security: SecurityConfig) -> list[str]:
+    """Return the words of a command line by which another process shows the same name.
+
+    They name files; a password never stands there.
+    """
+    if security.kind == "none":
+        return []
+    part: dict[str, object] = {"kind": security.kind}
+    if security.kind == "tls":
+        part["tls"] = msgspec.to_builtins(security.tls)
+    else:
+        user = security.user
+        part["user"] = {"name": user.name, "password_file": user.password_file}
+    return ["--security", msgspec.json.encode(part).decode()]
+
+
+FOLDER = "CREDENTIALS_DIRECTORY"
+
+
+def with_credentials(part: object, environ: Mapping[str, str] = os.environ) -> object:
+    """Return a part of a configuration with the folder in place of its name.
+
+    Where nobody lends anything the name stays: the file is missing then, and is named so.
+    """
+    folder = environ.get(FOLDER)
+    if folder is None:
+        return part
+    if isinstance(part, dict):
+        return {key: with_credentials(value, environ) for key, value in part.items()}
+    if isinstance(part, str) and part.startswith(f"${FOLDER}/"):
+        return folder + part.removeprefix(f"${FOLDER}")
+    return part

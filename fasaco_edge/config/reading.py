@@ -1,0 +1,189 @@
+"""All that is wrong with a document that is to be a section of the configuration.
+
+The text of a configuration: YAML, with the line of each key.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+import msgspec
+import yaml
+
+from fasaco_edge.config.sections import Section
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.plain_yaml import PlainYamlError, compose, read_bounded
+from fasaco_edge.text import shown
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing that is wrong.
+
+    Attributes:
+        key: where, like ``bus.listen[0]``; "" for the file.
+        error: what, and what is allowed; without the name of the file.
+        line: of the file, from 1 on; None where it has none.
+    """
+
+    key: str
+    error: BadConfiguration
+    line: int | None = None
+
+
+def section_faults(
+    kind: type[Section], document: object, key: str = "", root: type[Section] | None = None
+) -> Iterator[Fault]:
+    """Yield what keeps ``document`` from being a ``kind``, key by key.
+
+    Args:
+        kind: the section.
+        document: what YAML makes of its text.
+        key: of the section, "" for the whole.
+        root: the whole, where a key that is unknown here may belong elsewhere.
+    """
+    root = root or kind
+    fields = {field.encode_name: field for field in msgspec.structs.fields(kind)}
+    if not isinstance(document, dict):
+        yield _fault(key, f"{key or 'the file'}: expected object, got {shown(document)}")
+        return
+    if any(not isinstance(name, str) for name in document):
+        yield _fault(key, f"{key or 'the file'}: expected str as key, got {shown(document)}")
+    for name, value in document.items():
+        if not isinstance(name, str):
+            continue
+        path = f"{key}.{name}" if key else name
+        if name not in fields:
+            yield _fault(path, f"unknown key {path}{_meant(name, key, list(fields), root)}")
+        elif section := section_of(fields[name].type):
+            yield from section_faults(section, value, path, root)
+        elif fault := _value_fault(fields[name].type, value, path):
+            yield fault
+    for name, field in fields.items():
+        if field.required and name not in document:
+            yield _fault(key, f"{key}: object missing required field {name}")
+
+
+def section_of(kind: object) -> type[Section] | None:
+    """Return the section that a key of this type holds, one that may be left out, too."""
+    for choice in (kind, *get_args(kind)):
+        if isinstance(choice, type) and issubclass(choice, Section):
+            return choice
+    return None
+
+
+def _value_fault(kind: object, value: object, key: str) -> Fault | None:
+    wanted: Any = kind
+    try:
+        msgspec.convert(value, wanted)
+    except msgspec.ValidationError as error:
+        # "Expected `int` >= 1 - at `$[0]`"
+        match = re.fullmatch(r"(?P<what>.*?)(?: - at `\$(?P<at>[^`]*)`)?", str(error), re.DOTALL)
+        assert match is not None
+        at = match["at"] or ""
+        for index in re.findall(r"\[(\d+)\]", at):
+            assert isinstance(value, list)
+            value = value[int(index)]
+        what = match["what"].replace("`", "")
+        expected = _choices(kind) or what[0].lower() + what[1:].partition(", got")[0]
+        if expected == "expected str":
+            expected += ", in quotes"  # YAML 1.1 takes 8:1 for a number
+        return _fault(key + at, f"{key}{at}: {expected}, got {shown(value)}")
+    return None
+
+
+def _choices(kind: object) -> str:
+    """Return what a key may be where that is one of a few names, else ""."""
+    if get_origin(kind) is not Literal:
+        return ""
+    *others, last = get_args(kind)
+    return "expected " + (f"{', '.join(others)} or {last}" if others else str(last))
+
+
+def _meant(name: str, key: str, names: list[str], root: type[Section]) -> str:
+    """Return which key was meant, or which there are."""
+    before = f"{key}." if key else ""
+    if near := get_close_matches(name, names, 1):
+        return f"; did you mean {before}{near[0]}?"
+    elsewhere = [path for path in _paths(root, "") if path.rpartition(".")[2] == name]
+    if elsewhere:
+        return f"; did you mean {' or '.join(elsewhere)}?"
+    return f"; there are {', '.join(names)}"
+
+
+def _paths(kind: type[Section], before: str) -> Iterator[str]:
+    """Yield all keys there are."""
+    for field in msgspec.structs.fields(kind):
+        path = before + field.encode_name
+        yield path
+        if section := section_of(field.type):
+            yield from _paths(section, f"{path}.")
+
+
+def _fault(key: str, text: str) -> Fault:
+    return Fault(key, BadConfiguration(text))
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigText:
+    """What a file holds.
+
+    Attributes:
+        document: plain values.
+        lines: of each key, from 1 on.
+        twice: keys that stand there more than once: YAML would take the last.
+    """
+
+    document: object
+    lines: dict[str, int] = dataclasses.field(default_factory=dict)
+    twice: tuple[Fault, ...] = ()
+
+    def line_of(self, key: str) -> int | None:
+        """Return the line of a key, or of what it would stand in; None where nothing does."""
+        while key:
+            if key in self.lines:
+                return self.lines[key]
+            key = key[: max(key.rfind("."), key.rfind("["), 0)]
+        return None
+
+
+def read_text(path: Path) -> ConfigText:
+    """Read a file.
+
+    Raises:
+        BadConfiguration: it cannot be read, or is no YAML; without the name of the file.
+    """
+    try:
+        node, document = compose(read_bounded(path))
+    except OSError as error:
+        raise BadConfiguration(str(error.strerror)) from error
+    except PlainYamlError as error:
+        raise BadConfiguration(f"not plain YAML: {error}") from error
+    lines: dict[str, int] = {}
+    twice = []
+    for key, line in _keys(node, ""):
+        if key in lines:
+            said = f"{key}: stands twice, in line {lines[key]} and in line {line}"
+            twice.append(Fault(key, BadConfiguration(said), line))
+        lines[key] = line
+    return ConfigText(document if document is not None else {}, lines, tuple(twice))
+
+
+def _keys(node: yaml.Node | None, before: str) -> Iterator[tuple[str, int]]:
+    """Yield each key and its line."""
+    if isinstance(node, yaml.MappingNode):
+        for name, value in node.value:
+            key = f"{before}.{name.value}" if before else str(name.value)
+            yield key, name.start_mark.line + 1
+            yield from _keys(value, key)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            key = f"{before}[{index}]"
+            yield key, item.start_mark.line + 1
+            yield from _keys(item, key)

@@ -1,0 +1,153 @@
+"""Configuration of the daemon's side towards ROS 2."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from fasaco_edge.bus.access import Role, ros_rights
+from fasaco_edge.config.sections import Section
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.wire import schemas
+from fasaco_edge.wire.limits import MAX_STRING_BYTES
+from fasaco_edge.wire.ros_keys import RosTopic, graph_key
+
+# ROS 2 design, "Topic and Service name mapping": letters, digits, _; no digit first.
+_TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+_NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+# rmw/validate_full_topic_name.h, RMW_TOPIC_MAX_NAME_LENGTH.
+_MAX_TOPIC_LENGTH = 247
+
+DEFAULT_NODE = "fasaco_edge"
+# As tf2's listeners have it. A bridge keeps all nodes' static transforms in one history.
+TF_DEPTH = POSE_DEPTH = 100
+UPDATES_DEPTH = 256
+
+
+class RosTopicNames(Section, frozen=True):
+    """Names of topics, before which the namespace is put; ``pose`` or ``tf`` is not needed."""
+
+    map: str = "/map"
+    map_updates: str = "/map_updates"
+    pose: str = "/pose"
+    tf: str = "/tf"
+    tf_static: str = "/tf_static"
+    coverage_path: str = "/coverage_path"
+    coverage_grid: str = "/coverage_grid"
+
+
+class RosFrames(Section, frozen=True):
+    """Where the chain of transforms begins and ends; what is between is found by itself."""
+
+    map: str = "map"
+    robot: str = "base_link"
+
+
+class RosConfig(Section, frozen=True):
+    """ROS 2 topics, beside the native keys.
+
+    ``kind`` says how ROS comes to Zenoh: its middleware is rmw_zenoh, or zenoh-bridge-ros2dds
+    stands between. ``domain`` and ``node`` are for rmw_zenoh alone: a bridge has its own.
+    ``pose`` is the type of the pose's topic, or "tf".
+    """
+
+    kind: Literal["bridge", "rmw_zenoh"]
+    domain: Annotated[int, Meta(ge=0, le=2**32 - 1)] = 0
+    namespace: str = "/"
+    node: str = DEFAULT_NODE
+    topics: RosTopicNames = RosTopicNames()
+    pose: Literal[
+        "tf",
+        "geometry_msgs/msg/PoseStamped",
+        "geometry_msgs/msg/PoseWithCovarianceStamped",
+        "nav_msgs/msg/Odometry",
+    ] = "tf"
+    frames: RosFrames = RosFrames()
+
+    @property
+    def map(self) -> RosTopic:
+        """In: the map."""
+        return RosTopic(self._name(self.topics.map), schemas.OCCUPANCY_GRID, latched=True)
+
+    @property
+    def map_updates(self) -> RosTopic:
+        """In: new values for a window of the map."""
+        name = self._name(self.topics.map_updates)
+        return RosTopic(name, schemas.OCCUPANCY_GRID_UPDATE, depth=UPDATES_DEPTH)
+
+    @property
+    def poses(self) -> dict[str, RosTopic]:
+        """In: what tells where the robot is, by the mailbox's kind."""
+        if self.pose != "tf":
+            return {"pose": RosTopic(self._name(self.topics.pose), self.pose, depth=POSE_DEPTH)}
+        tf, static = self._name(self.topics.tf), self._name(self.topics.tf_static)
+        return {
+            "tf_static": RosTopic(static, schemas.TF_MESSAGE, latched=True, depth=TF_DEPTH),
+            "pose": RosTopic(tf, schemas.TF_MESSAGE, depth=TF_DEPTH),
+        }
+
+    @property
+    def coverage_path(self) -> RosTopic:
+        """Out: the walk still to be driven."""
+        return RosTopic(self._name(self.topics.coverage_path), schemas.PATH, latched=True)
+
+    @property
+    def coverage_grid(self) -> RosTopic:
+        """Out: what is covered."""
+        name = self._name(self.topics.coverage_grid)
+        return RosTopic(name, schemas.OCCUPANCY_GRID, latched=True)
+
+    def rights(self) -> Role:
+        """Return what those may do that have the role ``ros``."""
+        heard = [self.map, self.map_updates, *self.poses.values()]
+        said = [self.coverage_path, self.coverage_grid]
+        if self.kind == "bridge":
+            return ros_rights(
+                [topic.bridge_key for topic in heard], [topic.bridge_key for topic in said], []
+            )
+        return ros_rights(
+            [topic.rmw_key(self.domain, any_hash=True) for topic in heard],
+            [topic.rmw_key(self.domain) for topic in said],
+            [graph_key(self.domain)],
+        )
+
+    def faults(self) -> Iterator[BadConfiguration]:
+        """Yield what no single value's type shows.
+
+        A name is none, two topics have one name, or what is for rmw_zenoh alone was said of a
+        bridge.
+        """
+        if self.namespace != "/" and not _TOPIC.fullmatch(self.namespace):
+            yield BadConfiguration(f"namespace must be / or like /robot1, got {self.namespace!r}")
+        if not _NODE.fullmatch(self.node):
+            yield BadConfiguration(f"node must be letters, digits and _, got {self.node!r}")
+        if self.kind == "bridge" and (self.domain != 0 or self.node != DEFAULT_NODE):
+            yield BadConfiguration("domain and node are for kind rmw_zenoh: a bridge has its own")
+        yield from self._topic_faults()
+        for key in ("map", "robot"):
+            frame = getattr(self.frames, key)
+            # What cannot be printed may have no UTF-8, or be a NUL.
+            printed = frame if frame.isprintable() else ""
+            if not 0 < len(printed.encode()) <= MAX_STRING_BYTES:
+                yield BadConfiguration(f"frames.{key} must be the name of a frame, got {frame!r}")
+        if self.frames.map == self.frames.robot:
+            both = self.frames.map
+            yield BadConfiguration(f"frames.map and frames.robot must differ, got {both!r} twice")
+
+    def _topic_faults(self) -> Iterator[BadConfiguration]:
+        keys: dict[str, str] = {}
+        for key in RosTopicNames.__struct_fields__:
+            name: str = getattr(self.topics, key)
+            if not _TOPIC.fullmatch(name) or len(self._name(name)) > _MAX_TOPIC_LENGTH:
+                yield BadConfiguration(f"topics.{key} must be like /robot1/map, got {name!r}")
+            if name in keys:
+                yield BadConfiguration(
+                    f"topics.{keys[name]} and topics.{key} must differ, got {name!r} twice"
+                )
+            keys[name] = key
+
+    def _name(self, topic: str) -> str:
+        return self.namespace.rstrip("/") + topic

@@ -1,0 +1,132 @@
+"""What all sections of a configuration have in common.
+
+Configuration of the planner.
+
+Configuration of the mission, and of where its progress is kept.
+
+Configuration of the recorder that the daemon starts with --record.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
+
+
+class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Unknown keys are errors."""
+
+
+class PlannerConfig(Section, frozen=True):
+    """The colony, see ``planners.colony.ColonyConfig``; and the time one plan may take [s].
+
+    While the robot drives, ``spare_share`` of a processor core goes into making the rest of its
+    path better; fasaco with local search alone can do that.
+
+    ``local_search`` is for fasaco alone; without it a plan may end before its budget.
+
+    ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
+    The paper's ants see no further than their neighbours; a robot's see what will soon
+    be cut off, which saves it revisits (``fasaco_edge/bench/RESULTS.md``).
+    """
+
+    name: Literal["fasaco", "aco", "stc", "spiral-stc", "zigzag"] = "fasaco"
+    local_search: bool = True
+    ants: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
+    velocities: str = "8:1"
+    q0: Annotated[float, Meta(ge=0, le=1)] = 0.98
+    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.1
+    tau0: Annotated[float, Meta(ge=1e-12, le=1e6)] = 0.1
+    visibility: Literal["neighbour", "distance", "fewest-open"] = "fewest-open"
+    beta: Annotated[float, Meta(ge=0, le=10)] = 2.0
+    threads: Annotated[int, Meta(ge=1, le=64)] = 1
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
+    budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.1
+    spare_share: Annotated[float, Meta(ge=0, le=1)] = 0.05
+
+    def colony(self) -> ColonyConfig:
+        """Return these as a colony.
+
+        Raises:
+            BadConfiguration: the velocities cannot be read, or there are fewer ants
+                than cohorts.
+        """
+        return ColonyConfig(
+            ants=self.ants,
+            velocities=parse_velocities(self.velocities),
+            q0=self.q0,
+            alpha=self.alpha,
+            tau0=self.tau0,
+            seed=self.seed,
+            visibility=self.visibility,
+            beta=self.beta,
+        )
+
+
+class MissionSettings(Section, frozen=True):
+    """Whether to begin without being told to, how patient to be, and where progress is kept.
+
+    What is blocked or left over in the end is tried again ``retries`` times, each after
+    ``retry_s`` [s]. Without a pose for ``lost_pose_s`` [s], or a map or an update for
+    ``stale_map_s`` [s], the state is degraded; 0 for never. ``state_dir`` "" is the folder a
+    service manager or the user has for that.
+    """
+
+    autostart: bool = True
+    retries: Annotated[int, Meta(ge=0, le=100)] = 2
+    retry_s: Annotated[float, Meta(ge=0, le=86_400)] = 30.0
+    lost_pose_s: Annotated[float, Meta(ge=0, le=86_400)] = 3.0
+    stale_map_s: Annotated[float, Meta(ge=0, le=86_400)] = 0.0
+    state_dir: str = ""
+
+    def state_folder(self, environ: Mapping[str, str] = os.environ) -> Path:
+        """Return the folder of the coverage ledger.
+
+        By default systemd's $STATE_DIRECTORY, else fasaco-edge in an absolute $XDG_STATE_HOME,
+        else in ~/.local/state; BadConfiguration where there is no such home.
+        """
+        if self.state_dir:
+            return _home(Path(self.state_dir))
+        if service := environ.get("STATE_DIRECTORY", "").partition(":")[0]:
+            return Path(service)
+        if (user := environ.get("XDG_STATE_HOME", "")).startswith("/"):
+            return Path(user, "fasaco-edge")
+        return _home(Path("~/.local/state/fasaco-edge"))
+
+
+def _home(path: Path) -> Path:
+    try:
+        return path.expanduser()
+    except RuntimeError as error:
+        raise BadConfiguration(f"mission.state_dir: {path}: there is no home folder") from error
+
+
+class RecordingConfig(Section, frozen=True):
+    """How large and how old a file may become, and what all may take.
+
+    A recording goes on in the next file after ``part_mb`` [MB] or ``part_min`` [min], 0 for
+    never. Of more than ``quota_mb`` [MB] of this robot's files the oldest are deleted; 0 for
+    no limit. Nothing is written while the disk has less than ``least_free_mb`` [MB] free.
+    """
+
+    part_mb: Annotated[int, Meta(ge=1, le=100_000)] = 64
+    part_min: Annotated[float, Meta(ge=0, le=10_000)] = 10.0
+    quota_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 2000
+    least_free_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 200
+
+    def words(self) -> list[str]:
+        """Return these as options of ``fasaco-edge record``."""
+        return [
+            *("--part-mb", str(self.part_mb)),
+            *("--part-min", f"{self.part_min:g}"),
+            *("--quota-mb", str(self.quota_mb)),
+            *("--least-free-mb", str(self.least_free_mb)),
+        ]

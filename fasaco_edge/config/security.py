@@ -1,0 +1,249 @@
+"""Who may speak on the bus: ``bus.security`` of the configuration, and what Zenoh makes of it."""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta
+
+from fasaco_edge.bus import access
+from fasaco_edge.config.endpoints import UNIX, is_local, protocol_of
+from fasaco_edge.config.sections import Section
+from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate, OpenToEveryone
+from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_JSON_BYTES
+
+LOG = logging.getLogger(__name__)
+
+# Beside its cells a map holds some numbers and the name of a frame, a path's attachment less still.
+HEADER_BYTES = 1024
+# The largest pose is a nav_msgs/Odometry with two covariances and two names.
+POSE_BYTES = 4096
+ATTRIBUTES = {"tls": "cert_common_names", "user": "usernames"}
+
+Hertz = Annotated[float, Meta(gt=0, le=10_000)]
+Name = Annotated[str, Meta(min_length=1)]
+
+
+class TlsConfig(Section, frozen=True):
+    """Files, PEM: the CA that signs whoever takes part, this daemon's certificate and its key."""
+
+    root_ca: str = ""
+    certificate: str = ""
+    private_key: str = ""
+
+
+class UserConfig(Section, frozen=True):
+    """This daemon's user name, and the file that holds nothing but its password.
+
+    ``dictionary_file`` has a line ``name:password`` for each who may connect.
+    """
+
+    name: str = ""
+    password_file: str = ""
+    dictionary_file: str = ""
+
+
+class RolesConfig(Section, frozen=True):
+    """Who may do what: common names of certificates, or user names; see ``bus.access.ROLES``."""
+
+    mapper: tuple[Name, ...] = ()
+    viewer: tuple[Name, ...] = ()
+    operator: tuple[Name, ...] = ()
+    recorder: tuple[Name, ...] = ()
+    ros: tuple[Name, ...] = ()
+    router: tuple[Name, ...] = ()
+
+
+class LimitsConfig(Section, frozen=True):
+    """What each who takes part may send at most [bytes, 1/s]; see ``bus.access.Limits``."""
+
+    map_bytes: Annotated[int, Meta(ge=HEADER_BYTES)] = MAX_GRID_CELLS + HEADER_BYTES
+    maps_hz: Hertz = 100.0
+    poses_hz: Hertz = 200.0
+    queries_hz: Hertz = 100.0
+
+
+class SecurityConfig(Section, frozen=True):
+    """How others show who they are, and what they may do then."""
+
+    kind: Literal["none", "tls", "user"] = "none"
+    tls: TlsConfig = TlsConfig()
+    user: UserConfig = UserConfig()
+    roles: RolesConfig = RolesConfig()
+    limits: LimitsConfig = LimitsConfig()
+
+    def names(self) -> dict[str, tuple[str, ...]]:
+        """Return who has each role."""
+        return {role: getattr(self.roles, role) for role in self.roles.__struct_fields__}
+
+    def warn_of_clock(self) -> None:
+        """Log where nobody can be connected with because the clock is before the certificate.
+
+        Certificates are looked into, which takes memory and time, only where the clock is before
+        the time at which they, or this program, were written.
+        """
+        if self.kind != "tls":
+            return
+        try:
+            written = [os.stat(path).st_mtime for _, path in files(self)]
+            if time.time() >= max(*written, Path(__file__).stat().st_mtime):
+                return
+            from fasaco_edge.config.credentials import read_certificate  # noqa: PLC0415
+
+            read_certificate(self.tls)
+        except ClockBeforeCertificate as error:
+            LOG.warning("%s; %s", error, error.hint, extra={"event": "clock"})
+        except (OSError, BadConfiguration):
+            return  # whoever opens the session tells that
+
+    def of_client(self) -> dict[str, Any]:
+        """Return what a session needs to show who it is, as a part of Zenoh's configuration.
+
+        Raises:
+            BadConfiguration: a file cannot be read.
+        """
+        match self.kind:
+            case "tls":
+                for name, file in files(self):
+                    _read(name, file)
+                tls = self.tls
+                transport = access.mutual_tls(tls.root_ca, tls.certificate, tls.private_key)
+            case "user":
+                user = self.user
+                password = _read("user.password_file", user.password_file).strip()
+                if not password:
+                    raise BadConfiguration(
+                        f"bus.security.user.password_file: {user.password_file} is empty"
+                    )
+                transport = access.user_password(user.name, password)
+            case _:
+                return {}
+        # Gossip would tell everybody where everybody is, and let them make us connect there.
+        return {"transport": transport, "scouting": {"gossip": {"enabled": False}}}
+
+    def of_daemon(self, prefix: str, ros: access.Role | None = None) -> dict[str, Any]:
+        """Return what a daemon's session needs besides, to keep others to their roles.
+
+        Args:
+            prefix: what all keys of the robot begin with.
+            ros: what the role of that name may do; None without a block ``ros2``.
+
+        Raises:
+            BadConfiguration: a file cannot be read.
+        """
+        part = self.of_client()
+        if self.kind == "none":
+            return part
+        if self.kind == "user" and self.user.dictionary_file:
+            _read("user.dictionary_file", self.user.dictionary_file)
+            part["transport"]["auth"]["usrpwd"]["dictionary_file"] = self.user.dictionary_file
+        grants = [
+            access.Grant(role, who, prefix) for role, who in self.names().items() if role != "ros"
+        ]
+        if ros is not None:
+            grants.append(access.Grant("ros", self.roles.ros, "", rights=ros))
+            # A recorder hears what the daemon hears.
+            heard = access.Role(ros.told, listens=ros.speaks)
+            grants.append(access.Grant("ros", self.roles.recorder, "", of="recorder", rights=heard))
+        part["access_control"] = access.access_control(grants, ATTRIBUTES[self.kind])
+        return part | self.thinned(prefix)
+
+    def thinned(self, prefix: str) -> dict[str, Any]:
+        """Return the limits, as a part of Zenoh's configuration."""
+        most = self.limits
+        return access.limits(
+            prefix,
+            access.Limits(
+                map_bytes=most.map_bytes,
+                pose_bytes=POSE_BYTES,
+                json_bytes=MAX_JSON_BYTES + HEADER_BYTES,
+                maps_hz=most.maps_hz,
+                poses_hz=most.poses_hz,
+                queries_hz=most.queries_hz,
+            ),
+        )
+
+
+def files(security: SecurityConfig) -> Iterator[tuple[str, str]]:
+    """Yield the files that the chosen kind needs: the key under ``bus.security``, and the path."""
+    if security.kind == "none":
+        return
+    section = getattr(security, security.kind)
+    for name in section.__struct_fields__:
+        if name != "name":
+            yield f"{security.kind}.{name}", getattr(section, name)
+
+
+def security_faults(
+    security: SecurityConfig,
+    listen: Sequence[str],
+    connect: Sequence[str],
+    *,
+    open_to_everyone: bool = False,
+) -> Iterator[BadConfiguration]:
+    """Yield what is missing, or does not go together.
+
+    That is OpenToEveryone where anybody could speak at an endpoint that can be reached from
+    elsewhere.
+    """
+    beyond = [endpoint for endpoint in listen if not is_local(endpoint)]
+    if security.kind == "none":
+        if beyond and not open_to_everyone:
+            yield OpenToEveryone(
+                f"bus.listen: {beyond[0]} can be reached from other computers, and everybody there "
+                "could give this robot maps and commands"
+            )
+        named = [role for role, who in security.names().items() if who]
+        if named:
+            yield BadConfiguration(
+                f"bus.security.roles.{named[0]}: with bus.security.kind none nobody shows a name"
+            )
+        return
+    if open_to_everyone:
+        yield BadConfiguration(
+            f"bus.open_to_everyone: contradicts bus.security.kind {security.kind}"
+        )
+    yield from _missing(security, listen)
+    for key, endpoints in (("listen", listen), ("connect", connect)):
+        for endpoint in endpoints:
+            yield from _protocol_faults(security.kind, key, endpoint)
+
+
+def _missing(security: SecurityConfig, listen: Sequence[str]) -> Iterator[BadConfiguration]:
+    if security.kind == "user" and not security.user.name:
+        yield BadConfiguration("bus.security.user.name: needed with bus.security.kind user")
+    for name, file in files(security):
+        if "\0" in file:
+            yield BadConfiguration(f"bus.security.{name} must be a path, got one with a NUL")
+        if not file and (name != "user.dictionary_file" or listen):
+            yield BadConfiguration(
+                f"bus.security.{name}: needed with bus.security.kind {security.kind}"
+            )
+
+
+def _protocol_faults(kind: str, key: str, endpoint: str) -> Iterator[BadConfiguration]:
+    protocol = protocol_of(endpoint)
+    if kind == "tls" and protocol != "tls":
+        yield BadConfiguration(
+            f"bus.{key}: {endpoint}: only tls/<host>:<port> carries certificates",
+            hint="correct the endpoint, or bus.security.kind",
+        )
+    if kind == "user" and protocol not in ("tcp", "ws", *UNIX):
+        yield BadConfiguration(
+            f"bus.{key}: {endpoint}: user and password are shown over tcp, ws or a unix socket",
+            hint="correct the endpoint, or bus.security.kind",
+        )
+
+
+def _read(name: str, file: str) -> str:
+    try:
+        return Path(file).read_text(encoding="utf-8")
+    except OSError as error:
+        raise BadConfiguration(f"bus.security.{name}: {file}: {error.strerror}") from error
+    except ValueError as error:
+        raise BadConfiguration(f"bus.security.{name}: {file}: not a text") from error

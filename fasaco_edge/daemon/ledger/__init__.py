@@ -1,0 +1,1 @@
+"""The coverage ledger on disk."""

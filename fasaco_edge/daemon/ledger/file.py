@@ -1,0 +1,269 @@
+"""A robot's ledger on disk: two generations, each whole or not there at all.
+
+``<robot>.ledger`` is the newest, ``<robot>.ledger.previous`` the one before. A new one is
+written to ``<robot>.ledger.new`` and on to the disk itself; only then the names move on: at
+every moment a whole ledger stands under one of them, and ``load`` finds the newest. What
+cannot be used is kept aside under another name, which says why: of each kind the newest few, and
+the largest. What has no covered cell is not worth keeping.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import re
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from fasaco_edge.daemon.ledger.codec import (
+    MOST_BYTES,
+    LedgerFileError,
+    decode_ledger,
+    encode_ledger,
+)
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.host.durable import make_folder, sync_folder, write_through
+from fasaco_edge.host.files import open_own, read_own
+from fasaco_edge.mission.coverage.ledger import LedgerMismatchError, LedgerSnapshot
+
+# So many files of each kind are kept aside, and the largest.
+KEPT_ASIDE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What there was on disk: a ledger, or none; and what was wrong, if anything."""
+
+    ledger: LedgerSnapshot | None = None
+    fault: FasacoError | None = None
+
+
+class LedgerFile:
+    """The files of one robot in a folder; made for one process at a time.
+
+    Attributes:
+        path: the newest generation.
+    """
+
+    def __init__(self, folder: Path, robot: str) -> None:
+        self.path = folder / f"{robot}.ledger"
+        self._new = folder / f"{robot}.ledger.new"
+        self._previous = folder / f"{robot}.ledger.previous"
+        self._lock: int | None = None
+        self._exclusive = False
+        # Files to be renamed before anything is written; why is in their new names.
+        self._unwanted: list[tuple[Path, str]] = []
+        # Whether the new generation is whole, but still under its own name.
+        self._moving = False
+
+    def lock(self) -> None:
+        """Keep other processes from writing this ledger, until this one ends.
+
+        Raises:
+            LedgerFileError: another process has it.
+        """
+        self._exclusive = True
+        # What there is no folder for yet is locked before it is written.
+        with contextlib.suppress(OSError):
+            self._take_lock()
+
+    def load(self, cell_m: float) -> Found:
+        """Return the newest whole ledger, and finish a write that was cut short.
+
+        Args:
+            cell_m: edge of the cells it has to have [m].
+        """
+        broken: list[tuple[Path, FasacoError]] = []
+        for path in (self._new, self.path, self._previous):
+            try:
+                ledger = decode_ledger(_read(path), cell_m)
+            except (FileNotFoundError, NotADirectoryError):
+                continue
+            except LedgerMismatchError as error:
+                return Found(fault=self._refused(error))
+            except (OSError, LedgerFileError) as error:
+                # A write that was cut short is no fault: what was there before still is.
+                if path != self._new:
+                    broken.append((path, LedgerFileError(reason_of(error))))
+                continue
+            return self._taken(path, ledger, broken)
+        if broken:
+            return Found(fault=self._lost(broken))
+        # What appears later, on a disk that is mounted late, was not read: not overwritten either.
+        self._unwanted = [(path, "unread") for path in (self.path, self._previous)]
+        return Found()
+
+    def write(self, ledger: LedgerSnapshot) -> list[str]:
+        """Write a ledger so that it outlives a loss of power from the moment this returns.
+
+        Returns the names under which files that were in its way are kept.
+
+        Raises:
+            LedgerFileError: another process has it, which ``lock`` could not find out.
+            OSError: that failed; what was there before still is.
+        """
+        payload = encode_ledger(ledger)
+        make_folder(self.path.parent)
+        if self._exclusive and self._lock is None:
+            self._take_lock()
+        kept = self._rename_unwanted()
+        if self._moving and self._new.exists():
+            self._move_on()  # it may be the only whole one but that before
+        try:
+            write_through(self._new, payload)
+        except OSError:
+            # Half a file only takes room from others, on a disk that may be full.
+            self._new.unlink(missing_ok=True)
+            raise
+        self._moving = True
+        self._move_on()
+        return kept
+
+    def set_aside(self, why: str) -> list[str]:
+        """Keep what there is under other names, and return these.
+
+        Args:
+            why: a word for the new names.
+
+        Raises:
+            OSError: it could not be renamed yet; that is done before the next write.
+        """
+        self._unwanted = [(path, why) for path in (self._new, self.path, self._previous)]
+        return self._rename_unwanted()
+
+    def _take_lock(self) -> None:
+        make_folder(self.path.parent)
+        # Not open for writing: that would keep the disk from turning read-only.
+        lock = open_own(f"{self.path}.lock", os.O_RDONLY)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            os.close(lock)
+            raise LedgerFileError(
+                f"another daemon keeps the ledger {self.path}",
+                hint="end it, or give this one another robot.name, mission.state_dir or --state",
+            ) from error
+        except OSError:
+            pass  # there are no locks on this disk
+        self._lock = lock
+
+    def _taken(
+        self, path: Path, ledger: LedgerSnapshot, broken: list[tuple[Path, FasacoError]]
+    ) -> Found:
+        self._moving = path == self._new
+        try:
+            if self._moving:
+                self._move_on()
+        except OSError as error:
+            return Found(ledger, LedgerFileError(f"cannot write {self.path}: {reason_of(error)}"))
+        if path in (self.path, self._new):
+            return Found(ledger)
+        why = "; ".join(f"{bad.name}: {error}" for bad, error in broken) or f"no {self.path.name}"
+        fault = LedgerFileError(
+            f"gone on from the ledger before the newest ({why})",
+            hint="the last second or two before the end may be lost; check the disk",
+        )
+        return Found(ledger, self._after_aside(fault, [bad for bad, _ in broken], "broken"))
+
+    def _refused(self, error: LedgerMismatchError) -> FasacoError:
+        everything = [self._new, self.path, self._previous]
+        return self._after_aside(error, everything, "mismatch")
+
+    def _lost(self, broken: list[tuple[Path, FasacoError]]) -> FasacoError:
+        why = "; ".join(f"{bad.name}: {error}" for bad, error in broken)
+        fault = LedgerFileError(
+            f"no ledger could be read ({why}): begun anew",
+            hint="everything is to be covered again; check the disk",
+        )
+        return self._after_aside(fault, [bad for bad, _ in broken], "broken")
+
+    def _after_aside(self, fault: FasacoError, paths: list[Path], why: str) -> FasacoError:
+        """Return ``fault`` with where the files were kept."""
+        self._unwanted = [(path, why) for path in paths]
+        try:
+            kept = self._rename_unwanted()
+        except OSError as error:
+            return type(fault)(f"{fault}; {reason_of(error)}", hint=fault.hint)
+        if not kept:
+            return fault
+        return type(fault)(f"{fault}; kept as {', '.join(kept)}", hint=fault.hint)
+
+    def _rename_unwanted(self) -> list[str]:
+        """Rename what is not to be overwritten; return the new names."""
+        kept = []
+        while self._unwanted:
+            path, why = self._unwanted[-1]
+            if path.exists() and _is_empty(path):
+                path.unlink()
+            elif path.exists():
+                aside = _free_name(path, why)
+                path.rename(aside)
+                kept.append(aside.name)
+                _prune(path, why, aside)
+            self._unwanted.pop()
+        if kept:
+            # Else they may be back under their old names after a loss of power.
+            sync_folder(self.path.parent)
+        return kept[::-1]
+
+    def _move_on(self) -> None:
+        """Make the new generation the newest, and that the one before; in this order.
+
+        After a crash in between, the new one is found under its own name.
+        """
+        if self.path.exists():
+            os.replace(self.path, self._previous)
+        os.replace(self._new, self.path)
+        self._moving = False
+        sync_folder(self.path.parent)
+
+
+def _read(path: Path) -> bytes:
+    # Anything but a plain file might keep the reader waiting.
+    if path.exists() and not path.is_file():
+        raise LedgerFileError("no plain file")
+    payload = read_own(path, MOST_BYTES + 1)
+    if len(payload) > MOST_BYTES:
+        raise LedgerFileError(f"over {MOST_BYTES} bytes")
+    return payload
+
+
+def _is_empty(path: Path) -> bool:
+    """Tell whether a ledger can be read, and has no covered cell."""
+    with contextlib.suppress(OSError, FasacoError):
+        return not decode_ledger(_read(path), None).cells
+    return False
+
+
+def _prune(path: Path, why: str, newest: Path) -> None:
+    """Delete what was kept of the same kind, but the newest few and the largest."""
+    older = [other for other in _aside(path, why).values() if other != newest]
+    largest = max([*older, newest], key=lambda other: other.stat().st_size)
+    for other in older[: 1 - KEPT_ASIDE]:
+        if other != largest:
+            other.unlink()
+
+
+def _free_name(path: Path, why: str) -> Path:
+    """Return a name that tells when, and by its number after which others, whatever the clock."""
+    moment = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
+    number = max((number for number, _, _ in _aside(path, why)), default=0) + 1
+    return path.with_name(f"{path.name}.{why}-{moment}" + (f"-{number}" if number > 1 else ""))
+
+
+def _aside(path: Path, why: str) -> dict[tuple[int, str, str], Path]:
+    """Return what was kept of one kind by number, time and name, the oldest first."""
+    form = re.compile(re.escape(f"{path.name}.{why}-") + r"(\w+Z)(?:-(\d+))?")
+    found = {
+        (int(match[2] or 1), match[1], other.name): other
+        for other in path.parent.iterdir()
+        if (match := form.fullmatch(other.name))
+    }
+    return dict(sorted(found.items()))
+
+
+def reason_of(error: Exception) -> str:
+    """Return what went wrong, without the path that is told anyway."""
+    return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)

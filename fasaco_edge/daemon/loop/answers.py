@@ -1,0 +1,171 @@
+"""Answers to who asks what was said last: on Zenoh's thread, without waiting for the loop.
+
+Answers to who asks what this daemon is: its configuration, its versions, what can be asked.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable
+from functools import partial
+from typing import Any, cast
+
+import msgspec
+
+from fasaco_edge import __version__
+from fasaco_edge.bus.queries import Reply, Request, Shared, matches
+from fasaco_edge.bus.session import ZENOH_VERSION, Bus
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.errors import BadQuery, FasacoError, NotYet, UnknownQuery
+from fasaco_edge.wire.json_text import encode_error, encode_json
+from fasaco_edge.wire.keys import RPC_NAMES, VERSION, Keys
+
+NEWEST = "newest"
+Said = Reply | Shared
+
+
+def error_reply(error: FasacoError) -> Reply:
+    """Return the answer that tells an error."""
+    return Reply(encode_error(error), is_error=True)
+
+
+def answering(answer: Callable[[Request], Said]) -> Callable[[Request], Said]:
+    """Return ``answer`` such that an error it raises is the answer."""
+
+    def answered(request: Request) -> Said:
+        try:
+            return answer(request)
+        except FasacoError as error:
+            return error_reply(error)
+
+    return answered
+
+
+def check(request: Request, *parameters: str, payload: bool = False) -> None:
+    """Check that a query has no other parameters, and a payload only where it takes one.
+
+    Raises:
+        BadQuery: it has, by name.
+    """
+    name = request.key.rpartition("/")[2]
+    takes = ", ".join(parameters) or "none"
+    for parameter in request.parameters:
+        if parameter not in parameters:
+            raise BadQuery(f"{name}: unknown parameter {parameter!r}, it takes {takes}")
+    if request.payload and not payload:
+        raise BadQuery(f"{name} takes no payload, got one of {len(request.payload)} bytes")
+
+
+class LastSamples:
+    """Keeps what was said last on some topics, and answers with it.
+
+    The answer is the same on the topic itself, as a storage would give it.
+    """
+
+    def __init__(self, bus: Bus, keys: Keys) -> None:
+        self._lock = threading.Lock()
+        self._last: dict[str, Said] = {}
+        # Of the newest full plan: by cohort, and the newest; and the number of its request.
+        self._trails: dict[str, Said] = {}
+        self._plan = 0
+        for name in ("path", "status", "coverage"):
+            answer = answering(partial(self._answer, name))
+            for key in (keys.rpc(name), getattr(keys, name)):
+                bus.serve(key, answer)
+        for key in (keys.rpc("pheromone"), keys.pheromone):
+            bus.serve(key, answering(self._trail))
+
+    def keep(self, topic: str, reply: Said) -> None:
+        """Keep what was said on ``topic``."""
+        with self._lock:
+            self._last[topic] = reply
+
+    def keep_trail(self, plan: int, cohort: int, reply: Said) -> None:
+        """Keep the trail that ``cohort`` of plan ``plan`` has left."""
+        with self._lock:
+            if plan != self._plan:
+                self._plan, self._trails = plan, {}
+            self._trails[str(cohort)] = self._trails[NEWEST] = reply
+
+    def _answer(self, topic: str, request: Request) -> Said:
+        check(request)
+        with self._lock:
+            reply = self._last.get(topic)
+        if reply is None:
+            raise NotYet(f"there is no {topic} yet")
+        return reply
+
+    def _trail(self, request: Request) -> Said:
+        check(request, "cohort")
+        cohort = request.parameters.get("cohort", NEWEST)
+        if cohort != NEWEST:
+            if not re.fullmatch("[0-9]{1,9}", cohort):
+                raise BadQuery(f"cohort must be a whole number from 0, got {cohort!r}")
+            cohort = str(int(cohort))
+        with self._lock:
+            reply = self._trails.get(cohort)
+            kept = [name for name in self._trails if name != NEWEST]
+        if reply is not None:
+            return reply
+        if not kept:
+            raise NotYet("there is no pheromone yet: no full plan was made")
+        raise NotYet(
+            f"the newest full plan has no trail of cohort {cohort}",
+            hint=f"leave cohort out, or ask for {', '.join(kept)}",
+        )
+
+
+SECRET = re.compile(r"password|passphrase|secret|private_key|credential|token", re.IGNORECASE)
+LEFT_OUT = "(left out)"
+
+
+def serve_about(bus: Bus, keys: Keys, config: Callable[[], DaemonConfig]) -> None:
+    """Serve ``config``, as it is then, and ``version``; tell others what there is to ask."""
+    versions = {
+        "package": "fasaco-edge",
+        "version": __version__,
+        "protocol": VERSION.removeprefix("@"),
+        "zenoh": ZENOH_VERSION,
+    }
+    documents = {"config": lambda: config_document(config()), "version": lambda: versions}
+    for name, document in documents.items():
+        bus.serve(keys.rpc(name), answering(partial(_tell, document)))
+    bus.serve(f"{keys.prefix}/@rpc/*", partial(_unknown, keys), complete=False)
+
+
+def config_document(config: DaemonConfig) -> dict[str, Any]:
+    """Return the configuration in force as it may be shown to anybody: without secrets.
+
+    An endpoint may carry any setting of Zenoh's behind its ``#``, keys and passwords among
+    them: all that is left out.
+    """
+    return cast("dict[str, Any]", _shown(msgspec.to_builtins(config)))
+
+
+def _shown(value: object) -> object:
+    if isinstance(value, dict):
+        return {
+            name: LEFT_OUT if item and SECRET.search(str(name)) else _shown(item)
+            for name, item in value.items()
+        }
+    if isinstance(value, list | tuple):
+        return [_shown(item) for item in value]
+    if isinstance(value, str) and re.match(r"\w+/[^#]*#", value):
+        return f"{value.partition('#')[0]}#{LEFT_OUT}"
+    return value
+
+
+def _tell(document: Callable[[], dict[str, Any]], request: Request) -> Reply:
+    check(request)
+    return Reply(encode_json(document()))
+
+
+def _unknown(keys: Keys, request: Request) -> Reply | None:
+    """Answer what no other queryable does: this one hears every query."""
+    if any(matches(request.key, keys.rpc(name)) for name in RPC_NAMES):
+        return None
+    name = request.key.rpartition("/")[2]
+    return error_reply(
+        UnknownQuery(f"there is no query {name!r}; there are {', '.join(RPC_NAMES)}")
+    )

@@ -1,0 +1,175 @@
+"""What goes out: path, coverage, pheromone, status; each through the gate, which may refuse it.
+
+The coverage grid: published when it has changed, and no more often than anybody could look.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bus.publisher import QOS
+from fasaco_edge.bus.queries import Reply, Shared
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.daemon.loop.answers import LastSamples
+from fasaco_edge.daemon.loop.faults import Gate
+from fasaco_edge.daemon.ros_bridge import RosBridge
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.core.events import Answer, CommandReceived
+from fasaco_edge.mission.orders.order import command_document
+from fasaco_edge.wire import schemas
+from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.maps import encode_occupancy_grid
+from fasaco_edge.wire.paths import encode_path
+from fasaco_edge.wire.pheromone import encode_pheromone
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.loop.worker import Observed
+
+
+from typing import TYPE_CHECKING
+
+from fasaco_edge.wire.coverage import coverage_grid
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.core.mission import Mission
+
+
+class Outbox:
+    """The publishers of a daemon; what they have said last is kept for who asks later.
+
+    Attributes:
+        gate: all that is published passes it.
+    """
+
+    def __init__(self, bus: Bus, keys: Keys, ros: RosBridge | None = None) -> None:
+        self.gate = Gate()
+        self._ros = ros
+        self._last = LastSamples(bus, keys)
+        self._path = bus.publisher(keys.path, schemas.PATH, QOS["path"])
+        self._coverage = bus.publisher(keys.coverage, schemas.OCCUPANCY_GRID, QOS["coverage"])
+        self._pheromone = bus.publisher(keys.pheromone, schemas.PHEROMONE_GRID, QOS["pheromone"])
+        self._status = bus.publisher(keys.status, qos=QOS["status"])
+        self._command = bus.publisher(keys.command, qos=QOS["command"])
+
+    def path(
+        self,
+        xy: NDArray[np.float64],
+        frame: str,
+        stamp_ns: int,
+        about: dict[str, Any],
+    ) -> None:
+        """Publish a path through ``xy`` [m], float64 (n, 2), facing along the way.
+
+        Where it cannot be told an empty one is: the robot must not go on along the one before.
+        """
+        if not self.gate.let_out("path", lambda: self._say_path(xy, frame, stamp_ns, about)):
+            nothing = about | {"steps": 0}
+            self.gate.let_out("path", lambda: self._say_path(xy[:0], frame, stamp_ns, nothing))
+
+    def _say_path(
+        self, xy: NDArray[np.float64], frame: str, stamp_ns: int, about: dict[str, Any]
+    ) -> None:
+        attachment = encode_json(about)
+        path = Shared.of(encode_path(xy, headings(xy), frame, stamp_ns), schemas.PATH, attachment)
+        self._last.keep("path", path)
+        self._path.put(path.payload, attachment)
+        if self._ros is not None:
+            self._ros.path.put(path)
+
+    def forget(self) -> None:
+        """Keep no path and no coverage for those who join late: another daemon has them."""
+        for publisher in (self._path, self._coverage):
+            publisher.forget()
+        if self._ros is not None:
+            self._ros.path.forget()
+            self._ros.coverage.forget()
+
+    def status(self, document: dict[str, Any]) -> None:
+        """Publish the status."""
+        self.gate.let_out("status", lambda: self._say_status(document))
+
+    def _say_status(self, document: dict[str, Any]) -> None:
+        payload = encode_json(document)
+        self._last.keep("status", Reply(payload))
+        self._status.put(payload)
+
+    def commands(self, commands: Sequence[CommandReceived], answers: Sequence[Answer]) -> None:
+        """Tell everybody what was taken: a question is heard by who is asked alone."""
+        refused = {answer.number for answer in answers if answer.error is not None}
+        for asked in commands:
+            if asked.number not in refused:
+                self.gate.let_out("command", partial(self._say_command, asked))
+
+    def _say_command(self, asked: CommandReceived) -> None:
+        self._command.put(encode_json(command_document(asked.command, asked.order)))
+
+    def coverage(self, grid: OccupancyGrid) -> None:
+        """Publish the coverage, a grid on the lattice."""
+        self.gate.let_out("coverage", lambda: self._say_coverage(grid))
+
+    def _say_coverage(self, grid: OccupancyGrid) -> None:
+        coverage = Shared.of(encode_occupancy_grid(grid), schemas.OCCUPANCY_GRID)
+        self._last.keep("coverage", coverage)
+        self._coverage.put(coverage.payload)
+        if self._ros is not None:
+            self._ros.coverage.put(coverage)
+
+    def pheromone(self, seen: Observed, frame: str) -> None:
+        """Keep the pheromone field, and publish it if anyone listens."""
+        self.gate.let_out("pheromone", lambda: self._say_pheromone(seen, frame))
+
+    def _say_pheromone(self, seen: Observed, frame: str) -> None:
+        payload = encode_pheromone(seen.snapshot, frame, time.time_ns())
+        reply = Reply(payload, schemas.PHEROMONE_GRID)
+        self._last.keep_trail(seen.plan, seen.snapshot.cohort, reply)
+        if self._pheromone.has_listeners():
+            self._pheromone.put(payload)
+
+
+def headings(xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the heading [rad], float64 (n,), at each point of a path: towards the next one."""
+    if len(xy) < 2:
+        return np.zeros(len(xy))
+    ahead = np.diff(xy, axis=0)
+    yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
+    return np.append(yaw, yaw[-1])
+
+
+PERIOD_S = 0.5
+
+
+class CoverageNews:
+    """Knows what was published last."""
+
+    def __init__(self, outbox: Outbox) -> None:
+        self._outbox = outbox
+        self._published_at = float("-inf")
+        self._key: tuple[object, ...] = ()
+
+    def forget(self) -> None:
+        """Take what comes next for news, whatever it is."""
+        self._key = ()
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish the coverage if that is due."""
+        # An order may forget what was covered, and keep the robot out of cells.
+        key = (mission.ledger.total, mission.map_revision, mission.assignment)
+        if key == self._key or now - self._published_at < PERIOD_S:
+            return
+        lattice, grid = mission.lattice, mission.grid
+        if lattice is None or grid is None:
+            return
+        self._published_at, self._key = now, key
+        visits = mission.ledger.visits(lattice.window)
+        self._outbox.coverage(
+            coverage_grid(
+                lattice.window, lattice.cell_m, lattice.states, visits, grid.frame, grid.stamp_ns
+            )
+        )

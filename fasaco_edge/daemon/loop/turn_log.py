@@ -1,0 +1,235 @@
+"""The turn log: tells a recorder what each turn of the loop took in and decided.
+
+It is told from the beginning or not at all: what is missing at its beginning, no replay can
+make up for. Samples that came before anybody listened are in it themselves.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from fasaco_edge import __version__
+from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.bus.publisher import Publisher
+from fasaco_edge.bus.session import Sample
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.daemon.ledger.codec import encode_ledger
+from fasaco_edge.daemon.loop.answers import config_document
+from fasaco_edge.daemon.loop.decided import DecidedNews, cells_checksum, kernels_name
+from fasaco_edge.daemon.loop.inbox import Received
+from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanBroken, PlanReady
+from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
+from fasaco_edge.mission.orders.order import command_document
+from fasaco_edge.samples.codec import SampleEncoder
+from fasaco_edge.wire.turns import (
+    Beginning,
+    PlanTaken,
+    Taken,
+    Told,
+    Turn,
+    TurnBatch,
+    encode_turns,
+)
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.core.mission import Mission
+
+LOG = logging.getLogger(__name__)
+
+PERIOD_S = 0.5
+# A recorder needs some seconds to start; nobody is waited for any longer than so many turns.
+WAITING_TURNS = 2048
+# Samples from before are told as long as there is room, deflated; more would hold the loop up.
+TOLD_BYTES, DEFLATED_BYTES = 8_000_000, 500_000
+# A longer pose is none, and named only; of so many bytes of poses no turn more is waited for.
+POSE_BYTES, POSES_BYTES = 1024, 500_000
+# A busy link drops maps, too; larger ones are named only, for to tell them costs the loop time.
+MAP_BYTES = 100_000
+# So many bytes of samples do not wait for the next batch's time.
+FULL_BYTES = 4_000_000
+# From when somebody listens, until everything surely comes to them, too.
+MARGIN_S = 0.2
+MAPS = ("map", "map_update")
+POSE = "pose"
+
+
+@dataclass(frozen=True, slots=True)
+class TurnNote:
+    """A turn: when it was [s, monotonic], what the loop took in, and what was decided."""
+
+    now: float
+    items: Sequence[tuple[str, object]]
+    patches_lost: int
+    commands: Sequence[CommandReceived]
+    decision: Decision
+
+
+class TurnLog:
+    """Publishes the log in batches.
+
+    Args:
+        publisher: of the log's key.
+        config: in force.
+        restored: the ledger the daemon began with, if any.
+    """
+
+    def __init__(
+        self, publisher: Publisher, config: DaemonConfig, restored: LedgerSnapshot | None
+    ) -> None:
+        self._publisher = publisher
+        self._config = config
+        self._restored = restored
+        self._is_open = True
+        self._heard_at = self._told_until = float("inf")
+        self._published_at = float("-inf")
+        self._first, self._times = 1, list[float]()
+        self._turns: list[Turn] = []
+        self._told_room, self._deflated_room = TOLD_BYTES, DEFLATED_BYTES
+        self._samples = SampleEncoder(run=0)
+        self._news = DecidedNews()
+        self._has_begun = self._kernels_told = False
+
+    def note(self, turn: TurnNote, mission: Mission | None) -> None:
+        """Take a turn into the log; what was published may be some turns behind."""
+        if not self._is_open:
+            return
+        self._listen(turn.now)
+        samples = [
+            self._taken(kind, item) for kind, item in turn.items if isinstance(item, Received)
+        ]
+        plans = [item for _, item in turn.items if isinstance(item, PlanReady)]
+        if any(isinstance(item, PlanBroken) for _, item in turn.items):
+            self.end("a plan broke, which no replay repeats")
+            return
+        decided = self._news.of(turn.decision, mission)
+        is_empty = not (samples or plans or turn.commands or turn.patches_lost or decided)
+        if is_empty and mission is None:
+            return
+        self._times.append(turn.now)
+        if not is_empty or (mission is not None and not self._has_begun):
+            self._turns.append(
+                Turn(
+                    number=self._first + len(self._times) - 1,
+                    is_begun=mission is not None,
+                    samples=samples,
+                    patches_lost=turn.patches_lost,
+                    commands=[
+                        (asked.number, command_document(asked.command, asked.order))
+                        for asked in turn.commands
+                    ],
+                    plan=_plan_taken(plans[-1]) if plans else None,
+                    decided=decided,
+                )
+            )
+        self._has_begun = mission is not None
+        self._forget_poses([i.sample for _, i in turn.items if isinstance(i, Received)])
+        is_full = self._samples.waiting_bytes > FULL_BYTES
+        if is_full or turn.now - self._published_at >= PERIOD_S:
+            self._published_at = turn.now
+            self.publish()
+
+    def publish(self) -> None:
+        """Publish what has gathered, if somebody listens."""
+        if not self._is_open or not self._times:
+            return
+        if self._heard_at == float("inf"):
+            if len(self._times) > WAITING_TURNS or self._samples.waiting_bytes > POSES_BYTES:
+                self._close()
+            return
+        if not self._publisher.has_listeners():
+            self._close()
+            return
+        batch = TurnBatch(
+            first=self._first,
+            times=self._times,
+            turns=self._turns,
+            beginning=self._beginning() if self._first == 1 else None,
+            told=self._samples.take(),
+            kernels=self._kernels(),
+        )
+        self._publisher.put(encode_turns(batch))
+        self._first, self._times, self._turns = self._first + len(self._times), [], []
+
+    def _listen(self, now: float) -> None:
+        """Find out whether somebody listens by now."""
+        if self._heard_at == float("inf") and self._publisher.has_listeners():
+            self._heard_at, self._told_until = now, time.monotonic() + MARGIN_S
+
+    def _close(self) -> None:
+        self.end("nobody listens to it")
+
+    def end(self, why: str) -> None:
+        """End the log: what comes after could not be repeated."""
+        if not self._is_open:
+            return
+        LOG.info("the turn log ends: %s", why)
+        self._is_open = False
+        self._times, self._turns, self._restored = [], [], None
+        self._samples = SampleEncoder(run=0)
+
+    def _taken(self, kind: str, item: Received) -> Taken:
+        sample = item.sample
+        if kind == POSE and len(sample.payload) <= POSE_BYTES:
+            self._samples.add(Arrival(kind, sample, 0, 0))
+            return Taken(kind, 0)
+        if kind == "map" and len(sample.payload) <= MAP_BYTES and item.at >= self._told_until:
+            self._samples.add(Arrival(kind, sample, 0, 0))
+            return Taken(kind, 0, item.at)
+        told = self._told(sample) if item.at < self._told_until else None
+        return Taken(kind, zlib.crc32(sample.payload), item.at if kind in MAPS else 0.0, told)
+
+    def _told(self, sample: Sample) -> Told | None:
+        """Return the sample itself; None where there is no room for it."""
+        if len(sample.payload) > self._told_room:
+            return None
+        self._told_room -= len(sample.payload)
+        deflated = zlib.compress(sample.payload, 1)
+        if len(deflated) > self._deflated_room:
+            return None
+        self._deflated_room -= len(deflated)
+        return Told(sample.key, sample.schema, deflated)
+
+    def _forget_poses(self, newest: Sequence[Sample]) -> None:
+        """As long as there is nothing but poses, the newest is all that will count."""
+        is_waiting = self._heard_at == float("inf") and not self._has_begun
+        if is_waiting and len(self._turns) > 1 and all(map(_is_pose, self._turns)):
+            self._times, self._turns = self._times[-1:], [_numbered(self._turns[-1], self._first)]
+            self._samples = SampleEncoder(run=0)
+            for sample in newest:
+                self._samples.add(Arrival(POSE, sample, 0, 0))
+
+    def _beginning(self) -> Beginning:
+        ledger = encode_ledger(self._restored) if self._restored else b""
+        return Beginning(__version__, config_document(self._config), ledger)
+
+    def _kernels(self) -> str:
+        if self._kernels_told or not self._has_begun:
+            return ""
+        self._kernels_told = True
+        return kernels_name()
+
+
+def _plan_taken(ready: PlanReady) -> PlanTaken:
+    work = ready.path.work
+    return PlanTaken(
+        ready.number,
+        ready.seconds,
+        list(ready.stops),
+        (work.ants, work.kicks, work.proposals),
+        cells_checksum(ready.path.cells),
+    )
+
+
+def _is_pose(turn: Turn) -> bool:
+    return (
+        not turn.commands and not turn.patches_lost and all(s.topic == POSE for s in turn.samples)
+    )
+
+
+def _numbered(turn: Turn, number: int) -> Turn:
+    return Turn(number, turn.is_begun, turn.samples)

@@ -1,0 +1,144 @@
+"""How the loop gets on: what the service manager is told, and how long the turns take.
+
+How long it takes from a map that calls for a plan until the path that answers it.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import TYPE_CHECKING, Any
+
+from fasaco_edge.daemon.notify import ServiceManager
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.loop.worker import PlanningWorker
+
+
+import time
+
+LOG = logging.getLogger(__name__)
+
+# Of the silence that is allowed: a turn may come late, and a word get lost.
+SHARE = 0.25
+
+# What comes in waits for the turn before: from so long a turn on it is late [s].
+LATE_S = 0.1
+# Durations are told to within 10 %: their logarithms, in buckets from this one up, the last for
+# all beyond 18 minutes. So the figures of a year take as much memory as those of a minute.
+LEAST_S, PER_DOUBLING, BUCKETS = 1e-6, 8, 8 * 30
+
+
+class TurnTimes:
+    """How long the turns of a loop took, since it began."""
+
+    def __init__(self) -> None:
+        self._counts = [0] * BUCKETS
+        self._turns = self._late = 0
+        self._longest_s = 0.0
+
+    def note(self, seconds: float) -> None:
+        """Count a turn."""
+        doublings = math.log2(max(seconds, LEAST_S) / LEAST_S)
+        self._counts[min(int(doublings * PER_DOUBLING), BUCKETS - 1)] += 1
+        self._turns += 1
+        self._late += seconds > LATE_S
+        self._longest_s = max(self._longest_s, seconds)
+
+    def document(self) -> dict[str, Any]:
+        """Return the figures as part of a status [ms]; null before the first turn."""
+        figures: dict[str, Any] = {"turns": self._turns, "late": self._late}
+        for name, share in (("p50", 0.5), ("p99", 0.99), ("p99_9", 0.999), ("max", 1.0)):
+            figures[name] = round(1e3 * self._within(share), 3) if self._turns else None
+        return figures
+
+    def _within(self, share: float) -> float:
+        """Return within how long this share of the turns was over [s]."""
+        missing = math.ceil(share * self._turns)
+        for bucket, count in enumerate(self._counts[:-1]):
+            missing -= count
+            if missing <= 0:
+                most_s = LEAST_S * math.exp2((bucket + 1) / PER_DOUBLING)
+                return min(most_s, self._longest_s)
+        return self._longest_s
+
+
+class Vitals:
+    """Feeds the watchdog from the loop itself, and only while the planning thread gets on, too.
+
+    A thread of its own that fed it would do so beside a loop that hangs.
+
+    Attributes:
+        remark: what else is to be known of the service; "" for nothing.
+    """
+
+    def __init__(self, manager: ServiceManager) -> None:
+        self.remark = ""
+        self._manager = manager
+        self._period_s = SHARE * manager.watchdog_s
+        self._fed_at = float("-inf")
+        self._progress = -1
+        self._state = ""
+
+    def beat(self, worker: PlanningWorker | None, now: float) -> None:
+        """Feed the watchdog if that is due; before there is a worker, nothing can hang but us."""
+        if not self._period_s or now - self._fed_at < self._period_s:
+            return
+        if worker is not None:
+            if worker.progress == self._progress:
+                return
+            self._progress = worker.progress
+        self._fed_at = now
+        self._manager.alive()
+
+    def tell(self, status: dict[str, Any]) -> None:
+        """Say in a line what a status says; log it where the state is another."""
+        if status["state"] != self._state:
+            self._state = status["state"]
+            LOG.info("%s", _doing(status), extra={"event": "state", "state": self._state})
+        remark = f"; {self.remark}" if self.remark else ""
+        self._manager.status(status_line(status) + remark)
+
+
+def status_line(status: dict[str, Any]) -> str:
+    """Return a status as a line: its state and why, how much is covered, what is wrong."""
+    parts = [_doing(status)]
+    if coverage := status["coverage"]:
+        area = f"{coverage['covered_m2']:.0f} of {coverage['to_cover_m2']:.0f} m2"
+        parts.append(f"{100 * coverage['fraction']:.0f} % covered, {area}")
+    if path := status["path"]:
+        parts.append(f"path {path['revision']} with {path['remaining_steps']} steps to go")
+    if fault := status["ledger"].get("fault"):
+        parts.append(str(fault))
+    return "; ".join(parts)
+
+
+def _doing(status: dict[str, Any]) -> str:
+    return f"{status['state']}: {status['reason']}" if status["reason"] else str(status["state"])
+
+
+class MapClock:
+    """Follows a map from its arrival over the plan it calls for to that plan's path.
+
+    Attributes:
+        arrived: when the newest map of this turn arrived [s, monotonic]; None without one.
+    """
+
+    def __init__(self) -> None:
+        self.arrived: float | None = None
+        # Arrival of the oldest map that no plan was asked for yet, and of the one
+        # that the plan under way was asked for.
+        self._unanswered: float | None = None
+        self._asked: float | None = None
+
+    def call_for_plan(self) -> None:
+        """Note that the newest map calls for a plan."""
+        self._unanswered = self._unanswered or self.arrived
+
+    def ask(self) -> None:
+        """Note that a plan was asked for."""
+        self._asked, self._unanswered = self._unanswered, None
+
+    def answer(self) -> float | None:
+        """Return how long it took until now [s]; None where no map had called for the plan."""
+        return None if self._asked is None else time.monotonic() - self._asked

@@ -1,0 +1,112 @@
+"""The thread that plans. Its kernels run without the interpreter lock, so the loop stays awake."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from fasaco_edge.bus.mailbox import LatestSlot
+from fasaco_edge.errors import PlanFailed
+from fasaco_edge.mission.core.events import PlanBroken, PlanReady, PlanRequest
+from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.planner import AnyOf, CoveragePlanner, Interrupt, Noted, TimeBudget
+from fasaco_edge.planners.work import SearchProgress
+
+LOG = logging.getLogger(__name__)
+
+# An attempt to make a path better takes so long [s].
+SPARE_S = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observed:
+    """What plan ``plan`` lets others see."""
+
+    plan: int
+    snapshot: ColonySnapshot
+
+
+class PlanningWorker:
+    """Plans one request at a time and posts the result.
+
+    Attributes:
+        progress: counts what the thread has done: questions of a search, whether it is to stop,
+            and waits for a request. It stands still only where the thread hangs.
+    """
+
+    def __init__(
+        self,
+        planner: CoveragePlanner,
+        budget_s: float,
+        post: Callable[[str, object], None],
+    ) -> None:
+        self.progress = 0
+        self._planner = planner
+        self._budget_s = budget_s
+        self._post = post
+        self._requests = LatestSlot[PlanRequest]()
+        self._stopping = threading.Event()
+        self._interrupt = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="planner", daemon=True)
+        self._thread.start()
+
+    def submit(self, request: PlanRequest) -> None:
+        """Plan ``request`` next."""
+        self._requests.put(request)
+
+    def interrupt(self) -> None:
+        """End the search under way with the best walk it has: something newer came."""
+        self._interrupt.set()
+
+    def disown(self) -> None:
+        """Interrupt the search; nothing of it is posted any more, and the thread ends by itself."""
+        self._stopping.set()
+        self._interrupt.set()
+
+    def close(self, timeout_s: float) -> None:
+        """Interrupt the search and end the thread."""
+        self.disown()
+        self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        try:
+            while not self._stopping.is_set():
+                self.progress += 1
+                request = self._requests.take(timeout_s=0.2)
+                if request is not None:
+                    self._plan(request)
+        except BaseException as error:
+            self._post("failed", error)
+
+    def _plan(self, request: PlanRequest) -> None:
+        started = time.monotonic()
+        self._interrupt.clear()
+        if self._stopping.is_set():
+            return
+        budget_s = SPARE_S if request.problem.only_better else self._budget_s
+        stop = Noted(AnyOf(self._count, TimeBudget(budget_s), Interrupt(self._interrupt)))
+        try:
+            # Costs some percent of a full plan, and a repair nothing.
+            path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))
+        except Exception as error:
+            # The same map comes again after a restart: to end with it helps nobody.
+            LOG.exception("plan %d", request.number, extra={"event": "plan_failed"})
+            why = f"plan {request.number} failed: {type(error).__name__}: {error}"
+            self._post("plan", PlanBroken(request.number, PlanFailed(why)))
+            return
+        seconds = time.monotonic() - started
+        if self._stopping.is_set():
+            return
+        self._post("plan", PlanReady(request.number, path, seconds, tuple(stop.stops)))
+
+    def _count(self, progress: SearchProgress) -> bool:
+        self.progress += 1
+        return False
+
+    def _observe(self, plan: int, snapshot: ColonySnapshot) -> None:
+        if not self._stopping.is_set():
+            self._post("snapshot", Observed(plan, snapshot))

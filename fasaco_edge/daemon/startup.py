@@ -1,0 +1,258 @@
+"""Before there is a mission: the first map sends for the kernels, what comes meanwhile is held.
+
+Kernels come with the first map: until then the daemon is small.
+
+Importing numba costs 60 MB, and compiling on a new machine takes many seconds;
+both happen in a thread of their own, so that the loop keeps answering.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from fasaco_edge.daemon.ledger.writer import Keeping
+from fasaco_edge.errors import FasacoError, PatchWithoutBase
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, fitting
+from fasaco_edge.mission.core.events import (
+    Answer,
+    CommandReceived,
+    Event,
+    MapReceived,
+    PatchesLost,
+    PatchRun,
+    PoseReceived,
+    in_runs,
+)
+from fasaco_edge.mission.orders.assignment import CommandError
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.loop.worker import PlanningWorker
+    from fasaco_edge.mission.core.mission import Mission
+
+
+import threading
+from typing import TYPE_CHECKING
+
+from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.host.processes import release_unused
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.loop.worker import PlanningWorker
+    from fasaco_edge.mission.core.mission import Mission
+
+
+class Beginning:
+    """Holds events, takes commands, and hands both over to the mission.
+
+    Attributes:
+        assignment: what the mission will have to do.
+        held: of the newest two frames each the newest map, with the updates after it laid over it,
+            and the newest pose: which of them counts is for the mission to find. That updates were
+            lost stays, until there is another map. It may be held for long, and does not grow.
+    """
+
+    def __init__(
+        self, keeping: Keeping, load: Callable[[], Loader], held: Sequence[Event] = ()
+    ) -> None:
+        self.assignment = keeping.first
+        self.held: list[Event] = []
+        self._keeping = keeping
+        self._load = load
+        self._loader: Loader | None = None
+        self.held.extend(held)
+
+    @property
+    def stage(self) -> str:
+        """What is being loaded; "" for nothing, or nothing more."""
+        return self._loader.stage if self._loader and not self._loader.is_done else ""
+
+    def end(self) -> None:
+        """Let go of what is loaded, or is being loaded: another takes its place."""
+        if self._loader is not None:
+            self._loader.drop()
+
+    def take(self, events: Sequence[Event]) -> list[FasacoError]:
+        """Hold events; return those that are of no use, and why."""
+        faults: list[FasacoError] = []
+        for event in in_runs(events):
+            match event:
+                case MapReceived(grid):
+                    self._drop(lambda held: not _is_pose(held), grid.frame)
+                    self.held.append(event)
+                case PoseReceived(pose):
+                    self._drop(_is_pose, pose.frame)
+                    self.held.append(event)
+                case PatchRun(patches):
+                    faults += self._lay(patches)
+                case PatchesLost(count):
+                    faults.append(PatchWithoutBase(f"{count} map updates were lost"))
+                    if self._maps() and not self._has_lost:
+                        self.held.append(event)
+        return faults
+
+    def _maps(self) -> dict[str, int]:
+        """Return where in ``held`` the map of each frame is."""
+        held = enumerate(self.held)
+        return {one.grid.frame: place for place, one in held if isinstance(one, MapReceived)}
+
+    @property
+    def _has_lost(self) -> bool:
+        return any(isinstance(held, PatchesLost) for held in self.held)
+
+    def _lay(self, patches: Sequence[MapPatch]) -> list[FasacoError]:
+        """Lay updates over the maps held; return why some cannot be."""
+        maps = self._maps()
+        if not maps or self._has_lost:
+            why = "updates before it were lost" if maps else "there is no map yet"
+            return [PatchWithoutBase(f"map update refused: {why}") for _ in patches]
+        faults: list[FasacoError] = []
+        newest = next(reversed(maps))
+        for frame, place in maps.items():
+            # One of neither frame misfits the newest map.
+            theirs = [p for p in patches if (p.frame if p.frame in maps else newest) == frame]
+            grid = self._grid_at(place)
+            fit, misfits = fitting(grid, theirs)
+            self.held[place] = MapReceived(grid.patched(*fit))
+            faults += misfits
+        return faults
+
+    def _grid_at(self, place: int) -> OccupancyGrid:
+        held = self.held[place]
+        assert isinstance(held, MapReceived)
+        return held.grid
+
+    def load(self) -> None:
+        """Begin to load what plans, once there is a map."""
+        if self._loader is None and self._maps():
+            self._loader = self._load()
+
+    def _drop(self, kind: Callable[[Event], bool], frame: str) -> None:
+        """Drop of a kind what is in this frame, and all but the newest of the other frames."""
+        others = [_frame(held) for held in self.held if kind(held)]
+        kept = next((other for other in reversed(others) if other not in ("", frame)), None)
+        self.held = [held for held in self.held if not kind(held) or _frame(held) == kept]
+
+    def loaded(self) -> tuple[Mission, PlanningWorker] | None:
+        """Return mission and worker once they are there."""
+        self.load()
+        loaded = self._loader.poll() if self._loader else None
+        if loaded is not None:
+            self._keeping.restore(loaded[0], self.assignment)
+        return loaded
+
+    def obey(self, commands: Sequence[CommandReceived], rival: str = "") -> list[Answer]:
+        """Take commands, as the mission will, unless another daemon is to; return the answers."""
+        answers = []
+        for asked in commands:
+            try:
+                if rival:
+                    raise CommandError(rival, hint="command the one that plans")
+                self.assignment = self.assignment.after(asked.command, asked.order)
+                if asked.command == "replan":
+                    raise CommandError("nothing to plan: the first plan is still to come")
+            except FasacoError as error:
+                answers.append(Answer(asked.number, error))
+                continue
+            if asked.command == "reset":
+                self._keeping.forget()
+            answers.append(Answer(asked.number))
+        return answers
+
+
+def _is_pose(event: Event) -> bool:
+    return isinstance(event, PoseReceived)
+
+
+def _frame(event: Event) -> str:
+    match event:
+        case MapReceived(grid):
+            return grid.frame
+        case PoseReceived(pose):
+            return pose.frame
+    return ""  # it lies in none
+
+
+def heard_of(mission: Mission) -> list[Event]:
+    """Return the events after which another mission knows map and pose, too."""
+    heard: list[Event] = []
+    if mission.grid is not None:
+        heard.append(MapReceived(mission.grid))
+    if mission.pose is not None:
+        heard.append(PoseReceived(mission.pose))
+    return heard
+
+
+class Loader:
+    """Imports what plans, warms the kernels up, and sets up mission and worker."""
+
+    def __init__(self, config: DaemonConfig, mailbox: Mailbox[object]) -> None:
+        self.stage = "importing"
+        self.error: BaseException | None = None
+        self._config = config
+        self._mailbox = mailbox
+        self._loaded: tuple[Mission, PlanningWorker] | None = None
+        self._is_dropped = False
+        threading.Thread(target=self._run, name="loader", daemon=True).start()
+
+    def poll(self) -> tuple[Mission, PlanningWorker] | None:
+        """Return what was loaded, None until then; raise what went wrong."""
+        if self.error is not None:
+            raise self.error
+        return self._loaded
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all is loaded, or went wrong."""
+        return self._loaded is not None or self.error is not None
+
+    def drop(self) -> None:
+        """Let the worker go, now or once it is there: nobody will ask for it."""
+        self._is_dropped = True
+        if self._loaded is not None:
+            self._loaded[1].disown()
+
+    def _run(self) -> None:
+        try:
+            self._loaded = self._load()
+            if self._is_dropped:
+                self._loaded[1].disown()
+        except BaseException as error:
+            self.error = error
+        self._mailbox.post("loaded", None)
+
+    def _load(self) -> tuple[Mission, PlanningWorker]:
+        from fasaco_edge.daemon.loop.worker import PlanningWorker  # noqa: PLC0415
+        from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
+        from fasaco_edge.mission.config import MissionConfig  # noqa: PLC0415
+        from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415
+        from fasaco_edge.mission.orders.assignment import NO_ORDER, Assignment  # noqa: PLC0415
+        from fasaco_edge.planners.near_optimal import NearOptimal  # noqa: PLC0415
+        from fasaco_edge.planners.table import planner_of  # noqa: PLC0415
+        from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
+
+        warm_up(self._report)
+        release_unused()
+        robot, maps, planner = self._config.robot, self._config.map, self._config.planner
+        footprint = Footprint(
+            robot.tool_width_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least
+        )
+        chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
+        worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
+        patience = self._config.mission
+        mission = MissionConfig(
+            footprint,
+            maps.max_lattice_cells,
+            robot.cost(),
+            retries=patience.retries,
+            retry_s=patience.retry_s,
+            lost_pose_s=patience.lost_pose_s,
+            stale_map_s=patience.stale_map_s,
+            spare_share=planner.spare_share if isinstance(chosen, NearOptimal) else 0.0,
+        )
+        first = Assignment.by_itself() if patience.autostart else Assignment.none(NO_ORDER)
+        return Mission(mission, first), worker
+
+    def _report(self, stage: str) -> None:
+        self.stage = f"kernels: {stage}"

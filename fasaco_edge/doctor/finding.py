@@ -1,0 +1,149 @@
+"""What systemd says of the daemon's unit, where there are systemd and the unit.
+
+What a check finds, and what it looks at.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from fasaco_edge.config.config import DaemonConfig
+
+NAME = "fasaco-edge.service"
+TIMEOUT_S = 1.0
+PROPERTIES = (
+    "LoadState", "ActiveState", "MainPID", "Environment", "MemoryMax", "MemoryHigh",
+    "StateDirectory", "CacheDirectory", "DynamicUser", "User",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """The unit as systemd has loaded it, drop-ins included.
+
+    Attributes:
+        properties: of ``systemctl show``.
+    """
+
+    properties: Mapping[str, str]
+
+    @property
+    def pid(self) -> int | None:
+        """The daemon's process; None where it does not run."""
+        return int(self.properties.get("MainPID", "0")) or None
+
+    @property
+    def environ(self) -> dict[str, str]:
+        """What the daemon finds in its environment, as far as that is for us."""
+        words = shlex.split(self.properties.get("Environment", ""))
+        environ = dict(word.partition("=")[::2] for word in words)
+        if state := self.properties.get("StateDirectory", "").split():
+            environ["STATE_DIRECTORY"] = f"/var/lib/{state[0]}"
+        return environ
+
+    def run_as(self, command: str) -> str:
+        """Return how to run a command as the daemon is run, and into its folders."""
+        dynamic = self.properties.get("DynamicUser") == "yes"
+        user = self.properties.get("User") or (NAME.partition(".")[0] if dynamic else "")
+        given = {
+            "DynamicUser": "yes" if dynamic else "",
+            "User": user,
+            "CacheDirectory": self.properties.get("CacheDirectory", ""),
+        }
+        words = [f"-p {shlex.quote(f'{name}={value}')}" for name, value in given.items() if value]
+        return " ".join(["systemd-run --wait", *words, command])
+
+    def limit(self, name: str) -> int | None:
+        """Return a limit [bytes]; None for none."""
+        value = self.properties.get(name, "infinity")
+        return int(value) if value.isdecimal() else None
+
+
+def find_unit(root: Path = Path("/")) -> Unit | None:
+    """Ask systemd; None where it is not at work here, knows no such unit, or does not answer."""
+    if not (root / "run/systemd/system").is_dir():
+        return None
+    command = ["systemctl", "show", NAME, f"--property={','.join(PROPERTIES)}"]
+    try:
+        told = subprocess.run(
+            command, check=True, capture_output=True, text=True, timeout=TIMEOUT_S
+        ).stdout
+    except (OSError, subprocess.SubprocessError):
+        return None
+    properties = dict(line.partition("=")[::2] for line in told.splitlines())
+    return Unit(properties) if properties.get("LoadState") == "loaded" else None
+
+
+class Level(StrEnum):
+    """How it is: good; good, but worth a thought; not to be left like that."""
+
+    OK = "ok"
+    WARN = "warn"
+    FAIL = "fail"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of the doctor's report.
+
+    Attributes:
+        level: how it is.
+        found: what was found.
+        to_do: what to do about it; "" where there is nothing.
+        details: more lines, for who wants to know.
+    """
+
+    level: Level
+    found: str
+    to_do: str = ""
+    details: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Patient:
+    """What checks look at; more may come to it.
+
+    Attributes:
+        config: the daemon's configuration.
+        file: where that was read; None for the defaults.
+        unit: the daemon's unit, as systemd has it; None where there is none.
+        recordings: where recordings are to go; None where nobody said.
+        root: the computer's root folder.
+    """
+
+    config: DaemonConfig
+    file: Path | None = None
+    unit: Unit | None = None
+    recordings: Path | None = None
+    root: Path = Path("/")
+
+    @property
+    def environ(self) -> Mapping[str, str]:
+        """The environment the daemon would find: its unit's, else ours."""
+        return self.unit.environ if self.unit else os.environ
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A question about a daemon and its computer.
+
+    Attributes:
+        name: one or two words.
+        look: finds the answer; it changes nothing.
+        of_machine: whether it says something without a configuration, too.
+    """
+
+    name: str
+    look: Callable[[Patient], Finding]
+    of_machine: bool = False
+
+
+def worst(levels: list[Level]) -> Level:
+    """Return the worst level, ok for none."""
+    return max(levels, key=list(Level).index, default=Level.OK)

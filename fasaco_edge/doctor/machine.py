@@ -1,0 +1,222 @@
+"""The computer: whether the package runs here at all, and what time it is.
+
+Memory, and who sees to it that the daemon takes no more than its share.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import re
+import struct
+import sys
+import time
+from importlib import metadata
+from pathlib import Path
+
+from fasaco_edge.daemon.memory import afforded, limits_mib, needed_bytes
+from fasaco_edge.doctor.finding import Finding, Level, Patient
+
+MACHINES = ("x86_64", "aarch64")
+# What makes a difference to array code, as /proc/cpuinfo spells it.
+FEATURES = ("avx2", "avx512f", "asimd", "sve")
+COMPILED = ("eclipse-zenoh", "llvmlite", "msgspec", "numba", "numpy", "pillow", "rerun-sdk")
+LEAST_PYTHON = (3, 11)
+# adjtimex(2): struct timex, and where in it is what.
+TIMEX_BYTES, MAXERROR_AT, STATUS_AT = 208, 24, 40
+STA_UNSYNC = 0x40
+TIME_ERROR = 5
+
+
+def system(patient: Patient) -> Finding:
+    """Tell about the processor, the system and Python."""
+    bits, machine = 8 * struct.calcsize("P"), platform.machine()
+    cores = len(os.sched_getaffinity(0))
+    python = platform.python_version()
+    found = f"{_model(patient.root) or machine}, {cores} cores; Python {python}"
+    name = _os_name(patient.root) or "Linux"
+    details = (
+        f"{name}, kernel {platform.release()}, {machine}, {bits} bits; {_features(patient.root)}",
+    )
+    if bits != 64:
+        to_do = "install a 64-bit system: there are no packages for 32 bits"
+        return Finding(Level.FAIL, f"{found}: a 32-bit system", to_do, details)
+    if machine not in MACHINES:
+        to_do = f"use one of {', '.join(MACHINES)}: for others there are no packages"
+        return Finding(Level.FAIL, f"{found}: {machine}", to_do, details)
+    if sys.version_info < LEAST_PYTHON:
+        return Finding(Level.FAIL, f"{found}: too old", "install Python 3.11 or newer", details)
+    if cores == 1:
+        to_do = "let whatever controls the robot have a higher priority: the unit has Nice=10"
+        return Finding(Level.WARN, f"{found}: planning shares it with all else", to_do, details)
+    return Finding(Level.OK, found, details=details)
+
+
+def c_library(patient: Patient) -> Finding:
+    """Tell whether the C library is as new as the installed packages want it."""
+    name, _, version = (os.confstr("CS_GNU_LIBC_VERSION") or "").partition(" ")
+    if name != "glibc":
+        to_do = "use a system with glibc, as Debian and Raspberry Pi OS are"
+        return Finding(Level.FAIL, "not glibc: the packages are built for that", to_do)
+    needs = {package: need for package in COMPILED if (need := _needed_glibc(package))}
+    least = max(needs.values(), default=(0, 0))
+    details = tuple(f"{package}: {_dotted(need)}" for package, need in needs.items())
+    found = f"glibc {version}, packages need {_dotted(least)}"
+    if tuple(int(part) for part in re.findall(r"\d+", version)[:2]) < least:
+        return Finding(Level.FAIL, found, "install a newer system release", details)
+    return Finding(Level.OK, found, details=details)
+
+
+def clock(patient: Patient) -> Finding:
+    """Tell whether the clock is right: recordings, certificates and stamps go by it."""
+    written = (Path(__file__)).stat().st_mtime
+    now = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime())
+    wait = "timedatectl set-ntp true, or wait until the network is there"
+    if time.time() < written - 86_400:
+        found = f"{now}, before this program was installed: the computer forgot the time"
+        return Finding(Level.FAIL, found, wait)
+    kept = kernel_clock()
+    if kept is None:
+        return Finding(Level.WARN, f"{now}; nobody can say whether it is right", wait)
+    is_synchronised, error_s = kept
+    if is_synchronised or (patient.root / "run/systemd/timesync/synchronized").exists():
+        return Finding(Level.OK, f"{now}, synchronised, off by at most {error_s:.3g} s")
+    return Finding(Level.WARN, f"{now}, not synchronised", wait)
+
+
+def kernel_clock() -> tuple[bool, float] | None:
+    """Return whether the kernel's clock is synchronised, and how far off at most [s]; only asks."""
+    timex = ctypes.create_string_buffer(TIMEX_BYTES)
+    try:
+        state = ctypes.CDLL(None).adjtimex(timex)
+    except (AttributeError, OSError):
+        return None
+    if state < 0:
+        return None
+    (error_us,) = struct.unpack_from("q", timex, MAXERROR_AT)
+    (status,) = struct.unpack_from("i", timex, STATUS_AT)
+    return state != TIME_ERROR and not status & STA_UNSYNC, error_us / 1e6
+
+
+def _model(root: Path) -> str:
+    """Return what the computer is called: a board by its name, a PC by its processor's."""
+    try:
+        board = (root / "proc/device-tree/model").read_text(encoding="utf-8")
+        return board.rstrip("\0\n")
+    except OSError:
+        return _cpuinfo(root, "model name")
+
+
+def _os_name(root: Path) -> str:
+    return _field(root / "etc/os-release", "PRETTY_NAME=").strip('"')
+
+
+def _features(root: Path) -> str:
+    flags = f"{_cpuinfo(root, 'flags')} {_cpuinfo(root, 'Features')}".split()
+    known = [feature for feature in FEATURES if feature in flags]
+    return "processor features: " + (", ".join(known) or "none that matter")
+
+
+def _cpuinfo(root: Path, name: str) -> str:
+    return _field(root / "proc/cpuinfo", rf"{name}\s*: ")
+
+
+def _field(file: Path, before: str) -> str:
+    """Return what follows in the first line that begins so; "" where there is none."""
+    try:
+        match = re.search(f"^{before}(.*)$", file.read_text(encoding="utf-8"), re.MULTILINE)
+    except OSError:
+        return ""
+    return match[1].strip() if match else ""
+
+
+def _needed_glibc(package: str) -> tuple[int, ...]:
+    """Return the glibc that the wheel of an installed package was built for; () for none."""
+    try:
+        tags = metadata.distribution(package).read_text("WHEEL") or ""
+    except metadata.PackageNotFoundError:
+        return ()
+    # A wheel may name several: it needs the oldest of them.
+    versions = [(int(major), int(minor)) for major, minor in re.findall(r"x_(\d+)_(\d+)_", tags)]
+    versions += [(2, 17)] if "manylinux2014" in tags else []
+    return min(versions, default=())
+
+
+def _dotted(version: tuple[int, ...]) -> str:
+    return ".".join(map(str, version))
+
+
+# A daemon with a plan of a large building takes less; what is free should do for it.
+WANTED_MB = 350
+PI_CMDLINES = ("boot/firmware/cmdline.txt", "boot/cmdline.txt")
+
+
+def memory(patient: Patient) -> Finding:
+    """Tell how much memory there is, and whether its limits hold."""
+    total_mb, free_mb = _meminfo_mb(patient.root, "Total"), _meminfo_mb(patient.root, "Available")
+    found = f"{free_mb:.0f} MB of {total_mb:.0f} MB free"
+    version = controller(patient.root)
+    details = (_told(patient, version),)
+    unit = patient.unit
+    limit = unit.limit("MemoryMax") if unit else None
+    if version is None:
+        holds = "limits of the unit do not hold" if limit else "no limit on memory would hold"
+        return Finding(
+            Level.WARN,
+            f"{found}; the memory controller is off: {holds}",
+            _how_to_enable(patient.root),
+            details,
+        )
+    if free_mb < WANTED_MB:
+        to_do = "end what else runs, or plan with larger cells (robot.tool_width_m)"
+        return Finding(Level.WARN, f"{found}; the daemon may want {WANTED_MB} MB", to_do, details)
+    if limit and limit < needed_bytes(patient.config):
+        high, most = limits_mib(patient.config)
+        smaller = afforded(patient.config, limit).map
+        found += f"; the unit's limit is {limit / 1e6:.0f} MB: maps of no more than "
+        found += f"{smaller.max_pixels} pixels and {smaller.max_lattice_cells} cells are taken"
+        to_do = f"systemctl edit fasaco-edge: MemoryHigh={high}M, MemoryMax={most}M"
+        return Finding(Level.WARN, found, to_do, details)
+    return Finding(Level.OK, found, details=details)
+
+
+def controller(root: Path) -> int | None:
+    """Return which version of control groups limits memory; None where none does."""
+    if "memory" in _read(root / "sys/fs/cgroup/cgroup.controllers").split():
+        return 2
+    # The names of version 1's stand there even where the kernel was told to leave them out.
+    enabled = re.search(r"^memory\s+\d+\s+\d+\s+1$", _read(root / "proc/cgroups"), re.MULTILINE)
+    return 1 if enabled and (root / "sys/fs/cgroup/memory").is_dir() else None
+
+
+def _told(patient: Patient, version: int | None) -> str:
+    groups = f"control groups version {version}" if version else "no memory controller"
+    if patient.unit is None:
+        return f"{groups}; no unit fasaco-edge.service here: nothing limits the daemon"
+    limits = [
+        f"{name} {'none' if limit is None else f'{limit / 1e6:.0f} MB'}"
+        for name in ("MemoryHigh", "MemoryMax")
+        for limit in [patient.unit.limit(name)]
+    ]
+    return f"{groups}; of the unit: {', '.join(limits)}"
+
+
+def _how_to_enable(root: Path) -> str:
+    words = "cgroup_enable=memory"
+    for place in PI_CMDLINES:
+        if (root / place).is_file():
+            return f"add {words} to the one line of /{place}, and reboot"
+    return f"start the kernel with {words}"
+
+
+def _meminfo_mb(root: Path, name: str) -> float:
+    match = re.search(rf"^Mem{name}:\s+(\d+) kB", _read(root / "proc/meminfo"), re.MULTILINE)
+    return int(match[1]) * 1024 / 1e6 if match else 0.0
+
+
+def _read(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8")
+    except OSError:
+        return ""

@@ -1,0 +1,191 @@
+"""What is open to whom.
+
+How the daemon shows who it is, and whether its secrets are kept.
+"""
+
+from __future__ import annotations
+
+import stat
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from fasaco_edge.bus.access import ROLES
+from fasaco_edge.config.config import BusConfig
+from fasaco_edge.config.credentials import read_certificate
+from fasaco_edge.config.endpoints import UNIX, is_local, protocol_of
+from fasaco_edge.daemon.loop.inbox import MAP_SPACING_S
+from fasaco_edge.doctor.finding import Finding, Level, Patient, worst
+from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
+
+SHOWS = {
+    "none": "by anybody there",
+    "tls": "by whoever shows a certificate of the CA",
+    "user": "by whoever knows a password",
+}
+
+
+def endpoints(patient: Patient) -> Finding:
+    """Tell where the daemon listens, from where that can be reached, and by whom."""
+    bus = patient.config.bus
+    kind = bus.security.kind
+    details = [f"{endpoint}: {_reach(endpoint)}, {SHOWS[kind]}" for endpoint in bus.listen]
+    details += [f"{endpoint}: connects there" for endpoint in bus.connect]
+    beyond = [endpoint for endpoint in bus.listen if not is_local(endpoint)]
+    if not beyond:
+        where = "on this computer alone" if bus.listen else "nowhere"
+        return Finding(Level.OK, f"listens {where}; security: {kind}", details=tuple(details))
+    found = f"listens beyond this computer; security: {kind}"
+    if kind == "none":
+        return Finding(
+            Level.WARN,
+            f"{found}: everybody in reach may give maps, poses and commands",
+            "choose bus.security.kind tls, or keep the network to yourself",
+            tuple(details),
+        )
+    if kind == "user":
+        return Finding(
+            Level.WARN,
+            f"{found}: names are checked, but all that is said can be read on the way",
+            "choose bus.security.kind tls where others share the network",
+            tuple(details),
+        )
+    return Finding(Level.OK, found, details=tuple(details))
+
+
+def roles(patient: Patient) -> Finding:
+    """Tell who may do what."""
+    security = patient.config.bus.security
+    if security.kind == "none":
+        return Finding(Level.OK, "no roles: whoever reaches the daemon may do everything")
+    names = security.names()
+    details = tuple(
+        f"{role} ({', '.join(who) or 'nobody'}): {ROLES[role].told}" for role, who in names.items()
+    )
+    if names["router"] or not patient.config.bus.listen:
+        missing = [] if names["router"] else ["router"]
+    else:
+        missing = [role for role in ("mapper", "operator") if not names[role]]
+    if missing:
+        lacking = " or ".join(missing)
+        return Finding(
+            Level.WARN,
+            f"nobody is {lacking}: what that role does, nobody can do",
+            f"name somebody in bus.security.roles.{missing[0]}",
+            details,
+        )
+    count = len({name for who in names.values() for name in who})
+    return Finding(
+        Level.OK, f"names with a role: {count}; everybody else may do nothing", details=details
+    )
+
+
+def limits(patient: Patient) -> Finding:
+    """Tell how much each who sends may send."""
+    bus = patient.config.bus
+    if bus.security.kind == "none" and not bus.open_to_everyone:
+        own = f"takes in at most {1 / MAP_SPACING_S:g} maps a second, the newest always"
+        return Finding(Level.OK, f"none for who sends; the daemon {own}")
+    most = bus.security.limits
+    return Finding(
+        Level.OK,
+        f"of each: maps up to {most.map_bytes / 1e6:.1f} MB, {most.maps_hz:g} maps, "
+        f"{most.poses_hz:g} poses and {most.queries_hz:g} queries of a key a second",
+    )
+
+
+def _reach(endpoint: str) -> str:
+    if protocol_of(endpoint) in UNIX:
+        return "from this computer, where the file's permissions allow it"
+    return "from this computer" if is_local(endpoint) else "from other computers"
+
+
+SOON = timedelta(days=30)
+SECRETS = {
+    "tls": ("private_key",),
+    "user": ("password_file", "dictionary_file"),
+}
+HOW_TO = "protocol/README.md, Security, tells how to make them"
+
+
+def identity(patient: Patient) -> Finding:
+    """Tell by what name others know the daemon, and until when."""
+    bus = patient.config.bus
+    security, listens = bus.security, bool(bus.listen)
+    if security.kind == "none":
+        return Finding(Level.OK, "shows no name, asks for none")
+    try:
+        security.of_daemon(patient.config.keys().prefix)
+        if security.kind == "user":
+            return _login(bus)
+        certificate = read_certificate(security.tls, listens=listens)
+    except (BadConfiguration, ClockBeforeCertificate) as error:
+        to_do = error.hint if isinstance(error, ClockBeforeCertificate) else HOW_TO
+        return Finding(Level.FAIL, str(error), to_do)
+    left = certificate.ends - datetime.now(UTC)
+    details = [_recording(bus, certificate.name)]
+    if listens:
+        details.insert(0, f"others connect to it as {', '.join(certificate.hosts) or 'nothing'}")
+    found = f"certificate of {certificate.name!r}, ends {certificate.ends:%Y-%m-%d}"
+    if not certificate.name or (listens and not certificate.hosts):
+        return Finding(Level.FAIL, f"{found}: a name is missing in it", HOW_TO, tuple(details))
+    if left < SOON:
+        return Finding(Level.WARN, f"{found}, in {left.days} days", "renew it", tuple(details))
+    return Finding(Level.OK, found, details=tuple(details))
+
+
+def secret_files(patient: Patient) -> Finding:
+    """Tell whether others on this computer can read keys and passwords."""
+    security = patient.config.bus.security
+    if security.kind == "none":
+        return Finding(Level.OK, "there are none")
+    section = getattr(security, security.kind)
+    paths = [Path(file) for name in SECRETS[security.kind] if (file := getattr(section, name))]
+    levels, details = [], []
+    for path in paths:
+        try:
+            mode = path.stat().st_mode
+        except OSError as error:
+            return Finding(Level.FAIL, f"{path}: {error.strerror}", HOW_TO)
+        levels.append(_level(mode))
+        details.append(f"{path}: {stat.filemode(mode)}")
+    level = worst(levels)
+    if level is Level.OK:
+        return Finding(level, "read by their owner alone", details=tuple(details))
+    whom = "everybody on this computer" if level is Level.FAIL else "their group"
+    command = "chmod 600 " + " ".join(map(str, paths))
+    return Finding(level, f"can be read by {whom}", command, tuple(details))
+
+
+def _login(bus: BusConfig) -> Finding:
+    """Tell about user and password; the files can be read."""
+    security, user = bus.security, bus.security.user
+    names = []
+    text = Path(user.dictionary_file).read_text(encoding="utf-8") if user.dictionary_file else ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        name, colon, password = line.partition(":")
+        if not (name and colon and password):
+            where = f"{user.dictionary_file}, line {number}"
+            return Finding(Level.FAIL, f"{where}: no name:password", "correct the line")
+        names.append(name)
+    unknown = {name for who in security.names().values() for name in who} - set(names)
+    details = (f"may connect: {', '.join(names) or 'nobody'}", _recording(bus, user.name))
+    if user.dictionary_file and unknown:
+        missing = ", ".join(sorted(unknown))
+        found = f"user {user.name!r}; {missing}: a role, but no password"
+        return Finding(Level.WARN, found, f"add lines to {user.dictionary_file}", details)
+    return Finding(
+        Level.OK, f"user {user.name!r}; {len(names)} others may connect", details=details
+    )
+
+
+def _recording(bus: BusConfig, name: str) -> str:
+    if name in bus.security.roles.recorder:
+        return "a recorder that it starts itself (--record) may hear everything"
+    where = "bus.security.roles.recorder" if bus.listen else "the recorders of the router"
+    return f"to record with --record, add {name!r} to {where}"
+
+
+def _level(mode: int) -> Level:
+    if mode & (stat.S_IROTH | stat.S_IWOTH):
+        return Level.FAIL
+    return Level.WARN if mode & (stat.S_IRGRP | stat.S_IWGRP) else Level.OK

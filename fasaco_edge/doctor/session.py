@@ -1,0 +1,244 @@
+"""Who listens at an endpoint, found out without Zenoh.
+
+The bus: whether the daemon can join it, and who is there.
+"""
+
+from __future__ import annotations
+
+import re
+import socket
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from fasaco_edge.bus.session import Bus, BusSettings, Sample, check_settings, open_bus
+from fasaco_edge.config.endpoints import from_here, host_of, protocol_of
+from fasaco_edge.config.ros import RosConfig
+from fasaco_edge.daemon.claim import claims_in
+from fasaco_edge.doctor.finding import Finding, Level, Patient
+from fasaco_edge.errors import BadConfiguration, BusUnavailable, MalformedMessage
+from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.keys import VERSION
+from fasaco_edge.wire.ros_keys import RosTopic
+
+ANSWER_S = 0.5
+LISTENING = "0A"  # proc(5), /proc/net/tcp
+STREAMS = ("tcp", "tls", "ws")
+
+
+def address_of(endpoint: str) -> tuple[str, int] | None:
+    """Return where a TCP connection reaches an endpoint from here; None where none does."""
+    if protocol_of(endpoint) not in STREAMS:
+        return None
+    port = re.search(r":(\d+)(?:[?#]|$)", endpoint)
+    here = from_here(endpoint)
+    return (host_of(here), int(port[1])) if port else None
+
+
+def answers(endpoint: str) -> bool | None:
+    """Tell whether somebody listens at an endpoint; None where that cannot be found out."""
+    address = address_of(endpoint)
+    if address is None:
+        return None
+    try:
+        socket.create_connection(address, timeout=ANSWER_S).close()
+    except OSError:
+        return False
+    return True
+
+
+def why_not_bound(endpoint: str) -> str:
+    """Return why nobody could listen at an endpoint of this computer; "" where one could."""
+    address = address_of(endpoint)
+    if address is None:
+        return ""
+    host, port = host_of(endpoint), address[1]
+    try:
+        place = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(place[0], place[1]) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(place[4])
+    except OSError as error:
+        return error.strerror or str(error)
+    return ""
+
+
+def program_at(endpoint: str, root: Path = Path("/")) -> str:
+    """Return the name and process of the program that listens at an endpoint of this computer.
+
+    "" where it cannot be seen: those of other users only root sees.
+    """
+    address = address_of(endpoint)
+    inodes = _listening(root, address[1]) if address else set()
+    sockets = {f"socket:[{inode}]" for inode in inodes}
+    for process in (root / "proc").glob("[0-9]*") if sockets else ():
+        try:
+            held = {str(file.readlink()) for file in (process / "fd").iterdir()}
+            if held & sockets:
+                name = (process / "comm").read_text(encoding="utf-8").strip()
+                return f"{name}, process {process.name}"
+        except OSError:
+            continue
+    return ""
+
+
+def _listening(root: Path, port: int) -> set[str]:
+    """Return the inodes of the sockets that listen at a port."""
+    inodes = set()
+    for table in ("tcp", "tcp6"):
+        try:
+            lines = (root / "proc/net" / table).read_text(encoding="ascii").splitlines()[1:]
+        except OSError:
+            continue
+        for fields in map(str.split, lines):
+            if fields[3] == LISTENING and int(fields[1].rpartition(":")[2], 16) == port:
+                inodes.add(fields[9])
+    return inodes
+
+
+# So long is listened for maps and poses [s]; poses come ten times a second.
+LISTEN_S = 0.7
+ASK_S = 0.7
+
+
+def session(patient: Patient) -> Finding:
+    """Tell whether a session can be opened as the daemon would, or who is in its place."""
+    bus = patient.config.bus
+    try:
+        check_settings(bus.settings(patient.config.keys().prefix, patient.config.ros2 or None))
+    except (BadConfiguration, BusUnavailable) as error:
+        return Finding(Level.FAIL, str(error), error.hint)
+    details, is_taken = [], False
+    for endpoint in bus.listen:
+        if answers(from_here(endpoint)):
+            is_taken = True
+            who = program_at(endpoint) or "a program of another user"
+            details.append(f"{endpoint}: {who} listens there")
+        elif why := why_not_bound(endpoint):
+            to_do = "correct bus.listen: that address is not this computer's, or not for this user"
+            return Finding(Level.FAIL, f"{endpoint}: nobody can listen there: {why}", to_do)
+        else:
+            details.append(f"{endpoint}: free")
+    silent = [endpoint for endpoint in bus.connect if answers(endpoint) is False]
+    details += [f"{endpoint}: nobody answers" for endpoint in silent]
+    told = tuple(details)
+    if len(silent) == len(bus.connect) > 0:
+        level = Level.FAIL if bus.mode == "client" else Level.WARN
+        then = "does not start" if bus.mode == "client" else "tries again and again"
+        found = f"nobody answers at {', '.join(silent)}: the daemon {then}"
+        return Finding(level, found, "start the router there, or correct bus.connect", told)
+    if not is_taken:
+        return Finding(Level.OK, "nobody is in the way", details=told)
+    try:
+        with _joined(patient) as joined:
+            met = " and ".join(joined.met()) or "nobody"
+            return Finding(Level.OK, f"joined {met} as a client", details=told)
+    except BusUnavailable as error:
+        to_do = "end what listens there, or choose another port in bus.listen"
+        found = f"what listens there does not speak Zenoh with us: {error}"
+        return Finding(Level.FAIL, found, to_do, told)
+
+
+def peers(patient: Patient) -> Finding:
+    """Tell who is on the bus: the daemon, its recorder, other robots, maps and poses."""
+    if not any(answers(endpoint) is not False for endpoint in _ways(patient)):
+        return Finding(Level.OK, "nobody to ask: neither daemon nor router is there")
+    try:
+        with _joined(patient) as bus:
+            return _seen(patient, bus)
+    except (BadConfiguration, BusUnavailable) as error:
+        return Finding(Level.WARN, f"could not be asked: {error}", error.hint)
+
+
+def _seen(patient: Patient, bus: Bus) -> Finding:
+    keys, ros = patient.config.keys(), patient.config.ros2
+    wanted = {"map": [keys.map], "pose": [keys.pose]}
+    if ros:
+        wanted["map"].append(_ros_key(ros, ros.map))
+        wanted["pose"] += [_ros_key(ros, topic) for topic in ros.poses.values()]
+    heard = _listen(bus, wanted)
+    alive = bus.alive(f"{keys.base}/{VERSION}/*/alive", ASK_S)
+    others = sorted(key.split("/")[-2] for key in alive if key != keys.alive)
+    details = [f"other robots: {', '.join(others)}"] if others else []
+    claims = claims_in(bus.alive(keys.claims, ASK_S))
+    details += [f"daemon {own} {stand}" for own, stand in sorted(claims.items())]
+    status = _status(bus, keys.rpc("status")) if keys.alive in alive else None
+    for kind, count in heard.items():
+        details.append(f"{kind}: {f'{count} in {LISTEN_S:g} s' if count else 'nothing heard'}")
+    if keys.alive not in alive:
+        found = f"no daemon of robot {keys.robot!r}; {_in_words(heard)}"
+        return Finding(Level.OK, found, details=tuple(details))
+    if status is None:
+        found = "the daemon runs, and does not tell us how it is"
+        to_do = "ask under a name with the role viewer (bus.security.roles)"
+        return Finding(Level.WARN, found, to_do, tuple(details))
+    found = f"the daemon runs: {status['state']}, {status['reason']}"
+    if len(claims) > 1:
+        found = f"{len(claims)} daemons have the name {keys.robot!r}, of which one plans; {found}"
+        to_do = "end those that wait, or give them names of their own (robot.name)"
+        return Finding(Level.WARN, found, to_do, tuple(details))
+    if status["map"] is None or status["pose"] is None:
+        lacking = " and ".join(kind for kind in ("map", "pose") if status[kind] is None)
+        topics = ", ".join(key for kind in wanted if status[kind] is None for key in wanted[kind])
+        return Finding(
+            Level.WARN, f"{found}; it has no {lacking}", f"publish on {topics}", tuple(details)
+        )
+    return Finding(Level.OK, found, details=tuple(details))
+
+
+def _ros_key(ros: RosConfig, topic: RosTopic) -> str:
+    if ros.kind == "bridge":
+        return topic.bridge_key
+    return topic.rmw_key(ros.domain, any_hash=True)
+
+
+def _listen(bus: Bus, wanted: dict[str, list[str]]) -> dict[str, int]:
+    """Return how many samples of each kind came."""
+    heard, lock = Counter[str](), threading.Lock()
+
+    def counting(kind: str) -> Callable[[Sample], None]:
+        def count(_: Sample) -> None:
+            with lock:
+                heard[kind] += 1
+
+        return count
+
+    for kind, kinds_keys in wanted.items():
+        for key in kinds_keys:
+            bus.subscribe(key, counting(kind), latched=True)
+    time.sleep(LISTEN_S)
+    with lock:
+        return {kind: heard[kind] for kind in wanted}
+
+
+def _in_words(heard: dict[str, int]) -> str:
+    there = [f"{kind}s" for kind, count in heard.items() if count]
+    return f"{' and '.join(there)} come in" if there else "neither map nor pose comes in"
+
+
+def _status(bus: Bus, key: str) -> dict[str, Any] | None:
+    for reply in bus.get(key, ASK_S):
+        if not reply.is_error:
+            try:
+                return decode_json(reply.payload)
+            except MalformedMessage:
+                return None
+    return None
+
+
+def _ways(patient: Patient) -> list[str]:
+    bus = patient.config.bus
+    return [*map(from_here, bus.listen), *bus.connect]
+
+
+@contextmanager
+def _joined(patient: Patient) -> Iterator[Bus]:
+    """Join the bus as one client more, by the endpoints at which somebody answers."""
+    ways = tuple(way for way in _ways(patient) if answers(way) is not False)
+    secured = patient.config.bus.security.of_client()
+    with open_bus(BusSettings("client", ways, (), secured)) as bus:
+        yield bus

@@ -1,0 +1,177 @@
+"""Files and folders of this process: its own, never what somebody else put in their place.
+
+Whose hands could have put a file in place: what only root and one user could have is trusted.
+
+Code that is read from a disk is run with all that its reader may do. So the folder it lies in, and
+each one above, belongs to root or to that user, and nobody else may write there: somebody who may
+write to a folder can put another one in place of any that lies in it. Two things that look wrong
+are not: a sticky folder (``/tmp``) keeps what lies in it from everybody but its owner, and a link
+is as good as who made it and where it lies (systemd's ``/var/cache/NAME`` of a DynamicUser= is one
+of root's).
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import pwd
+import stat
+from pathlib import Path
+
+
+def open_own(path: str | Path, flags: int, mode: int = 0o644) -> int:
+    """Open a file to write it, made where it was not there; return its descriptor.
+
+    A link is not followed, and a plain file of another user is not taken: in a folder that others
+    may write to, either may be a trap.
+
+    Raises:
+        OSError: that failed, or the file is not ours.
+    """
+    flags |= os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+    # What is there is only emptied once it is known to be ours.
+    descriptor = os.open(path, flags & ~os.O_TRUNC, mode)
+    try:
+        status = os.fstat(descriptor)
+        if stat.S_ISREG(status.st_mode):
+            _check_owner(path, status)
+            if flags & os.O_TRUNC:
+                os.ftruncate(descriptor, 0)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def read_own(path: str | Path, most: int = -1) -> bytes:
+    """Return what is in a plain file of ours, or of root's, that is no link; ``most`` bytes of it.
+
+    Raises:
+        OSError: that failed, or it is somebody else's.
+    """
+    # Where it is no plain file, to open it may wait, or do something.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    with open(descriptor, "rb") as file:
+        status = os.fstat(descriptor)
+        _check_owner(path, status)
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EINVAL, "no plain file", str(path))
+        return file.read(most)
+
+
+def make_own_folder(folder: Path) -> None:
+    """Make a folder, or take the one there is, if it is ours: nor is a link of somebody's taken.
+
+    Raises:
+        OSError: that failed, or it is somebody else's.
+    """
+    folder.mkdir(exist_ok=True)
+    _check_owner(folder, folder.lstat())
+
+
+def _check_owner(path: str | Path, status: os.stat_result) -> None:
+    if status.st_uid not in (os.geteuid(), 0):
+        raise PermissionError(errno.EPERM, "another user has put it there", str(path))
+
+
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+# As many as Linux itself follows, see path_resolution(7).
+_MOST_LINKS = 40
+
+
+class UntrustedFileError(Exception):
+    """Somebody else could have written this; the text says what, and who."""
+
+
+def why_not_trusted(folder: Path, user: int | None = None) -> str:
+    """Return why others could decide what lies in ``folder``; "" if nobody else could.
+
+    Args:
+        folder: an absolute path. Of one that is not there, what there is of it is looked at: ""
+            if one that is made now is trusted.
+        user: whose the folder may be, beside root; without it this process's.
+    """
+    try:
+        _walk(folder, _trusted(user))
+    except UntrustedFileError as why:
+        return str(why)
+    except OSError as error:
+        return f"{error.filename}: {error.strerror}"
+    return ""
+
+
+def read_trusted(file: Path, user: int | None = None) -> bytes:
+    """Return what is in a file of a folder that is trusted.
+
+    Raises:
+        UntrustedFileError: others could have written it, or it is no plain file.
+        OSError: it is not there, or cannot be read.
+    """
+    # What was opened is what is looked at; a pipe would be waited for.
+    descriptor = os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise UntrustedFileError(f"{file} is no plain file")
+        _look_at(file, status, _trusted(user))
+        with open(descriptor, "rb", closefd=False) as opened:
+            return opened.read()
+    finally:
+        os.close(descriptor)
+
+
+def _trusted(user: int | None) -> frozenset[int]:
+    return frozenset((0, os.geteuid() if user is None else user))
+
+
+def _walk(folder: Path, trusted: frozenset[int]) -> None:
+    """Go from the root to ``folder``, and look at each step."""
+    place, links = Path("/"), 0
+    ahead = list(reversed(folder.parts[1:]))
+    status = os.lstat(place)
+    while True:
+        # In a sticky folder nobody takes from us what is ours, and that is looked at next.
+        sticky = ahead and status.st_mode & stat.S_ISVTX
+        _look_at(place, status, trusted, may_write=bool(sticky))
+        if not ahead:
+            break
+        part = ahead.pop()
+        if part == "..":  # of a link's target; ``place`` has no links in it
+            place, status = place.parent, os.lstat(place.parent)
+            continue
+        try:
+            status = os.lstat(place / part)
+        except FileNotFoundError:
+            return
+        if stat.S_ISLNK(status.st_mode):
+            links += 1
+            if status.st_uid not in trusted:
+                raise UntrustedFileError(f"{place / part} is a link of {_user(status.st_uid)}")
+            if links > _MOST_LINKS:
+                raise UntrustedFileError(f"{folder}: too many links")
+            target = Path(os.readlink(place / part))
+            ahead += reversed(target.parts[1:] if target.is_absolute() else target.parts)
+            place = Path("/") if target.is_absolute() else place
+            status = os.lstat(place)
+            continue
+        place /= part
+        if not stat.S_ISDIR(status.st_mode):
+            raise UntrustedFileError(f"{place} is no folder")
+
+
+def _look_at(
+    place: Path, status: os.stat_result, trusted: frozenset[int], *, may_write: bool = False
+) -> None:
+    if status.st_uid not in trusted:
+        raise UntrustedFileError(f"{place} belongs to {_user(status.st_uid)}")
+    # Entries of an access control list show in the bits of the group.
+    if status.st_mode & _OTHERS_WRITE and not may_write:
+        who = "everybody" if status.st_mode & stat.S_IWOTH else "its group"
+        raise UntrustedFileError(f"{place} may be written by {who}")
+
+
+def _user(uid: int) -> str:
+    try:
+        return f"user {pwd.getpwuid(uid).pw_name}"
+    except KeyError:
+        return f"user {uid}"

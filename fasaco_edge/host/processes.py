@@ -1,0 +1,89 @@
+"""Python processes that this one starts, and what they take over from it.
+
+What a process is resident with, its threads and what it has loaded, by proc(5).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from pathlib import Path, PurePath
+
+
+def python_program(module: str, *words: str) -> list[str]:
+    """Return the command line that runs a module with this interpreter.
+
+    ``-m`` alone would search the working folder first, which may be anybody's. What was started in
+    isolation goes on so: neither the environment nor a home folder says what is imported.
+    """
+    shut = "-I" if sys.flags.isolated else "-P"
+    return [sys.executable, shut, "-m", module, *words]
+
+
+# Options of mallopt(3) and what they are set to.
+_TRIM_THRESHOLD = (-1, 256 * 1024)
+_MMAP_THRESHOLD = (-3, 256 * 1024)
+_ARENA_MAX = (-8, 2)
+
+
+def resident_mb(pid: int | str = "self") -> float:
+    """Return the resident memory of a process now [MB]; without ``pid`` of this one."""
+    return _field_mb(pid, "VmRSS")
+
+
+def peak_mb(pid: int) -> float:
+    """Return the most it was ever resident with [MB]."""
+    return _field_mb(pid, "VmHWM")
+
+
+def thread_count() -> int:
+    """Return how many threads this process has."""
+    return len(os.listdir("/proc/self/task"))
+
+
+def has_loaded(pid: int, package: str) -> bool:
+    """Tell whether a Python package's compiled modules are mapped into a process."""
+    maps = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8", errors="replace")
+    files = {line.split(maxsplit=5)[5] for line in maps.splitlines() if line.endswith(".so")}
+    return any(package in _below_packages(PurePath(file)) for file in files)
+
+
+def _below_packages(file: PurePath) -> tuple[str, ...]:
+    """Return a file's folders below site-packages: a user's own folder may have any name."""
+    parts = file.parts
+    for root in ("site-packages", "dist-packages"):
+        if root in parts:
+            return parts[parts.index(root) + 1 :]
+    return ()
+
+
+def _field_mb(pid: int | str, name: str) -> float:
+    for line in Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines():
+        key, _, value = line.partition(":")
+        if key == name:
+            return round(int(value.split()[0]) * 1024 / 1e6, 1)
+    # A process that has ended and not been waited for has no memory.
+    return 0.0
+
+
+def release_unused() -> None:
+    """Give memory that was freed back to the system, where the C library can (glibc).
+
+    Loading kernels leaves some behind, in the arena of the thread that loaded them.
+    """
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
+
+
+def return_soon() -> None:
+    """Let what is freed go back to the system soon, where the C library can (glibc).
+
+    It learns from large blocks to keep them, in an arena for each thread: a recorder of large
+    maps was 15 MB larger by that. Call it before there are threads.
+    """
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        for option, value in (_ARENA_MAX, _MMAP_THRESHOLD, _TRIM_THRESHOLD):
+            mallopt(option, value)

@@ -1,0 +1,275 @@
+"""Ants of one cohort: equations (4) to (8) and the inner loops of Algorithm 1.
+
+Source: Carr and Wang, "Fast-Spanning Ant Colony Optimisation (FaSACO) for
+Mobile Robot Coverage Path Planning", 2022.
+
+===========  ==========================================  ======================
+Eq. (4)      pseudo-random proportional rule             ``_choose``
+Eq. (5)      visibility; 1 for every neighbour, so       ``_visibility``
+             ``eta ** beta`` drops out unless asked for
+Eq. (6)      probability of the other branch of (4)      ``_choose``
+Eq. (7)      local update, after every move              ``settle``
+Eq. (8)      global update along the best walk           ``deposit``
+===========  ==========================================  ======================
+
+What ants tell each other, and when: the ants of a group walk at the same time,
+as ants do, on the trail that the groups before them left. Then (7) is applied
+for each of their moves, ant by ant. So the ants of a group may walk on several
+threads, and the result is the same for any number of them.
+
+Where the paper is silent: a tie in (4) goes straight on; a dead end is left by
+the shortest walk to the nearest cell not yet covered, whose moves are moves
+like any other, (7) included. The paper prints "max p_k" for the second branch
+of (4), which would make it the first again; as in ant colony systems, (6) is
+drawn from.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.ants.growth import (
+    Graph,
+    Scratch,
+    append_way,
+    begin,
+    close,
+    find,
+    open_steps_of,
+)
+from fasaco_edge.kernels.costs import walk_cost
+from fasaco_edge.kernels.jit import kernel
+
+WORD = 0xFFFFFFFF
+
+# What eta of equation (5) is 1 over: the distance to a neighbour, which is 1; the
+# distance an ant of this velocity will go; one more than the cells still open
+# beside the neighbour (Warnsdorff's rule: visit first what will soon be cut off).
+NEIGHBOUR, DISTANCE, FEWEST_OPEN = 0, 1, 2
+
+
+class Rules(NamedTuple):
+    """Constants of equations (4) to (8), the end of the walk, and what makes one the best.
+
+    Attributes:
+        q0, alpha, tau0: as in the equations.
+        end: the cell the walk ends in, -1 for anywhere.
+        step_us, quarter_turn_us: what they cost [us].
+        visibility: NEIGHBOUR, DISTANCE or FEWEST_OPEN.
+        powers: float64, ``(1 / (i + 1)) ** beta`` at index i, as far as it is needed.
+    """
+
+    q0: float
+    alpha: float
+    tau0: float
+    end: int
+    step_us: int
+    quarter_turn_us: int
+    visibility: int
+    powers: NDArray[np.float64]
+
+
+@kernel
+def _draw(state: NDArray[np.int64]) -> float:
+    """Advance a xoshiro128++ stream (Blackman and Vigna 2019); return a number in [0, 1).
+
+    Words live in int64 and are masked, so that nothing overflows in plain Python.
+    """
+    total = (state[0] + state[3]) & WORD
+    word = ((((total << 7) & WORD) | (total >> 25)) + state[0]) & WORD
+    shifted = (state[1] << 9) & WORD
+    state[2] ^= state[0]
+    state[3] ^= state[1]
+    state[1] ^= state[2]
+    state[0] ^= state[3]
+    state[2] ^= shifted
+    state[3] = ((state[3] << 11) & WORD) | (state[3] >> 21)
+    return float(word / 4294967296.0)
+
+
+@kernel
+def _visibility(
+    graph: Graph, rules: Rules, scratch: Scratch, here: int, direction: int, velocity: int
+) -> float:
+    """Return eta ** beta of equation (5) for the open neighbour in a direction."""
+    after = here + graph.offsets[direction]
+    if rules.visibility == FEWEST_OPEN:
+        mask = open_steps_of(graph, scratch, after)
+        count = (mask & 1) + (mask >> 1 & 1) + (mask >> 2 & 1) + (mask >> 3)
+        return float(rules.powers[count])
+    run = 1
+    while run < velocity and open_steps_of(graph, scratch, after) >> direction & 1:
+        after += graph.offsets[direction]
+        run += 1
+    return float(rules.powers[run - 1])
+
+
+@kernel
+def _weigh(
+    graph: Graph,
+    trail: NDArray[np.float64],
+    rules: Rules,
+    scratch: Scratch,
+    here: int,
+    velocity: int,
+) -> None:
+    """Fill ``scratch.weights`` with tau * eta ** beta of the open neighbours."""
+    mask = open_steps_of(graph, scratch, here)
+    for direction in range(4):
+        if mask >> direction & 1:
+            seen = _visibility(graph, rules, scratch, here, direction, velocity)
+            scratch.weights[0, direction] = trail[here, direction] * seen
+
+
+@kernel
+def _choose(
+    mask: int,
+    weights: NDArray[np.float64],
+    row: int,
+    heading: int,
+    q0: float,
+    random: NDArray[np.int64],
+) -> int:
+    """Return a direction in ``mask`` by equation (4), from the weights in ``weights[row]``."""
+    total, best, best_weight = 0.0, heading, 0.0
+    for turn in range(4):
+        direction = (heading + turn) & 3
+        weight = weights[row, direction] * (mask >> direction & 1)
+        total += weight
+        if weight > best_weight:
+            best, best_weight = direction, weight
+    if mask & (mask - 1) == 0 or _draw(random) <= q0:
+        return best
+    # Eq. (6)
+    left = _draw(random) * total
+    for turn in range(4):
+        direction = (heading + turn) & 3
+        if mask >> direction & 1:
+            best = direction
+            left -= weights[row, direction]
+            if left < 0.0:
+                break
+    return best
+
+
+@kernel
+def _walk_one(
+    graph: Graph,
+    trail: NDArray[np.float64],
+    rules: Rules,
+    scratch: Scratch,
+    start: int,
+    velocity: int,
+    random: NDArray[np.int64],
+    walk: NDArray[np.int32],
+) -> int:
+    """Let one ant walk until every cell is covered; return the walk's length."""
+    remaining = begin(graph, scratch, start)
+    walk[0] = start
+    here, length, heading = start, 1, 0
+    while remaining > 0:
+        mask = open_steps_of(graph, scratch, here)
+        if mask == 0:
+            goal = find(graph, scratch, here, -1)
+            length = append_way(graph, scratch, walk, length, here, goal)
+            here, heading = goal, scratch.came_from[goal]
+            close(graph, scratch, here)
+            remaining -= 1
+            continue
+        if rules.visibility == NEIGHBOUR:
+            heading = _choose(mask, trail, here, heading, rules.q0, random)
+        else:
+            _weigh(graph, trail, rules, scratch, here, velocity)
+            heading = _choose(mask, scratch.weights, 0, heading, rules.q0, random)
+        # A cohort of velocity v keeps straight on for up to v cells.
+        for _ in range(velocity):
+            here += graph.offsets[heading]
+            if length < walk.size:
+                walk[length] = here
+            length += 1
+            close(graph, scratch, here)
+            remaining -= 1
+            if not open_steps_of(graph, scratch, here) >> heading & 1:
+                break
+    if rules.end >= 0 and here != rules.end:
+        find(graph, scratch, here, rules.end)
+        length = append_way(graph, scratch, walk, length, here, rules.end)
+    return length
+
+
+@kernel
+def walk_ants(
+    graph: Graph,
+    trail: NDArray[np.float64],
+    rules: Rules,
+    scratch: Scratch,
+    start: int,
+    velocity: int,
+    streams: NDArray[np.int64],
+    walks: NDArray[np.int32],
+    lengths: NDArray[np.int64],
+) -> None:
+    """Let ants walk on a trail that stays as it is.
+
+    Args:
+        graph: where they walk; all that is wanted, and the end, can be reached from the start.
+        trail: pheromone on the move out of a cell in each direction, float64 (n, 4), > 0.
+        rules: constants.
+        scratch: working memory.
+        start: the cell all ants start from.
+        velocity: cells an ant keeps straight on for, at least 1.
+        streams: int64 (ants, 4): state of each ant's random stream, words of 32 bits,
+            not all zero; advanced in place.
+        walks: out, int32 (ants, room); a longer walk is cut.
+        lengths: out, int64 (ants,), the walks' whole lengths.
+    """
+    for ant in range(streams.shape[0]):
+        lengths[ant] = _walk_one(
+            graph, trail, rules, scratch, start, velocity, streams[ant], walks[ant]
+        )
+
+
+@kernel
+def _pull(
+    graph: Graph, trail: NDArray[np.float64], walk: NDArray[np.int32], alpha: float, towards: float
+) -> None:
+    """Pull the trail of every move of a walk a little towards a value."""
+    for index in range(walk.size - 1):
+        here, gap = walk[index], walk[index + 1] - walk[index]
+        for direction in range(4):
+            # With one column, east and north are the same difference: the mask decides.
+            if graph.offsets[direction] == gap and graph.steps[here] >> direction & 1:
+                trail[here, direction] = (1.0 - alpha) * trail[here, direction] + alpha * towards
+                break
+
+
+@kernel
+def settle(
+    graph: Graph,
+    trail: NDArray[np.float64],
+    rules: Rules,
+    walks: NDArray[np.int32],
+    lengths: NDArray[np.int64],
+) -> tuple[int, int]:
+    """Apply the local update (7) for every move, ant by ant.
+
+    Returns:
+        The index of the cheapest walk, of equals the first, and its cost [us].
+    """
+    best, least = 0, 0
+    for ant in range(lengths.size):
+        walk = walks[ant, : lengths[ant]]
+        _pull(graph, trail, walk, rules.alpha, rules.tau0)
+        cost = walk_cost(walk, rules.step_us, rules.quarter_turn_us)
+        if ant == 0 or cost < least:
+            best, least = ant, cost
+    return best, least
+
+
+@kernel
+def deposit(
+    graph: Graph, trail: NDArray[np.float64], alpha: float, amount: float, best: NDArray[np.int32]
+) -> None:
+    """Strengthen the trail along ``best`` by equation (8), ``amount`` being delta phi."""
+    _pull(graph, trail, best, alpha, amount)

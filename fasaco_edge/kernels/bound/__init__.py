@@ -1,0 +1,1 @@
+"""Kernels for the lower bound on the number of steps."""

@@ -1,0 +1,247 @@
+"""A number of steps that no covering walk can beat.
+
+A walk from ``start`` to ``end`` visits all required cells; start and end count as
+required. Each bound below counts some steps that every such walk makes.
+
+*Blocks.* Take what the walk does in one biconnected block B. It leaves B by a cut
+vertex and returns by the same one, so with its excursions cut out it is a walk in B:
+from a, the start or the cut vertex on the way to it, to b, the end or the cut vertex
+on the way to it. It visits the wanted cells of B: the required ones, and cut vertices
+with required cells beyond them. It is open, a != b, only in blocks between start and
+end. A block with no wanted cell but a counts nothing. No step lies in two blocks, so
+the bounds of the blocks add up.
+
+*Independent set.* Let I be wanted cells of B, no two of them neighbours. A step has
+at most one end in I, so visits to I share no steps. Each has a step before it and one
+after it, but for the first and the last cell of an open walk. So a closed walk makes
+2 |I| steps at I, an open one 2 |I| - [a in I] - [b in I]. Any I will do: what hinges on
+the matching it is read from is only how large it is.
+
+*Islands.* Cells joined by steps at I are an island; only islands with wanted cells
+count. If there are k > 1, the walk makes further steps between them, none of them at I:
+(1) Islands have two colours, and no step joins two of one colour (kernels/islands.py).
+A walk comes to each of the m islands of a colour and leaves it, which is 2 m steps, as
+none of them serves two of these islands; one less for each end of the walk in one of
+them. With both ends in the same island it leaves that one, too, and comes back: 2 m.
+(2) Its ways from island to island connect them, so they weigh no less than a minimum
+spanning tree. If it is closed, or ends in the island where it began, it crosses every
+cut at least twice. Without one crossing of the cut at the tree's heaviest edge, the
+lightest across it, the other ways still connect: tree + heaviest.
+
+*Way back.* An open walk and a shortest way from b to a make a closed walk: the bound of
+that, less the distance.
+
+*Parity.* Each step changes the colour on the chessboard: the colours of a and b say
+whether the steps are even.
+
+*End anywhere.* A shortest walk ends in a required cell, the last one it comes to. So the
+bound is the least of those for given ends: all blocks closed, less the largest saving by
+open ones on the way to an end, found from the leaves of the tree of blocks up.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.bound.blocks import (
+    Sea,
+    biconnected_blocks,
+    find_islands,
+    measure_from,
+    spanning_weight,
+    wanted_first,
+)
+from fasaco_edge.kernels.bound.matching import (
+    Bipartite,
+    Pairing,
+    choose_independent,
+    match,
+    pairing_for,
+)
+from fasaco_edge.kernels.jit import kernel
+
+NO_END = -(2**30)
+# Cells searched for a larger matching. On maps of a million cells with scattered obstacles no
+# bound gained from more; without any search they were up to four steps lower.
+SEARCHED_PER_CELL, SEARCHED_AT_LEAST = 10, 10_000
+
+
+class Ground(NamedTuple):
+    """A lattice of n cells, and memory for the bounds of its blocks.
+
+    Attributes:
+        steps: step masks, uint8 (n,).
+        offsets: int64 (4,), difference of flat index for a step in each direction.
+        colour: uint8 (n,), 0 or 1 as on a chessboard.
+        wanted: uint8 (n,), 1 for required cells and cut vertices on the way to them.
+        block: int32 (n,), number of the last block that was cut out with the cell.
+        inside: uint8 (n,), step masks inside that block.
+        links: uint8 (n,), the same, to wanted cells alone.
+        pairing: a matching of the block's wanted cells.
+        chosen: uint8 (n,), an independent set of them.
+        island, away: int32 (n,), see ``Sea``.
+        open_steps: int32 (n,), bound of the walk over that block that ends in the cell.
+    """
+
+    steps: NDArray[np.uint8]
+    offsets: NDArray[np.int64]
+    colour: NDArray[np.uint8]
+    wanted: NDArray[np.uint8]
+    block: NDArray[np.int32]
+    inside: NDArray[np.uint8]
+    links: NDArray[np.uint8]
+    pairing: Pairing
+    chosen: NDArray[np.uint8]
+    island: NDArray[np.int32]
+    away: NDArray[np.int32]
+    open_steps: NDArray[np.int32]
+
+
+@kernel
+def covering_bound(
+    steps: NDArray[np.uint8], required: NDArray[np.uint8], start: int, end: int
+) -> int:
+    """Return a number of steps that no walk over all required cells can beat.
+
+    Args:
+        steps: step masks, uint8 (rows, cols); symmetric.
+        required: uint8 (rows, cols), 1 for cells to visit; those that cannot be reached
+            from the start are left out.
+        start: flat cell ``row * cols + col`` the walk begins in.
+        end: flat cell it ends in, one that can be reached; -1 for anywhere.
+    """
+    ground = _ground(steps, required)
+    ground.wanted[start] = 1
+    # Steps saved, against a walk back to the cell, by an end in it or beyond it.
+    saved = np.full(steps.size, NO_END, np.int32)
+    if end < 0:
+        saved[ground.wanted != 0] = 0
+    else:
+        ground.wanted[end] = 1
+        saved[end] = 0
+    blocks = biconnected_blocks(ground.steps, ground.offsets, start)
+    closed = 0
+    for number in range(blocks.first.size - 1):
+        cells = blocks.cells[blocks.first[number] : blocks.first[number + 1]]
+        count = wanted_first(cells, ground.wanted)
+        if count == 1:
+            continue
+        top = cells[0]
+        ground.wanted[top] = 1
+        around = _bound_block(ground, cells, count, number + 1)
+        closed += around
+        for cell in cells[1:count]:
+            if saved[cell] > NO_END:
+                saved[top] = max(saved[top], saved[cell] + around - ground.open_steps[cell])
+    return int(closed - saved[start])
+
+
+@kernel
+def _ground(steps: NDArray[np.uint8], required: NDArray[np.uint8]) -> Ground:
+    rows, cols = steps.shape
+    size = rows * cols
+    colour = np.empty((rows, cols), np.uint8)
+    for row in range(rows):
+        for col in range(cols):
+            colour[row, col] = (row + col) & 1
+    return Ground(
+        steps=steps.ravel(),
+        offsets=np.array([1, cols, -1, -cols], np.int64),
+        colour=colour.ravel(),
+        wanted=required.ravel().copy(),
+        block=np.zeros(size, np.int32),
+        inside=np.empty(size, np.uint8),
+        links=np.empty(size, np.uint8),
+        pairing=pairing_for(size),
+        chosen=np.zeros(size, np.uint8),
+        island=np.empty(size, np.int32),
+        away=np.empty(size, np.int32),
+        open_steps=np.empty(size, np.int32),
+    )
+
+
+@kernel
+def _bound_block(ground: Ground, cells: NDArray[np.int32], count: int, number: int) -> int:
+    """Return the bound of a closed walk over a block; write those of open ones.
+
+    Args:
+        ground: the lattice; ``open_steps`` is written for all wanted cells but the top.
+        cells: int32, the block's cells: the top, the other wanted ones, the rest.
+        count: how many of them are wanted, the top among them.
+        number: of the block, from 1.
+    """
+    if cells.size == 2:
+        ground.open_steps[cells[1]] = 1
+        return 2
+    _cut_out(ground, cells, number)
+    pairing, top = ground.pairing, cells[0]
+    graph = Bipartite(cells[:count], ground.links, ground.colour, ground.offsets)
+    sea = Sea(
+        cells, count, ground.inside, ground.offsets, ground.island, ground.away, pairing.queue
+    )
+    match(graph, pairing, SEARCHED_AT_LEAST + SEARCHED_PER_CELL * count)
+    for cell in cells[1:count]:
+        ground.open_steps[cell] = 0
+    same = 1 if ground.colour[top] else 0
+    closed, first = 0, -1
+    for turn in range(3):
+        # The first two sets leave out all cells of one colour that any largest set leaves
+        # out; the second, of the top's colour, the top if it can. Then the third leaves out
+        # the top and what cells of the other colour can be left out with it.
+        if turn == 2:
+            if ground.chosen[top]:
+                break
+            first = pairing.mate[top]
+        side = same if turn == 1 else 1 - same
+        closed = max(closed, _bound_by_set(ground, graph, sea, side, first))
+    if count < cells.size:
+        measure_from(sea, top)
+        for cell in cells[1:count]:
+            steps = closed - sea.away[cell]
+            ground.open_steps[cell] = max(ground.open_steps[cell], steps)
+    return closed
+
+
+@kernel
+def _cut_out(ground: Ground, cells: NDArray[np.int32], number: int) -> None:
+    """Write the step masks inside a block, and to its wanted cells."""
+    for cell in cells:
+        ground.block[cell] = number
+    for cell in cells:
+        inside, links = 0, 0
+        for direction in range(4):
+            if ground.steps[cell] >> direction & 1:
+                after = cell + ground.offsets[direction]
+                if ground.block[after] == number:
+                    inside |= 1 << direction
+                    if ground.wanted[after]:
+                        links |= 1 << direction
+        ground.inside[cell], ground.links[cell] = inside, links
+
+
+@kernel
+def _bound_by_set(ground: Ground, graph: Bipartite, sea: Sea, side: int, first: int) -> int:
+    """Bound walks over a block, as ``_bound_block`` does, by one independent set."""
+    colour, chosen, island = ground.colour, ground.chosen, sea.island
+    size = choose_independent(graph, ground.pairing, side, first, chosen)
+    black, white = find_islands(sea, chosen, colour)
+    tree, round_trip = 0, 0
+    if black + white > 1:
+        if sea.wanted < sea.cells.size:
+            tree, heaviest = spanning_weight(sea, black + white)
+            round_trip = tree + heaviest
+        round_trip = max(round_trip, 2 * black, 2 * white)
+    top = graph.cells[0]
+    top_colour, top_chosen = int(colour[top]), int(chosen[top])
+    for cell in graph.cells[1:]:
+        end_colour, end_chosen = int(colour[cell]), int(chosen[cell])
+        between = round_trip
+        if island[cell] != island[top]:
+            ends_white = (top_colour ^ top_chosen ^ 1) + (end_colour ^ end_chosen ^ 1)
+            between = max(tree, 2 * white - ends_white, 2 * black - (2 - ends_white))
+        steps = 2 * size - top_chosen - end_chosen + between
+        steps += (steps + top_colour + end_colour) & 1
+        ground.open_steps[cell] = max(ground.open_steps[cell], steps)
+    closed = 2 * size + round_trip
+    return int(closed + (closed & 1))

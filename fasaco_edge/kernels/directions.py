@@ -1,9 +1,0 @@
-"""The four directions of a step, counter-clockwise from east.
-
-Row 0 is the row with the smallest y, so north is towards larger rows. Bit
-``1 << direction`` of a cell's step mask says that this step is legal.
-"""
-
-EAST, NORTH, WEST, SOUTH = 0, 1, 2, 3
-ROW_STEP = (0, 1, 0, -1)
-COL_STEP = (1, 0, -1, 0)

@@ -1,0 +1,1 @@
+"""Kernels on maps and the lattice: which cells are coverable, reachable, changed."""

@@ -1,0 +1,1 @@
+"""Kernels that improve and repair a complete walk."""

@@ -1,0 +1,96 @@
+"""Which loops go round an obstacle.
+
+The moves of the local search change a walk within unit squares. How often the
+walk passes an obstacle on one side, odd or even, they cannot change: the parity
+of a walk's steps is a chain over the two-element field, a square adds a
+boundary, and what is left is the chain's class in the first homology of the
+ground. To leave a class takes a loop round a hole, and to find one takes this:
+each hole throws a ray to the east, and a loop goes round some hole if the rays
+it crosses do not cancel out.
+
+A hole is a connected set of squares of which some step is missing; the one
+outside is no hole.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.cells import EAST, NORTH
+from fasaco_edge.kernels.jit import kernel
+from fasaco_edge.kernels.local_search.walk_array import Ground
+from fasaco_edge.kernels.random import draw
+
+
+@kernel
+def _has(ground: Ground, cell: int, direction: int) -> bool:
+    return bool(ground.steps[cell] >> direction & 1)
+
+
+@kernel
+def _is_whole(ground: Ground, corner: int) -> bool:
+    """Tell whether the square north-east of ``corner`` has all four steps."""
+    north = ground.offsets[NORTH]
+    return (
+        _has(ground, corner, EAST)
+        and _has(ground, corner, NORTH)
+        and _has(ground, corner + 1, NORTH)
+        and _has(ground, corner + north, EAST)
+    )
+
+
+@kernel
+def _flood(
+    ground: Ground, first: int, seen: NDArray[np.uint8], queue: NDArray[np.int32], bound: int
+) -> None:
+    """Mark all squares that hang together with ``first`` across missing steps."""
+    north = ground.offsets[NORTH]
+    queue[0] = first
+    seen[first] = 1
+    head, tail = 0, 1
+    while head < tail:
+        square = queue[head]
+        head += 1
+        beside = (square + 1, square + north, square - 1, square - north)
+        closed = (
+            _has(ground, square + 1, NORTH),
+            _has(ground, square + north, EAST),
+            _has(ground, square, NORTH),
+            _has(ground, square, EAST),
+        )
+        for side in range(4):
+            after = beside[side]
+            if closed[side] or not 0 <= after < bound or seen[after]:
+                continue
+            seen[after] = 1
+            queue[tail] = after
+            tail += 1
+
+
+@kernel
+def rays(ground: Ground, rays_crossed: NDArray[np.int64]) -> int:
+    """Throw the rays; return the number of holes.
+
+    Args:
+        ground: framed by cells without steps.
+        rays_crossed: out, int64 (n,): which rays the step to the north of a cell
+            crosses, as a sum (exclusive or) of one random number for each ray.
+            Steps along a row cross none.
+    """
+    size, north = ground.bound, ground.offsets[NORTH]
+    bound = size - north - 1
+    seen = np.zeros(size, np.uint8)
+    queue = np.empty(size, np.int32)
+    numbers = np.full(1, 88172645463325252, np.uint64)
+    rays_crossed[:] = 0
+    _flood(ground, 0, seen, queue, bound)
+    holes, ray = 0, 0
+    for square in range(bound):
+        # A ray ends with its row: the frame has no step to cross.
+        if square % north == 0:
+            ray = 0
+        rays_crossed[square] = ray
+        if not seen[square] and not _is_whole(ground, square):
+            _flood(ground, square, seen, queue, bound)
+            ray ^= draw(numbers)
+            holes += 1
+    return holes

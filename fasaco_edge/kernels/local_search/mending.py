@@ -1,0 +1,269 @@
+"""Mending a walk after the ground changed: what is gone is left out, what is new is put in.
+
+A mended walk is legal and complete, and where nothing changed it is the walk
+that it was; how good it is, is left to local search.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.jit import inlined, kernel
+from fasaco_edge.kernels.local_search.walk_array import Ground, leads
+
+NOWHERE = -1
+
+# Entries of ``_Walk.counts``.
+VISITS, LAST = range(2)
+
+
+@kernel
+def _way(
+    ground: Ground,
+    start: int,
+    goal: int,
+    came_from: NDArray[np.int32],
+    queue: NDArray[np.int32],
+) -> int:
+    """Search a shortest way breadth first; return its steps, -1 where there is none.
+
+    ``came_from``, int32 (n,), all NOWHERE, receives the cell before each one reached.
+    """
+    queue[0] = start
+    came_from[start] = start
+    head, tail = 0, 1
+    while head < tail and came_from[goal] == NOWHERE:
+        here = queue[head]
+        head += 1
+        for direction in range(4):
+            if not ground.steps[here] >> direction & 1:
+                continue
+            after = here + ground.offsets[direction]
+            if came_from[after] == NOWHERE:
+                came_from[after] = here
+                queue[tail] = after
+                tail += 1
+    if came_from[goal] == NOWHERE:
+        return -1
+    steps, cell = 0, goal
+    while cell != start:
+        cell = came_from[cell]
+        steps += 1
+    return steps
+
+
+@inlined
+def _append_way(
+    came_from: NDArray[np.int32], walk: NDArray[np.int32], length: int, goal: int, steps: int
+) -> int:
+    cell = goal
+    for index in range(length + steps - 1, length - 1, -1):
+        walk[index] = cell
+        cell = came_from[cell]
+    return length + steps
+
+
+@kernel
+def keep_legal(
+    ground: Ground, before: NDArray[np.int32], start: int, walk: NDArray[np.int32]
+) -> int:
+    """Write what is left of a walk; return its length.
+
+    Args:
+        ground: as it is now.
+        before: int32 (m,), the walk that was, cells of this ground.
+        start: where the walk begins now.
+        walk: out, int32 (room,): the walk from ``start``. Where a step is gone, or leads
+            from where the robot is not, it goes by a shortest way to the next cell
+            that is still to be covered; it ends with the last of these.
+
+    Returns:
+        The walk's length; it ends early where the room does.
+    """
+    size = ground.bound
+    seen = np.zeros(size, np.uint8)
+    queue = np.empty(size, np.int32)
+    walk[0] = start
+    seen[start] = 1
+    length, kept, here = 1, 1, start
+    for cell in before:
+        if cell == here or (seen[cell] and not leads(ground, here, cell)):
+            continue
+        is_open = ground.needed[cell] > 0 and not seen[cell]
+        if leads(ground, here, cell):
+            if length == walk.size:
+                break
+            walk[length] = cell
+            length += 1
+        elif is_open and ground.steps[cell]:
+            came_from = np.full(size, NOWHERE, np.int32)
+            steps = _way(ground, here, cell, came_from, queue)
+            if steps < 0:
+                continue
+            if length + steps > walk.size:
+                break
+            length = _append_way(came_from, walk, length, cell, steps)
+            for index in range(length - steps, length):
+                seen[walk[index]] = 1
+        else:
+            continue
+        here = cell
+        seen[cell] = 1
+        if is_open:
+            kept = length
+    return kept
+
+
+class _Walk(NamedTuple):
+    """A walk that visits are put into, as a linked list.
+
+    Attributes:
+        cells: int32 (room,), the cell of each visit.
+        following: int32 (room,), the visit after each one, NOWHERE after the last.
+        visit_of: int32 (n,), the last visit of each cell, NOWHERE where there is none.
+        counts: int64 (2,), VISITS so far, and the LAST one.
+    """
+
+    cells: NDArray[np.int32]
+    following: NDArray[np.int32]
+    visit_of: NDArray[np.int32]
+    counts: NDArray[np.int64]
+
+
+class _Wave(NamedTuple):
+    """A search outward from the walk.
+
+    Attributes:
+        queue: int32 (n,), the cells reached, nearest first.
+        came_from: int32 (n,), the cell before each one reached, itself for the first ones.
+        way: int32 (n,), working memory.
+    """
+
+    queue: NDArray[np.int32]
+    came_from: NDArray[np.int32]
+    way: NDArray[np.int32]
+
+
+@inlined
+def _insert(walk: _Walk, after: int, cell: int) -> int:
+    """Put a visit of ``cell`` after visit ``after``; return it."""
+    visit = int(walk.counts[VISITS])
+    walk.cells[visit] = cell
+    walk.following[visit] = walk.following[after]
+    walk.following[after] = visit
+    walk.counts[VISITS] += 1
+    return visit
+
+
+@kernel
+def _visit(walk: _Walk, wave: _Wave, goal: int, free_end: bool) -> None:
+    """Visit a cell from the nearest one on the walk: there and back, or there from a free end."""
+    length, cell = 0, goal
+    while walk.visit_of[cell] == NOWHERE:
+        wave.way[length] = cell
+        length += 1
+        cell = wave.came_from[cell]
+    at = walk.visit_of[cell]
+    is_end = free_end and at == walk.counts[LAST]
+    for index in range(length - 1, -1, -1):
+        at = _insert(walk, at, wave.way[index])
+        walk.visit_of[wave.way[index]] = at
+    if is_end:
+        walk.counts[LAST] = at
+        return
+    for index in range(1, length):
+        at = _insert(walk, at, wave.way[index])
+    _insert(walk, at, cell)
+
+
+@kernel
+def _begin(wave: _Wave, visits: NDArray[np.int32], first: int, end: int, tail: int) -> int:
+    """Queue the cells of visits ``first`` to ``end``, the last one first; return the tail."""
+    for index in range(end - 1, first - 1, -1):
+        cell = visits[index]
+        if wave.came_from[cell] == NOWHERE:
+            wave.came_from[cell] = cell
+            wave.queue[tail] = cell
+            tail += 1
+    return tail
+
+
+@kernel
+def _spread(
+    ground: Ground, walk: _Walk, wave: _Wave, tail: int, over_all: bool, free_end: bool
+) -> int:
+    """Visit missing cells in a wave from the queued ones; return the tail.
+
+    ``over_all``: over any cells, else only from one missing cell to the next.
+    """
+    head = 0
+    while head < tail:
+        here = wave.queue[head]
+        head += 1
+        for direction in range(4):
+            after = here + ground.offsets[direction]
+            if not ground.steps[here] >> direction & 1 or wave.came_from[after] != NOWHERE:
+                continue
+            missing = ground.needed[after] > 0 and walk.visit_of[after] == NOWHERE
+            if not (missing or over_all):
+                continue
+            wave.came_from[after] = here
+            wave.queue[tail] = after
+            tail += 1
+            if missing:
+                _visit(walk, wave, after, free_end)
+    return tail
+
+
+@kernel
+def _written(walk: _Walk, out: NDArray[np.int32]) -> int:
+    """Write visits in their order, from visit 0 on; return their number."""
+    index, written = 0, 0
+    while index != NOWHERE:
+        out[written] = walk.cells[index]
+        written += 1
+        index = walk.following[index]
+    return written
+
+
+@kernel
+def put_in_new(
+    ground: Ground, before: NDArray[np.int32], free_end: bool, held: int, out: NDArray[np.int32]
+) -> int:
+    """Lead a walk over all cells that it misses; return the new walk's length.
+
+    In a wave from the walk outward, each missing cell is visited from the nearest
+    cell that is on the walk by then: there and back; or there alone, where a free
+    end lies beside it. Of several such visits it is the last one: more may be known
+    until then, and what lies just ahead stays as it is. From there a cell is visited
+    only where no way over missing cells leads to it from later on.
+
+    Args:
+        ground: whose cells with ``needed`` above 0 are to be visited; those that cannot
+            be reached are left out.
+        before: int32 (m,), the walk, m at least 1.
+        free_end: whether the walk may end anywhere.
+        held: so many first visits lie just ahead.
+        out: out, int32 (room,); room for ``m + 2 * n`` visits is enough for any walk.
+    """
+    size = ground.bound
+    walk = _Walk(
+        np.empty(out.size, np.int32),
+        np.empty(out.size, np.int32),
+        np.full(size, NOWHERE, np.int32),
+        np.array((before.size, before.size - 1), np.int64),
+    )
+    wave = _Wave(
+        np.empty(size, np.int32), np.full(size, NOWHERE, np.int32), np.empty(size, np.int32)
+    )
+    for index in range(before.size):
+        walk.cells[index] = before[index]
+        walk.following[index] = index + 1
+        walk.visit_of[before[index]] = index
+    walk.following[before.size - 1] = NOWHERE
+    tail = _begin(wave, before, held, before.size, 0)
+    tail = _spread(ground, walk, wave, tail, False, free_end)
+    tail = _begin(wave, before, 0, min(held, before.size), tail)
+    _spread(ground, walk, wave, tail, True, free_end)
+    return _written(walk, out)

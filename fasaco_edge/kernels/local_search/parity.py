@@ -1,0 +1,345 @@
+"""Changes of a walk that local search cannot make: its end moves, or a loop is added.
+
+How often each step is walked is all that counts for a covering walk's length:
+any such numbers that hang together and are odd only at the walk's two ends are
+a walk (Euler). Along a way or a loop each number changes by one, down where the
+step is walked twice, up where it is not: the walk stays connected, and its ends
+move, or the walk passes a hole on another side. A search that finds steps
+walked twice at no cost proposes ways that gain much and lose little.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.cells import NORTH
+from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.local_search.walk_array import LENGTH, Ground, Walk, axis_of
+from fasaco_edge.kernels.random import draw, index_of
+
+# Odds of a change that makes the walk longer by so many steps, from -16 on:
+# e ** (-steps / 3), in whole numbers.
+SHORTEST = -16
+ODDS = np.round(np.exp(-(np.arange(64) + SHORTEST) / 3.0) * 65536).astype(np.int64)
+
+NOWHERE = -1
+JUMPS = 0
+DRAWS = 1 << 20
+
+
+class Tally(NamedTuple):
+    """How often steps are walked, and working memory for the search over them.
+
+    Attributes:
+        times: int16 (n, 2), how often the steps east and north of a cell are walked.
+        order_of_old: int8 (n, 4), the direction in which the walk, seen from its end, went on
+            from a cell that it came to in each direction; -1 for none.
+        rays: int64 (n,), see ``holes.rays``.
+        reached: int64 (n,), number of the search that reached the cell, doubled; one
+            more once its distance is settled.
+        distance: int32 (n,), steps on the way there that are walked less than twice.
+        growth: int32 (n,), by how much a change of the way there lengthens the walk.
+        parent: int32 (n,), the cell before it on the way.
+        crossed: int64 (n,), rays crossed on the way.
+        order: int32 (n,), cells in the order they were settled.
+        near, far: int32 (4 * n,), cells to look at now and one step later.
+        loops: int64 (n, 2), loops found: twice the cell, one more for the step north;
+            and their odds.
+        marked: int64 (n,), number of the last climb that passed the cell.
+        clock: int64 (2,), numbers given to searches and climbs.
+        stack: int32 (room of the walk,).
+        counts: int64 (1,), number of JUMPS.
+        jump_ends: int32 (jumps, 2), the cells a jump leads between. Jump i stands in the
+            walk as cell n + i, between its two cells.
+        next_jump: int32 (jumps, 2), the next in the list of jumps from that cell.
+        jumped: uint8 (jumps,), whether it was made.
+        links: int32 (n,), -1: first in the list of the cell's jumps, twice its number
+            and one more for its second end.
+    """
+
+    times: NDArray[np.int16]
+    order_of_old: NDArray[np.int8]
+    rays: NDArray[np.int64]
+    reached: NDArray[np.int64]
+    distance: NDArray[np.int32]
+    growth: NDArray[np.int32]
+    parent: NDArray[np.int32]
+    crossed: NDArray[np.int64]
+    order: NDArray[np.int32]
+    near: NDArray[np.int32]
+    far: NDArray[np.int32]
+    loops: NDArray[np.int64]
+    marked: NDArray[np.int64]
+    clock: NDArray[np.int64]
+    stack: NDArray[np.int32]
+    counts: NDArray[np.int64]
+    jump_ends: NDArray[np.int32]
+    next_jump: NDArray[np.int32]
+    jumped: NDArray[np.uint8]
+    links: NDArray[np.int32]
+
+
+@inlined
+def _direction(ground: Ground, one: int, other: int) -> int:
+    for direction in range(4):
+        if ground.offsets[direction] == other - one:
+            return direction
+    return -1
+
+
+@lean_kernel
+def note_order(ground: Ground, walk: Walk, tally: Tally) -> None:
+    """Set ``order_of_old``."""
+    bound, cells = ground.bound, walk.cells
+    tally.order_of_old[:] = -1
+    for index in range(1, walk.counts[LENGTH] - 1):
+        before, here, after = cells[index - 1], cells[index], cells[index + 1]
+        if before < bound and here < bound and after < bound:
+            came = _direction(ground, after, here)
+            tally.order_of_old[here, came] = _direction(ground, here, before)
+
+
+@lean_kernel
+def count_steps(ground: Ground, walk: Walk, tally: Tally) -> None:
+    """Set ``times``; jumps are not steps."""
+    bound = ground.bound
+    tally.times[:] = 0
+    for index in range(walk.counts[LENGTH] - 1):
+        one, other = walk.cells[index], walk.cells[index + 1]
+        if one < bound and other < bound:
+            tally.times[min(one, other), axis_of(one, other)] += 1
+
+
+@lean_kernel
+def search_ways(
+    ground: Ground, tally: Tally, root: int, limit: int, random: NDArray[np.uint64]
+) -> int:
+    """Search from ``root``, steps that are walked twice being free (0-1 breadth first).
+
+    Returns:
+        How many cells were settled, at most about ``limit``: ``order`` has them.
+    """
+    tally.clock[0] += 2
+    now = tally.clock[0]
+    near, far = tally.near, tally.far
+    near[0] = root
+    tally.reached[root] = now
+    tally.distance[root] = tally.growth[root] = 0
+    tally.crossed[root] = 0
+    tally.parent[root] = NOWHERE
+    head, near_size, far_size, settled = 0, 1, 0, 0
+    while settled < limit:
+        if head == near_size:
+            if far_size == 0:
+                break
+            near, far = far, near
+            head, near_size, far_size = 0, far_size, 0
+        here = near[head]
+        head += 1
+        if tally.reached[here] == now + 1:
+            continue
+        tally.reached[here] = now + 1
+        tally.order[settled] = here
+        settled += 1
+        first = draw(random) & 3
+        for turn in range(4):
+            direction = (first + turn) & 3
+            if not ground.steps[here] >> direction & 1:
+                continue
+            after = here + ground.offsets[direction]
+            if tally.reached[after] == now + 1:
+                continue
+            edge, axis = min(here, after), direction & 1
+            doubled = tally.times[edge, axis] >= 2
+            distance = tally.distance[here] + (0 if doubled else 1)
+            if tally.reached[after] == now and distance >= tally.distance[after]:
+                continue
+            tally.reached[after] = now
+            tally.distance[after] = distance
+            tally.parent[after] = here
+            tally.growth[after] = tally.growth[here] + (-1 if doubled else 1)
+            tally.crossed[after] = tally.crossed[here]
+            if axis == 1:
+                tally.crossed[after] ^= tally.rays[edge]
+            if doubled:
+                near[near_size] = after
+                near_size += 1
+            else:
+                far[far_size] = after
+                far_size += 1
+    return settled
+
+
+@inlined
+def _odds(growth: int) -> int:
+    return int(ODDS[min(max(growth - SHORTEST, 0), ODDS.size - 1)])
+
+
+@inlined
+def change_step(ground: Ground, tally: Tally, one: int, other: int) -> None:
+    """Walk a step once less where it is walked twice, else once more."""
+    edge, axis = min(one, other), axis_of(one, other)
+    tally.times[edge, axis] += -1 if tally.times[edge, axis] >= 2 else 1
+
+
+@lean_kernel
+def draw_end(tally: Tally, settled: int, random: NDArray[np.uint64]) -> int:
+    """Return another end for the walk, by the odds of how much longer it gets."""
+    total = 0
+    for index in range(1, settled):
+        total += _odds(tally.growth[tally.order[index]])
+    left = (index_of(draw(random), DRAWS) * total) >> 20
+    for index in range(1, settled):
+        left -= _odds(tally.growth[tally.order[index]])
+        if left < 0:
+            return int(tally.order[index])
+    return int(tally.order[settled - 1])
+
+
+@lean_kernel
+def common_ancestor(tally: Tally, one: int, other: int) -> int:
+    """Return the last cell that the ways to two settled cells share."""
+    tally.clock[1] += 1
+    climb = tally.clock[1]
+    while one != NOWHERE:
+        tally.marked[one] = climb
+        one = tally.parent[one]
+    while tally.marked[other] != climb:
+        other = tally.parent[other]
+    return other
+
+
+@lean_kernel
+def find_loops(ground: Ground, tally: Tally, settled: int) -> int:
+    """List in ``loops`` the steps that close a loop round a hole; return how many there are."""
+    now, found = tally.clock[0], 0
+    for index in range(settled):
+        here = tally.order[index]
+        for direction in range(NORTH + 1):
+            if not ground.steps[here] >> direction & 1:
+                continue
+            after = here + ground.offsets[direction]
+            if tally.reached[after] != now + 1:
+                continue
+            if tally.parent[here] == after or tally.parent[after] == here:
+                continue
+            crossed = tally.crossed[here] ^ tally.crossed[after]
+            if direction == NORTH:
+                crossed ^= tally.rays[here]
+            if crossed == 0 or found == tally.loops.shape[0]:
+                continue
+            shared = common_ancestor(tally, here, after)
+            growth = tally.growth[here] + tally.growth[after] - 2 * tally.growth[shared]
+            growth += -1 if tally.times[here, direction] >= 2 else 1
+            tally.loops[found, 0] = 2 * here + direction
+            tally.loops[found, 1] = _odds(growth)
+            found += 1
+    return found
+
+
+@lean_kernel
+def draw_loop(tally: Tally, found: int, random: NDArray[np.uint64]) -> int:
+    """Return one of the loops found, by its odds."""
+    total = 0
+    for index in range(found):
+        total += tally.loops[index, 1]
+    left = (index_of(draw(random), DRAWS) * total) >> 20
+    for index in range(found):
+        left -= tally.loops[index, 1]
+        if left < 0:
+            return int(tally.loops[index, 0])
+    return int(tally.loops[found - 1, 0])
+
+
+@inlined
+def _heading(ground: Ground, tally: Tally, depth: int) -> int:
+    """Return how to go on from the top of the stack: as of old, else straight; -1 for any way."""
+    if depth < 2:
+        return -1
+    here = tally.stack[depth - 1]
+    came = _direction(ground, tally.stack[depth - 2], here)
+    if came < 0:
+        return -1
+    known = tally.order_of_old[here, came]
+    return int(known) if known >= 0 else came
+
+
+@lean_kernel
+def _hang_up_jumps(tally: Tally) -> None:
+    """Let each cell's ``links`` begin the list of the jumps from there."""
+    for jump in range(tally.counts[JUMPS]):
+        for side in range(2):
+            cell = tally.jump_ends[jump, side]
+            tally.next_jump[jump, side] = tally.links[cell]
+            tally.links[cell] = 2 * jump + side
+        tally.jumped[jump] = 0
+
+
+@inlined
+def _next_step(ground: Ground, tally: Tally, here: int, heading: int) -> int:
+    """Take a step that is still to be walked; return its direction, or -1."""
+    for turn in range(4):
+        direction = (heading + turn) & 3
+        after = here + ground.offsets[direction]
+        edge = min(here, after)
+        if tally.times[edge, direction & 1] > 0:
+            tally.times[edge, direction & 1] -= 1
+            return direction
+    return -1
+
+
+@inlined
+def _next_jump(tally: Tally, here: int) -> int:
+    """Take a jump that is still to be made; return twice its number and its side, or -1."""
+    while tally.links[here] >= 0:
+        link = tally.links[here]
+        tally.links[here] = tally.next_jump[link >> 1, link & 1]
+        # A jump hangs in two lists, and is made once.
+        if not tally.jumped[link >> 1]:
+            tally.jumped[link >> 1] = 1
+            return int(link)
+    return -1
+
+
+@lean_kernel
+def euler_walk(
+    ground: Ground,
+    walk: Walk,
+    tally: Tally,
+    end: int,
+    steady: bool,
+    random: NDArray[np.uint64],
+) -> int:
+    """Write into ``walk.cells`` a walk that takes each step as often as ``times`` says.
+
+    Hierholzer's algorithm from the walk's ``end``, so that what it yields begins
+    with the start. Uses up ``times``. Where there is a choice it goes on as the walk
+    did of old (``order_of_old``) or straight if ``steady``, else at random. Returns the
+    walk's length.
+    """
+    bound, stack = ground.bound, tally.stack
+    _hang_up_jumps(tally)
+    stack[0] = end
+    depth, length = 1, 0
+    while depth:
+        here = stack[depth - 1]
+        if here < bound:
+            heading = _heading(ground, tally, depth) if steady else -1
+            if heading < 0:
+                heading = draw(random) & 3
+            direction = _next_step(ground, tally, here, heading)
+            if direction >= 0:
+                stack[depth] = here + ground.offsets[direction]
+                depth += 1
+                continue
+            link = _next_jump(tally, here)
+            if link >= 0:
+                stack[depth] = bound + (link >> 1)
+                stack[depth + 1] = tally.jump_ends[link >> 1, 1 - (link & 1)]
+                depth += 2
+                continue
+        walk.cells[length] = here
+        length += 1
+        depth -= 1
+    return length

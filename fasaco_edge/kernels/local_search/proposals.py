@@ -1,0 +1,375 @@
+"""Local search on a walk: thousands of small proposals, none of which needs a distance.
+
+============  =================================================  ==============
+move          what it does                                       steps
+============  =================================================  ==============
+square flip   steps a-b and c-d become a-c and b-d, what lies    0
+              between is turned round (2-opt on a square)
+end flip      the tail behind a step a-b is turned round, where  0
+              the free end lies beside a
+corner flip   a visit that can be spared goes to the opposite    0
+              corner of its square
+shrink        a spike, or two visits that can be spared between  -2 (-1 at a
+              neighbours, or the free end, is left out           free end)
+detour        one step becomes three, or a spike                 +2
+============  =================================================  ==============
+
+Where steps alone count, the moves at no cost are always taken: they carry the
+visits that can be spared about until two of them meet and shrink. Where turns
+count, most moves cost something, and simulated annealing decides (Metropolis).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.local_search.walk_array import (
+    COST,
+    LENGTH,
+    SPARE_CELLS,
+    Ground,
+    Prices,
+    Walk,
+    drop,
+    insert_two,
+    is_at,
+    leads,
+    put,
+    reverse,
+    turning,
+)
+from fasaco_edge.kernels.random import draw, index_of
+
+# -ln(u) for u spread evenly over (0, 1), in units of 1 / 65536: whole numbers, so
+# that a walk is accepted or not alike on every machine.
+EXPONENTIAL = np.round(-np.log((np.arange(4096) + 0.5) / 4096) * 65536).astype(np.int64)
+
+# Of 64 proposals at a visit that can be spared so many try to be rid of it, and of
+# 64 proposals so many are detours where they can be afforded.
+SPARED_OF_64 = 40
+DETOURS_OF_64 = 8
+
+# Half of the proposals go where something can be gained: to visits that can be
+# spared, or to a cell one or two steps beside one.
+AT_SPARE_OF_256 = 128
+BESIDE_OF_256 = 128
+
+
+@inlined
+def accepts(delta: int, heat_us: int, random: NDArray[np.uint64]) -> bool:
+    """Tell whether a change of cost [us] is taken at a temperature [us] (Metropolis)."""
+    if delta <= 0:
+        return True
+    if heat_us == 0:
+        return False
+    return bool(delta <= heat_us * EXPONENTIAL[draw(random) & 4095] >> 16)
+
+
+@inlined
+def _turn_at(walk: Walk, index: int, quarter_turn_us: int) -> int:
+    """Return the cost of the turn at a visit, 0 at the walk's ends."""
+    if index < 1 or index + 1 >= walk.counts[LENGTH]:
+        return 0
+    cells = walk.cells
+    return turning(cells[index - 1], cells[index], cells[index + 1], quarter_turn_us)
+
+
+@inlined
+def _turn_in(walk: Walk, before: int, here: int, after: int, quarter_turn_us: int) -> int:
+    """Return the cost of the turn at cell ``here`` between visits ``before`` and ``after``.
+
+    Either may lie beyond the walk's ends: then there is no turn.
+    """
+    if before < 0 or after >= walk.counts[LENGTH]:
+        return 0
+    return turning(walk.cells[before], here, walk.cells[after], quarter_turn_us)
+
+
+@inlined
+def _shorten_end(
+    ground: Ground, walk: Walk, prices: Prices, heat_us: int, random: NDArray[np.uint64]
+) -> None:
+    last = walk.counts[LENGTH] - 1
+    delta = -prices.step_us - _turn_at(walk, last - 1, prices.quarter_turn_us)
+    if accepts(delta, heat_us, random):
+        drop(ground, walk, last, 1)
+        walk.counts[COST] += delta
+
+
+@inlined
+def _drop_spike(
+    ground: Ground,
+    walk: Walk,
+    index: int,
+    prices: Prices,
+    heat_us: int,
+    random: NDArray[np.uint64],
+) -> None:
+    """Leave out visit ``index`` between two visits of one cell, and the second of these."""
+    turn = prices.quarter_turn_us
+    delta = -2 * prices.step_us
+    if turn:
+        delta -= 2 * turn + _turn_at(walk, index - 1, turn) + _turn_at(walk, index + 1, turn)
+        delta += _turn_in(walk, index - 2, walk.cells[index - 1], index + 2, turn)
+    if accepts(delta, heat_us, random):
+        drop(ground, walk, index, 2)
+        walk.counts[COST] += delta
+
+
+@inlined
+def _drop_detour(
+    ground: Ground,
+    walk: Walk,
+    index: int,
+    prices: Prices,
+    heat_us: int,
+    random: NDArray[np.uint64],
+) -> None:
+    """Leave out visits ``index`` and ``index + 1``, whose neighbours are beside each other."""
+    turn = prices.quarter_turn_us
+    delta = -2 * prices.step_us
+    if turn:
+        for place in range(index - 1, index + 3):
+            delta -= _turn_at(walk, place, turn)
+        before, after = walk.cells[index - 1], walk.cells[index + 2]
+        if index > 1:
+            delta += turning(walk.cells[index - 2], before, after, turn)
+        if index + 3 < walk.counts[LENGTH]:
+            delta += turning(before, after, walk.cells[index + 3], turn)
+    if accepts(delta, heat_us, random):
+        drop(ground, walk, index, 2)
+        walk.counts[COST] += delta
+
+
+@inlined
+def _flip_corner(
+    ground: Ground,
+    walk: Walk,
+    index: int,
+    prices: Prices,
+    heat_us: int,
+    random: NDArray[np.uint64],
+) -> None:
+    """Move a visit to the opposite corner of the square that the walk turns in there."""
+    cells = walk.cells
+    before, here, after = cells[index - 1], cells[index], cells[index + 1]
+    corner = before + after - here
+    if corner == here or not (leads(ground, before, corner) and leads(ground, after, corner)):
+        return
+    turn = prices.quarter_turn_us
+    delta = 0
+    if turn:
+        delta -= _turn_at(walk, index - 1, turn) + _turn_at(walk, index + 1, turn)
+        if index > 1:
+            delta += turning(cells[index - 2], before, corner, turn)
+        if index + 2 < walk.counts[LENGTH]:
+            delta += turning(corner, after, cells[index + 2], turn)
+    if delta >= 0 and index < prices.held:
+        return
+    if turn:
+        if not accepts(delta, heat_us, random):
+            return
+        walk.counts[COST] += delta
+    put(ground, walk, index, corner)
+
+
+@inlined
+def _be_rid_of(
+    ground: Ground,
+    walk: Walk,
+    index: int,
+    choice: int,
+    prices: Prices,
+    heat_us: int,
+    random: NDArray[np.uint64],
+) -> None:
+    """Leave out a visit that can be spared, or move it."""
+    if index == 0:
+        return
+    last = walk.counts[LENGTH] - 1
+    if index == last:
+        if prices.free_end:
+            _shorten_end(ground, walk, prices, heat_us, random)
+        return
+    cells = walk.cells
+    before, here, after = cells[index - 1], cells[index], cells[index + 1]
+    if before == after:
+        _drop_spike(ground, walk, index, prices, heat_us, random)
+        return
+    both_spare = index + 2 <= last and walk.visits[after] > ground.needed[after]
+    if choice & 1 and both_spare and leads(ground, before, cells[index + 2]):
+        _drop_detour(ground, walk, index, prices, heat_us, random)
+        return
+    if after - here != here - before:
+        _flip_corner(ground, walk, index, prices, heat_us, random)
+
+
+@inlined
+def _turns_of_flip(walk: Walk, first: int, last: int, turn: int) -> int:
+    """Return by how much turns cost more if visits ``first + 1`` to ``last`` are turned round."""
+    cells, length = walk.cells, walk.counts[LENGTH]
+    near, after, far = cells[first], cells[first + 1], cells[last]
+    delta = turning(near, far, cells[last - 1], turn)
+    delta -= turning(near, after, cells[first + 2], turn)
+    if first > 0:
+        delta += turning(cells[first - 1], near, far, turn)
+        delta -= turning(cells[first - 1], near, after, turn)
+    if last + 1 < length:
+        beyond = cells[last + 1]
+        delta += turning(cells[first + 2], after, beyond, turn)
+        delta -= turning(cells[last - 1], far, beyond, turn)
+        if last + 2 < length:
+            delta += turning(after, beyond, cells[last + 2], turn)
+            delta -= turning(far, beyond, cells[last + 2], turn)
+    return int(delta)
+
+
+@inlined
+def _is_flip(ground: Ground, walk: Walk, first: int, last: int, back: int, free_end: bool) -> bool:
+    """Tell whether visits ``first + 1`` to ``last`` can be turned round.
+
+    One of the two new steps is known to be there: between the last visits of both
+    parts if ``back``, else between the first ones.
+    """
+    if first < 0 or last - first < 2:
+        return False
+    cells = walk.cells
+    if back:
+        return leads(ground, cells[first], cells[last])
+    if last + 1 == walk.counts[LENGTH]:
+        return free_end
+    return leads(ground, cells[first + 1], cells[last + 1])
+
+
+@inlined
+def _flip_square(
+    ground: Ground,
+    walk: Walk,
+    index: int,
+    direction: int,
+    choice: int,
+    prices: Prices,
+    heat_us: int,
+    random: NDArray[np.uint64],
+) -> None:
+    """Flip the square beside visit ``index`` in ``direction``, if two steps run along it."""
+    here = walk.cells[index]
+    if not ground.steps[here] >> direction & 1:
+        return
+    beside = here + ground.offsets[direction]
+    other = walk.place[beside]
+    if not is_at(walk, beside, other):
+        return
+    back = choice & 1
+    first, last = min(index, other) - back, max(index, other) - back
+    if not _is_flip(ground, walk, first, last, back, prices.free_end):
+        return
+    turn = prices.quarter_turn_us
+    delta = _turns_of_flip(walk, first, last, turn) if turn else 0
+    if delta >= 0 and first + 1 < prices.held:
+        return
+    if turn:
+        if not accepts(delta, heat_us, random):
+            return
+        walk.counts[COST] += delta
+    reverse(walk, first + 1, last)
+
+
+@inlined
+def _detour(
+    ground: Ground,
+    walk: Walk,
+    index: int,
+    direction: int,
+    choice: int,
+    prices: Prices,
+    heat_us: int,
+    random: NDArray[np.uint64],
+) -> None:
+    """Go from visit ``index`` to the next around a square, or to a side and back first."""
+    length = walk.counts[LENGTH]
+    if index + 1 >= length or length + 2 > walk.cells.size or index + 1 < prices.held:
+        return
+    cells = walk.cells
+    here, after = cells[index], cells[index + 1]
+    aside = here + ground.offsets[direction]
+    if aside == after or not ground.steps[here] >> direction & 1:
+        return
+    turn = prices.quarter_turn_us
+    delta = 2 * prices.step_us + 2 * turn - _turn_at(walk, index, turn)
+    if index > 0:
+        delta += turning(cells[index - 1], here, aside, turn)
+    if choice & 1 or after - here == here - aside:
+        back = here
+        delta += turning(aside, here, after, turn)
+    else:
+        back = aside + after - here
+        if not (leads(ground, aside, back) and leads(ground, after, back)):
+            return
+        delta -= _turn_at(walk, index + 1, turn)
+        if index + 2 < length:
+            delta += turning(back, after, cells[index + 2], turn)
+    if accepts(delta, heat_us, random):
+        insert_two(ground, walk, index + 1, aside, back)
+        walk.counts[COST] += delta
+
+
+@inlined
+def _pick_spare(ground: Ground, walk: Walk, bits: int) -> int:
+    """Return a cell that has a visit to spare, or one a step or two beside such a cell; or -1."""
+    cell = walk.spare[index_of(bits, walk.counts[SPARE_CELLS])]
+    aside = bits >> 16 & 255
+    if aside < BESIDE_OF_256:
+        if not ground.steps[cell] >> (aside & 3) & 1:
+            return -1
+        cell += ground.offsets[aside & 3]
+        if aside & 4:
+            if not ground.steps[cell] >> (aside >> 3 & 3) & 1:
+                return -1
+            cell += ground.offsets[aside >> 3 & 3]
+    return int(cell)
+
+
+@lean_kernel
+def improve(
+    ground: Ground,
+    walk: Walk,
+    prices: Prices,
+    area: NDArray[np.int32],
+    heat_us: int,
+    proposals: int,
+    random: NDArray[np.uint64],
+) -> None:
+    """Make proposals at one temperature.
+
+    Args:
+        ground: where the walk goes.
+        walk: changed in place; its length is below 2^22.
+        prices: what is to become less.
+        area: cells to make the proposals at, int32 (m,); empty for the whole walk.
+        heat_us: temperature [us]; at 0 no change for the worse is taken.
+        proposals: how many to make.
+        random: stream, uint64 (1,), not 0; advanced.
+    """
+    for _ in range(proposals):
+        bits = draw(random)
+        if area.size:
+            cell = area[index_of(bits, area.size)]
+        elif walk.counts[SPARE_CELLS] and bits >> 8 & 255 < AT_SPARE_OF_256:
+            cell = _pick_spare(ground, walk, bits)
+            if cell < 0:
+                continue
+        else:
+            index = index_of(bits, walk.counts[LENGTH])
+            cell = walk.cells[index]
+            walk.place[cell] = index
+        index = walk.place[cell]
+        if not is_at(walk, cell, index):
+            continue
+        direction, choice = bits & 3, bits >> 2 & 63
+        if choice < SPARED_OF_64 and walk.visits[cell] > ground.needed[cell]:
+            _be_rid_of(ground, walk, index, choice, prices, heat_us, random)
+        elif heat_us == 0 or choice < 64 - DETOURS_OF_64:
+            _flip_square(ground, walk, index, direction, choice, prices, heat_us, random)
+        else:
+            _detour(ground, walk, index, direction, choice, prices, heat_us, random)

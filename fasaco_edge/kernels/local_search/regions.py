@@ -1,0 +1,271 @@
+"""Where a walk changed, and what lies around.
+
+A region of a large ground, cut out with the parts of a walk that lie in it.
+
+What the walk does outside stands in the region's own walk as a jump between the
+two cells just outside where it leaves and comes back; jumps and those cells
+stay as they are (``needed`` is FIXED, no step leads there), so that whatever
+improves the region's walk improves the whole one, and the whole one stays
+connected. Put back, the outside parts are taken over in the order and the
+direction that the region's walk has come to visit them in.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.cells import NORTH
+from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.local_search.walk_array import FIXED, FRAME, Ground, axis_of, copy
+
+
+@lean_kernel
+def changed_cells(
+    ground: Ground,
+    before: NDArray[np.int32],
+    walk: NDArray[np.int32],
+    times: NDArray[np.int32],
+    cells: NDArray[np.int32],
+) -> int:
+    """List the cells at steps that one walk takes more often than the other.
+
+    Args:
+        ground: where both walks lie; cells without a step are left out.
+        before, walk: int32 (m,), (n,).
+        times: int32 (cells of the ground, 2), all 0: working memory.
+        cells: out, int32 (2 * (m + n),): a cell may be listed more than once.
+
+    Returns:
+        How many are listed.
+    """
+    for index in range(walk.size - 1):
+        one, other = walk[index], walk[index + 1]
+        times[min(one, other), axis_of(one, other)] += 1
+    for index in range(before.size - 1):
+        one, other = before[index], before[index + 1]
+        times[min(one, other), axis_of(one, other)] -= 1
+    listed = 0
+    for steps in (walk, before):
+        for index in range(steps.size - 1):
+            one, other = steps[index], steps[index + 1]
+            if times[min(one, other), axis_of(one, other)] == 0:
+                continue
+            for cell in (one, other):
+                if ground.steps[cell]:
+                    cells[listed] = cell
+                    listed += 1
+    return listed
+
+
+@lean_kernel
+def neighbourhood(
+    ground: Ground,
+    cells: NDArray[np.int32],
+    radius: int,
+    labels: NDArray[np.int32],
+    label: int,
+    found: NDArray[np.int32],
+) -> int:
+    """Label some cells, and those around them.
+
+    Args:
+        ground: where they lie.
+        cells: int32 (n,).
+        radius: steps from them to the rim.
+        labels: int32 (cells of the ground,), changed in place.
+        label: one that no cell has yet.
+        found: out, int32 (room,), the labelled cells, nearest first; no more are labelled
+            than there is room for.
+
+    Returns:
+        How many were labelled.
+    """
+    size = 0
+    for cell in cells:
+        if labels[cell] != label and size < found.size:
+            labels[cell] = label
+            found[size] = cell
+            size += 1
+    first = 0
+    for _ in range(radius):
+        last = size
+        for index in range(first, last):
+            cell = found[index]
+            for direction in range(4):
+                beside = cell + ground.offsets[direction]
+                is_open = ground.steps[cell] >> direction & 1 and labels[beside] != label
+                if is_open and size < found.size:
+                    labels[beside] = label
+                    found[size] = beside
+                    size += 1
+        first = last
+    return size
+
+
+# What ``sections`` notes at its end besides the jumps.
+BEFORE, AFTER = 0, 1
+
+
+class Box(NamedTuple):
+    """A region: the cells with its label, and the rectangle they lie in.
+
+    Attributes:
+        labels: int32 (n,), label of each cell of the large ground.
+        label: the region's.
+        row, col: the rectangle's first row and column in the large ground.
+        rows, cols: its size.
+    """
+
+    labels: NDArray[np.int32]
+    label: int
+    row: int
+    col: int
+    rows: int
+    cols: int
+
+
+@inlined
+def _local(ground: Ground, box: Box, cell: int) -> int:
+    """Return a cell of the large ground, inside or just beside the box, as the region's."""
+    width = ground.offsets[NORTH]
+    row, col = cell // width - box.row, cell % width - box.col
+    return int((row + FRAME) * (box.cols + 2 * FRAME) + col + FRAME)
+
+
+@inlined
+def _large(ground: Ground, box: Box, cell: int) -> int:
+    """Return a cell of the region as one of the large ground."""
+    width = box.cols + 2 * FRAME
+    row, col = cell // width - FRAME + box.row, cell % width - FRAME + box.col
+    return int(row * ground.offsets[NORTH] + col)
+
+
+@lean_kernel
+def cut_ground(ground: Ground, box: Box, region: Ground) -> int:
+    """Fill the region's steps and needs; return how many cells it has."""
+    region.steps[:] = 0
+    region.needed[:] = FIXED
+    width, cells = ground.offsets[NORTH], 0
+    for row in range(box.row, box.row + box.rows):
+        for col in range(box.col, box.col + box.cols):
+            cell = row * width + col
+            if box.labels[cell] != box.label or ground.steps[cell] == 0:
+                continue
+            mask = 0
+            for direction in range(4):
+                beside = cell + ground.offsets[direction]
+                if ground.steps[cell] >> direction & 1 and box.labels[beside] == box.label:
+                    mask |= 1 << direction
+            here = _local(ground, box, cell)
+            region.steps[here] = mask
+            region.needed[here] = ground.needed[cell]
+            cells += 1
+    return cells
+
+
+@lean_kernel
+def cut_walk(
+    ground: Ground,
+    box: Box,
+    cells: NDArray[np.int32],
+    bound: int,
+    walk: NDArray[np.int32],
+    jump_ends: NDArray[np.int32],
+    sections: NDArray[np.int32],
+    limits: NDArray[np.int64],
+) -> tuple[int, int]:
+    """Write the parts of a walk that lie in the region, with jumps between them.
+
+    Args:
+        ground: the large ground.
+        box: the region.
+        cells: int32 (length,), the whole walk.
+        bound: number of cells of the region's ground, frame and all: jump i is cell
+            ``bound + i``.
+        walk: out, int32 (room,), the region's walk.
+        jump_ends: out, int32 (jumps, 2), see ``parity.Tally``.
+        sections: out, int32 (jumps, 2), first and last visit of the whole walk that the
+            jump stands for.
+        limits: out, int64 (2,): visits up to BEFORE come before the region's walk, those
+            from AFTER on come after it.
+
+    Returns:
+        Length of the region's walk and number of jumps; (0, 0) where the walk does not
+        come there or there is too little room.
+    """
+    length, jumps, visit = 0, 0, 0
+    while visit < cells.size and box.labels[cells[visit]] != box.label:
+        visit += 1
+    if visit == cells.size:
+        return 0, 0
+    limits[BEFORE], limits[AFTER] = 0, cells.size
+    if visit > 0:
+        limits[BEFORE] = visit - 1
+        walk[0] = _local(ground, box, cells[visit - 1])
+        length = 1
+    while visit < cells.size:
+        if length + 4 > walk.size:
+            return 0, 0
+        here = _local(ground, box, cells[visit])
+        walk[length] = here
+        length += 1
+        if box.labels[cells[visit]] == box.label:
+            visit += 1
+            continue
+        first = visit
+        while visit < cells.size and box.labels[cells[visit]] != box.label:
+            visit += 1
+        if visit == cells.size:
+            limits[AFTER] = first + 1
+            break
+        if jumps == sections.shape[0]:
+            return 0, 0
+        there = _local(ground, box, cells[visit - 1])
+        walk[length], walk[length + 1] = bound + jumps, there
+        length += 2
+        jump_ends[jumps, 0], jump_ends[jumps, 1] = here, there
+        sections[jumps, 0], sections[jumps, 1] = first, visit - 1
+        jumps += 1
+    return length, jumps
+
+
+@lean_kernel
+def put_back(
+    ground: Ground,
+    box: Box,
+    cells: NDArray[np.int32],
+    bound: int,
+    walk: NDArray[np.int32],
+    sections: NDArray[np.int32],
+    limits: NDArray[np.int64],
+    out: NDArray[np.int32],
+) -> int:
+    """Write the whole walk with the region's parts as they are now; return its length.
+
+    Args:
+        ground, box, cells, bound, sections, limits: as in ``cut_walk``.
+        walk: int32 (m,), the region's walk.
+        out: int32 (room,), there must be room.
+    """
+    length = limits[BEFORE]
+    copy(cells, out, length)
+    written = False
+    for cell in walk:
+        if cell < bound:
+            if not written:
+                out[length] = _large(ground, box, cell)
+                length += 1
+            written = False
+            continue
+        # The cell before the jump is the section's first, or its last.
+        first, last = sections[cell - bound, 0], sections[cell - bound, 1]
+        forward = cells[first] == out[length - 1]
+        for index in range(1, last - first + 1):
+            out[length] = cells[first + index] if forward else cells[last - index]
+            length += 1
+        written = True
+    for index in range(limits[AFTER], cells.size):
+        out[length] = cells[index]
+        length += 1
+    return int(length)

@@ -1,0 +1,1 @@
+"""The mission itself: events in, decisions out."""

@@ -1,0 +1,1 @@
+"""What has been covered, how far it is, and what stays uncovered."""

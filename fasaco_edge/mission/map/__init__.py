@@ -1,0 +1,1 @@
+"""The map side of a mission: frames, the newest map, the reachable area."""

@@ -1,0 +1,122 @@
+"""Loop closures: the mapper finds that all lies elsewhere, and moves map and pose at once.
+
+The ledger's cells are places in the map's frame: after such a jump nobody knows which of them
+the tool passed over, only that the map was somewhere between its old place and the new one, as
+far as it moved at all. What counts still is what was covered wherever in between it lay.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.changes import LatticeChange
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
+from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
+
+# So many cells turn from free to blocked or back in one map, and such a share of those that were
+# known: no door and no passer-by does that.
+LEAST_CELLS, LEAST_SHARE = 20, 0.1
+# Whoever moved less than this stayed where it was: [m], [rad].
+STILL_M, STILL_RAD = 0.02, math.radians(0.2)
+# How far a cell's centre may lie from the middle of four [cells] to be one with the nearest.
+NEAR = 0.1
+# Where the map may have lain, as shares of the way.
+BETWEEN = (0.25, 0.5, 0.75, 1.0)
+
+
+def has_moved(change: LatticeChange) -> bool:
+    """Tell whether a map shows walls elsewhere all over."""
+    if change.before is None or len(change.cells) < LEAST_CELLS:
+        return False
+    then, now = _states(change.before, change.cells), _states(change.after, change.cells)
+    turned = int(np.count_nonzero((then != UNKNOWN) & (now != UNKNOWN) & (then != now)))
+    # The whole lattice is looked at only where that may matter: this is asked at every map.
+    return turned >= LEAST_CELLS and turned >= LEAST_SHARE * int(
+        np.count_nonzero(change.before.states != UNKNOWN)
+    )
+
+
+def _states(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """Return the states of cells (row, col), (n, 2); those beyond the lattice are UNKNOWN."""
+    window = lattice.window
+    rows, cols = cells[:, 0] - window.row0, cells[:, 1] - window.col0
+    inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
+    states = np.full(len(cells), UNKNOWN, np.uint8)
+    states[inside] = lattice.states[rows[inside], cols[inside]]
+    return states
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """How a rigid map moved, as the robot's pose tells: it stood in ``start``, now in ``end``."""
+
+    start: Pose2D
+    end: Pose2D
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it did not."""
+        start, end = self.start, self.end
+        distance = math.hypot(end.x - start.x, end.y - start.y)
+        turn = math.remainder(end.yaw - start.yaw, math.tau)
+        return distance < STILL_M and abs(turn) < STILL_RAD
+
+    def back(
+        self, share: float, x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where points [m] were before such a share of the motion."""
+        start, end = self.start, self.end
+        turn = -share * math.remainder(end.yaw - start.yaw, math.tau)
+        dx = x - start.x - share * (end.x - start.x)
+        dy = y - start.y - share * (end.y - start.y)
+        cos, sin = math.cos(turn), math.sin(turn)
+        return cos * dx - sin * dy + start.x, sin * dx + cos * dy + start.y
+
+
+def doubtful(before: LedgerSnapshot, motion: Motion) -> Callable[[Window], NDArray[np.bool_]]:
+    """Return what tells which cells of a window, bool (rows, cols), may not have been covered."""
+
+    def inside(window: Window) -> NDArray[np.bool_]:
+        rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1]
+        x, y = (cols + 0.5) * before.cell_m, (rows + 0.5) * before.cell_m
+        doubt = np.zeros(rows.shape, bool)
+        for share in BETWEEN:
+            doubt |= ~_covered(before, *motion.back(share, x, y))
+        return doubt | _between_cells(before.cell_m, *motion.back(1.0, x, y))
+
+    return inside
+
+
+def _covered(
+    before: LedgerSnapshot, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Tell for points [m] whether all cells were covered whose centres they lie between."""
+    row, col = y / before.cell_m - 0.5, x / before.cell_m - 0.5
+    low_row, high_row = np.floor(row + NEAR).astype(int), np.ceil(row - NEAR).astype(int)
+    low_col, high_col = np.floor(col + NEAR).astype(int), np.ceil(col - NEAR).astype(int)
+    row0, col0 = int(low_row.min()), int(low_col.min())
+    window = Window(row0, col0, int(high_row.max()) + 1, int(high_col.max()) + 1)
+    visited = before.visits(window) > 0
+    covered = np.ones(x.shape, bool)
+    for rows in (low_row, high_row):
+        for cols in (low_col, high_col):
+            covered &= visited[rows - row0, cols - col0]
+    return covered
+
+
+def _between_cells(
+    cell_m: float, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Tell which points [m] a round tool may have missed that was in the middle of each cell.
+
+    A map most often moves as a whole, to where it is now: only there is looked at it.
+    """
+    row, col = y / cell_m - 0.5, x / cell_m - 0.5
+    away: NDArray[np.bool_] = np.hypot(row - np.rint(row), col - np.rint(col)) >= 0.5
+    return away

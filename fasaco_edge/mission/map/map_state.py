@@ -1,0 +1,241 @@
+"""The site: the newest map, the robot's place in it, and what it can come to from there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fasaco_edge.errors import (
+    FasacoError,
+    MapTooFar,
+    MapTooLarge,
+    PatchWithoutBase,
+    WrongFrame,
+)
+from fasaco_edge.grid.changes import LatticeChange
+from fasaco_edge.grid.geometry import StampedPose, Window
+from fasaco_edge.grid.lattice import (
+    COVERABLE,
+    UNKNOWN,
+    Cell,
+    CoverageLattice,
+    lattice_window,
+)
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, fitting
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.coverage.progress import Coverage
+from fasaco_edge.mission.map.frames import Frames
+from fasaco_edge.mission.map.loop_closure import has_moved
+from fasaco_edge.mission.map.reachable_area import FreeArea, Ground, anchor_cell
+from fasaco_edge.mission.orders.order import MissionOrder, OrderError
+from fasaco_edge.mission.orders.polygons import Polygon, bounds
+from fasaco_edge.mission.orders.zones import kept_out, without
+
+
+class Site:
+    """Takes maps and poses in.
+
+    Attributes:
+        grid: the newest map, with all updates; None before there is one.
+        map_revision: counts the maps, from 1.
+        free: the lattice over it.
+        lattice: the same without the cells the robot must keep out of.
+        pose: the newest pose in the map's frame; before there is a map in any frame.
+        map_moved: whether the newest map shows the walls elsewhere: a loop closure.
+        ground: what can be reached, as of the last ``survey``; None where the robot stands ill.
+        frames: which frame counts, and what was heard in another.
+    """
+
+    def __init__(self, config: MissionConfig) -> None:
+        self.grid: OccupancyGrid | None = None
+        self.map_revision = 0
+        self.free: CoverageLattice | None = None
+        self.lattice: CoverageLattice | None = None
+        self.pose: StampedPose | None = None
+        self.ground: Ground | None = None
+        self.map_moved = False
+        self.frames = Frames()
+        self._config = config
+        self._change: LatticeChange | None = None
+        self._keep_out: tuple[Polygon, ...] = ()
+        self._patches_lost = False
+        # Why the newest map was not taken; "" where it was.
+        self._refused = ""
+        self._free_area = FreeArea(config.footprint.free_at_most)
+
+    def take_map(self, grid: OccupancyGrid) -> bool:
+        """Take a full map in; return whether its frame counts from now on, and did not before.
+
+        Raises:
+            WrongFrame: another frame counts.
+            MapTooLarge: its lattice would be too large.
+            MapTooFar: its lattice would reach too far from 0.
+        """
+        counts_now = False
+        if self.frames.counts not in ("", grid.frame):
+            # It may be wanted later, if it is one that can be taken at all.
+            lattice_window(
+                grid.geometry, self._config.footprint.cell_m, self._config.max_lattice_cells
+            )
+            counts_now = self.frames.hear_map(grid)
+            self.frames.refuse_map(grid)
+        try:
+            self._take_map(grid)
+        except (MapTooLarge, MapTooFar) as error:
+            self._refused = str(error)
+            raise
+        self._patches_lost, self._refused = False, ""
+        return self.frames.hear_map(grid) or counts_now
+
+    def turn(self) -> bool:
+        """Go on with map and pose of the frame that counts; return whether it is another map."""
+        grid = self.frames.newest_map
+        is_other = grid is not None and (self.grid is None or self.grid.frame != grid.frame)
+        if grid is not None and is_other:
+            self._patches_lost = False
+            self._take_map(grid)
+        if grid is not None and (self.pose is None or self.pose.frame != grid.frame):
+            self.pose = self.frames.pose_in(grid.frame)
+        return is_other
+
+    def take_patches(self, patches: Sequence[MapPatch]) -> tuple[bool, list[FasacoError]]:
+        """Take map updates in that came one after the other, as one: a map is copied and looked at
+        once, however many there are.
+
+        Returns:
+            Whether the map is another now; why some could not be laid over it.
+        """
+        own, faults = self.frames.hear_patches(patches)
+        if self.grid is None or self._patches_lost:
+            why = "updates before it were lost" if self._patches_lost else "there is no map yet"
+            return False, faults + [PatchWithoutBase(f"map update refused: {why}") for _ in own]
+        fit, misfits = fitting(self.grid, own)
+        if fit:
+            within = Window.around(*(patch.window for patch in fit))
+            self._take_map(self.grid.patched(*fit), within)
+            self.frames.hear_map(self.grid)
+        return bool(fit), faults + misfits
+
+    def lose_patches(self, count: int) -> None:
+        """Note that updates were lost; always raises PatchWithoutBase, which says so."""
+        self._patches_lost = True
+        raise PatchWithoutBase(f"{count} map updates were lost")
+
+    def _take_map(self, grid: OccupancyGrid, within: Window | None = None) -> None:
+        config = self._config
+        footprint, most = config.footprint, config.max_lattice_cells
+        is_first = self.grid is None or self.grid.frame != grid.frame
+        if self.grid is None or self.free is None or is_first:
+            change = LatticeChange.first(grid, footprint, most)
+        else:
+            maps = self.grid, grid
+            change = LatticeChange.between(maps, self.free, footprint, most, within)
+        self.map_moved = has_moved(change)
+        before, self.grid = self.lattice, grid
+        if is_first:
+            before = self.ground = None
+        if change.after is not self.free:
+            self.free, self.lattice = change.after, self._without_kept_out(change.after)
+            # Without the same cells as before: no others have changed.
+            self._change = LatticeChange(before, self.lattice, change.cells)
+        self.map_revision += 1
+        if self.pose is not None and self.pose.frame != grid.frame:
+            self.pose = self.frames.pose_in(grid.frame)
+
+    def keep_out(self, polygons: tuple[Polygon, ...]) -> None:
+        """Keep out of these polygons (x, y) [m] from now on, and of no others."""
+        self._keep_out = polygons
+        if self.free is not None:
+            self.lattice = self._without_kept_out(self.free)
+
+    def _without_kept_out(self, free: CoverageLattice) -> CoverageLattice:
+        if not self._keep_out:
+            return free
+        radius_m = self._config.footprint.robot_radius_m
+        return without(free, kept_out(self._keep_out, free.window, free.cell_m, radius_m))
+
+    def take_pose(self, pose: StampedPose) -> None:
+        """Take a pose in.
+
+        Raises:
+            WrongFrame: it is not in the map's frame, or not in the one that counts.
+        """
+        if self.grid is not None and pose.frame != self.grid.frame:
+            raise WrongFrame(f"pose in frame {pose.frame!r}, map in {self.grid.frame!r}")
+        if self.frames.counts not in ("", pose.frame):
+            raise WrongFrame(f"pose in frame {pose.frame!r}, progress in {self.frames.counts!r}")
+        self.pose = pose
+
+    def without_map(self) -> str:
+        """Return why there is no map."""
+        why = self.frames.without_map()
+        return f"{why}: the last one was refused: {self._refused}" if self._refused else why
+
+    def without_pose(self) -> str:
+        """Return why there is no pose, or none any more."""
+        return self.frames.without_pose(self.grid.frame) if self.grid is not None else "no pose yet"
+
+    def elsewhere(self) -> str:
+        """Return that poses come in another frame than the map, to be added; "" where none do."""
+        strange = self.grid is not None and self.frames.last_pose_frame not in ("", self.grid.frame)
+        return f"; {self.without_pose()}" if strange else ""
+
+    def cell(self) -> Cell | None:
+        """Return the coverable cell the robot is in, or next to."""
+        if self.lattice is None or self.pose is None:
+            return None
+        return anchor_cell(self.lattice, self.pose.pose)
+
+    def misplaced(self) -> str:
+        """Return why the robot cannot be where it is, and what is waited for."""
+        assert self.free is not None
+        assert self.lattice is not None
+        assert self.pose is not None
+        cell = self.lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
+        waits = "waits for a map or a pose that puts it on free ground"
+        if not self.lattice.contains(cell):
+            return f"robot is outside of the map: {waits}"
+        place = self.lattice.local(cell)
+        if self.free.states[place] == COVERABLE:
+            return "robot is in a keep-out zone: waits to be driven out of it, or for another order"
+        if self.free.states[place] == UNKNOWN:
+            return f"robot is on unknown ground: {waits}"
+        return f"robot is in an occupied cell, or too close to one: {waits}"
+
+    def check_zones(self, order: MissionOrder) -> None:
+        """Check that each zone lies on the map, if only in part; without a map there is no telling.
+
+        Raises:
+            OrderError: one does not.
+        """
+        if self.grid is None:
+            return
+        west, south, east, north = self.grid.geometry.bounds()
+        for index, zone in enumerate(order.zones):
+            x0, y0, x1, y1 = bounds(zone.polygon) if zone.polygon else (west, south, east, north)
+            if x1 <= west or x0 >= east or y1 <= south or y0 >= north:
+                raise OrderError(
+                    f"zones[{index}].polygon: zone {zone.name!r} lies outside of the map, "
+                    f"x {west:.2f}..{east:.2f} m, y {south:.2f}..{north:.2f} m"
+                )
+
+    def survey(self) -> None:
+        """Find out what can be reached from where the robot is."""
+        cell, before, self.ground = self.cell(), self.ground, None
+        if cell is None or self.lattice is None:
+            return
+        if before is None or self._change is None or self._change.after is not self.lattice:
+            self.ground = Ground.around(self.lattice, cell)
+        else:
+            self.ground = before.after(self._change, cell)
+
+    def coverage(self, ledger: CoverageLedger) -> Coverage | None:
+        """Return how much of it is covered; None before there is a map."""
+        if self.lattice is None or self.grid is None:
+            return None
+        reachable = self.ground.reachable if self.ground else None
+        visits = ledger.visits(self.lattice.window)
+        free_m2 = self._free_area.out_of_reach_m2(
+            self.grid, self.map_revision, self.lattice, reachable
+        )
+        return Coverage.of(self.lattice, reachable, visits, free_m2)

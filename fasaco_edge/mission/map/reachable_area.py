@@ -1,0 +1,219 @@
+"""What a map knows to be free and the robot's cells leave out: beside walls, behind doors.
+
+The part of the lattice the robot can come to, and what a new map changed of it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.changes import LatticeChange, carried
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice, pixels_of, placement_on
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.cells import COL_STEP, ROW_STEP
+from fasaco_edge.kernels.lattice.pixels import count_free_beside
+from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, update_reach
+
+
+class FreeArea:
+    """Counts free pixels, anew where the map or what can be reached has changed."""
+
+    def __init__(self, free_at_most: int) -> None:
+        self._free_at_most = free_at_most
+        # Of which map and reach the count is, not the map itself: that would outlive its time.
+        self._counted: tuple[int, NDArray[np.bool_] | None] = (-1, None)
+        self._area_m2 = 0.0
+
+    def out_of_reach_m2(
+        self,
+        grid: OccupancyGrid,
+        revision: int,
+        lattice: CoverageLattice,
+        reachable: NDArray[np.bool_] | None,
+    ) -> float:
+        """Return the area [m2] of free pixels whose centre lies in no reachable cell.
+
+        Args:
+            grid: the map.
+            revision: which map it is.
+            lattice: the lattice over it.
+            reachable: bool (rows, cols) on the lattice; None where the robot has no place yet.
+        """
+        counted, known = self._counted
+        if revision != counted or reachable is not known:
+            nowhere = np.zeros(lattice.states.shape, bool)
+            raster, _ = grid.geometry.on_raster()
+            pixels = count_free_beside(
+                pixels_of(grid),
+                self._free_at_most,
+                placement_on(raster, lattice.cell_m),
+                nowhere if reachable is None else reachable,
+                lattice.window.row0,
+                lattice.window.col0,
+            )
+            self._area_m2 = pixels * grid.geometry.resolution**2
+            self._counted = revision, reachable
+        return self._area_m2
+
+
+# A robot that stands a little off, or whose cell was just closed by a noisy
+# scan, goes on from the nearest coverable cell this close.
+ANCHOR_CELLS = 1.5
+
+# Where more of the lattice has changed, to search all of it is as fast.
+LOCAL_SHARE = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class GroundChange:
+    """How many reachable cells came, went, or have other steps than before.
+
+    ``window`` is the smallest around all of them; None where nobody has looked.
+    """
+
+    gained: int
+    lost: int
+    rewired: int
+    window: Window | None = field(default=None, compare=False)
+
+    def __bool__(self) -> bool:
+        return bool(self.gained or self.lost or self.rewired)
+
+    def __str__(self) -> str:
+        parts = [
+            f"{count} {'cell' if count == 1 else 'cells'} {what}"
+            for count, what in ((self.gained, "more"), (self.lost, "fewer"))
+            if count
+        ]
+        if not parts:
+            parts = [f"passages changed at {self.rewired} cells"]
+        return "map: " + ", ".join(parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """A lattice and what of it is reachable, bool (rows, cols)."""
+
+    lattice: CoverageLattice
+    reachable: NDArray[np.bool_]
+
+    @classmethod
+    def around(cls, lattice: CoverageLattice, cell: Cell) -> Self:
+        """Return the ground that can be reached from a coverable ``cell``."""
+        reachable = reachable_from(lattice.steps, *lattice.local(cell)).astype(bool)
+        return cls(lattice, reachable)
+
+    def after(self, change: LatticeChange, cell: Cell) -> Ground:
+        """Return the ground that can be reached from ``cell`` after the lattice has changed.
+
+        The same as ``around`` finds, at the cost of what changed where that is possible.
+        """
+        lattice = change.after
+        if lattice is self.lattice and self.holds(cell):
+            return self
+        if change.before is not self.lattice:
+            return Ground.around(lattice, cell)
+        old, new = self.lattice.window, lattice.window
+        changed = change.cells - np.array((new.row0, new.col0), np.int32)
+        is_local = 0 < len(changed) <= lattice.states.size * LOCAL_SHARE
+        if is_local and (changed >= 0).all() and (changed < (new.rows, new.cols)).all():
+            steps = carried(self.lattice.steps, old, new)
+            steps.flags.writeable = False
+            reachable = carried(self.reachable, old, new).copy()
+            if update_reach(steps, lattice.steps, changed, reachable, *lattice.local(cell)):
+                return Ground(lattice, reachable)
+        return Ground.around(lattice, cell)
+
+    def holds(self, cell: Cell) -> bool:
+        """Tell whether a coverable ``cell`` is reachable."""
+        return bool(self.reachable[self.lattice.local(cell)])
+
+    def change_since(self, before: Ground) -> GroundChange:
+        """Compare with the ground before; cells outside an array are not reachable."""
+        mine, theirs = self.lattice.window, before.lattice.window
+        common = mine.intersection(theirs)
+        total, total_before = np.count_nonzero(self.reachable), np.count_nonzero(before.reachable)
+        if common is None:
+            window = Window.around(_around(self.reachable, mine), _around(before.reachable, theirs))
+            return GroundChange(int(total), int(total_before), 0, window)
+        here, there = common.slices_in(mine), common.slices_in(theirs)
+        now, then = self.reachable[here], before.reachable[there]
+        both = now & then
+        kept = np.count_nonzero(both)
+        rewired = (self.lattice.steps[here] != before.lattice.steps[there]) & both
+        change = GroundChange(
+            gained=int(total - kept),
+            lost=int(total_before - kept),
+            rewired=int(np.count_nonzero(rewired)),
+        )
+        if not change:
+            return change
+        # Reachable in one of the two alone, also where only one of them has cells.
+        came, went = self.reachable.copy(), before.reachable.copy()
+        came[here] &= ~then
+        went[there] &= ~now
+        window = Window.around(_around(rewired, common), _around(came, mine), _around(went, theirs))
+        return replace(change, window=window)
+
+    def holding(self, cells: NDArray[np.int32]) -> int:
+        """Return how many leading cells of a walk, int32 (n, 2), can be driven here.
+
+        None where the first one is not coverable: nobody may be sent there.
+        """
+        if not len(cells):
+            return 0
+        lattice, first = self.lattice, (int(cells[0, 0]), int(cells[0, 1]))
+        if not lattice.contains(first) or lattice.states[lattice.local(first)] != COVERABLE:
+            return 0
+        window, steps = lattice.window, lattice.steps
+        rows, cols = cells[:-1, 0] - window.row0, cells[:-1, 1] - window.col0
+        inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
+        allowed = np.zeros(len(rows), np.uint8)
+        allowed[inside] = steps[rows[inside], cols[inside]]
+        # Column by column: this runs at every pose, over tens of thousands of cells.
+        row_moves, col_moves = np.diff(cells[:, 0]), np.diff(cells[:, 1])
+        legal = np.zeros(len(rows), bool)
+        for direction, (row_step, col_step) in enumerate(zip(ROW_STEP, COL_STEP, strict=True)):
+            heading = (row_moves == row_step) & (col_moves == col_step)
+            legal |= heading & (allowed >> direction & 1).astype(bool)
+        return 1 + int(np.argmin(legal)) if not legal.all() else len(cells)
+
+    def way(self, start: Cell, goal: Cell) -> NDArray[np.int32]:
+        """Return a shortest walk, int32 (n, 2); empty where there is none."""
+        lattice = self.lattice
+        if not (lattice.contains(start) and lattice.contains(goal)):
+            return np.empty((0, 2), np.int32)
+        walk = shortest_walk(lattice.steps, lattice.local(start), lattice.local(goal))
+        offset = np.array((lattice.window.row0, lattice.window.col0), np.int32)
+        return (walk + offset).astype(np.int32)
+
+
+def _around(marked: NDArray[np.bool_], window: Window) -> Window | None:
+    """Return the smallest window around the marked cells of ``window``, bool (rows, cols)."""
+    rows, cols = np.flatnonzero(marked.any(axis=1)), np.flatnonzero(marked.any(axis=0))
+    if not len(rows):
+        return None
+    first = Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
+    return first.moved(window.row0, window.col0)
+
+
+def anchor_cell(lattice: CoverageLattice, pose: Pose2D) -> Cell | None:
+    """Return the coverable cell a robot at ``pose`` is in, or is next to; else None."""
+    row, col = lattice.cell_at(pose.x, pose.y)
+    best, best_distance = None, ANCHOR_CELLS * lattice.cell_m
+    for cell in ((row + i, col + j) for i in (0, -1, 1) for j in (0, -1, 1)):
+        if not (lattice.contains(cell) and lattice.states[lattice.local(cell)] == COVERABLE):
+            continue
+        if cell == (row, col):
+            return cell
+        x, y = (cell[1] + 0.5) * lattice.cell_m, (cell[0] + 0.5) * lattice.cell_m
+        distance = math.hypot(x - pose.x, y - pose.y)
+        if distance < best_distance:
+            best, best_distance = cell, distance
+    return best

@@ -1,0 +1,235 @@
+"""How far an order is carried out: which zone, which pass, paused or not; kept with the ledger.
+
+Nothing here knows a map, so that commands are taken before there is one.
+
+How far each zone of an order is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.mission.orders.order import (
+    CommandName,
+    MissionOrder,
+    OrderDocument,
+    OrderError,
+    Zone,
+    order_document,
+    order_of,
+)
+
+VERSION = 1
+
+# Why a daemon that does not begin by itself stands.
+NO_ORDER = "no order yet: start a mission"
+
+
+class CommandError(FasacoError):
+    """A command that makes no sense in the state the mission is in."""
+
+    code = "not_now"
+    hint = "ask for the status, and start a mission first"
+
+
+class Stage(StrEnum):
+    """What of an order is being carried out."""
+
+    COVERING = "covering"
+    RETRYING = "retrying"
+    RETURNING = "returning"
+    OVER = "over"
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """An order, and how far it is carried out.
+
+    Attributes:
+        order: what to do; None for nothing at all.
+        standing: whether it began by itself, and goes on whenever the map shows more.
+        stage: what is being done: zones covered pass by pass, then what was left over tried
+            again, then the way home.
+        zone: index of the zone.
+        turn: number of the pass over it, from 1.
+        begun: whether that pass has begun.
+        tries: how often what was left over was tried again.
+        home: the cell (row, col) the mission began in.
+        paused: whether the robot is to stand.
+        why: why there is no order, where there is none.
+    """
+
+    order: MissionOrder | None = None
+    standing: bool = False
+    stage: Stage = Stage.COVERING
+    zone: int = 0
+    turn: int = 1
+    begun: bool = False
+    tries: int = 0
+    home: tuple[int, int] | None = None
+    paused: bool = False
+    why: str = ""
+
+    @classmethod
+    def by_itself(cls) -> Assignment:
+        """Return what a daemon does that was told nothing: cover all that is not covered yet."""
+        return cls(MissionOrder(keep_covered=True), standing=True)
+
+    @classmethod
+    def none(cls, why: str) -> Assignment:
+        """Return the assignment of a mission that waits for an order."""
+        return cls(why=why)
+
+    @property
+    def current(self) -> Zone | None:
+        """The zone being covered; None where none is."""
+        if self.order is None or self.stage is not Stage.COVERING:
+            return None
+        return self.order.zones[self.zone]
+
+    @property
+    def title(self) -> str:
+        """The zone and pass in words."""
+        zone = self.current
+        if zone is None:
+            return str(self.stage)
+        name = "everything reachable" if zone.polygon is None else f"zone {zone.name!r}"
+        return name if zone.passes == 1 else f"{name}, pass {self.turn} of {zone.passes}"
+
+    @property
+    def returns_after_this(self) -> bool:
+        """Whether nothing comes after this zone and pass but the way home."""
+        return self.order is not None and self.order.return_home and self.next_leg() is self
+
+    def next_leg(self) -> Assignment:
+        """Return the assignment in its next pass, or the next zone; itself after the last."""
+        if self.order is None or self.stage is not Stage.COVERING:
+            return self
+        if self.turn < self.order.zones[self.zone].passes:
+            return replace(self, turn=self.turn + 1, begun=False)
+        if self.zone + 1 < len(self.order.zones):
+            return replace(self, zone=self.zone + 1, turn=1, begun=False)
+        return self
+
+    def after(self, command: CommandName, order: MissionOrder) -> Assignment:
+        """Return what a command makes of it.
+
+        What is so already stays as it is: a command may be sent twice. ``start`` replaces
+        another order; the same one goes on, unless it is over.
+
+        Raises:
+            CommandError: there is nothing to pause, to resume or to plan.
+        """
+        match command:
+            case "start":
+                return self._started(order)
+            case "pause" | "resume":
+                if self.order is None or (self.stage is Stage.OVER and not self.standing):
+                    raise CommandError(f"there is no mission to {command}")
+                return replace(self, paused=command == "pause")
+            case "replan":
+                if self.order is None or self.paused:
+                    why = "the mission is paused" if self.paused else "there is no mission"
+                    raise CommandError(f"nothing to plan: {why}")
+            case "cancel" if self.order is not None:
+                return Assignment.none("cancelled")
+            case "reset":
+                return Assignment.none("reset: what was covered is forgotten")
+        return self
+
+    def elsewhere(self, why: str) -> Assignment:
+        """Return what is left of it in another building, where its zones mean nothing."""
+        if self.standing:
+            return replace(Assignment.by_itself(), paused=self.paused)
+        return self if self.order is None else Assignment.none(f"{why}: the order was dropped")
+
+    def anywhere(self, why: str) -> Assignment:
+        """Return what is left of it in another frame, before anything was covered.
+
+        To cover everything means the same there; zones do not.
+        """
+        has_places = self.order is not None and (
+            bool(self.order.keep_out) or any(zone.polygon for zone in self.order.zones)
+        )
+        if self.order is None or self.standing or has_places:
+            return self.elsewhere(why)
+        return Assignment(self.order, paused=self.paused)
+
+    def _started(self, order: MissionOrder) -> Assignment:
+        same = self.order is not None and order == replace(
+            self.order, keep_covered=order.keep_covered
+        )
+        if same and self.stage is not Stage.OVER:
+            return replace(self, paused=False)
+        return Assignment(order)
+
+    def note(self) -> str:
+        """Return it as JSON, to be kept with the ledger."""
+        plain: dict[str, Any] = {
+            "version": VERSION,
+            "order": None if self.order is None else order_document(self.order),
+            "standing": self.standing,
+            "stage": str(self.stage),
+            "zone": self.zone,
+            "pass": self.turn,
+            "begun": self.begun,
+            "tries": self.tries,
+            "home": self.home,
+            "paused": self.paused,
+            "why": self.why,
+        }
+        return msgspec.json.encode(plain).decode()
+
+    @classmethod
+    def of_note(cls, note: str) -> Assignment:
+        """Return the assignment that ``note`` gave.
+
+        Raises:
+            OrderError: it is of another version, or not whole.
+        """
+        try:
+            kept = msgspec.json.decode(note, type=_Note)
+        except (msgspec.DecodeError, UnicodeError) as error:
+            raise OrderError(
+                f"the order kept with the ledger cannot be read: {error}",
+                hint="start the mission again; nothing is driven without an order",
+            ) from error
+        order = None if kept.order is None else order_of(kept.order)
+        if order is not None and not (
+            kept.zone < len(order.zones) and kept.turn <= order.zones[kept.zone].passes
+        ):
+            raise OrderError(f"the order kept has no zone {kept.zone} with a pass {kept.turn}")
+        return cls(
+            order,
+            kept.standing,
+            Stage(kept.stage),
+            kept.zone,
+            kept.turn,
+            kept.begun,
+            kept.tries,
+            kept.home,
+            kept.paused,
+            kept.why,
+        )
+
+
+class _Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An assignment as it is kept."""
+
+    version: Literal[1]
+    order: OrderDocument | None
+    standing: bool
+    stage: Literal["covering", "retrying", "returning", "over"]
+    zone: Annotated[int, Meta(ge=0)]
+    turn: Annotated[int, Meta(ge=1)] = msgspec.field(name="pass")
+    begun: bool
+    tries: int
+    home: tuple[int, int] | None
+    paused: bool
+    why: str

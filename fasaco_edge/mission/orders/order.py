@@ -1,0 +1,260 @@
+"""What a mission is ordered to do: zones, passes, where never to go, whether to drive home.
+
+Orders and commands as documents, in JSON or YAML: what may stand in them, and their schema.
+
+``protocol/schema/mission.json`` is made from these definitions; a test holds it to them.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, TypeVar, get_args
+
+import msgspec
+from msgspec import Meta
+
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.grid.geometry import FARTHEST_M
+from fasaco_edge.mission.orders.polygons import Polygon, flaw
+
+# What an order may hold at most: it is kept with the ledger, written once a second.
+MOST_ZONES = 100
+MOST_KEEP_OUT = 100
+MOST_POINTS = 1_000
+MOST_POINTS_IN_ALL = 5_000
+MOST_PASSES = 100
+LONGEST_NAME = 64
+
+
+class OrderError(FasacoError):
+    """An order that cannot be carried out as it is written."""
+
+    code = "bad_order"
+    hint = "correct the named member; see protocol/schema/mission.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Zone:
+    """An area to cover.
+
+    Attributes:
+        name: tells it from others.
+        polygon: its corners (x, y) [m] in the map frame, the last joined to the first; None for
+            everything the robot can come to.
+        passes: how often.
+    """
+
+    name: str
+    polygon: Polygon | None
+    passes: int = 1
+
+
+EVERYTHING = "everything"
+
+
+@dataclass(frozen=True, slots=True)
+class MissionOrder:
+    """What to cover.
+
+    Attributes:
+        zones: one after the other, in this order; at least one.
+        keep_out: polygons (x, y) [m] in the map frame that the robot must not touch.
+        return_home: whether to drive back in the end to where the mission began.
+        keep_covered: whether what is covered already counts in the first pass.
+    """
+
+    zones: tuple[Zone, ...] = (Zone(EVERYTHING, None),)
+    keep_out: tuple[Polygon, ...] = ()
+    return_home: bool = False
+    keep_covered: bool = False
+
+    def check(self) -> None:
+        """Check all that can be checked without a map.
+
+        Raises:
+            OrderError: naming the member, what is wrong with it, and what is allowed.
+        """
+        _check_count("zones", len(self.zones), 1, MOST_ZONES)
+        _check_count("keep_out", len(self.keep_out), 0, MOST_KEEP_OUT)
+        names = [zone.name for zone in self.zones]
+        for index, zone in enumerate(self.zones):
+            where = f"zones[{index}]"
+            _check_name(f"{where}.name", zone.name)
+            if zone.name in names[:index]:
+                raise OrderError(f"{where}.name: there is a zone {zone.name!r} already")
+            if not 1 <= zone.passes <= MOST_PASSES:
+                raise OrderError(f"{where}.passes must be in 1..{MOST_PASSES}, got {zone.passes}")
+        polygons = {
+            f"zones[{index}].polygon": zone.polygon
+            for index, zone in enumerate(self.zones)
+            if zone.polygon is not None
+        } | {f"keep_out[{index}]": polygon for index, polygon in enumerate(self.keep_out)}
+        points = sum(map(len, polygons.values()))
+        if points > MOST_POINTS_IN_ALL:
+            raise OrderError(
+                f"polygons must have at most {MOST_POINTS_IN_ALL} points, got {points}"
+            )
+        for where, polygon in polygons.items():
+            _check_polygon(where, polygon)
+
+
+EVERYTHING_ONCE = MissionOrder()
+
+
+def _check_count(where: str, count: int, least: int, most: int) -> None:
+    if not least <= count <= most:
+        raise OrderError(f"{where} must be {least}..{most}, got {count}")
+
+
+def _check_name(where: str, name: str) -> None:
+    if not (1 <= len(name) <= LONGEST_NAME and name.isprintable() and name.strip() == name):
+        raise OrderError(
+            f"{where} must be 1..{LONGEST_NAME} printable characters, got {name!r:.80}"
+        )
+
+
+def _check_polygon(where: str, polygon: Polygon) -> None:
+    if len(polygon) > MOST_POINTS:
+        raise OrderError(f"{where} must have at most {MOST_POINTS} points, got {len(polygon)}")
+    for index, (x, y) in enumerate(polygon):
+        # A negated comparison, so that NaN is caught too.
+        if not math.hypot(x, y) <= FARTHEST_M:
+            raise OrderError(
+                f"{where}[{index}] must be finite and within {FARTHEST_M:g} m of 0, got ({x}, {y})"
+            )
+    if why := flaw(polygon):
+        raise OrderError(f"{where} {why}")
+
+
+CommandName = Literal["start", "pause", "resume", "cancel", "reset", "replan", "status"]
+
+_Passes = Annotated[int, Meta(ge=1, le=MOST_PASSES, description="how often to cover")]
+_Polygon = Annotated[
+    list[Annotated[tuple[float, float], Meta(description="x, y [m] in the map frame")]],
+    Meta(min_length=3, max_length=MOST_POINTS, description="corners; the last joins the first"),
+]
+
+
+class _Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Unknown members are errors."""
+
+
+class ZoneDocument(_Document, frozen=True):
+    """An area to cover."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
+    polygon: _Polygon
+    passes: _Passes | None = None
+
+
+class OrderDocument(_Document, frozen=True):
+    """What to cover. Without zones: everything the robot can come to."""
+
+    zones: Annotated[list[ZoneDocument], Meta(max_length=MOST_ZONES)] = []
+    keep_out: Annotated[list[_Polygon], Meta(max_length=MOST_KEEP_OUT)] = []
+    passes: _Passes = 1
+    return_home: bool = False
+    keep_covered: bool = False
+
+
+class CommandDocument(_Document, frozen=True):
+    """What is asked of a mission; ``order`` goes with ``start`` alone."""
+
+    command: CommandName
+    order: OrderDocument | None = None
+
+
+_Read = TypeVar("_Read", bound=_Document)
+
+
+def read_order(document: object) -> MissionOrder:
+    """Return the order that a parsed JSON or YAML document holds; None is one for everything.
+
+    Raises:
+        OrderError: naming the member, what was expected and what came.
+    """
+    return order_of(_converted(document if document is not None else {}, OrderDocument))
+
+
+def read_command(document: object) -> tuple[CommandName, MissionOrder]:
+    """Return what a document asks for.
+
+    Raises:
+        OrderError: naming the member, what was expected and what came.
+    """
+    asked = _converted(document, CommandDocument)
+    if asked.order is not None and asked.command != "start":
+        raise OrderError(f"order goes with start alone, got it with {asked.command}")
+    return asked.command, order_of(asked.order or OrderDocument())
+
+
+def order_document(order: MissionOrder) -> dict[str, Any]:
+    """Return ``order`` as ``read_order`` reads it."""
+    rest = {
+        "keep_out": order.keep_out,
+        "return_home": order.return_home,
+        "keep_covered": order.keep_covered,
+    }
+    first = order.zones[0]
+    if first.polygon is None:
+        return {"passes": first.passes, **rest}
+    zones = [
+        {"name": zone.name, "polygon": zone.polygon, "passes": zone.passes} for zone in order.zones
+    ]
+    return {"zones": zones, **rest}
+
+
+def command_document(command: CommandName, order: MissionOrder) -> dict[str, Any]:
+    """Return a command as ``read_command`` reads it."""
+    if command != "start":
+        return {"command": command}
+    return {"command": command, "order": order_document(order)}
+
+
+def command_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a command."""
+    return msgspec.json.schema(CommandDocument)
+
+
+def order_of(document: OrderDocument) -> MissionOrder:
+    """Return the order that a document holds.
+
+    Raises:
+        OrderError: naming the member, what is wrong with it, and what is allowed.
+    """
+    zones = tuple(
+        Zone(zone.name, tuple(zone.polygon), zone.passes or document.passes)
+        for zone in document.zones
+    )
+    order = MissionOrder(
+        zones or (Zone(EVERYTHING, None, document.passes),),
+        tuple(map(tuple, document.keep_out)),
+        document.return_home,
+        document.keep_covered,
+    )
+    order.check()
+    return order
+
+
+def _converted(document: object, kind: type[_Read]) -> _Read:
+    try:
+        return msgspec.convert(document, kind)
+    except msgspec.ValidationError as error:
+        raise OrderError(_explained(str(error), document)) from error
+
+
+def _explained(message: str, document: object) -> str:
+    """Turn ``Expected `int` >= 1 - at `$.passes``` into member, expectation and value."""
+    what, _, where = message.replace("`", "").partition(" - at $")
+    what = what[0].lower() + what[1:].partition(", got ")[0]
+    if match := re.fullmatch(r"object (contains unknown|missing required) field (.*)", what):
+        kind = "unknown" if match[1].endswith("unknown") else "missing"
+        return f"{where.lstrip('.') or 'the order'}: {kind} member {match[2]}"
+    value: Any = document
+    for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", where):
+        value = value[name] if name else value[int(index)]
+    if what.startswith("invalid enum value"):
+        what = f"expected {', '.join(get_args(CommandName))}"
+    return f"{where.lstrip('.') or 'the order'}: {what}, got {value!r:.60}"

@@ -1,0 +1,117 @@
+"""An order on the lattice: the cells of its zones, and those its keep-out zones take away."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
+from fasaco_edge.kernels.cells import EAST, NORTH, SOUTH, WEST
+from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
+from fasaco_edge.mission.orders.order import Zone
+from fasaco_edge.mission.orders.polygons import Polygon
+
+# A polygon drawn along the border of a cell does not touch it; rounding must not decide [m].
+TOUCH_TOLERANCE_M = 1e-6
+
+
+def in_zones(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
+    """Return which cells of ``window`` lie in one of the zones, bool (rows, cols), read-only."""
+    if any(zone.polygon is None for zone in zones):
+        return _everything(window)
+    return _inside_any(tuple(zone.polygon for zone in zones if zone.polygon), window, cell_m)
+
+
+def counts_in(
+    polygons: tuple[Polygon, ...], window: Window, cell_m: float, cells: NDArray[np.bool_]
+) -> list[int]:
+    """Return how many of ``cells``, bool (rows, cols) of ``window``, lie in each polygon."""
+    if not polygons:
+        return []
+    counts: list[int] = count_in(_planes(polygons, window, cell_m), np.packbits(cells)).tolist()
+    return counts
+
+
+def kept_out(
+    polygons: tuple[Polygon, ...], window: Window, cell_m: float, robot_radius_m: float
+) -> NDArray[np.bool_]:
+    """Return which cells of ``window`` the robot must keep out of, bool (rows, cols), read-only.
+
+    Those that a polygon touches, or where the robot would touch it.
+    """
+    return _near_any(polygons, window, cell_m, max(0.5 * cell_m, robot_radius_m))
+
+
+def cells_inside(polygon: Polygon, window: Window, cell_m: float) -> NDArray[np.bool_]:
+    """Return which cells of ``window`` have their centre inside, bool (rows, cols)."""
+    cells = np.zeros((window.rows, window.cols), bool)
+    turn_inside(np.array(polygon, np.float64), window.row0, window.col0, cell_m, cells)
+    return cells
+
+
+def cells_near(
+    polygon: Polygon, window: Window, cell_m: float, reach_m: float
+) -> NDArray[np.bool_]:
+    """Return which cells of ``window`` the polygon comes near, bool (rows, cols).
+
+    Near is where it touches the square around the cell's centre that reaches ``reach_m`` [m] to
+    each side, and all inside. With half a cell or more, a disc of that radius can drive from
+    centre to centre of the other cells, and touches no polygon.
+    """
+    return _near_any((polygon,), window, cell_m, reach_m)
+
+
+def without(lattice: CoverageLattice, cells: NDArray[np.bool_]) -> CoverageLattice:
+    """Return ``lattice`` with some of its cells, bool (rows, cols), blocked for driving too."""
+    if not cells.any():
+        return lattice
+    states, steps = lattice.states.copy(), lattice.steps.copy()
+    states[cells] = BLOCKED
+    steps[cells] = 0
+    steps[:, :-1][cells[:, 1:]] &= ~np.uint8(1 << EAST)
+    steps[:, 1:][cells[:, :-1]] &= ~np.uint8(1 << WEST)
+    steps[:-1][cells[1:]] &= ~np.uint8(1 << NORTH)
+    steps[1:][cells[:-1]] &= ~np.uint8(1 << SOUTH)
+    return CoverageLattice(lattice.window, lattice.cell_m, states, steps)
+
+
+# A map moves its window seldom; zones and passes ask for the same cells again and again.
+@lru_cache(maxsize=1)
+def _everything(window: Window) -> NDArray[np.bool_]:
+    cells = np.ones((window.rows, window.cols), bool)
+    cells.flags.writeable = False
+    return cells
+
+
+@lru_cache(maxsize=4)
+def _inside_any(polygons: tuple[Polygon, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
+    cells = np.zeros((window.rows, window.cols), bool)
+    for polygon in polygons:
+        cells |= cells_inside(polygon, window, cell_m)
+    cells.flags.writeable = False
+    return cells
+
+
+# A bit for each cell: of a hundred zones as much as a dozen masks.
+@lru_cache(maxsize=1)
+def _planes(polygons: tuple[Polygon, ...], window: Window, cell_m: float) -> NDArray[np.uint8]:
+    return np.stack([np.packbits(cells_inside(polygon, window, cell_m)) for polygon in polygons])
+
+
+@lru_cache(maxsize=2)
+def _near_any(
+    polygons: tuple[Polygon, ...], window: Window, cell_m: float, reach_m: float
+) -> NDArray[np.bool_]:
+    starts = np.zeros((window.rows, window.cols + 1), np.int32)
+    inside = np.zeros((window.rows, window.cols), bool)
+    for polygon in polygons:
+        corners = np.array(polygon, np.float64)
+        add_near(corners, window.row0, window.col0, cell_m, reach_m - TOUCH_TOLERANCE_M, starts)
+        inside |= cells_inside(polygon, window, cell_m)
+    cells: NDArray[np.bool_] = np.cumsum(starts, axis=1, out=starts)[:, :-1] > 0
+    cells |= inside
+    cells.flags.writeable = False
+    return cells

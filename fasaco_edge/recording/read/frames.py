@@ -1,0 +1,224 @@
+"""The chunks of a recording, read without Rerun, which believes what a file claims.
+
+A chunk is an Arrow message, packed, in a Protobuf message, in a frame (``recording.repair``). Each
+says how much the next one holds; that is looked at before any room is made for it. Rerun's own
+reader makes the room, and ends the process where it cannot be had, or where a message is broken.
+The footer, a table of what stands where, is not needed to read from the beginning to the end.
+
+What is whole of a recording, also of one that a crash tore; the file is never touched.
+"""
+
+from __future__ import annotations
+
+import shutil
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, BinaryIO
+
+from fasaco_edge.recording.read.repair import FOOTER_KIND, FRAME, HEADER_BYTES, Scan, scan_recording
+from fasaco_edge.recording.sdk import pa
+
+CHUNK_KIND = 2
+# Of a chunk, unpacked: the largest that a recorder writes is a map of 64 million pixels.
+MOST_CHUNK_BYTES = 128 * 1024 * 1024
+# What LZ4 makes of a byte at most.
+LZ4_RATIO = 255
+
+# Fields of a chunk's frame, and of the store it belongs to.
+STORE, PACKING, UNPACKED, ARROW, IS_STATIC = 1, 2, 3, 5, 7
+STORE_KIND, STORE_ID = 1, 2
+RECORDING = 1
+NOT_PACKED, LZ4 = 1, 2
+ENTITY_PATH = b"rerun:entity_path"
+# Protobuf's kinds of values, and where Arrow's Flatbuffers have what.
+_VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
+_HEADER, _COMPRESSION = 2, 3
+
+# What a message that is broken ends in.
+BROKEN = (ValueError, LookupError, struct.error, OSError, StopIteration)
+
+Fields = dict[int, int | bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Some rows of an entity.
+
+    Attributes:
+        recording_id: of the recording it is part of.
+        entity: without its leading slash.
+        is_static: whether it has no times.
+        batch: the rows, a ``pyarrow.RecordBatch``, valid throughout.
+        bytes: its size, unpacked.
+    """
+
+    recording_id: str
+    entity: str
+    is_static: bool
+    batch: Any
+    bytes: int
+
+
+def chunks(recording: BinaryIO, scan: Scan) -> Iterator[Chunk | None]:
+    """Yield for each whole frame the chunk in it; None for one that is none of a recording's.
+
+    Raises:
+        ValueError: a frame is not what it claims to be.
+        OSError: the file cannot be read.
+    """
+    recording.seek(HEADER_BYTES)
+    for number in range(1, scan.frames + 1):
+        kind, length = FRAME.unpack(recording.read(FRAME.size))
+        if kind == FOOTER_KIND:
+            yield None
+            return
+        body = recording.read(length)
+        try:
+            yield _chunk(body) if kind == CHUNK_KIND else None
+        # StopIteration: Arrow's, where a message is missing.
+        except (*BROKEN, pa.ArrowException) as error:
+            raise ValueError(f"frame {number} of {scan.frames}: {error or 'torn'}") from error
+
+
+def column(batch: Any, name: str, kind: Any) -> Any:  # noqa: ANN401 - pyarrow has no types
+    """Return a column of a batch; None where there is none.
+
+    Raises:
+        ValueError: it is of another type than ``kind``, or has nulls in it.
+    """
+    if name not in batch.schema.names:
+        return None
+    found = batch.column(name)
+    if found.type != kind or found.null_count:
+        raise ValueError(f"{name} has to be {kind} without nulls, got {found.type}")
+    return found
+
+
+def _chunk(body: bytes) -> Chunk | None:
+    message = _fields(body)
+    store = _fields(_bytes(message, STORE))
+    if store.get(STORE_KIND) != RECORDING:
+        return None
+    content = _unpacked(message)
+    batch = _batch(content)
+    entity = (batch.schema.metadata or {})[ENTITY_PATH].decode().removeprefix("/")
+    identifier = _bytes(store, STORE_ID).decode()
+    return Chunk(identifier, entity, bool(_number(message, IS_STATIC, 0)), batch, len(content))
+
+
+def _unpacked(message: Fields) -> Any:  # noqa: ANN401 - a buffer of pyarrow
+    packing, packed = _number(message, PACKING, NOT_PACKED), _bytes(message, ARROW)
+    if packing == NOT_PACKED:
+        return pa.py_buffer(packed)
+    if packing != LZ4:
+        raise ValueError(f"packed in a way that is not known, {packing}")
+    claimed, most = _number(message, UNPACKED, 0), min(len(packed) * LZ4_RATIO, MOST_CHUNK_BYTES)
+    if claimed > most:
+        raise ValueError(f"claims {claimed} bytes; {len(packed)} packed ones hold at most {most}")
+    return pa.decompress(packed, decompressed_size=claimed, codec="lz4_raw")
+
+
+def _batch(content: Any) -> Any:  # noqa: ANN401 - pyarrow has no types
+    """Return the one batch of rows in an Arrow stream."""
+    messages = pa.ipc.MessageReader.open_stream(content)
+    schema = pa.ipc.read_schema(messages.read_next_message())
+    rows = messages.read_next_message()
+    if rows.type != "record batch":
+        raise ValueError(f"rows have to follow the schema, got a {rows.type}")
+    _check_not_compressed(rows.metadata.to_pybytes())
+    batch = pa.ipc.read_record_batch(rows, schema)
+    batch.validate(full=True)
+    return batch
+
+
+def _check_not_compressed(flat: bytes) -> None:
+    """Raise ValueError where columns would be unpacked once more, to whatever they claim."""
+    message = struct.unpack_from("<I", flat)[0]
+    header = _slot(flat, message, _HEADER)
+    rows = header + struct.unpack_from("<I", flat, header)[0]
+    if _slot(flat, rows, _COMPRESSION):
+        raise ValueError("columns that are compressed, which none of a recorder's are")
+
+
+def _slot(flat: bytes, table: int, number: int) -> int:
+    """Return where a field of a Flatbuffers table stands; 0 where it is left out."""
+    about = table - struct.unpack_from("<i", flat, table)[0]
+    size = struct.unpack_from("<H", flat, about)[0]
+    place = 4 + 2 * number
+    offset = struct.unpack_from("<H", flat, about + place)[0] if place < size else 0
+    return table + offset if offset else 0
+
+
+def _bytes(message: Fields, number: int) -> bytes:
+    value = message[number]
+    if not isinstance(value, bytes):
+        raise ValueError(f"field {number} has to be bytes")
+    return value
+
+
+def _number(message: Fields, number: int, unless: int) -> int:
+    value = message.get(number, unless)
+    if not isinstance(value, int):
+        raise ValueError(f"field {number} has to be a number")
+    return value
+
+
+def _fields(message: bytes) -> Fields:
+    """Return the fields of a Protobuf message by their numbers: integers, and bytes."""
+    found: Fields = {}
+    at = 0
+    while at < len(message):
+        key, at = _varint(message, at)
+        kind = key & 7
+        if kind == _VARINT:
+            found[key >> 3], at = _varint(message, at)
+            continue
+        if kind == _BYTES:
+            length, at = _varint(message, at)
+        elif kind in (_FIXED64, _FIXED32):
+            length = 8 if kind == _FIXED64 else 4
+        else:
+            raise ValueError("no Protobuf message")
+        if at + length > len(message):
+            raise ValueError("it breaks off")
+        found[key >> 3] = message[at : at + length]
+        at += length
+    return found
+
+
+def _varint(message: bytes, at: int) -> tuple[int, int]:
+    value = 0
+    for place in range(10):
+        byte = message[at + place]
+        value |= (byte & 0x7F) << (7 * place)
+        if byte < 0x80:
+            return value, at + place + 1
+    raise ValueError("a number of more than ten bytes")
+
+
+@contextmanager
+def whole_part(path: Path) -> Iterator[tuple[Path, Scan]]:
+    """Yield ``path``, or where its end is torn a copy of what is whole; and what the file holds.
+
+    Raises:
+        ValueError: it is no recording.
+        OSError: it cannot be read, or there is no room for the copy.
+    """
+    with path.open("rb") as recording:
+        scan = scan_recording(recording)
+        if scan is None:
+            raise ValueError("this is no recording")
+        if scan.has_footer or not scan.torn_bytes:
+            yield path, scan
+            return
+        with TemporaryDirectory() as folder:
+            copy = Path(folder, path.name)
+            recording.seek(0)
+            with copy.open("wb") as target:
+                shutil.copyfileobj(recording, target)
+                target.truncate(scan.whole_bytes)
+            yield copy, scan

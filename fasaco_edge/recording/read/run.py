@@ -1,0 +1,197 @@
+"""The parts of one run, read once: what was plotted, its states, its log, its samples.
+
+Pictures are passed over chunk by chunk, so that memory does not grow with them.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecording
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.read.frames import Chunk, chunks, column
+from fasaco_edge.recording.read.repair import Scan, scan_recording
+from fasaco_edge.recording.read.samples import HINT, Batch, blobs, wall_ns
+from fasaco_edge.recording.sdk import pa
+from fasaco_edge.samples.codec import place_of
+
+SCALAR, STATE, TEXT = "Scalars:scalars", "StateChange:state", "TextLog:text"
+READ = ("metrics/", "state/", "log/")
+# What is kept of a file, unpacked, is at most so many times its size, and this [bytes].
+MOST_RATIO, LEAST_ROOM_BYTES = 16, 16_000_000
+
+Told = tuple[int, str]
+"""When [ns], and what."""
+
+
+@dataclass(frozen=True, slots=True)
+class PartFile:
+    """A file of a recording: its size, what a crash tore off, whether it was ended in order."""
+
+    path: Path
+    bytes: int
+    torn_bytes: int
+    has_footer: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunRecord:
+    """What the parts of one run hold.
+
+    Attributes:
+        recording_id: what all parts share.
+        parts: the files, by name.
+        began_ns, ended_ns: first and last time on the timeline ``wall`` [ns].
+        plots: float64 (n, 2) of each plotted entity: when, since ``began_ns`` [s], and its value.
+        states: of each state entity when it was entered, and what it was.
+        log: of each log entity when, and what was said.
+        batches: samples, for ``RecordedSamples.of``.
+    """
+
+    recording_id: str
+    parts: tuple[PartFile, ...]
+    began_ns: int
+    ended_ns: int
+    plots: Mapping[str, NDArray[np.float64]]
+    states: Mapping[str, tuple[Told, ...]]
+    log: Mapping[str, tuple[Told, ...]]
+    batches: tuple[Batch, ...]
+
+
+def count_frames(paths: Sequence[Path]) -> int:
+    """Return how many frames there are to be read.
+
+    Raises:
+        UnreadableRecording: a file is missing, or is no recording.
+    """
+    return sum(_scan(path).frames for path in paths)
+
+
+def read_run_record(paths: Sequence[Path], advance: Callable[[], None]) -> RunRecord:
+    """Read the parts of one run, in any order.
+
+    Args:
+        paths: the files; a torn one is read as far as it is whole, and left as it is.
+        advance: called with each frame.
+
+    Raises:
+        UnreadableRecording: a file is missing or no recording, or there are no samples.
+        DifferentRuns: the parts are not of one run.
+    """
+    gathering = _Gathering(advance)
+    for path in sorted(set(paths)):
+        gathering.read(path)
+    return gathering.record()
+
+
+@dataclass(slots=True)
+class _Gathering:
+    """What was read so far."""
+
+    advance: Callable[[], None]
+    ids: dict[str, Path] = field(default_factory=dict)
+    parts: list[PartFile] = field(default_factory=list)
+    span: list[int] = field(default_factory=list)
+    rows: dict[str, list[tuple[int, Any]]] = field(default_factory=lambda: defaultdict(list))
+    batches: list[Batch] = field(default_factory=list)
+
+    def read(self, path: Path) -> None:
+        try:
+            with path.open("rb") as recording:
+                scan = _scan(path)
+                torn = 0 if scan.has_footer else scan.torn_bytes
+                self.parts.append(PartFile(path, scan.total_bytes, torn, scan.has_footer))
+                room = MOST_RATIO * scan.total_bytes + LEAST_ROOM_BYTES
+                for chunk in chunks(recording, scan):
+                    self.advance()
+                    if chunk is not None:
+                        self.ids.setdefault(chunk.recording_id, path)
+                        room -= self._take(chunk, path)
+                        if room < 0:
+                            raise ValueError(f"unpacks to more than {MOST_RATIO} times its size")
+        except OSError as error:
+            raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
+        except (ValueError, MalformedMessage) as error:
+            raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error
+
+    def _take(self, chunk: Chunk, path: Path) -> int:
+        """Take a chunk; return how many bytes of it are kept."""
+        entity, batch = chunk.entity, chunk.batch
+        if entity == entities.INPUTS:
+            self.batches += [Batch(place_of(body), body, path) for body in blobs(batch)]
+        elif entity.startswith(READ) and not chunk.is_static and batch.num_rows:
+            times = wall_ns(batch)
+            self.span += [min(times), max(times)]
+            values = [value[0] if value else None for value in _values(batch)]
+            self.rows[entity] += [
+                row for row in zip(times, values, strict=False) if row[1] is not None
+            ]
+        else:
+            return 0
+        return chunk.bytes
+
+    def record(self) -> RunRecord:
+        """Return all of it, in order of time."""
+        if len(self.ids) > 1:
+            raise DifferentRuns(
+                "these are parts of different runs: "
+                + ", ".join(f"{path} of {name}" for name, path in sorted(self.ids.items()))
+            )
+        if not self.batches:
+            where = ", ".join(str(part.path) for part in self.parts)
+            raise UnreadableRecording(
+                f"{where}: holds no samples", hint="recordings of this release and later ones do"
+            )
+        began = min(self.span, default=0)
+        for rows in self.rows.values():
+            rows.sort(key=lambda row: row[0])
+        return RunRecord(
+            recording_id=next(iter(self.ids), ""),
+            parts=tuple(self.parts),
+            began_ns=began,
+            ended_ns=max(self.span, default=0),
+            plots=dict(self._plots(began)),
+            states=self._texts("state/"),
+            log=self._texts("log/"),
+            batches=tuple(self.batches),
+        )
+
+    def _plots(self, began: int) -> Iterator[tuple[str, NDArray[np.float64]]]:
+        for entity, rows in self.rows.items():
+            if entity.startswith("metrics/"):
+                seconds = [(1e-9 * (at - began), float(value)) for at, value in rows]
+                yield entity, np.array(seconds, np.float64).reshape(-1, 2)
+
+    def _texts(self, prefix: str) -> dict[str, tuple[Told, ...]]:
+        return {
+            entity: tuple((at, str(value)) for at, value in rows)
+            for entity, rows in self.rows.items()
+            if entity.startswith(prefix)
+        }
+
+
+def _values(batch: Any) -> list[Any]:  # noqa: ANN401 - pyarrow has no types
+    for component, kind in ((SCALAR, pa.float64()), (STATE, pa.string()), (TEXT, pa.string())):
+        found = column(batch, component, pa.list_(kind))
+        if found is not None:
+            values: list[Any] = found.to_pylist()
+            return values
+    return []
+
+
+def _scan(path: Path) -> Scan:
+    try:
+        with path.open("rb") as recording:
+            scan = scan_recording(recording)
+    except OSError as error:
+        raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
+    if scan is None:
+        raise UnreadableRecording(f"{path}: this is no recording", hint=HINT)
+    return scan

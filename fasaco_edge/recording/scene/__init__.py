@@ -1,0 +1,1 @@
+"""Decoded messages drawn as entities of a recording."""

@@ -1,0 +1,131 @@
+"""Figures over time: a figure that stays what it was is not drawn again and again.
+
+An entity that is drawn once a second takes five megabytes an hour, whatever is drawn: the
+recording is flushed as often, and each flush begins a chunk for each entity.
+
+The numbers of statuses as curves: what changes from second to second, and no state tells.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.fields import Json, number, section
+from fasaco_edge.recording.sdk import rr
+from fasaco_edge.recording.write.journal import Journal
+
+# A curve goes on as a step (``styles``); at the latest after so long it is drawn anyway, so
+# that a part, and what follows a gap, soon has all of them.
+PERIOD_NS = 60_000_000_000
+# Latencies and memory tremble: by less than this share of them nothing has changed.
+TREMBLE = 0.1
+
+
+@dataclass(slots=True)
+class _Curve:
+    drawn: float
+    drawn_ns: int
+    last: float
+
+
+class Curves:
+    """Draws figures into a journal."""
+
+    def __init__(self, journal: Journal) -> None:
+        self._journal = journal
+        self._curves: dict[str, _Curve] = {}
+
+    def draw(self, entity: str, value: float, tremble: float = 0.0, spacing_ns: int = 0) -> None:
+        """Draw ``value`` where it differs from the one drawn.
+
+        Args:
+            entity: what to draw it as.
+            value: the figure as it is now.
+            tremble: the share of it by which it has to differ by more.
+            spacing_ns: the least time from one drawn to the next [ns].
+        """
+        now_ns = self._journal.wall_ns
+        curve = self._curves.get(entity)
+        if curve is None:
+            curve = self._curves[entity] = _Curve(value, now_ns, value)
+        else:
+            curve.last = value
+            same = abs(value - curve.drawn) <= tremble * abs(curve.drawn)
+            if now_ns - curve.drawn_ns < (PERIOD_NS if same else spacing_ns):
+                return
+        self._draw(entity, curve)
+
+    def finish(self) -> None:
+        """Draw what each figure was in the end."""
+        for entity, curve in self._curves.items():
+            if curve.last != curve.drawn:
+                self._draw(entity, curve)
+
+    def _draw(self, entity: str, curve: _Curve) -> None:
+        curve.drawn, curve.drawn_ns = curve.last, self._journal.wall_ns
+        self._journal.log(entity, rr.Scalars(curve.last))
+
+
+# Counts that go on and on are drawn no more often than this.
+COUNT_SPACING_NS = 30_000_000_000
+# Processor time is told as a share of so many seconds at least.
+LEAST_SHARE_S = 30.0
+# By the contract there are some dozens; another's may not fill the recording.
+MOST_CODES = 50
+_CODE = re.compile(r"[a-z_]{1,40}")
+
+CELLS = ("coverable", "covered", "recovered", "unreachable")
+PLANS = ("plans", "unchanged", "outdated", "attempts")
+
+
+class StatusFigures:
+    """Draws the numbers of each status; any may be missing."""
+
+    def __init__(self, curves: Curves) -> None:
+        self._curves = curves
+        # Uptime and processor time [s] where the share under way begins.
+        self._since: tuple[float, float] | None = None
+
+    def add(self, status: Json) -> None:
+        """Draw what a status says in numbers."""
+        for name, value in section(status, "latency_ms").items():
+            if number({name: value}, name) is not None:
+                self._curves.draw(f"{entities.LATENCY}/{name}", value, TREMBLE)
+        memory = number(status, "rss_mb")
+        if memory is not None:
+            self._curves.draw(f"{entities.MEMORY}/planner", memory, TREMBLE)
+        self._add_processor(status)
+        self._draw(entities.THREADS, number(status, "threads"))
+        for name in CELLS:
+            self._draw(f"{entities.CELLS}/{name}", number(section(status, "coverage"), name))
+        steps = number(section(status, "path"), "remaining_steps")
+        self._draw(entities.REMAINING_STEPS, steps)
+        for name in PLANS:
+            self._draw(f"{entities.PLANS}/{name}", number(section(status, "plan"), name))
+        by_code = section(section(status, "errors"), "by_code")
+        for code in sorted(filter(_CODE.fullmatch, by_code))[:MOST_CODES]:
+            self._draw(f"{entities.ERRORS}/{code}", number(by_code, code))
+
+    def add_path(self, note: Json) -> None:
+        """Draw how good a planned path is; steps, bound and cost are in the log and the inputs."""
+        gap = number(note, "gap")
+        if gap is not None:
+            self._curves.draw(entities.GAP, gap)
+
+    def _add_processor(self, status: Json) -> None:
+        uptime_s, cpu_s = number(status, "uptime_s"), number(status, "cpu_s")
+        if uptime_s is None or cpu_s is None:
+            return
+        since = self._since
+        if since is None or uptime_s < since[0]:  # it was started again
+            self._since = uptime_s, cpu_s
+        elif uptime_s - since[0] >= LEAST_SHARE_S:
+            percent = 100 * (cpu_s - since[1]) / (uptime_s - since[0])
+            self._since = uptime_s, cpu_s
+            self._curves.draw(entities.PROCESSOR, percent, TREMBLE)
+
+    def _draw(self, entity: str, value: float | None) -> None:
+        if value is not None:
+            self._curves.draw(entity, value, spacing_ns=COUNT_SPACING_NS)

@@ -1,0 +1,181 @@
+"""What a new map says otherwise than the one before it, and how far the known map reaches.
+
+Large things are drawn no faster than a recording may grow: a map of a million pixels, a
+path of ten thousand cells.
+
+Each layer has an allowance. As long as there is some left, what comes is drawn at once;
+else the newest waits until the allowance has grown again. What came in between is not drawn.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import GridGeometry, Window
+from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
+from fasaco_edge.recording import entities
+
+Bounds = tuple[float, float, float, float]
+
+# Crossing it, a pixel has become an obstacle or ceased to be one [percent].
+OCCUPIED_FROM = 50
+# Rasters further apart than this are not compared [pixels].
+RASTER_TOLERANCE_PX = 0.01
+BLOCK_PIXELS = 1_000_000
+
+
+def known_bounds(grid: OccupancyGrid) -> Bounds | None:
+    """Return (x_min, y_min, x_max, y_max) [m] of what is known; None where nothing is."""
+    window = _window_of(grid.cells.shape, lambda rows: grid.cells[rows] != UNKNOWN)
+    return _bounds(grid.geometry, window) if window else None
+
+
+def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None:
+    """Return (x_min, y_min, x_max, y_max) [m] around the pixels that turned free or occupied.
+
+    Pixels that were unknown do not count, else the whole exploration would. None where
+    no pixel changed, or where the two rasters do not match.
+    """
+    shift = _raster_shift(before.geometry, after.geometry)
+    if shift is None:
+        return None
+    row0, col0 = shift
+    outer = Window(0, 0, after.geometry.rows, after.geometry.cols)
+    placed = Window(row0, col0, row0 + before.geometry.rows, col0 + before.geometry.cols)
+    common = outer.intersection(placed)
+    if common is None:
+        return None
+    old, new = before.cells[common.slices_in(placed)], after.cells[common.slices_in(outer)]
+
+    def changed(rows: slice) -> NDArray[np.bool_]:
+        turned = (old[rows] >= OCCUPIED_FROM) != (new[rows] >= OCCUPIED_FROM)
+        marked: NDArray[np.bool_] = turned & (old[rows] != UNKNOWN) & (new[rows] != UNKNOWN)
+        return marked
+
+    window = _window_of(new.shape, changed)
+    if window is None:
+        return None
+    row, col = common.row0, common.col0
+    moved = Window(window.row0 + row, window.col0 + col, window.row1 + row, window.col1 + col)
+    return _bounds(after.geometry, moved)
+
+
+def union(one: Bounds | None, other: Bounds) -> Bounds:
+    """Return the least rectangle around both."""
+    if one is None:
+        return other
+    least, most = map(min, one[:2], other[:2]), map(max, one[2:], other[2:])
+    x0, y0 = least
+    x1, y1 = most
+    return x0, y0, x1, y1
+
+
+def _raster_shift(before: GridGeometry, after: GridGeometry) -> tuple[int, int] | None:
+    """Return (row, col) in ``after`` of pixel (0, 0) of ``before``; None off the raster."""
+    turned = not math.isclose(before.origin.yaw, after.origin.yaw, abs_tol=1e-6)
+    if turned or not math.isclose(before.resolution, after.resolution, rel_tol=1e-6):
+        return None
+    col, row = after.to_pixels(before.origin.x, before.origin.y)
+    if max(abs(col - round(col)), abs(row - round(row))) > RASTER_TOLERANCE_PX:
+        return None
+    return round(row), round(col)
+
+
+def _window_of(
+    shape: tuple[int, ...], marked: Callable[[slice], NDArray[np.bool_]]
+) -> Window | None:
+    """Return the window of what is marked, some rows at a time: a mask of all is another map."""
+    some, found = max(BLOCK_PIXELS // max(shape[1], 1), 1), None
+    for start in range(0, shape[0], some):
+        mask = marked(slice(start, start + some))
+        rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        if len(rows):
+            here = Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
+            found = Window.around(found, here.moved(start, 0))
+    return found
+
+
+def _bounds(geometry: GridGeometry, window: Window) -> Bounds:
+    corner = geometry.to_map(window.col0, window.row0)
+    origin = type(geometry.origin)(*corner, geometry.origin.yaw)
+    return GridGeometry(window.rows, window.cols, geometry.resolution, origin).bounds()
+
+
+BURST_S = 60.0
+# In the file [bytes/s].
+RATES = {
+    entities.MAP: 3_000,
+    entities.COVERAGE: 1_000,
+    entities.PHEROMONE: 1_500,
+    entities.PATH: 2_000,
+}
+# A grid's size in the file is judged by every so many-th row.
+EVERY_ROW = 8
+# Rerun's compression (LZ4) against the fastest deflate, at worst.
+LOOSER = 1.5
+
+
+@dataclass(slots=True)
+class _Layer:
+    """How much may be drawn [bytes], as of when [ns], and what waits: its size, how to draw it."""
+
+    allowance: float
+    at_ns: int = 0
+    waiting: tuple[int, Callable[[], None]] | None = None
+
+
+class Layers:
+    """Decides when each layer is drawn; the journal's thread and clock."""
+
+    def __init__(self) -> None:
+        self._layers = {name: _Layer(BURST_S * rate) for name, rate in RATES.items()}
+
+    def draw(self, name: str, size: int, draw: Callable[[], None], now_ns: int) -> None:
+        """Call ``draw`` now, or later instead of what came before.
+
+        Args:
+            name: one of ``RATES``.
+            size: about how much it takes in the file [bytes].
+            draw: does it, at any later time.
+            now_ns: a clock that never steps [ns].
+        """
+        self._layers[name].waiting = size, draw
+        self._catch_up(name, now_ns)
+
+    def catch_up(self, now_ns: int) -> None:
+        """Draw what has waited long enough; call it often."""
+        for name in self._layers:
+            self._catch_up(name, now_ns)
+
+    def finish(self) -> None:
+        """Draw all that waits."""
+        for layer in self._layers.values():
+            if layer.waiting is not None:
+                (_, draw), layer.waiting = layer.waiting, None
+                draw()
+
+    def _catch_up(self, name: str, now_ns: int) -> None:
+        layer, rate = self._layers[name], RATES[name]
+        if layer.waiting is None:
+            return
+        gained = rate * (now_ns - layer.at_ns) / 1e9
+        layer.allowance = min(layer.allowance + gained, BURST_S * rate)
+        layer.at_ns = now_ns
+        if layer.allowance <= 0:
+            return
+        (size, draw), layer.waiting = layer.waiting, None
+        layer.allowance -= size
+        draw()
+
+
+def size_in_file(grid: NDArray[np.generic]) -> int:
+    """Return about how much a grid (rows, cols) of bytes takes in a recording [bytes]."""
+    some = np.ascontiguousarray(grid[::EVERY_ROW])
+    share = grid.size / max(some.size, 1)
+    return round(LOOSER * share * len(zlib.compress(some.data, 1)))

@@ -1,0 +1,254 @@
+"""Decoded messages in, entities out: what the recording shows of a mission."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from fasaco_edge.errors import PatchWithoutBase
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.fields import Json, integer, number, section, text
+from fasaco_edge.recording.scene import archetypes as draw
+from fasaco_edge.recording.scene.anchor import Anchor
+from fasaco_edge.recording.scene.blueprint import build_blueprint
+from fasaco_edge.recording.scene.curves import TREMBLE, Curves, StatusFigures
+from fasaco_edge.recording.scene.layers import (
+    Bounds,
+    Layers,
+    changed_bounds,
+    known_bounds,
+    size_in_file,
+    union,
+)
+from fasaco_edge.recording.scene.paths import PathDrawing, TrailDrawing
+from fasaco_edge.recording.scene.pheromone import PheromoneDrawing
+from fasaco_edge.recording.scene.runcard import RunDescription
+from fasaco_edge.recording.scene.styles import log_styles
+from fasaco_edge.recording.sdk import rr
+from fasaco_edge.recording.write.journal import Journal
+from fasaco_edge.recording.write.settings import RecorderReport
+from fasaco_edge.wire.paths import PathMessage
+from fasaco_edge.wire.pheromone import PheromoneMessage
+
+DEFAULT_RADIUS_M = 0.2
+# The view follows the growing map in steps of this fraction of its size: each blueprint
+# takes 120 kB.
+REFRAME_FRACTION = 0.15
+
+
+class Scene:
+    """Draws a mission into a journal, message by message; the caller sets the time."""
+
+    def __init__(self, journal: Journal, description: RunDescription) -> None:
+        self._journal = journal
+        self._run = description
+        # Where 0 is drawn; known with the first place.
+        self._anchor: Anchor | None = None
+        self._map: OccupancyGrid | None = None
+        self._known: Bounds | None = None
+        self._framed: Bounds | None = None
+        self._errors = self._restored = 0
+        self._states: dict[str, str] = {}
+        self._layers = Layers()
+        self._curves = Curves(journal)
+        self._trail = TrailDrawing(journal)
+        self._figures = StatusFigures(self._curves)
+        self._paths = PathDrawing(journal, self._layers)
+        self._pheromone = PheromoneDrawing(journal, self._layers, self._curves)
+        log_styles(journal)
+        self._describe()
+        self._draw_robot(DEFAULT_RADIUS_M)
+
+    def add_map(self, grid: OccupancyGrid) -> None:
+        """Draw the map, and where it contradicts the one before."""
+        self._draw_grid(self._anchored(grid.geometry.origin).grid(grid))
+
+    def _draw_grid(self, grid: OccupancyGrid) -> None:
+        before, self._map = self._map, grid
+        if before is not None:
+            if before.geometry == grid.geometry and np.array_equal(before.cells, grid.cells):
+                return
+            changed = changed_bounds(before, grid)
+            if changed is not None:
+                self._journal.log(entities.MAP_CHANGE, draw.box_archetype(changed, draw.CHANGE))
+
+        def draw_map() -> None:
+            self._journal.log(
+                entities.MAP, draw.map_archetype(grid), latched=True, size=grid.cells.size
+            )
+            self._frame(grid)
+
+        self._draw(entities.MAP, size_in_file(grid.cells), draw_map)
+
+    def add_map_update(self, patch: MapPatch) -> None:
+        """Lay a patch over the map.
+
+        Raises:
+            PatchWithoutBase: it fits no map that came before.
+        """
+        if self._map is None:
+            raise PatchWithoutBase("a map update came before any map")
+        self._draw_grid(self._map.patched(patch))
+
+    def add_pose(self, stamped: StampedPose) -> None:
+        """Move the robot, and draw its trail."""
+        pose = self._anchored(stamped.pose).pose(stamped.pose)
+        self._journal.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
+        self._trail.add(pose.x, pose.y)
+
+    def add_command(self, command: Json) -> None:
+        """Log a command that the mission has taken."""
+        self._say(entities.MISSION_LOG, f"command: {text(command, 'command')}")
+
+    def add_path(self, message: PathMessage, note: Json) -> None:
+        """Draw the path to drive, over the one before it, and log why it came."""
+        anchor = self._anchor
+        if anchor is None and len(message.xy):
+            anchor = self._anchored(Pose2D(*message.xy[0].tolist()))
+        anchor = anchor or Anchor()
+        self._paths.add(anchor.path(message), anchor.note(note))
+        self._figures.add_path(note)
+
+    def add_coverage(self, grid: OccupancyGrid) -> None:
+        """Tint what is covered, and plot how much that is."""
+        grid = self._anchored(grid.geometry.origin).grid(grid)
+
+        def draw_coverage() -> None:
+            self._journal.log(
+                entities.COVERAGE,
+                draw.coverage_archetype(grid),
+                latched=True,
+                size=4 * grid.cells.size,
+            )
+
+        # It is drawn in four bytes a cell, which makes it twice as large.
+        self._draw(entities.COVERAGE, 2 * size_in_file(grid.cells), draw_coverage)
+        covered, recovered = draw.coverage_fractions(grid)
+        self._curves.draw(entities.COVERED_FRACTION, covered)
+        self._curves.draw(entities.RECOVERED_FRACTION, recovered)
+
+    def add_pheromone(self, message: PheromoneMessage) -> None:
+        """Draw the pheromone after a cohort, and plot the best walk so far."""
+        self._pheromone.add(self._anchored(message.geometry.origin).pheromone(message))
+        if self._pheromone.trail_range != self._run.trail_range:
+            self._run = replace(self._run, trail_range=self._pheromone.trail_range)
+            self._describe()
+
+    def add_status(self, status: Json) -> None:
+        """Plot the planner's figures, show its states, log its errors; any key may be missing."""
+        self._figures.add(status)
+        self._add_configuration(status)
+        self._add_restored(section(status, "ledger"))
+        self.enter(entities.MISSION_STATE, text(status, "state"), text(status, "reason"))
+        planning = section(status, "plan").get("planning")
+        if isinstance(planning, bool):
+            self.enter(entities.PLANNER_STATE, "planning" if planning else "idle")
+        self._add_errors(section(status, "errors"))
+
+    def add_report(self, report: RecorderReport) -> None:
+        """Show the recorder's own state and memory."""
+        self.enter(entities.RECORDER_STATE, report.state, report.reason)
+        self._curves.draw(f"{entities.MEMORY}/recorder", report.rss_mb, TREMBLE)
+
+    def enter(self, entity: str, state: str, reason: str = "") -> None:
+        """Show that ``entity`` is in ``state`` from now on; log it where there is a reason."""
+        if not state or self._states.get(entity) == state:
+            return
+        self._states[entity] = state
+        self._journal.log(entity, rr.StateChange(state=state), latched=True)
+        if reason:
+            recorder = entity == entities.RECORDER_STATE
+            log = entities.RECORDER_LOG if recorder else entities.MISSION_LOG
+            self._say(log, f"{state}: {reason}")
+
+    def complain(self, log: str, message: str) -> None:
+        """Log something that went wrong."""
+        self._say(log, message, "WARN")
+
+    def catch_up(self) -> None:
+        """Draw what had to wait; call it often."""
+        self._layers.catch_up(self._journal.wall_ns)
+        self._trail.catch_up()
+
+    def finish(self) -> None:
+        """Draw what waits, and frame the map as it was at the end."""
+        self._layers.finish()
+        self._trail.finish()
+        self._curves.finish()
+        if self._known is not None and self._known != self._framed:
+            self._journal.show(build_blueprint(self._known))
+
+    def _draw(self, layer: str, size: int, draw_it: Callable[[], None]) -> None:
+        self._layers.draw(layer, size, draw_it, self._journal.wall_ns)
+
+    def _anchored(self, place: Pose2D) -> Anchor:
+        """Return where 0 is drawn; say so with the first place, where that is far away."""
+        if self._anchor is None:
+            self._anchor = anchor = Anchor.near(place.x, place.y)
+            if anchor:
+                where = rr.Transform3D(translation=[anchor.x, anchor.y, 0.0])
+                self._journal.log_static(entities.WORLD, where)
+                self._run = replace(self._run, anchor=(anchor.x, anchor.y))
+                self._describe()
+        return self._anchor
+
+    def _frame(self, grid: OccupancyGrid) -> None:
+        bounds = known_bounds(grid)
+        if bounds is None:
+            return
+        self._known = bounds = union(self._known, bounds)
+        if self._framed is None or _is_far(self._framed, bounds):
+            self._framed = bounds
+            self._journal.show(build_blueprint(bounds))
+
+    def _add_configuration(self, status: Json) -> None:
+        version, config = text(status, "version"), dict(section(status, "config"))
+        known = replace(
+            self._run, version=version or self._run.version, config=config or self._run.config
+        )
+        if known == self._run:
+            return
+        self._run = known
+        self._describe()
+        radius = number(config, "robot_radius_m")
+        if radius is not None and radius > 0:
+            self._draw_robot(radius)
+
+    def _describe(self) -> None:
+        card = rr.TextDocument(self._run.markdown(), media_type="text/markdown")
+        self._journal.log_static(entities.RUN_CARD, card)
+        self._journal.describe(self._run.name, self._run.properties())
+
+    def _draw_robot(self, radius_m: float) -> None:
+        body, heading = draw.body_archetypes(radius_m)
+        self._journal.log_static(entities.ROBOT_BODY, body)
+        self._journal.log_static(entities.ROBOT_HEADING, heading)
+
+    def _add_restored(self, ledger: Json) -> None:
+        restored = integer(ledger, "restored_cells") or 0
+        if restored != self._restored:
+            self._restored = restored
+            self._say(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
+
+    def _add_errors(self, errors: Json) -> None:
+        total = integer(errors, "total")
+        if total is None or total == self._errors:
+            return
+        # Fewer than before: the planner was started again.
+        if total > self._errors:
+            last = text(errors, "last") or "no text"
+            self._say(entities.MISSION_LOG, f"error {total}: {last}", "ERROR")
+        self._errors = total
+
+    def _say(self, log: str, message: str, level: str = "INFO") -> None:
+        self._journal.log(log, rr.TextLog(message, level=level))
+
+
+def _is_far(framed: Bounds, bounds: Bounds) -> bool:
+    size = max(framed[2] - framed[0], framed[3] - framed[1])
+    moved = max(abs(a - b) for a, b in zip(framed, bounds, strict=True))
+    return moved > REFRAME_FRACTION * size

@@ -1,0 +1,1 @@
+"""The recorder: samples off the bus into parts of a recording."""

@@ -1,0 +1,97 @@
+"""The time of a recording.
+
+Between Zenoh's threads and the one that writes: bounded memory, order of arrival.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable
+
+from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.bus.session import Sample
+
+
+class RunClock:
+    """UTC [ns] that never steps: a clock set during a run must not tear its timeline."""
+
+    def __init__(self) -> None:
+        self._offset_ns = time.time_ns() - time.monotonic_ns()
+
+    def now_ns(self) -> int:
+        """Return the time [ns] since the epoch, as the clock saw it when the run began."""
+        return self._offset_ns + time.monotonic_ns()
+
+    def arrival(self, topic: str, sample: Sample) -> Arrival:
+        """Return a sample that has just come."""
+        at_ns = time.monotonic_ns()
+        return Arrival(topic, sample, at_ns, self._offset_ns + at_ns)
+
+
+# So many samples waiting mean that the writer is behind: some ten seconds of poses.
+BEHIND_SAMPLES = 1024
+
+# What a sample makes worthless when the writer is behind. Paths are missing: they are
+# small, and each revision counts. A full map also clears the patches of the one before it.
+SUPERSEDED: dict[str, frozenset[str]] = {
+    "map": frozenset({"map", "map_update"}),
+    "pose": frozenset({"pose"}),
+    "coverage": frozenset({"coverage"}),
+    "pheromone": frozenset({"pheromone"}),
+    "status": frozenset({"status"}),
+}
+
+
+class Inbox:
+    """Samples in order of arrival, at most ``capacity_bytes`` of them.
+
+    Once the writer is behind, what is newer takes the place of the older of its kind;
+    once there is no room, samples are dropped. Both are counted as lost.
+    """
+
+    def __init__(self, capacity_bytes: int, stamp: Callable[[str, Sample], Arrival]) -> None:
+        self._stamp = stamp
+        self._changed = threading.Condition()
+        self._waiting: deque[Arrival] = deque()
+        self._capacity = capacity_bytes
+        self._bytes = 0
+        self._lost: Counter[str] = Counter()
+
+    def post(self, topic: str, sample: Sample) -> None:
+        """Leave a sample; safe from any thread, never waits for the writer."""
+        size = sample.size
+        with self._changed:
+            # Stamped here, so that of samples on several threads none is before an earlier one.
+            arrival = self._stamp(topic, sample)
+            if len(self._waiting) >= BEHIND_SAMPLES or 2 * (self._bytes + size) > self._capacity:
+                self._forget(SUPERSEDED.get(arrival.topic, frozenset()))
+            if self._bytes + size > self._capacity:
+                self._lost[arrival.topic] += 1
+                return
+            self._waiting.append(arrival)
+            self._bytes += size
+            self._changed.notify()
+
+    def take(self, timeout_s: float) -> list[Arrival]:
+        """Return all samples there are; wait up to ``timeout_s`` [s] for the first."""
+        with self._changed:
+            if not self._waiting:
+                self._changed.wait(timeout_s)
+            arrivals = list(self._waiting)
+            self._waiting.clear()
+            self._bytes = 0
+            return arrivals
+
+    @property
+    def lost(self) -> Counter[str]:
+        """How many samples of each topic never reached the writer."""
+        with self._changed:
+            return self._lost.copy()
+
+    def _forget(self, topics: frozenset[str]) -> None:
+        self._lost.update(arrival.topic for arrival in self._waiting if arrival.topic in topics)
+        kept = deque(arrival for arrival in self._waiting if arrival.topic not in topics)
+        self._bytes = sum(arrival.sample.size for arrival in kept)
+        self._waiting = kept

@@ -1,0 +1,161 @@
+"""What the mission heard, byte for byte, beside what is drawn of it.
+
+Samples are gathered for almost a second and written as one blob, past rerun's own batches: a kill
+costs no more. Each part begins with what is in force, told as a whole, so that it can be
+read without the parts before it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import Counter
+from dataclasses import replace
+from typing import Final
+
+from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
+from fasaco_edge.bus.session import Sample
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.recording.fields import section
+from fasaco_edge.recording.write.journal import Journal
+from fasaco_edge.samples.codec import Numbered, SampleEncoder
+from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.paths import decode_path
+
+INPUTS: Final = ("map", "map_update", "pose", "tf_static", "command", "turns")
+"""Topics that are logged as they come: all that a mission hears, and when it took it."""
+# What is in force for no longer than it takes to hear it.
+PASSING: Final = ("pose", "command", "turns")
+PERIOD_NS = 900_000_000
+STATUS_PERIOD_NS = 15_000_000_000
+WAITING_BYTES = 4_000_000
+# Each node that has some tells them once.
+MOST_STATIC = 64
+# Updates since the last full map; with more of them a part begins without the map.
+IN_FORCE_BYTES = 8_000_000
+
+
+class InputLog:
+    """Writes samples into a journal; for the journal's thread only.
+
+    Of paths only a digest is kept, of statuses those that tell something new, and one in
+    ``STATUS_PERIOD_NS``: how far the mission is, is known so exactly whatever comes.
+    """
+
+    def __init__(self, journal: Journal, run: int) -> None:
+        self._journal = journal
+        self._encoder = SampleEncoder(run)
+        self._in_force = _InForce()
+        self._part = 0
+        self._lost = 0
+        self._next_ns = 0
+        self._told: tuple[object, ...] = ()
+        self._told_ns = 0
+
+    def add(self, arrival: Arrival) -> None:
+        """Take a sample, if it is one that matters."""
+        if arrival.topic == "path":
+            arrival = _path_digest(arrival)
+        elif arrival.topic not in INPUTS and not self._is_news(arrival):
+            return
+        self._in_force.note(self._encoder.add(arrival))
+        if self._encoder.waiting_bytes > WAITING_BYTES:
+            self.write()
+
+    def note_lost(self, lost: Counter[str]) -> None:
+        """Note how many samples of each topic never came here, in all."""
+        count = sum(lost[topic] for topic in INPUTS)
+        self._encoder.skip(count - self._lost)
+        self._lost = count
+
+    def write_if_due(self, now_ns: int) -> None:
+        """Write what has gathered, about once a second; ``now_ns`` by a steady clock [ns]."""
+        if now_ns >= self._next_ns:
+            self._next_ns = now_ns + PERIOD_NS
+            self.write()
+
+    def finish(self) -> None:
+        """Write what is left; a part begun just before the end gets a batch, too."""
+        part = self._journal.part_number
+        self._write(in_any_case=part > 1 and part != self._part)
+
+    def write(self) -> None:
+        """Write what has gathered."""
+        self._write(in_any_case=False)
+
+    def _write(self, *, in_any_case: bool) -> None:
+        if self._part != self._journal.part_number:
+            self._part = self._journal.part_number
+            self._encoder.restart(self._in_force.samples())
+        batch = self._encoder.take(in_any_case=in_any_case)
+        if batch and not self._journal.write_blob(batch):
+            # What is not there, nothing can be told by.
+            self._part = 0
+
+    def _is_news(self, arrival: Arrival) -> bool:
+        if arrival.topic != "status":
+            return False
+        try:
+            status = decode_json(arrival.sample.payload)
+        except MalformedMessage:
+            return False
+        # A map in it: the mission has begun.
+        has_map = status.get("map") is not None
+        told = (
+            *(status.get("state"), has_map, status.get("version"), status.get("config")),
+            sorted(section(section(status, "errors"), "by_code")),
+            section(status, "ledger").get("fault"),
+            section(status, "recorder").get("state"),
+        )
+        if told == self._told and arrival.at_ns - self._told_ns < STATUS_PERIOD_NS:
+            return False
+        self._told, self._told_ns = told, arrival.at_ns
+        return True
+
+
+def _path_digest(arrival: Arrival) -> Arrival:
+    """Return what stands for a path: thousands of points are many bytes, and no input."""
+    payload = arrival.sample.payload
+    with contextlib.suppress(MalformedMessage):
+        payload = decode_path(payload).xy.tobytes()
+    before = arrival.sample
+    sample = Sample(before.key, digest(payload), before.schema, before.attachment)
+    return replace(arrival, topic=PATH_DIGEST, sample=sample)
+
+
+class _InForce:
+    """The newest map, what has changed of it since, and the newest of what else is latched.
+
+    Static transforms come from several nodes, and all of them hold.
+    """
+
+    def __init__(self) -> None:
+        self._newest: dict[str, Numbered] = {}
+        self._static: dict[bytes, Numbered] = {}
+        self._updates: list[Numbered] = []
+        self._updates_bytes = 0
+
+    def note(self, numbered: Numbered) -> None:
+        topic = numbered.arrival.topic
+        if topic == "map":
+            self._updates, self._updates_bytes = [], 0
+        if topic == "tf_static":
+            self._static[numbered.arrival.sample.payload] = numbered
+            while len(self._static) > MOST_STATIC:
+                del self._static[next(iter(self._static))]
+        elif topic != "map_update":
+            self._newest[topic] = numbered
+        elif "map" in self._newest:
+            self._note_update(numbered)
+
+    def _note_update(self, numbered: Numbered) -> None:
+        self._updates.append(numbered)
+        self._updates_bytes += len(numbered.arrival.sample.payload)
+        if self._updates_bytes > IN_FORCE_BYTES:
+            # A map without its updates would be another one: better none.
+            del self._newest["map"]
+            self._updates, self._updates_bytes = [], 0
+
+    def samples(self) -> list[Numbered]:
+        newest = [numbered for topic, numbered in self._newest.items() if topic not in PASSING]
+        held = (*newest, *self._static.values(), *self._updates)
+        return sorted(held, key=lambda numbered: numbered.number)

@@ -1,0 +1,172 @@
+"""The recordings of a folder: what the next run is called, which part is older, which ones go.
+
+A run has a number one above the highest there is, before anything else in its name: clocks go
+backward, on a computer without a battery for its clock at each start, and numbers do not. Only
+parts that a recorder of this robot has named are deleted, only where no recorder writes them, and
+nothing else that lies in the folder.
+
+The room that recordings may take, on their disk and in all.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import logging
+import os
+import re
+import shutil
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from fasaco_edge.errors import BadConfiguration
+
+NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
+TIME = "%Y%m%dT%H%M%SZ"
+
+
+def next_run(folder: Path, robot: str, began: datetime) -> str:
+    """Return what a run of ``robot`` that begins now is called: it is younger than all there are.
+
+    Raises:
+        BadConfiguration: the folder cannot be read.
+    """
+    try:
+        names = os.listdir(folder) if folder.is_dir() else []
+    except OSError as error:
+        raise BadConfiguration(f"cannot record into {folder}: {error}") from error
+    runs = [int(match[1]) for match in map(NUMBERED.fullmatch, names) if match]
+    return f"run{max(runs, default=0) + 1:05}-{began:{TIME}}-{robot}"
+
+
+@dataclass(frozen=True, slots=True)
+class Quota:
+    """How much the recordings of ``robot`` in a folder may take [bytes]; 0 for no limit."""
+
+    robot: str
+    most_bytes: int
+
+    def keep(self, folder: Path, coming: int = 0) -> list[Path]:
+        """Delete the oldest parts until ``coming`` bytes more fit; return what was deleted.
+
+        Raises:
+            OSError: the folder cannot be read, or a file in it not be deleted.
+        """
+        if not self.most_bytes:
+            return []
+        parts = oldest_first(folder, self.robot)
+        total, deleted = sum(size for _, size in parts), []
+        for path, size in parts:
+            if total + coming <= self.most_bytes:
+                break
+            if _delete(path):
+                deleted.append(path)
+                total -= size
+        return deleted
+
+
+def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
+    """Return the parts of a robot's recordings, each with its size [bytes], the oldest first.
+
+    Runs without a number, as they were called once, are older than those with one. Among
+    themselves they are as old as what was written to them last: by its file's time, or by the name
+    where that is later, as that of a copy may be.
+
+    Raises:
+        OSError: the folder cannot be read.
+    """
+    named = re.compile(
+        # Only where there was no number, a second run within a second was told by one behind.
+        r"(?P<run>(?:run(?P<order>\d{5,9})-)?(?P<when>\d{8}T\d{6}Z)-"
+        rf"{re.escape(robot)}(?(order)|(?:-(?P<again>\d+))?))-part(?P<number>\d+)\.rrd"
+    )
+    found, last = [], dict[str, float]()
+    matches = {path: match for path in folder.iterdir() if (match := named.fullmatch(path.name))}
+    runs = {match["run"] for match in matches.values()}
+    for path, match in matches.items():
+        # The number behind the name may be the end of another robot's: ours is the second of two.
+        if match["again"] and f"{match['when']}-{robot}" not in runs:
+            continue
+        if path.is_file() and not path.is_symlink():
+            status = path.stat()
+            found.append((match, path, status.st_size))
+            written = max(_time(match["when"]), status.st_mtime)
+            last[match["run"]] = max(last.get(match["run"], 0.0), written)
+
+    def age(part: tuple[re.Match[str], Path, int]) -> tuple[int, float, int, int]:
+        match, _, _ = part
+        number = int(match["number"])
+        if match["order"]:
+            return int(match["order"]), 0.0, 1, number
+        return 0, last[match["run"]], int(match["again"] or 1), number
+
+    return [(path, size) for _, path, size in sorted(found, key=age)]
+
+
+def _time(when: str) -> float:
+    """Return the time in a name [s]; 0 where there is no such day."""
+    try:
+        return datetime.strptime(when, TIME).replace(tzinfo=UTC).timestamp()
+    except ValueError:
+        return 0.0
+
+
+def _delete(path: Path) -> bool:
+    """Delete a part; False where somebody writes it: they hold a lock on it."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        path.unlink()
+    except BlockingIOError:
+        return False
+    finally:
+        os.close(descriptor)
+    return True
+
+
+LOG = logging.getLogger(__name__)
+
+# Room beyond the floor before recording goes on: not to fill the disk again at once.
+RESUME_BYTES = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """How much a part may take, and how much the disk must keep free [bytes].
+
+    A part older than ``part_s`` [s] is followed by the next, too, 0 for never; ``quota`` limits
+    what all take.
+    """
+
+    part_bytes: int
+    least_free_bytes: int
+    part_s: float = 0.0
+    quota: Quota | None = None
+
+    def is_full(self, folder: Path) -> bool:
+        """Tell whether less is free in ``folder`` than must be."""
+        return _free_bytes(folder) < self.least_free_bytes
+
+    def may_begin(self, folder: Path) -> bool:
+        """Tell whether there is room enough to go on."""
+        return _free_bytes(folder) >= self.least_free_bytes + RESUME_BYTES
+
+    def keep_quota(self, folder: Path) -> None:
+        """Delete the oldest parts in ``folder`` where all take more than they may."""
+        if self.quota is None:
+            return
+        try:
+            deleted = self.quota.keep(folder, self.part_bytes)
+        except OSError as error:
+            LOG.warning("recordings above their quota stay: %s", error)
+            return
+        if deleted:
+            LOG.info("deleted for the quota: %s", ", ".join(path.name for path in deleted))
+
+
+def _free_bytes(folder: Path) -> int:
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:
+        # The folder, or the disk it was on, is gone: no room there until it is back.
+        return 0

@@ -1,0 +1,280 @@
+"""The recorder: a process of its own that writes down what is said on the bus.
+
+Nothing it does, or fails to do, can delay the planner. Zenoh's threads only
+post; one thread decodes, draws and writes.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from types import FrameType
+
+from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.bus.publisher import QOS, Publisher
+from fasaco_edge.bus.session import Bus, Sample, open_bus
+from fasaco_edge.errors import BadConfiguration, FasacoError
+from fasaco_edge.host.processes import resident_mb, return_soon
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.read.repair import repair_folder
+from fasaco_edge.recording.scene.blueprint import build_blueprint
+from fasaco_edge.recording.scene.runcard import RunDescription
+from fasaco_edge.recording.scene.scene import Scene
+from fasaco_edge.recording.write.inbox import Inbox, RunClock
+from fasaco_edge.recording.write.input_log import InputLog
+from fasaco_edge.recording.write.journal import Journal
+from fasaco_edge.recording.write.live import serve_live
+from fasaco_edge.recording.write.quota import Quota, Room, next_run
+from fasaco_edge.recording.write.settings import RecorderReport, RecorderSettings
+from fasaco_edge.wire.json_text import decode_json, encode_json, is_the_planners
+from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.pheromone import decode_pheromone
+from fasaco_edge.wire.pose_decoding import PoseDecoder
+
+TAKE_TIMEOUT_S = 0.05
+REPORT_PERIOD_NS = 1_000_000_000
+# The planner speaks once a second.
+SILENCE_NS = 3_500_000_000
+# Of all that waits when the end comes, so much time is for writing [ns].
+LAST_WORDS_NS = 300_000_000
+EXIT_STALLED = 1
+
+
+def run_recorder(settings: RecorderSettings, stop: threading.Event | None = None) -> int:
+    """Record until SIGTERM, SIGINT or ``stop``; return the process's exit code.
+
+    Importing this module raises MissingExtra where rerun is not installed. After a disk
+    failed, the process ends here (``os._exit``), because rerun would never let it.
+
+    Raises:
+        BusUnavailable: nothing listens at the endpoints.
+        BadConfiguration: the folder cannot be made or written to.
+    """
+    return_soon()
+    stop = stop or threading.Event()
+    repairs = _repaired(settings.out)
+    with _stopped_by_signals(stop), open_bus(settings.bus) as bus:
+        recorder = Recorder(settings, bus)
+        for line in repairs:
+            recorder.note(line)
+        recorder.listen()
+        while not stop.is_set():
+            recorder.step(TAKE_TIMEOUT_S)
+        code = 0 if recorder.end() else EXIT_STALLED
+    if recorder.hangs:
+        # What could be saved is saved; rerun's own way out would never end.
+        os._exit(code)
+    return code
+
+
+class Recorder:
+    """Joins the bus to the journal: ``step`` takes what came, writes it, and reports."""
+
+    def __init__(self, settings: RecorderSettings, bus: Bus) -> None:
+        self._settings = settings
+        self._bus = bus
+        self._clock = RunClock()
+        began_ns = self._clock.now_ns()
+        began = datetime.fromtimestamp(began_ns / 1e9, UTC)
+        name = next_run(settings.out, settings.robot, began)
+        quota = Quota(settings.robot, settings.quota_bytes)
+        room = Room(settings.part_bytes, settings.least_free_bytes, settings.part_s, quota)
+        self._journal = Journal(settings.out, name, room, build_blueprint(None))
+        self._journal.at(began_ns)
+        if settings.serve is not None:
+            self._journal.serve(serve_live(name, *settings.serve))
+        self._inputs = InputLog(self._journal, began_ns)
+        description = RunDescription(settings.robot, f"{began:%Y-%m-%d %H:%M:%S} UTC")
+        self._scene = Scene(self._journal, description)
+        self._inbox = Inbox(settings.queue_bytes, self._clock.arrival)
+        self._readers: dict[str, Callable[[Sample], None]] = {
+            "map": self._read_map,
+            "map_update": self._read_map_update,
+            "pose": self._read_pose,
+            "tf_static": lambda sample: self._read_pose(sample, "tf_static"),
+            "command": self._read_command,
+            "turns": lambda _: None,  # for a replay, which reads the inputs
+            "path": self._read_path,
+            "coverage": self._read_coverage,
+            "pheromone": self._read_pheromone,
+            "status": self._read_status,
+        }
+        self._poses = PoseDecoder(settings.pose_schema, settings.frames)
+        self._messages = 0
+        self._malformed = 0
+        self._last_status_ns: int | None = None
+        self._report: RecorderReport | None = None
+        self._next_report_ns = 0
+        self._reporter: Publisher = bus.publisher(settings.keys.recorder, qos=QOS["recorder"])
+
+    def listen(self) -> None:
+        """Subscribe to everything there is to record, and say that the recorder is there."""
+        settings, keys = self._settings, self._settings.keys
+        self._subscribe("map", keys.map, latched=True)
+        self._subscribe("map_update", keys.map_update)
+        self._subscribe("pose", keys.pose)
+        for ros in settings.ros:
+            self._subscribe(ros.topic, ros.key, ros.latched, ros.depth, ros.schema)
+        self._subscribe("command", keys.command)
+        self._subscribe("path", keys.path, latched=True)
+        self._subscribe("coverage", keys.coverage, latched=True)
+        self._subscribe("pheromone", keys.pheromone)
+        self._subscribe("status", keys.status, latched=True)
+        # Last: once the daemon sees that this is listened to, everything else is, too.
+        self._subscribe("turns", keys.turns)
+        self._bus.token(keys.recorder_alive)
+
+    def step(self, timeout_s: float) -> None:
+        """Write what came within ``timeout_s`` [s], find out whether it is written, report."""
+        arrivals = deque(self._inbox.take(timeout_s))
+        while arrivals:  # what is written is let go
+            self._write(arrivals.popleft())
+            self._sync()
+        self._inputs.note_lost(self._inbox.lost)
+        self._journal.at(self._clock.now_ns())
+        self._sync()
+        self._scene.catch_up()
+        self._watch_planner()
+        self._tell(self._journal.state.value, self._journal.reason)
+
+    def end(self) -> bool:
+        """Write the last words and the footer; False where the disk does not take them."""
+        deadline_ns = time.monotonic_ns() + LAST_WORDS_NS
+        for arrival in self._inbox.take(0.0):
+            if time.monotonic_ns() < deadline_ns:
+                self._write(arrival)
+        self._journal.at(self._clock.now_ns())
+        self._inputs.finish()
+        self._tell("stopping", "asked to end")
+        self._scene.finish()
+        return self._journal.close()
+
+    @property
+    def hangs(self) -> bool:
+        """Whether rerun would hang when the interpreter exits."""
+        return self._journal.hangs
+
+    def note(self, line: str) -> None:
+        """Log something that went wrong before the recording began."""
+        self._scene.complain(entities.RECORDER_LOG, line)
+
+    def _subscribe(
+        self, topic: str, key: str, latched: bool = False, depth: int = 1, schema: str = ""
+    ) -> None:
+        def post(sample: Sample) -> None:
+            # As the daemon has it: ROS names no type beside a sample.
+            self._inbox.post(topic, sample.as_type(schema) if schema else sample)
+
+        self._bus.subscribe(key, post, latched, depth)
+
+    def _sync(self) -> None:
+        now_ns = time.monotonic_ns()
+        self._inputs.write_if_due(now_ns)
+        self._journal.sync(now_ns)
+
+    def _write(self, arrival: Arrival) -> None:
+        self._messages += 1
+        self._journal.message(arrival.wall_ns)
+        if arrival.topic == "status" and not is_the_planners(arrival.sample.payload):
+            line = "another daemon of this robot's name is there, and waits: it is not recorded"
+            self._scene.complain(entities.BUS_LOG, line)
+            return
+        self._inputs.add(arrival)
+        try:
+            self._readers[arrival.topic](arrival.sample)
+        except FasacoError as error:
+            self._malformed += 1
+            # A publisher gone wrong is so at every message: log the 1st, 2nd, 4th, 8th ...
+            if self._malformed & (self._malformed - 1) == 0:
+                line = f"{self._malformed} malformed, the last on {arrival.sample.key}: {error}"
+                self._scene.complain(entities.BUS_LOG, line)
+
+    def _read_map(self, sample: Sample) -> None:
+        self._scene.add_map(decode_occupancy_grid(sample.payload))
+
+    def _read_map_update(self, sample: Sample) -> None:
+        self._scene.add_map_update(decode_map_update(sample.payload))
+
+    def _read_pose(self, sample: Sample, topic: str = "pose") -> None:
+        is_static = topic == "tf_static"
+        pose = self._poses.decode(sample.payload, sample.schema, is_static=is_static)
+        if pose is not None:
+            self._scene.add_pose(pose)
+
+    def _read_command(self, sample: Sample) -> None:
+        self._scene.add_command(decode_json(sample.payload))
+
+    def _read_path(self, sample: Sample) -> None:
+        note = decode_json(sample.attachment) if sample.attachment else {}
+        self._scene.add_path(decode_path(sample.payload), note)
+
+    def _read_coverage(self, sample: Sample) -> None:
+        self._scene.add_coverage(decode_occupancy_grid(sample.payload))
+
+    def _read_pheromone(self, sample: Sample) -> None:
+        self._scene.add_pheromone(decode_pheromone(sample.payload))
+
+    def _read_status(self, sample: Sample) -> None:
+        self._last_status_ns = time.monotonic_ns()
+        self._scene.add_status(decode_json(sample.payload))
+
+    def _watch_planner(self) -> None:
+        last = self._last_status_ns
+        if last is not None and time.monotonic_ns() - last > SILENCE_NS:
+            self._scene.enter(entities.MISSION_STATE, "silent", "the planner says nothing any more")
+
+    def _tell(self, state: str, reason: str) -> None:
+        """Report on the bus and in the recording: on change, and once a second."""
+        now_ns = time.monotonic_ns()
+        last = self._report
+        if last is not None and last.state == state and now_ns < self._next_report_ns:
+            return
+        self._next_report_ns = now_ns + REPORT_PERIOD_NS
+        path = self._journal.path
+        self._report = RecorderReport(
+            state=state,
+            reason=reason,
+            file=str(path) if path else "",
+            bytes=self._journal.size,
+            messages=self._messages,
+            lost=self._journal.lost + self._inbox.lost.total(),
+            malformed=self._malformed,
+            rss_mb=resident_mb(),
+            pid=os.getpid(),
+        )
+        self._scene.add_report(self._report)
+        self._reporter.put(encode_json(self._report))
+
+
+def _repaired(folder: Path) -> list[str]:
+    try:
+        repairs = repair_folder(folder)
+    except OSError as error:
+        raise BadConfiguration(f"cannot record into {folder}: {error}") from error
+    return [str(repair) for repair in repairs]
+
+
+@contextmanager
+def _stopped_by_signals(stop: threading.Event) -> Iterator[None]:
+    """Set ``stop`` on SIGTERM and SIGINT; where this is not the main thread, leave them be."""
+
+    def ask(_number: int, _frame: FrameType | None) -> None:
+        stop.set()
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, ask) for number in (signal.SIGTERM, signal.SIGINT)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

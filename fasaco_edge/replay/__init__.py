@@ -1,0 +1,1 @@
+"""Recorded missions run again through the same inbox and mission."""

@@ -1,0 +1,1 @@
+"""Samples of the bus as bytes: the file format of recorded inputs."""

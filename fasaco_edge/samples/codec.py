@@ -1,0 +1,278 @@
+"""Samples as bytes: many at a time, without loss, and small.
+
+Successive payloads of a key are much alike, so a payload is told by what it differs in from
+the one before it of the same key and length (``bus.residuals``), and a batch of them is
+deflated. The first of a key is told as a whole, and each first one after
+``SampleEncoder.restart``.
+
+A batch is ``_HEAD`` and the deflated MessagePack of a list of lanes, which hold samples that
+share topic, key, schema and length. Large payloads have a lane for themselves.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from typing import Annotated
+
+import msgspec
+
+from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.session_config import MAX_MESSAGE_BYTES
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.samples.residuals import Residual, payloads_of, residual_of
+
+FORMAT = 1
+# Format, run, number of the first sample not told before.
+_HEAD = struct.Struct("<BQQ")
+LARGE_BYTES = 16_384
+DEFLATE_LEVEL = 6
+# What a batch may claim to hold, before any of it is believed: a map in force, a new one and what
+# gathers meanwhile, payloads and all (``recording.input_log``).
+MOST_BATCH_BYTES = 3 * MAX_MESSAGE_BYTES
+MOST_SAMPLES = 200_000
+# What ``_Lane.against`` says where the first payload is told as a whole.
+WHOLE = -1
+
+
+_MANY = msgspec.Meta(max_length=MOST_SAMPLES)
+
+
+@dataclass(frozen=True, slots=True)
+class Numbered:
+    """A sample and its number, counted from 0 over all samples of a run."""
+
+    number: int
+    arrival: Arrival
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a batch belongs: its run, and the number of its first sample not told before."""
+
+    run: int
+    first: int
+
+
+class _Lane(msgspec.Struct, array_like=True):
+    """Samples that share topic, key, schema and length.
+
+    Attributes:
+        numbers, at_ns, ahead_ns: of each sample its number, its time, and how far the wall clock
+            was ahead of that; each but the first as the difference from the one before.
+        attachments: of each sample; empty if none has any.
+        against: number of the sample that the first one is told by the difference from.
+        checksum: CRC-32 of all payloads in order.
+        sparse, body: the residual.
+    """
+
+    topic: str
+    key: str
+    schema: str
+    length: Annotated[int, msgspec.Meta(ge=0, le=MAX_MESSAGE_BYTES)]
+    numbers: Annotated[list[int], _MANY]
+    at_ns: Annotated[list[int], _MANY]
+    ahead_ns: Annotated[list[int], _MANY]
+    attachments: Annotated[list[bytes], _MANY]
+    against: int
+    checksum: int
+    sparse: bool
+    body: bytes
+
+
+class SampleEncoder:
+    """Turns samples into batches; a batch needs those before it, back to the last restart.
+
+    Args:
+        run: tells these samples from those of other runs; when it began [ns], say.
+    """
+
+    def __init__(self, run: int) -> None:
+        self.waiting_bytes = 0
+        self._run = run
+        self._next = 0
+        self._waiting: list[Numbered] = []
+        self._again: list[Numbered] = []
+        self._last: dict[str, Numbered] = {}
+
+    def add(self, arrival: Arrival) -> Numbered:
+        """Take a sample into the next batch; return it with its number."""
+        numbered = Numbered(self._next, arrival)
+        self._next += 1
+        self._waiting.append(numbered)
+        self.waiting_bytes += len(arrival.sample.payload)
+        return numbered
+
+    def skip(self, count: int) -> None:
+        """Leave out the numbers of samples that were lost, so that a reader sees the gap."""
+        self._next += count
+
+    def restart(self, again: Sequence[Numbered] = ()) -> None:
+        """Let the next batch need none before it, and begin with samples told before."""
+        self._last.clear()
+        first = self._waiting[0].number if self._waiting else self._next
+        self._again = [numbered for numbered in again if numbered.number < first]
+
+    def take(self, *, in_any_case: bool = False) -> bytes:
+        """Return all samples added since the last batch; b"" if there are none.
+
+        ``in_any_case``: then a batch of what was told before, if anything; nothing may follow it.
+        """
+        if not self._waiting and not in_any_case:
+            return b""
+        first = self._waiting[0].number if self._waiting else self._next
+        lanes = [self._lane(samples) for samples in _by_lane(self._again + self._waiting)]
+        self._again, self._waiting, self.waiting_bytes = [], [], 0
+        body = zlib.compress(msgspec.msgpack.encode(lanes), DEFLATE_LEVEL)
+        return _HEAD.pack(FORMAT, self._run, first) + body
+
+    def _lane(self, samples: list[Numbered]) -> _Lane:
+        arrivals = [numbered.arrival for numbered in samples]
+        first, last = arrivals[0], self._last.get(arrivals[0].topic)
+        if last is not None and _kind(last.arrival) != _kind(first):
+            last = None
+        self._last[first.topic] = samples[-1]
+        payloads = [arrival.sample.payload for arrival in arrivals]
+        residual = residual_of(payloads, last.arrival.sample.payload if last else b"")
+        attachments = [arrival.sample.attachment for arrival in arrivals]
+        return _Lane(
+            topic=first.topic,
+            key=first.sample.key,
+            schema=first.sample.schema,
+            length=len(payloads[0]),
+            numbers=_differences([numbered.number for numbered in samples]),
+            at_ns=_differences([arrival.at_ns for arrival in arrivals]),
+            ahead_ns=_differences([arrival.wall_ns - arrival.at_ns for arrival in arrivals]),
+            attachments=attachments if any(attachments) else [],
+            against=last.number if last else WHOLE,
+            checksum=_checksum(payloads),
+            sparse=residual.sparse,
+            body=residual.body,
+        )
+
+
+class SampleDecoder:
+    """Turns the batches of one run, in order, back into samples."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, Numbered] = {}
+
+    def samples(self, batch: bytes) -> list[Numbered]:
+        """Return the samples of ``batch`` in order of their numbers.
+
+        Raises:
+            MalformedMessage: it is no batch, or one that it needs is missing.
+        """
+        place_of(batch)
+        try:
+            samples = [
+                numbered
+                for lane in _lanes(_inflated(batch[_HEAD.size :]))
+                for numbered in self._samples(lane)
+            ]
+        except (zlib.error, struct.error, msgspec.DecodeError, ValueError, IndexError) as error:
+            raise MalformedMessage(f"batch of samples: {error}") from error
+        return sorted(samples, key=lambda numbered: numbered.number)
+
+    def _samples(self, lane: _Lane) -> list[Numbered]:
+        numbers, before = _sums(lane.numbers), b""
+        if lane.against != WHOLE:
+            last = self._last.get(lane.topic)
+            if last is None or last.number != lane.against:
+                raise MalformedMessage(
+                    f"sample {numbers[0]} is told by its difference from sample {lane.against}, "
+                    "which is missing"
+                )
+            before = last.arrival.sample.payload
+        residual = Residual(lane.body, lane.sparse)
+        payloads = payloads_of(residual, before, len(numbers), lane.length)
+        if _checksum(payloads) != lane.checksum:
+            raise MalformedMessage(f"sample {numbers[0]}, or one after it, is not what it was")
+        attachments = lane.attachments or [b""] * len(numbers)
+        samples = [
+            Numbered(number, Arrival(lane.topic, sample, at_ns, at_ns + ahead_ns))
+            for number, at_ns, ahead_ns, sample in zip(
+                numbers,
+                _sums(lane.at_ns),
+                _sums(lane.ahead_ns),
+                (
+                    Sample(lane.key, payload, lane.schema, attachment)
+                    for payload, attachment in zip(payloads, attachments, strict=True)
+                ),
+                strict=True,
+            )
+        ]
+        self._last[lane.topic] = samples[-1]
+        if sum(len(kept.arrival.sample.payload) for kept in self._last.values()) > MOST_BATCH_BYTES:
+            raise MalformedMessage("samples of more topics, and larger ones, than there are")
+        return samples
+
+
+def place_of(batch: bytes) -> Place:
+    """Return where a batch belongs.
+
+    Raises:
+        MalformedMessage: it is no batch, or of another release.
+    """
+    if len(batch) < _HEAD.size:
+        raise MalformedMessage(f"batch of samples: {len(batch)} bytes are none")
+    kind, run, first = _HEAD.unpack_from(batch)
+    if kind != FORMAT:
+        raise MalformedMessage(f"batch of samples: format must be {FORMAT}, got {kind}")
+    return Place(run, first)
+
+
+def _inflated(body: bytes) -> bytes:
+    inflater = zlib.decompressobj()
+    content = inflater.decompress(body, MOST_BATCH_BYTES)
+    if inflater.unconsumed_tail or not inflater.eof:
+        raise MalformedMessage(f"batch of samples: torn, or more than {MOST_BATCH_BYTES} bytes")
+    return content
+
+
+def _lanes(content: bytes) -> Iterator[_Lane]:
+    """Yield lanes one by one, as long as what they claim to hold can be held."""
+    samples = claimed = 0
+    for raw in msgspec.msgpack.decode(content, type=Annotated[list[msgspec.Raw], _MANY]):
+        lane = msgspec.msgpack.decode(raw, type=_Lane)
+        samples += len(lane.numbers)
+        claimed += len(lane.numbers) * lane.length
+        if samples > MOST_SAMPLES or claimed > MOST_BATCH_BYTES:
+            raise MalformedMessage(
+                f"batch of samples: claims {samples} samples of {claimed} bytes, at most "
+                f"{MOST_SAMPLES} of {MOST_BATCH_BYTES} are written"
+            )
+        yield lane
+
+
+def _kind(arrival: Arrival) -> tuple[str, str, str, int]:
+    sample = arrival.sample
+    return arrival.topic, sample.key, sample.schema, len(sample.payload)
+
+
+def _by_lane(samples: Sequence[Numbered]) -> list[list[Numbered]]:
+    lanes: dict[tuple[object, ...], list[Numbered]] = {}
+    for numbered in samples:
+        large = len(numbered.arrival.sample.payload) > LARGE_BYTES
+        lane = (*_kind(numbered.arrival), numbered.number if large else WHOLE)
+        lanes.setdefault(lane, []).append(numbered)
+    return list(lanes.values())
+
+
+def _checksum(payloads: Sequence[bytes]) -> int:
+    value = 0
+    for payload in payloads:
+        value = zlib.crc32(payload, value)
+    return value
+
+
+def _differences(values: Sequence[int]) -> list[int]:
+    return [after - before for before, after in pairwise((0, *values))]
+
+
+def _sums(differences: Sequence[int]) -> list[int]:
+    return list(accumulate(differences))

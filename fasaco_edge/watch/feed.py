@@ -1,0 +1,96 @@
+"""From the bus to whoever takes: joins as soon as it can, and stays."""
+
+from __future__ import annotations
+
+import threading
+from functools import partial
+from typing import Self
+
+from fasaco_edge.bus.mailbox import Mailbox, Queue
+from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.errors import BusUnavailable
+from fasaco_edge.watch.known import Token
+from fasaco_edge.wire.keys import VERSION, Keys
+from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
+
+# Each counts: states and revisions are noted, updates lie on each other.
+QUEUED = {
+    "token": Queue(256),
+    "status": Queue(64),
+    "path": Queue(64, MAX_MESSAGE_BYTES),
+    "map_update": Queue(256, MAX_MESSAGE_BYTES),
+    "command": Queue(16),
+}
+LATCHED = ("map", "path", "coverage", "status")
+RETRY_S = 0.5
+# So long the end may wait for a host that does not answer.
+END_S = 0.5
+
+
+def _size_of(item: object) -> int:
+    return item.size if isinstance(item, Sample) else 0
+
+
+class Feed:
+    """What is said of one robot, and which robots there are; end it on every way out.
+
+    Attributes:
+        trouble: why the bus cannot be joined yet; "" once it is.
+    """
+
+    def __init__(self, settings: BusSettings, keys: Keys) -> None:
+        self.trouble = ""
+        self._settings = settings
+        self._keys = keys
+        self._mailbox: Mailbox[object] = Mailbox(QUEUED, size_of=_size_of)
+        self._ended = threading.Event()
+        self._bus: Bus | None = None
+        self._lock = threading.Lock()
+        # A host that does not answer would keep whoever waits for it from everything else.
+        self._joining = threading.Thread(target=self._join, name="join-bus", daemon=True)
+        self._joining.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        # An interpreter must not end while a thread comes back from Zenoh: that is an abort.
+        self._joining.join(END_S)
+        with self._lock:
+            if self._bus is not None:
+                self._bus.close()
+
+    def take(self, timeout_s: float) -> list[tuple[str, object]]:
+        """Return what came, as (topic, Sample or Token); wait up to ``timeout_s`` [s] for it."""
+        return self._mailbox.take(timeout_s)
+
+    def _join(self) -> None:
+        while not self._ended.is_set():
+            try:
+                bus = open_bus(self._settings)
+            except BusUnavailable as error:
+                self.trouble = f"{', '.join(self._settings.connect)}: {error}"
+                self._ended.wait(RETRY_S)
+                continue
+            with self._lock:
+                if self._ended.is_set():
+                    bus.close()
+                    return
+                self._bus = bus
+                self._listen(bus)
+                self.trouble = ""
+            return
+
+    def _listen(self, bus: Bus) -> None:
+        prefix = f"{self._keys.base}/{VERSION}"
+        bus.watch_tokens(f"{prefix}/*/alive", self._note_token)
+        for topic in ("map", "map_update", "pose", "path", "coverage", "status", "command"):
+            key = f"{self._keys.prefix}/{topic}"
+            bus.subscribe(key, partial(self._post, topic), latched=topic in LATCHED)
+
+    def _note_token(self, key: str, here: bool) -> None:
+        self._mailbox.post("token", Token(key.split("/")[-2], here))
+
+    def _post(self, topic: str, sample: Sample) -> None:
+        self._mailbox.post(topic, sample)

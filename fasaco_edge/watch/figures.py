@@ -1,0 +1,152 @@
+"""The figures beside the picture: a row of name and value each, the most important first."""
+
+from __future__ import annotations
+
+from rich.table import Table
+from rich.text import Text
+
+from fasaco_edge.text import one_line
+from fasaco_edge.watch import phrases
+from fasaco_edge.watch.ink import Ink
+from fasaco_edge.watch.report import Coverage, Mission, PathReport, Recorder, Report
+
+Row = tuple[str, Text]
+
+# How a state is to be taken.
+STATE_COLOURS = {
+    "planning": "magenta",
+    "covering": "green",
+    "returning": "green",
+    "paused": "yellow",
+    "blocked": "red",
+    "degraded": "yellow",
+    "done": "blue",
+}
+LONGEST_BAR = 40
+LABEL_WIDTH = 9
+# From so many characters on there is room for what can be left out.
+WIDE = 30
+
+
+def figures(report: Report, width: int, ink: Ink) -> Table:
+    """Return all figures of a status as a table ``width`` characters wide."""
+    table = Table.grid(padding=(0, 1), pad_edge=False)
+    table.add_column(width=LABEL_WIDTH, style="cyan", no_wrap=True)
+    table.add_column(overflow="fold")
+    table.width = width
+    for name, value in _rows(report, width - LABEL_WIDTH - 1, ink):
+        table.add_row(name, value)
+    return table
+
+
+def _rows(report: Report, width: int, ink: Ink) -> list[Row]:
+    state = Text(one_line(report.state), f"bold {state_colour(report.state)}")
+    # A path's number is told with the path.
+    if report.path is None or report.reason != f"path {report.path.revision}":
+        state.append(f": {one_line(report.reason)}", "not bold")
+    rows: list[Row] = [("state", state)]
+    if report.coverage is not None:
+        rows += _coverage(
+            report.coverage, ink.bar(report.coverage.fraction, min(width, LONGEST_BAR))
+        )
+    if report.path is not None:
+        rows += _path(report.path, width)
+    rows += _mission(report.mission)
+    rows += _running(report)
+    return rows
+
+
+def state_colour(state: str) -> str:
+    """Return the colour of a state."""
+    return STATE_COLOURS.get(state, "bright_black")
+
+
+def _coverage(coverage: Coverage, bar: Text) -> list[Row]:
+    share = Text(phrases.percent(coverage.fraction), "bold")
+    share.append(f", {coverage.covered} of {coverage.coverable} cells", "not bold")
+    areas = f"{coverage.covered_m2:.1f} m2, {coverage.to_cover_m2:.1f} m2 to go"
+    rows: list[Row] = [("covered", share), ("", bar), ("", _text(areas))]
+    if coverage.recovered:
+        rows.append(("twice", _text(_cells(coverage.recovered))))
+    return rows
+
+
+def _path(path: PathReport, width: int) -> list[Row]:
+    left = f"{path.remaining_steps} of {path.steps} steps to go" if path.steps else "stop"
+    rows: list[Row] = [(f"path {path.revision}", _text(left)), ("", _text(path.reason))]
+    if path.planned_steps is not None:
+        plan = f"{path.planned_steps} steps"
+        if path.lower_bound_steps is not None:
+            plan += f", bound {path.lower_bound_steps}"
+        if path.gap is not None and width >= WIDE:
+            plan += f", gap {100 * path.gap:.1f} %"
+        rows.append(("plan", _text(plan)))
+    return rows
+
+
+def _mission(mission: Mission) -> list[Row]:
+    stage = (mission.stage, mission.zone, mission.turn, mission.passes)
+    rows: list[Row] = [("mission", _text(phrases.stage(*stage)))]
+    for zone in mission.zones:
+        at, covered = phrases.zone_progress(zone.turn, zone.passes, zone.covered, zone.cells)
+        told = f"pass {at}, {covered}" if zone.turn else at
+        rows.append((one_line(zone.name), _text(told)))
+    more = []
+    if mission.keep_out:
+        more.append(f"keep-out zones: {mission.keep_out}")
+    if mission.return_home:
+        more.append("returns home")
+    if more:
+        rows.append(("", _text(", ".join(more))))
+    if mission.unreached.cells:
+        left = f"{_cells(mission.unreached.cells)}, {mission.unreached.m2:.1f} m2"
+        rows.append(("unreached", _text(left)))
+    return rows
+
+
+def _running(report: Report) -> list[Row]:
+    latency, errors = report.latency_ms, report.errors
+    told = [
+        f"{name} {milliseconds:.0f}"
+        for name, milliseconds in (
+            ("plan", latency.plan),
+            ("map to path", latency.map_to_path),
+            ("map", latency.ingest),
+        )
+        if milliseconds is not None
+    ]
+    counted = ", ".join(f"{count} {code}" for code, count in errors.by_code.items())
+    rows: list[Row] = [
+        ("latency", _text(f"{', '.join(told)} ms" if told else "-")),
+        ("errors", _text(counted, "red") if errors.total else _text("none")),
+        ("ledger", _ledger(report)),
+        ("recorder", _recorder(report.recorder)),
+        ("daemon", _text(f"up {phrases.age(report.uptime_s)}, {report.rss_mb:.0f} MB")),
+    ]
+    return rows
+
+
+def _ledger(report: Report) -> Text:
+    ledger = report.ledger
+    if ledger.fault:
+        return _text(ledger.fault, "red")
+    if ledger.age_s is None:
+        return _text("not written yet")
+    return _text(f"written {phrases.age(ledger.age_s)} ago")
+
+
+def _recorder(recorder: Recorder | None) -> Text:
+    if recorder is None:
+        return _text("none")
+    good = recorder.state in ("recording", "starting")
+    return _text(
+        recorder.state if good else f"{recorder.state}: {recorder.reason}", "" if good else "red"
+    )
+
+
+def _cells(count: int) -> str:
+    return "1 cell" if count == 1 else f"{count} cells"
+
+
+def _text(told: str, style: str = "") -> Text:
+    return Text(one_line(told), style)

@@ -1,0 +1,225 @@
+"""All that is known of a robot by now, put together from samples as they come.
+
+How far a robot is on its path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bus.session import Sample
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.watch.journal import BAD, GOOD, ORDER, Journal, differences
+from fasaco_edge.watch.report import PathNote, Report, read
+from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.limits import MAX_COORDINATE_M
+from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.schemas import POSE_STAMPED
+
+# The daemon speaks once a second.
+SILENCE_S = 3.5
+# Without poses of their own on the native keys, those in the status are shown.
+POSE_LASTS_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """A robot's daemon that has come (``here``) or gone."""
+
+    robot: str
+    here: bool
+
+
+class Known:
+    """The newest map, coverage, path, pose and status of one robot, and what happened lately.
+
+    Attributes:
+        map, coverage: None before the first.
+        pose: where the robot is; None as long as nobody says.
+        report: the newest status.
+        document: the same as it came, b"" before the first.
+        walk: the path, and how far the robot is on it.
+        robots: of all robots on the bus that have a daemon, the names.
+        trouble: why the bus cannot be reached; "" where it can.
+        gone_since: since when the daemon is gone, since the epoch [s]; None while it is there,
+            and before it ever was.
+    """
+
+    def __init__(self, robot: str) -> None:
+        self.robot = robot
+        self.journal = Journal()
+        self.map: OccupancyGrid | None = None
+        self.coverage: OccupancyGrid | None = None
+        self.pose: Pose2D | None = None
+        self.report: Report | None = None
+        self.document = b""
+        self.walk = Walk()
+        self.robots: set[str] = set()
+        self.trouble = ""
+        self.gone_since: float | None = None
+        self._reported_at = self._posed_at = float("-inf")
+        self._malformed = 0
+        self._readers: dict[str, Callable[[Sample, float], None]] = {
+            "map": self._read_map,
+            "map_update": self._read_map_update,
+            "pose": self._read_pose,
+            "path": self._read_path,
+            "coverage": self._read_coverage,
+            "status": self._read_status,
+            "command": self._read_command,
+        }
+
+    @property
+    def is_here(self) -> bool:
+        """Whether the robot's daemon is on the bus."""
+        return self.robot in self.robots
+
+    @property
+    def path_ahead(self) -> NDArray[np.float64]:
+        """What is still to be driven, float64 (n, 2) [m], beginning where the robot is."""
+        return self.walk.ahead(self.pose)
+
+    def silent_s(self, now: float) -> float:
+        """Return for how long the daemon should have spoken and did not [s]; 0 while it does."""
+        silent = now - self._reported_at
+        return silent if self.report is not None and silent > SILENCE_S else 0.0
+
+    def take(self, topic: str, item: object, now: float) -> None:
+        """Take in a sample of ``topic`` or a Token, which came ``now``, since the epoch [s].
+
+        What cannot be read costs that sample, and is noted.
+        """
+        if isinstance(item, Token):
+            self._note_token(item, now)
+        elif isinstance(item, Sample):
+            try:
+                self._readers[topic](item, now)
+            except FasacoError as error:
+                self._malformed += 1
+                # A publisher gone wrong is so at every message: note the 1st, 2nd, 4th, 8th ...
+                if self._malformed & (self._malformed - 1) == 0:
+                    text = f"{topic} cannot be read ({self._malformed} so far): {error}"
+                    self.journal.add(now, text, BAD)
+
+    def _note_token(self, token: Token, now: float) -> None:
+        was_here = self.is_here
+        (self.robots.add if token.here else self.robots.discard)(token.robot)
+        if was_here and not self.is_here:
+            self.gone_since = now
+            self.journal.add(now, "the daemon is gone; waiting for it to come back", BAD)
+        elif self.is_here and not was_here:
+            back = self.gone_since is not None
+            # It has not had the time to speak.
+            self.gone_since, self._reported_at = None, now
+            self.journal.add(now, f"the daemon is {'back' if back else 'there'}", GOOD)
+
+    def _read_map(self, sample: Sample, _: float) -> None:
+        self.map = decode_occupancy_grid(sample.payload)
+
+    def _read_map_update(self, sample: Sample, _: float) -> None:
+        patch = decode_map_update(sample.payload)
+        # Updates of a map that came before this process did are of no use to it.
+        if self.map is not None:
+            self.map = self.map.patched(patch)
+
+    def _read_pose(self, sample: Sample, now: float) -> None:
+        told = self.report.config.pose.schema if self.report else ""
+        stamped = decode_pose(sample.payload, sample.schema or told or POSE_STAMPED)
+        self._posed_at = now
+        self._move(stamped.pose)
+
+    def _read_path(self, sample: Sample, now: float) -> None:
+        note = read(decode_json(sample.attachment), PathNote) if sample.attachment else PathNote()
+        self.walk = Walk(decode_path(sample.payload).xy, note.revision)
+        steps = f"{note.steps} steps" if len(self.walk.xy) else "stop"
+        self.journal.add(now, f"path {note.revision}, {steps}: {note.reason}")
+
+    def _read_coverage(self, sample: Sample, _: float) -> None:
+        self.coverage = decode_occupancy_grid(sample.payload)
+
+    def _read_status(self, sample: Sample, now: float) -> None:
+        report = read(decode_json(sample.payload), Report)
+        if report.claim.stand != "plans":
+            # It may be a second daemon of this name: what that is like is not how the robot is.
+            if report.claim.stand != "looks":
+                self.journal.add(now, f"a second daemon is {report.state}: {report.reason}", BAD)
+            return
+        for text, tone in differences(self.report, report):
+            self.journal.add(now, text, tone)
+        self.report, self.document, self._reported_at = report, sample.payload, now
+        if report.path is None:
+            # A daemon that was started anew has none of the old paths.
+            self.walk = Walk()
+        elif report.path.revision == self.walk.revision:
+            self.walk.left(report.path.remaining_steps)
+        pose = report.pose
+        if pose is not None and now - self._posed_at > POSE_LASTS_S:
+            self._move(Pose2D(pose.x, pose.y, pose.yaw))
+
+    def _read_command(self, sample: Sample, now: float) -> None:
+        document = decode_json(sample.payload)
+        order = document.get("order")
+        names = [str(zone["name"]) for zone in _zones(order)]
+        about = f" with {', '.join(names)}" if names else ""
+        self.journal.add(now, f"command {document.get('command')}{about}", ORDER)
+
+    def _move(self, pose: Pose2D) -> None:
+        if abs(pose.x) <= MAX_COORDINATE_M and abs(pose.y) <= MAX_COORDINATE_M:
+            self.pose = pose
+            self.walk.passed(pose)
+
+
+def _zones(order: object) -> list[dict[str, object]]:
+    zones = order.get("zones") if isinstance(order, dict) else None
+    found = zones if isinstance(zones, list) else []
+    return [zone for zone in found if isinstance(zone, dict) and "name" in zone]
+
+
+# Poses come more often than steps are driven: further ahead, a path may pass the place again.
+LOOK_AHEAD_STEPS = 8
+
+
+class Walk:
+    """A path, and which of its points the robot is at.
+
+    Attributes:
+        xy: float64 (n, 2), points [m].
+        revision: number of the path.
+        at: index of the point the robot came to last.
+    """
+
+    def __init__(self, xy: NDArray[np.float64] | None = None, revision: int = 0) -> None:
+        self.xy = np.zeros((0, 2)) if xy is None else xy
+        self.revision = revision
+        self.at = 0
+
+    def left(self, steps: int) -> None:
+        """Note that the daemon says so many steps are left."""
+        self.at = max(self.at, len(self.xy) - 1 - max(steps, 0))
+
+    def passed(self, pose: Pose2D) -> None:
+        """Note where the robot is; it goes forward only."""
+        near = self.xy[self.at : self.at + LOOK_AHEAD_STEPS]
+        if len(near) < 2:
+            return
+        step_m = float(np.hypot(*(near[1] - near[0])))
+        away = np.hypot(near[:, 0] - pose.x, near[:, 1] - pose.y)
+        closest = int(np.argmin(away))
+        if away[closest] <= step_m:
+            self.at += closest
+
+    def ahead(self, pose: Pose2D | None) -> NDArray[np.float64]:
+        """Return what is still to be driven, float64 (n, 2) [m], from the robot on."""
+        rest = self.xy[self.at + 1 :]
+        if not len(rest):
+            return rest
+        here = self.xy[self.at] if pose is None else np.array([pose.x, pose.y])
+        return np.concatenate([here[None, :], rest])

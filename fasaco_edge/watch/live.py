@@ -1,0 +1,265 @@
+"""The loop of a live view: take, draw, wait; and the same in plain lines.
+
+A terminal's other screen: entered, written to, and left as it was found.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import sys
+import termios
+import time
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any, Self, TextIO
+
+from rich.console import Console
+
+from fasaco_edge.bus.session import Sample
+from fasaco_edge.text import json_line, one_line
+from fasaco_edge.watch import phrases
+from fasaco_edge.watch.feed import Feed
+from fasaco_edge.watch.known import Known
+from fasaco_edge.watch.page import Page
+from fasaco_edge.wire.json_text import decode_json
+
+# At most ten pages a second, and only where something changed or the clock did [s].
+FRAME_S = 0.1
+LINE_EVERY_S = 1.0
+# Of what comes with the status, so much is waited for where there is none of it [s].
+REST_S = 1.0
+
+
+class Told:
+    """Whether SIGINT, SIGTERM or SIGHUP asked for the end."""
+
+    def __init__(self) -> None:
+        self.to_end = False
+
+    def __call__(self, _number: int, _frame: FrameType | None) -> None:
+        self.to_end = True
+
+
+def take(feed: Feed, known: Known, timeout_s: float) -> list[tuple[str, object]]:
+    """Take in what came; wait up to ``timeout_s`` [s] for it. Return it as well."""
+    items = feed.take(timeout_s)
+    now = phrases.steady_now()
+    for topic, item in items:
+        known.take(topic, item, now)
+    known.trouble = feed.trouble
+    return items
+
+
+def watch_on_screen(feed: Feed, known: Known, console: Console) -> None:
+    """Show the mission until somebody types q, or a signal asks for the end.
+
+    Raises:
+        OSError: the terminal is gone.
+    """
+    page, shown_at = Page(console), (0, (0, 0), "")
+    with told_to_end() as told, Screen(sys.stdout) as screen:
+        while not told.to_end:
+            came = take(feed, known, 0.0)
+            now = phrases.steady_now()
+            key = (int(now), screen.size(), known.trouble)
+            if came or key != shown_at:
+                shown_at, size = key, key[1]
+                screen.show(page.lines(known, now, *size), size)
+            if "q" in screen.keys(FRAME_S).lower():
+                return
+
+
+def watch_in_lines(feed: Feed, known: Known) -> None:
+    """Print what happens, and once a second how it stands, until a signal asks for the end."""
+    # What is there already comes within the first second.
+    told_entries, said, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
+    with told_to_end() as told:
+        while not told.to_end:
+            take(feed, known, FRAME_S)
+            now = phrases.steady_now()
+            for entry in known.journal.since(told_entries):
+                _print_line(entry.at_s, entry.text)
+            told_entries = known.journal.count
+            if now >= next_line_at:
+                next_line_at, line = now + LINE_EVERY_S, status_line(known, now)
+                if line != said:
+                    said = line
+                    _print_line(now, line)
+
+
+def watch_as_json(feed: Feed, known: Known) -> None:
+    """Print each status as a line of JSON, until a signal asks for the end."""
+    with told_to_end() as told:
+        while not told.to_end:
+            for topic, item in take(feed, known, FRAME_S):
+                if topic == "status" and isinstance(item, Sample):
+                    print_json(item.payload)
+
+
+def look_once(feed: Feed, known: Known, timeout_s: float) -> bool:
+    """Wait up to ``timeout_s`` [s] until enough is known for a picture; return whether it is."""
+    deadline = time.monotonic() + timeout_s
+    with told_to_end() as told:
+        while known.report is None or not known.is_here:
+            if told.to_end or time.monotonic() > deadline:
+                return False
+            take(feed, known, FRAME_S)
+        deadline = time.monotonic() + REST_S
+        while not (told.to_end or _is_whole(known)) and time.monotonic() < deadline:
+            take(feed, known, FRAME_S)
+    return True
+
+
+def status_line(known: Known, now: float) -> str:
+    """Return how it stands, in a line."""
+    report = known.report
+    if known.trouble:
+        return f"waiting for the bus at {one_line(known.trouble)}"
+    if known.gone_since is not None:
+        return "waiting for the daemon to come back"
+    if not known.is_here:
+        return f"waiting for a daemon of robot {known.robot}"
+    if report is None:
+        return "the daemon has said nothing yet"
+    if known.silent_s(now):
+        return "the daemon is silent"
+    coverage, path = report.coverage, report.path
+    line = phrases.figures(
+        report.state,
+        coverage.covered if coverage else 0,
+        coverage.coverable if coverage else 0,
+        path.revision if path else 0,
+        path.remaining_steps if path else 0,
+        report.plan.plans,
+        report.latency_ms.plan or 0.0,
+    )
+    return f"{phrases.percent(coverage.fraction if coverage else 0.0)}  {line}"
+
+
+def print_json(payload: bytes) -> None:
+    """Print a JSON object as one line, however it came."""
+    print(json_line(decode_json(payload)), flush=True)
+
+
+@contextmanager
+def told_to_end() -> Iterator[Told]:
+    """Let SIGINT, SIGTERM and SIGHUP ask for the end instead of being it."""
+    told = Told()
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, told) for number in numbers]
+    try:
+        yield told
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+def _is_whole(known: Known) -> bool:
+    return known.map is not None and known.coverage is not None and known.walk.revision > 0
+
+
+def _print_line(at_s: float, text: str) -> None:
+    sys.stdout.write(f"{phrases.clock(at_s)}  {text}\n")
+    sys.stdout.flush()
+
+
+ENTER = "\x1b[?1049h\x1b[?25l\x1b[2J"
+LEAVE = "\x1b[0m\x1b[?25h\x1b[?1049l"
+# Terminals that know it show a whole page at once, the others pass it over.
+BEGIN_PAGE, END_PAGE = "\x1b[?2026h", "\x1b[?2026l"
+
+
+class Screen:
+    """Shows pages of lines; sends only lines that changed."""
+
+    def __init__(self, terminal: TextIO) -> None:
+        self._terminal = terminal
+        self._keyboard = sys.stdin if sys.stdin is not None and sys.stdin.isatty() else None
+        self._is_heard = True
+        self._before: list[Any] | None = None
+        self._shown: list[str] = []
+        self._size = (0, 0)
+        self._stop_as_ever: Any = None
+
+    def __enter__(self) -> Self:
+        self._stop_as_ever = signal.signal(signal.SIGTSTP, self._suspend)
+        self._begin()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGTSTP, self._stop_as_ever)
+        self._end()
+
+    def size(self) -> tuple[int, int]:
+        """Return columns and lines, as they are now."""
+        try:
+            size = os.get_terminal_size(self._terminal.fileno())
+        except OSError:
+            return 80, 24
+        return max(size.columns, 1), max(size.lines, 1)
+
+    def show(self, lines: list[str], size: tuple[int, int]) -> None:
+        """Show a page of ``size``, columns and lines.
+
+        Raises:
+            OSError: the terminal is gone.
+        """
+        if size != self._size:
+            self._size, self._shown = size, []
+        begin = "" if self._shown else "\x1b[0m\x1b[2J"
+        shown = self._shown or [""] * len(lines)
+        changed = [
+            f"\x1b[{number};1H{line}"
+            for number, (line, old) in enumerate(zip(lines, shown, strict=True), 1)
+            if line != old
+        ]
+        if changed:
+            self._write(f"{BEGIN_PAGE}{begin}{''.join(changed)}{END_PAGE}")
+            self._shown = lines
+
+    def keys(self, timeout_s: float) -> str:
+        """Return what was typed; wait up to ``timeout_s`` [s] for it."""
+        keyboard = [self._keyboard.fileno()] if self._keyboard and self._is_heard else []
+        ready, _, _ = select.select(keyboard, [], [], timeout_s)
+        if not ready:
+            return ""
+        try:
+            typed = os.read(ready[0], 1024)
+        except OSError:
+            typed = b""
+        if not typed:
+            # Nobody types there any more; it would be ready for ever.
+            self._is_heard = False
+        return typed.decode(errors="replace")
+
+    def _begin(self) -> None:
+        if self._keyboard is not None:
+            self._before = termios.tcgetattr(self._keyboard)
+            # Keys come at once and are not shown; Ctrl-C and Ctrl-Z stay what they are.
+            tty.setcbreak(self._keyboard)
+        self._shown = []
+        self._write(ENTER)
+
+    def _end(self) -> None:
+        with contextlib.suppress(OSError):
+            self._write(LEAVE)
+        if self._before is not None and self._keyboard is not None:
+            with contextlib.suppress(termios.error):
+                termios.tcsetattr(self._keyboard, termios.TCSADRAIN, self._before)
+
+    def _suspend(self, _number: int, _frame: FrameType | None) -> None:
+        """Stop as Ctrl-Z asks, with the terminal as it was; go on where ``fg`` does."""
+        self._end()
+        os.kill(os.getpid(), signal.SIGSTOP)
+        self._begin()
+
+    def _write(self, text: str) -> None:
+        # Past the stream's buffer: what a terminal that is gone did not take must not wait there.
+        left = text.encode(self._terminal.encoding, errors="replace")
+        while left:
+            left = left[os.write(self._terminal.fileno(), left) :]

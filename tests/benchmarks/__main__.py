@@ -1,0 +1,39 @@
+"""Benchmarks for those who develop the planner: ``python -m tests.benchmarks NAME``.
+
+What a robot's owner measures on the robot is ``fasaco-edge bench``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from fasaco_edge.bench.benchmark import Benchmark
+from fasaco_edge.cli import common_options, run_command
+from fasaco_edge.cli.bench import EPILOG, add_benchmarks
+from tests.benchmarks.codec import CODEC
+from tests.benchmarks.ingest import INGEST
+from tests.benchmarks.online.benchmark import ONLINE
+from tests.benchmarks.quality.benchmark import QUALITY
+from tests.benchmarks.scale.benchmark import SCALE
+from tests.benchmarks.table1.benchmark import TABLE1
+
+BENCHMARKS: tuple[Benchmark[Any], ...] = (TABLE1, QUALITY, ONLINE, SCALE, CODEC, INGEST)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one benchmark and return the process's exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks",
+        description="Measure planner, codecs and whole missions in simulation.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_benchmarks(parser, BENCHMARKS, common_options())
+    return run_command(parser, sys.argv[1:] if argv is None else argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

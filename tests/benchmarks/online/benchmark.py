@@ -1,0 +1,210 @@
+"""``benchmarks online``: whole missions in buildings that the robot does not know."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Generator, Sequence
+from typing import TYPE_CHECKING
+
+from fasaco_edge.bench.benchmark import Benchmark, Report, Say, positive, seconds
+from fasaco_edge.bench.grid_options import add_grid_options, grid_names
+
+if TYPE_CHECKING:
+    from tests.benchmarks.online.run import MissionRun
+    from tests.benchmarks.online.runs import OnlinePlan
+
+DEFAULT_MAPS = ("office", "flat", "walled_grid", "basement", "warehouse")
+CASE_NAMES = (
+    "door-closes-ahead", "door-closes-behind", "room-appears-late", "loop-closure", "person",
+)  # fmt: skip
+# As the buildings are made; a mission over many more takes days.
+FEWEST_CELLS, MOST_CELLS = 1_000, 1_000_000
+# Options that figures say of themselves.
+CONDITIONS = (
+    "starts", "ranges", "seeds", "misread", "cost", "turn_s", "speed_m_s", "proposals",
+    "planning_takes_time",
+)  # fmt: skip
+
+
+def _within(low: float, high: float) -> Callable[[str], float]:
+    """Return what reads a number within bounds."""
+
+    def read(text: str) -> float:
+        number = float(text)
+        if not low <= number <= high:
+            raise argparse.ArgumentTypeError(f"must be in {low:g}..{high:g}, got {text}")
+        return number
+
+    return read
+
+
+def _some(text: str) -> int:
+    number = int(text)
+    if number < 0:
+        raise argparse.ArgumentTypeError(f"must be 0 or more, got {number}")
+    return number
+
+
+def _cells(text: str) -> int:
+    number = int(text)
+    if not FEWEST_CELLS <= number <= MOST_CELLS:
+        raise argparse.ArgumentTypeError(f"must be in {FEWEST_CELLS}..{MOST_CELLS}, got {text}")
+    return number
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    add_grid_options(parser, DEFAULT_MAPS)
+    parser.add_argument(
+        "--generated",
+        type=_some,
+        default=0,
+        metavar="N",
+        help="synthetic buildings of --cells cells, instead of the default maps (default: none)",
+    )
+    parser.add_argument(
+        "--cells", type=_cells, default=5_000, help="of generated buildings (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--mazes", type=_some, default=1, metavar="N", help="beside (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--cases",
+        nargs="*",
+        choices=CASE_NAMES,
+        default=list(CASE_NAMES),
+        metavar="CASE",
+        help=f"beside, missions in which something happens: {', '.join(CASE_NAMES)} (default: "
+        "all; no name for none)",
+    )
+    _add_robot_options(parser)
+    parser.add_argument(
+        "--starts",
+        type=positive,
+        default=2,
+        metavar="N",
+        help="in each building: its own, others drawn (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--seeds",
+        type=positive,
+        default=1,
+        metavar="N",
+        help="0 to N - 1, of planner and misreadings (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--proposals",
+        type=positive,
+        default=2_000_000,
+        help="moves that a plan may try, in place of the daemon's time (default: %(default)s, "
+        "about its 0.1 s)",
+    )
+    parser.add_argument(
+        "--planning-takes-time",
+        action="store_true",
+        help="the robot drives on, or stands, while a plan is made; then figures depend on the "
+        "machine",
+    )
+
+
+def _add_robot_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--ranges",
+        nargs="+",
+        type=_within(0.1, 100.0),
+        default=[3.5, 8.0],
+        metavar="M",
+        help="reach of the scanner, which looks all around [m] (default: 3.5 8)",
+    )
+    parser.add_argument(
+        "--misread",
+        type=_within(0.0, 0.5),
+        default=0.0,
+        metavar="SHARE",
+        help="of the cells taken for the opposite of what they are, beyond 1 m (default: "
+        "%(default)g; there are goals for 0.05, too)",
+    )
+    parser.add_argument(
+        "--cost",
+        choices=("steps", "turns"),
+        default="steps",
+        help="what walks are to have little of: steps alone, or time with turns (default: steps)",
+    )
+    parser.add_argument(
+        "--turn-s",
+        type=seconds,
+        default=1.5,
+        metavar="S",
+        help="a quarter-turn [s] (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--speed-m-s",
+        type=_within(0.01, 10.0),
+        default=0.25,
+        metavar="V",
+        help="straight on [m/s] (default: %(default)g)",
+    )
+
+
+def _plan(args: argparse.Namespace) -> OnlinePlan:
+    # Here and below, so that to list the benchmarks does not load the compiler.
+    from tests.benchmarks.online.buildings import BuildingChoice
+    from tests.benchmarks.online.robot import Pace
+    from tests.benchmarks.online.runs import OnlinePlan
+
+    names = grid_names(args, () if args.generated else DEFAULT_MAPS)
+    return OnlinePlan(
+        choice=BuildingChoice(names, args.generated, args.cells, args.mazes),
+        cases=tuple(dict.fromkeys(args.cases)),
+        starts=args.starts,
+        ranges_m=tuple(dict.fromkeys(args.ranges)),
+        seeds=args.seeds,
+        misread=args.misread,
+        pace=Pace(args.speed_m_s, args.turn_s),
+        with_turns=args.cost == "turns",
+        proposals=args.proposals,
+        planning_takes_time=args.planning_takes_time,
+    )
+
+
+def _count(args: argparse.Namespace) -> int:
+    from tests.benchmarks.online.runs import count
+
+    return count(_plan(args))
+
+
+def _measure(args: argparse.Namespace, say: Say) -> Generator[MissionRun, None, None]:
+    from tests.benchmarks.online.runs import measure
+
+    return measure(_plan(args), say)
+
+
+def _report(args: argparse.Namespace, runs: Sequence[MissionRun]) -> Report:
+    from tests.benchmarks.online.report import report
+
+    about = {name: getattr(args, name) for name in CONDITIONS}
+    return report(args.misread, with_turns=args.cost == "turns", about=about, runs=runs)
+
+
+ONLINE = Benchmark(
+    name="online",
+    summary="whole missions in unknown buildings, against robots that know them",
+    description="Send a simulated robot into buildings it does not know: after every cell its "
+    "scanner reveals some more, the real mission decides, the daemon's planner plans with "
+    "counted work, and the robot drives on; without a bus and, unless asked for, without "
+    "waiting for plans, so that the same options give the same missions. Every trail is judged "
+    "by code that shares nothing with mission and planner, and compared with the near-optimal "
+    "walk of a robot that knew the building. A ratio of 1.015 is 1.5 % more. Mazes, and cases "
+    "in which something happens on the way, are reported beside.",
+    add_options=_add_options,
+    count=_count,
+    measure=_measure,
+    report=_report,
+    epilog="""\
+examples:
+  python -m tests.benchmarks online
+  python -m tests.benchmarks online --maps flat basement --ranges 3.5 --mazes 0 --cases
+  python -m tests.benchmarks online --grids *.npy --starts 3 --seeds 10 --misread 0.05 --json
+  python -m tests.benchmarks online --generated 3 --cells 10000 --cost turns
+  python -m tests.benchmarks online --maps office --cases person --planning-takes-time
+""",
+)

@@ -1,0 +1,329 @@
+"""What there is to note of a mission under way: times, what is kept of paths, what is stale.
+
+Who answers a mission's requests for a plan, at once and with a counted amount of work.
+
+A daemon's planner works until its time is up; here it works until it has tried so many moves,
+so that the same mission can be had again on any machine.
+
+A whole mission in simulated time: the real ``Mission.step``, and a robot that does as told.
+
+After every leg the robot looks around; what is new goes to the mission with its pose, and its
+decision is carried out before the next leg. The time that takes is measured, but the robot
+does not stand meanwhile, unless planning is to take its time.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.mission.core.events import Decision, Event, PlanReady, PlanRequest, PoseReceived
+from fasaco_edge.mission.core.mission import Mission, MissionConfig
+from fasaco_edge.mission.coverage.progress import State
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import WorkLimit
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.work import SearchWork
+from tests.benchmarks.judge import MOVES
+from tests.benchmarks.online.buildings import Building
+from tests.benchmarks.online.robot import Pace, Robot
+from tests.benchmarks.online.sight import Senses, Sight
+from tests.benchmarks.planner import planner_for
+
+# How far ahead of the robot a path is to hold still [m].
+NEXT_M = 5.0
+
+
+class Elapsed(NamedTuple):
+    """How long something took: by the clock, and of processors [ms].
+
+    On a quiet machine both are the same, as there is one thread at work.
+    """
+
+    wall_ms: float
+    cpu_ms: float
+
+
+class Stopwatch:
+    """Runs from its making on."""
+
+    def __init__(self) -> None:
+        self._wall_s, self._cpu_s = time.perf_counter(), time.process_time()
+
+    def read(self) -> Elapsed:
+        """Return how long it has run."""
+        wall_s, cpu_s = time.perf_counter() - self._wall_s, time.process_time() - self._cpu_s
+        return Elapsed(1e3 * wall_s, 1e3 * cpu_s)
+
+
+@dataclass(slots=True)
+class Watch:
+    """Figures of a mission so far.
+
+    Attributes:
+        next_cells: so many steps are the next NEXT_M.
+        ingests: of each step with a map, how long it took up to the decision.
+        replans: of each path but the first, how long it took from the decision to it.
+        kept: of each path that took the place of one still valid, the share of the next
+            steps that stayed the same up to the first that did not.
+        updates: of each map that left the next steps valid, whether they stayed the same.
+        paths: how many were published.
+        requests: how many plans were asked for.
+        waiting_s: how long the robot stood without a way to go [s].
+        held_up: how often it stood before an obstacle that its path led into.
+        stale_m: way driven on a path that the newest map had blocked further on [m].
+        faults: what the mission refused, and why.
+    """
+
+    next_cells: int
+    ingests: list[Elapsed] = field(default_factory=list)
+    replans: list[Elapsed] = field(default_factory=list)
+    kept: list[float] = field(default_factory=list)
+    updates: list[bool] = field(default_factory=list)
+    paths: int = 0
+    requests: int = 0
+    waiting_s: float = 0.0
+    held_up: int = 0
+    stale_m: float = 0.0
+    faults: list[str] = field(default_factory=list)
+
+    def compare(
+        self,
+        before: NDArray[np.int32],
+        after: NDArray[np.int32],
+        lattice: CoverageLattice,
+        *,
+        with_path: bool,
+        with_map: bool,
+    ) -> None:
+        """Note what is kept of the way ahead, from the robot's cell on.
+
+        Args:
+            before, after: int32 (n, 2), the way ahead then and now.
+            lattice: as it is now.
+            with_path, with_map: whether a path was published, and a map came.
+        """
+        last, then = before[: self.next_cells + 1], after[: self.next_cells + 1]
+        if len(last) < 2 or not len(then) or not is_legal(last, lattice):
+            return
+        common = min(len(last), len(then))
+        same = (last[:common] == then[:common]).all(axis=1)
+        kept = max((common if same.all() else int(np.argmin(same))) - 1, 0) / (len(last) - 1)
+        if with_path:
+            self.kept.append(kept)
+        if with_map:
+            self.updates.append(kept == 1.0)
+
+
+def is_legal(walk: NDArray[np.int32], lattice: CoverageLattice) -> bool:
+    """Tell whether each step of a walk, int32 (n, 2), is allowed on ``lattice``."""
+    window = lattice.window
+    cells = walk - (window.row0, window.col0)
+    if not ((cells >= 0) & (cells < lattice.steps.shape)).all():
+        return False
+    moves = np.diff(cells, axis=0)
+    allowed = lattice.steps[tuple(cells[:-1].T)]
+    legal = np.zeros(len(moves), bool)
+    for direction, move in enumerate(MOVES):
+        legal |= (moves == move).all(axis=1) & (allowed >> direction & 1).astype(bool)
+    return bool(legal.all())
+
+
+# Takes the place of the daemon's planning thread.
+PlannerSeat = Callable[[PlanRequest], PlanReady]
+
+# A reference has so many proposals a cell, and so many in all at least.
+REFERENCE_PER_CELL, REFERENCE_LEAST = 10_000, 5_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class CountedPlanning:
+    """The daemon's planner, with work for a budget.
+
+    Attributes:
+        seed: of all random streams.
+        proposals: moves that a search may try; a repair ends long before.
+    """
+
+    seed: int
+    proposals: int
+
+    def __call__(self, request: PlanRequest) -> PlanReady:
+        """Answer a request."""
+        path, elapsed = self.timed(request.problem)
+        return PlanReady(request.number, path, 1e-3 * elapsed.wall_ms)
+
+    def timed(self, problem: CoverageProblem) -> tuple[CoveragePath, Elapsed]:
+        """Return a plan and how long it took."""
+        limit = WorkLimit(SearchWork(proposals=self.proposals))
+        stopwatch = Stopwatch()
+        path = planner_for(self.seed).plan(problem, limit)
+        return path, stopwatch.read()
+
+
+def near_optimal(problem: CoverageProblem) -> CoveragePath:
+    """Return the walk of a robot that knew the building: what missions are measured against."""
+    proposals = max(REFERENCE_PER_CELL * problem.cells, REFERENCE_LEAST)
+    return planner_for(0).plan(problem, WorkLimit(SearchWork(proposals=proposals)))
+
+
+# A robot without a way to go looks again after so long [s].
+TICK_S = 0.1
+# One that stood for so long will not go on any more [s]; nor one that drove each cell so often.
+PATIENCE_S, MOST_VISITS = 60.0, 20
+# Plans that a mission may ask for before the robot goes on.
+PLANS_AT_ONCE = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """What a mission takes place under.
+
+    Attributes:
+        senses: what the robot sees.
+        pace: how fast it is.
+        cost: what its walks are to have little of.
+        seat: who plans.
+        planning_takes_time: whether the robot drives on, or stands, while a plan is made.
+    """
+
+    senses: Senses
+    pace: Pace
+    cost: CoverageCost
+    seat: PlannerSeat
+    planning_takes_time: bool = False
+
+
+class OnlineMission:
+    """A robot in a building it does not know.
+
+    Attributes:
+        building: where it is.
+        sight: what is there, and what the robot knows of it.
+        robot: where it is and has been.
+        watch: what was noted.
+        now: simulated time [s].
+    """
+
+    def __init__(self, building: Building, conditions: Conditions) -> None:
+        self.building = building
+        self.sight = Sight(building, conditions.senses)
+        cell_m = building.footprint.cell_m
+        centre = building.lattice.centres(np.array([building.start], np.int32))
+        (x, y), *_ = centre.tolist()
+        self.robot = Robot(self.sight.geometry.to_pixels(x, y), cell_m)
+        self.watch = Watch(max(round(NEXT_M / cell_m), 1))
+        self.now = 0.0
+        self._conditions = conditions
+        self._mission = Mission(MissionConfig(building.footprint, cost=conditions.cost))
+        # A plan that takes its time, and when it will be there.
+        self._on_its_way: tuple[PlanReady, float] | None = None
+        self._stale = False
+
+    @property
+    def done(self) -> bool:
+        """Whether the mission says that all is covered."""
+        return self._mission.state is State.DONE
+
+    @property
+    def state(self) -> str:
+        """The mission's own words for how it is."""
+        return f"{self._mission.state}: {self._mission.reason}"
+
+    def run(self, act: Callable[[OnlineMission], None] = lambda _: None) -> None:
+        """Drive until the mission is done, or nothing is to be hoped for any more.
+
+        Args:
+            act: called before each leg; may change what is there.
+        """
+        most = MOST_VISITS * int(np.count_nonzero(self.building.reachable)) + 1000
+        moved_at = self.now
+        self.sense()
+        while not self.done and len(self.robot.trail) < most:
+            act(self)
+            if self._go():
+                moved_at = self.now
+            elif self.now - moved_at > PATIENCE_S:
+                return
+            self.sense()
+
+    def _go(self) -> bool:
+        """Drive a leg, or stand for a tick; tell which."""
+        leg = self.robot.next_leg(self.sight)
+        if leg is not None and self.sight.is_clear(self.robot.at, leg.end):
+            self.now += self._conditions.pace.seconds(leg.distance_m, leg.quarters)
+            self.robot.drive(leg, self.now)
+            self.watch.stale_m += leg.distance_m if self._stale else 0.0
+            return True
+        self.watch.held_up += leg is not None
+        until = self.now + TICK_S
+        if self._on_its_way is not None and leg is None:
+            until = max(self._on_its_way[1], self.now)
+        self.watch.waiting_s += until - self.now
+        self.now = until
+        return False
+
+    def sense(self) -> None:
+        """Look around, tell the mission, and do what it decides."""
+        self.sight.look(self.robot.at)
+        news = self.sight.news()
+        pose = StampedPose(self.robot.pose(self.sight), self.building.truth.frame)
+        events: list[Event] = [] if news is None else [news]
+        events.append(PoseReceived(pose))
+        if self._on_its_way is not None and self._on_its_way[1] <= self.now:
+            events.append(self._on_its_way[0])
+            self._on_its_way = None
+        before, paths = self.robot.ahead, self.watch.paths
+        self._decide(events, with_map=news is not None)
+        lattice, ahead = self._mission.lattice, self.robot.ahead
+        with_map, with_path = news is not None, self.watch.paths > paths
+        if lattice is not None and (with_map or with_path):
+            self._stale = len(ahead) > 1 and not is_legal(ahead, lattice)
+            self.watch.compare(before, ahead, lattice, with_path=with_path, with_map=with_map)
+
+    def _decide(self, events: list[Event], *, with_map: bool) -> None:
+        decision, stepping = self._step(events)
+        if with_map:
+            self.watch.ingests.append(stepping)
+        # A path that the mission has itself come to with the map is one, too.
+        spent = [stepping] if _planned(decision) and with_map else []
+        first, answers = not self.watch.requests, 0
+        while decision.plan is not None:
+            self.watch.requests += 1
+            answers += 1
+            stopwatch = Stopwatch()
+            ready = self._conditions.seat(decision.plan)
+            planning = stopwatch.read()
+            spent.append(planning)
+            if self._conditions.planning_takes_time or answers == PLANS_AT_ONCE:
+                takes_ms = planning.wall_ms if self._conditions.planning_takes_time else 0.0
+                self._on_its_way = ready, self.now + 1e-3 * takes_ms
+                break
+            decision, stepping = self._step([ready])
+            spent.append(stepping)
+        if spent and not first:
+            wall_ms, cpu_ms = (sum(times) for times in zip(*spent, strict=True))
+            self.watch.replans.append(Elapsed(wall_ms, cpu_ms))
+
+    def _step(self, events: list[Event]) -> tuple[Decision, Elapsed]:
+        """Step the mission and follow its path; return how long the step took."""
+        stopwatch = Stopwatch()
+        decision = self._mission.step(events, self.now)
+        stepping = stopwatch.read()
+        self.watch.faults += [str(fault) for fault in decision.faults]
+        if decision.path is not None:
+            self.watch.paths += 1
+            self.robot.follow(decision.path.cells)
+        return decision, stepping
+
+
+def _planned(decision: Decision) -> bool:
+    return decision.path is not None and decision.path.plan is not None

@@ -1,0 +1,172 @@
+"""Missions to tables: buildings first, mazes and cases beside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+
+from fasaco_edge.bench.benchmark import Report, ResultTable
+from fasaco_edge.bench.machine import machine, peak_mb
+from tests.benchmarks.online.buildings import BUILDING, CASE, KINDS, MAZE
+from tests.benchmarks.online.figures import Summary, goals, steps_ratio, time_ratio
+from tests.benchmarks.online.judge import MILESTONES
+from tests.benchmarks.online.run import MissionRun
+
+HEADER = (
+    "", "missions,\ncells", "steps\nto known", "time\nto known", "overlap,\nturns",
+    "kept,\nsame", "waiting\n[%],\nstale [m]",
+)  # fmt: skip
+LATENCY_HEADER = (
+    "", "replan\np50", "\np99", "\nmax", "p99 to\nfull", "full\nplan", "ingest\np50", "\np99",
+)  # fmt: skip
+UNTIL_HEADER = ("", *(f"{percent} %:\nsteps,\n[s]" for percent in MILESTONES))
+CASE_HEADER = (
+    "", "missions,\ndone", "missed,\nof cells", "steps,\ntime [s]", "plans,\npaths",
+    "replan\np50, p99,\nmax [ms]", "waiting\n[%],\nheld up",
+)  # fmt: skip
+
+REMARKS = (
+    "to known: to the near-optimal walk of a robot that knew the building from the start; the "
+    "median over missions, below it the worst. overlap, turns: revisits and quarter-turns a "
+    "cell. kept: how much of the next 5 m stayed the same, up to the first change, at each new "
+    "path in place of one still valid; same: the share of maps that changed nothing of it. "
+    "stale: driven on a path that the newest map had blocked further on.",
+    "replan: from the request to the path, but for the first; full plan: of all the building by "
+    "the same planner; p99 to full: of a mission, the median. ingest: a step of the mission with "
+    "a map, without planning. held up: how often the robot stood before an obstacle that its "
+    "path led into.",
+    "Every trail was judged, by code that shares nothing with mission and planner: each step "
+    "legal in the true building, every reachable cell visited. In cases cells are those that "
+    "can be reached in the end, and covered where the tool was in truth.",
+)
+
+
+def report(
+    misread: float, *, with_turns: bool, about: dict[str, object], runs: Sequence[MissionRun]
+) -> Report:
+    """Sum up any number of missions, even none; ``about`` says under what conditions."""
+    of_kind = {kind: [run for run in runs if run.kind == kind] for kind in KINDS}
+    buildings = Summary(of_kind[BUILDING])
+    groups = list(_groups(of_kind[BUILDING], of_kind[MAZE]))
+    cases = _by_building(of_kind[CASE])
+    beside = [*_by_building(of_kind[MAZE]), *cases]
+    further = [
+        ResultTable(
+            "latency [ms], below it time of processors",
+            LATENCY_HEADER,
+            tuple(_latency_row(*one) for one in groups),
+        ),
+        ResultTable(
+            "steps and seconds a cell until so much was covered",
+            UNTIL_HEADER,
+            tuple(_until_row(*one) for one in groups),
+        ),
+        ResultTable(
+            "beside: something happens", CASE_HEADER, tuple(_case_row(case) for case in cases)
+        ),
+    ]
+    return Report(
+        title=f"{len(buildings.runs)} missions in unknown buildings",
+        header=HEADER,
+        rows=tuple(_row(*one) for one in groups),
+        figures={
+            **buildings.document(),
+            "conditions": about,
+            "beside": {
+                group[0].building: {"kind": group[0].kind, **Summary(group).document()}
+                for group in beside
+            },
+            "runs": [run.document() for run in runs],
+            "peak_rss_mb": peak_mb(),
+            "machine": machine(),
+        },
+        goals=tuple(goals(buildings, misread, with_turns=with_turns)),
+        remarks=(*REMARKS, *_complaints(runs), f"peak memory of this process {peak_mb()} MB"),
+        further=tuple(table for table in further if table.rows),
+    )
+
+
+def _by_building(runs: Sequence[MissionRun]) -> list[list[MissionRun]]:
+    names = dict.fromkeys(run.building for run in runs)
+    return [[run for run in runs if run.building == name] for name in names]
+
+
+def _groups(
+    buildings: Sequence[MissionRun], mazes: Sequence[MissionRun]
+) -> Iterator[tuple[str, Summary]]:
+    if buildings:
+        yield "all buildings", Summary(buildings)
+    for group in _by_building(buildings):
+        for range_m in dict.fromkeys(run.range_m for run in group):
+            chosen = [run for run in group if run.range_m == range_m]
+            yield f"{group[0].building}, {range_m:g} m", Summary(chosen)
+    if mazes:
+        yield "mazes, beside", Summary(mazes)
+
+
+def _row(name: str, summary: Summary) -> tuple[str, ...]:
+    cells = sorted({run.cells for run in summary.runs})
+    covered = "" if summary.covered_all else "\nNOT ALL COVERED"
+    return (
+        f"{name}{covered}",
+        f"{len(summary.runs)}\n{cells[0] if len(cells) == 1 else f'{cells[0]}-{cells[-1]}'}",
+        _lines(".4f", summary.ratio_median(steps_ratio), summary.ratio_worst(steps_ratio)),
+        _lines(".3f", summary.ratio_median(time_ratio), summary.ratio_worst(time_ratio)),
+        _lines(".3f", summary.overlap, summary.quarters),
+        _lines(".3f", summary.kept, summary.unchanged),
+        f"{_percent(summary.waiting)}\n{summary.stale_m:.1f}",
+    )
+
+
+def _latency_row(name: str, summary: Summary) -> tuple[str, ...]:
+    return (
+        name,
+        *(_both(partial(summary.replan_ms, percent)) for percent in (50, 99, 100)),
+        _lines(".3f", summary.replan_to_full),
+        _both(summary.full_plan_ms),
+        *(_both(partial(summary.ingest_ms, percent)) for percent in (50, 99)),
+    )
+
+
+def _until_row(name: str, summary: Summary) -> tuple[str, ...]:
+    until = [(summary.steps_until(at), summary.seconds_until(at)) for at in MILESTONES]
+    return name, *(_lines(".3f", *moment) for moment in until)
+
+
+def _case_row(runs: Sequence[MissionRun]) -> tuple[str, ...]:
+    summary = Summary(runs)
+    missing = "" if all(run.happened for run in runs) else "\nDID NOT HAPPEN"
+    return (
+        f"{runs[0].building}{missing}",
+        f"{len(runs)}\n{sum(run.done for run in runs)}",
+        f"{max(run.missed for run in runs)}\n{runs[0].cells}",
+        f"{max(run.steps for run in runs)}\n{max(run.time_s for run in runs):.0f}",
+        f"{max(run.plans for run in runs)}\n{max(run.paths for run in runs)}",
+        _lines(".1f", *(summary.replan_ms(percent) for percent in (50, 99, 100))),
+        f"{_percent(summary.waiting)}\n{max(run.held_up for run in runs)}",
+    )
+
+
+def _complaints(runs: Sequence[MissionRun]) -> Iterator[str]:
+    """Yield what is wrong with missions, one by one."""
+    for run in runs:
+        about = f"{run.building}, start {run.start}, {run.range_m:g} m, seed {run.seed}"
+        if not run.done:
+            yield f"{about}: ended with {run.ended}; {run.missed} cells missed"
+        elif run.missed and run.kind != CASE:
+            yield f"{about}: said to be done, {run.missed} cells missed"
+        if run.problems:
+            yield f"{about}: {'; '.join(run.problems[:3])}"
+
+
+def _both(figure: Callable[..., float | None]) -> str:
+    """Return a time by the clock, and below it that of processors."""
+    return _lines(".1f", figure(cpu=False), figure(cpu=True))
+
+
+def _lines(style: str, *values: float | None) -> str:
+    return "\n".join("-" if value is None else f"{value:{style}}" for value in values)
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100.0 * share:.2f}"

@@ -1,0 +1,182 @@
+"""Runs on buildings to a table, with the exponents that time and memory grow by."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from fasaco_edge.bench.benchmark import Goal, Report
+from fasaco_edge.bench.machine import machine, peak_mb
+from fasaco_edge.drawing.spread import Spread
+from tests.benchmarks.scale.process import TARGETS, ScaleRun
+from tests.benchmarks.scale.runs import SizedRun
+
+MOST_GROWTH = 1.1
+# By size.
+MOST_FIRST_WALK_S = {5_000: 0.005, 1_000_000: 2.0}
+MOST_GAP = {100_000: (0.03, 5.0), 1_000_000: (0.04, 60.0)}
+MOST_MEMORY_MB = {100_000: 300.0, 1_000_000: 1500.0}
+
+HEADER = (
+    "cells", "budget\n[s]", "first\n[ms]", *(f"to {100 * target:g} %\n[s]" for target in TARGETS),
+    "gap\n[%]", "memory\n[MB]", "own\n[MB]", "kicks", "tried\n[10^6]",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Size:
+    """The runs on buildings of one size; one at least."""
+
+    size: int
+    runs: tuple[ScaleRun, ...]
+
+    def spread(self, figure: Callable[[ScaleRun], float]) -> Spread:
+        """Return the spread of a figure over the seeds."""
+        spread = Spread.of([figure(run) for run in self.runs])
+        assert spread is not None
+        return spread
+
+    def reached_s(self, target: float) -> Spread | None:
+        """Return when a gap was reached [s]; None if not by all."""
+        times = [dict(run.target_s)[target] for run in self.runs]
+        reached = [at for at in times if at is not None]
+        return Spread.of(reached) if len(reached) == len(times) else None
+
+    def gap_within(self, seconds: float) -> float | None:
+        """Return the median gap after so long; None if the budget was less."""
+        if min(run.budget_s for run in self.runs) < seconds:
+            return None
+        return self.spread(lambda run: _gap_at(run, seconds)).median
+
+    def document(self) -> dict[str, Any]:
+        """Return this as JSON values."""
+        reached = {f"{target:g}": self.reached_s(target) for target in TARGETS}
+        figures: dict[str, Callable[[ScaleRun], float]] = {
+            "cells": lambda run: run.cells,
+            "first_walk_s": lambda run: run.first_walk_s,
+            "gap": lambda run: run.gap,
+            "wall_s": lambda run: run.wall_s,
+            "peak_mb": lambda run: run.peak_mb,
+            "idle_mb": lambda run: run.idle_mb,
+            "own_mb": lambda run: run.own_mb,
+        }
+        return {
+            "size": self.size,
+            "budget_s": self.runs[0].budget_s,
+            "seeds": len(self.runs),
+            **{name: self.spread(figure).document() for name, figure in figures.items()},
+            "gap_reached_s": {gap: at and at.document() for gap, at in reached.items()},
+            "runs": [asdict(run) for run in self.runs],
+        }
+
+
+def _gap_at(run: ScaleRun, seconds: float) -> float:
+    """Return the gap after so long; without a walk until then it is endless."""
+    return min((gap for at, gap in run.noted if at <= seconds), default=math.inf)
+
+
+def by_size(runs: Sequence[SizedRun]) -> tuple[Size, ...]:
+    """Return the runs, put together size by size."""
+    sizes = sorted({run.size for run in runs})
+    return tuple(Size(size, tuple(one.run for one in runs if one.size == size)) for size in sizes)
+
+
+def exponent(points: Sequence[tuple[float, float]]) -> float | None:
+    """Return b of the y = a x^b that fits points (x, y) best, by least squares of logarithms.
+
+    None where there are not two different x above zero, with y above zero.
+    """
+    logs = [(math.log(x), math.log(y)) for x, y in points if x > 0.0 and y > 0.0]
+    if len({x for x, _ in logs}) < 2:
+        return None
+    return statistics.linear_regression(*zip(*logs, strict=True)).slope
+
+
+def growth(runs: Sequence[SizedRun]) -> dict[str, float | None]:
+    """Return the exponents of the time to the first walk and of own memory against cells.
+
+    None for a single size: its buildings differ by chance alone.
+    """
+    fitted = runs if len({one.size for one in runs}) > 1 else ()
+    return {
+        name: exponent([(one.run.cells, getattr(one.run, name)) for one in fitted])
+        for name in ("first_walk_s", "own_mb")
+    }
+
+
+def report(seeds: int, runs: Sequence[SizedRun]) -> Report:
+    """Sum up any number of runs, even none."""
+    sizes = by_size(runs)
+    exponents = growth(runs)
+    return Report(
+        title=f"buildings of several sizes, {seeds} seeds, one thread",
+        header=HEADER,
+        rows=tuple(_row(size) for size in sizes),
+        figures={
+            "seeds": seeds,
+            "sizes": [size.document() for size in sizes],
+            "exponents": exponents,
+            "peak_rss_mb": peak_mb(),
+            "machine": machine(),
+        },
+        goals=tuple(_goals(sizes, exponents)),
+        remarks=tuple(_remarks(exponents)),
+    )
+
+
+def _row(size: Size) -> tuple[str, ...]:
+    return (
+        f"{size.size:,}",
+        f"{size.runs[0].budget_s:g}",
+        _two(size.spread(lambda run: 1e3 * run.first_walk_s), ".3g"),
+        *(_two(size.reached_s(target), ".3g") for target in TARGETS),
+        _two(size.spread(lambda run: 100.0 * run.gap), ".2f"),
+        _two(size.spread(lambda run: run.peak_mb), ".0f"),
+        _two(size.spread(lambda run: run.own_mb), ".1f"),
+        _two(size.spread(lambda run: run.work["kicks"]), ".0f"),
+        _two(size.spread(lambda run: run.work["proposals"] / 1e6), ".0f"),
+    )
+
+
+def _two(spread: Spread | None, style: str) -> str:
+    """Return the median, and below it the most."""
+    return "-" if spread is None else f"{spread.median:{style}}\n{spread.high:{style}}"
+
+
+def _goals(sizes: Sequence[Size], exponents: dict[str, float | None]) -> Iterator[Goal]:
+    """Yield the goals that were measured."""
+    for size in sizes:
+        cells = f"{size.size:,} cells"
+        if size.size in MOST_FIRST_WALK_S:
+            first_s = size.spread(lambda run: run.first_walk_s).median
+            yield Goal(f"{cells}: first walk", first_s, MOST_FIRST_WALK_S[size.size], "s")
+        if size.size in MOST_GAP:
+            most, seconds = MOST_GAP[size.size]
+            gap = size.gap_within(seconds)
+            if gap is not None:
+                yield Goal(f"{cells}: gap within {seconds:g} s", 100.0 * gap, 100.0 * most, "%")
+        if size.size in MOST_MEMORY_MB:
+            peak = size.spread(lambda run: run.peak_mb).median
+            yield Goal(f"{cells}: memory", peak, MOST_MEMORY_MB[size.size], "MB")
+    for name, what in (("first_walk_s", "time to first walk"), ("own_mb", "own memory")):
+        if exponents[name] is not None:
+            yield Goal(f"growth of {what}: exponent", exponents[name], MOST_GROWTH)
+
+
+def _remarks(exponents: dict[str, float | None]) -> Iterator[str]:
+    yield (
+        "Above the median over the seeds, below the most. first: from the call to the first "
+        "complete walk. to 5 %: until the walk is proven to be that near to the shortest; - where "
+        "not all came there. memory: the most the process was resident with, interpreter and "
+        "kernels included; own: above what it had before there was a map. tried: moves proposed."
+    )
+    yield "Every walk was judged legal and complete by code that shares nothing with the planner."
+    time_growth, memory_growth = exponents["first_walk_s"], exponents["own_mb"]
+    if time_growth is not None and memory_growth is not None:
+        yield (
+            f"time to the first walk grows with cells to the power of {time_growth:.2f}, own "
+            f"memory to that of {memory_growth:.2f}"
+        )

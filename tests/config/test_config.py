@@ -1,0 +1,341 @@
+"""The configuration: what is missing is the default, what is wrong is refused and named."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.config.config import DaemonConfig, load_config
+from fasaco_edge.config.ros import RosConfig
+from fasaco_edge.config.sections import MissionSettings
+from fasaco_edge.errors import BadConfiguration
+from tests.support.processes import PROGRAM
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Any:
+    """Load a configuration from its text."""
+
+    def write_and_load(text: str) -> DaemonConfig:
+        file = tmp_path / "config.yaml"
+        file.write_text(text)
+        return load_config(file)
+
+    return write_and_load
+
+
+@pytest.mark.parametrize("text", ["", "# nothing but a remark\n", "{}", "robot: {}\nplanner: {}"])
+def test_what_is_missing_is_the_default(load, text):
+    assert load(text) == load_config(None) == DaemonConfig()
+
+
+def test_the_defaults_are_reachable_from_this_computer_only():
+    config = load_config(None)
+    assert config.bus.listen == ("tcp/127.0.0.1:7447",)
+    assert config.bus.connect == ()
+    assert config.keys().prefix == "fasaco/@v1/robot"
+
+
+def test_every_section_is_read(load):
+    sections = {
+        "robot": {"name": "mower-2", "radius_m": 0.25, "tool_width_m": 0.5},
+        "bus": {
+            "base": "site/north",
+            "mode": "router",
+            "listen": ["tcp/127.0.0.1:7001", "tcp/127.0.0.1:7002"],
+            "connect": ["tcp/10.0.0.1:7447"],
+        },
+        "map": {"free_at_most": 10, "occupied_at_least": 90, "max_lattice_cells": 1000},
+        "pose": {"schema": "nav_msgs/msg/Odometry"},
+        "planner": {
+            "name": "fasaco",
+            "ants": 17,
+            "velocities": "3,1",
+            "q0": 0.5,
+            "alpha": 1,
+            "tau0": 2.5,
+            "seed": 9,
+            "budget_s": 3,
+        },
+        "mission": {"state_dir": "/var/lib/mower"},
+    }
+    config = load(yaml.safe_dump(sections))
+    for name, section in sections.items():
+        for key, value in section.items():
+            got = getattr(getattr(config, name), key)
+            assert got == (tuple(value) if isinstance(value, list) else value), (name, key)
+    assert config.keys().prefix == "site/north/@v1/mower-2"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("robots: {}", "unknown key robots"),
+        ("robot: {radius: 0.2}", "unknown key robot.radius"),
+        ("robot: {radius_m: 0}", "robot.radius_m: expected float > 0.0, got 0"),
+        ("robot: {radius_m: -0.2}", "robot.radius_m: expected float > 0.0, got -0.2"),
+        ("robot: {radius_m: 10.5}", "robot.radius_m: expected float <= 10.0, got 10.5"),
+        ("robot: {radius_m: .nan}", "robot.radius_m: expected float > 0.0, got nan"),
+        ("robot: {radius_m: wide}", "robot.radius_m: expected float, got 'wide'"),
+        ("robot: {radius_m: true}", "robot.radius_m: expected float, got True"),
+        ("robot: {radius_m: }", "robot.radius_m: expected float, got None"),
+        ("robot: {tool_width_m: .inf}", "robot.tool_width_m: expected float <= 10.0, got inf"),
+        ("robot: 3", "robot: expected object, got 3"),
+        ("robot: {name: 3}", "robot.name: expected str, in quotes, got 3"),
+        ("robot: {name: a/b}", "robot must be chunks of letters, digits, '_' and '-', got 'a/b'"),
+        ("robot: {name: ''}", "got ''"),
+        ("robot: {name: '*'}", "got '*'"),
+        ("robot: {name: '@v1'}", "got '@v1'"),
+        ("bus: {base: /fasaco}", "base must be chunks of letters, digits, '_' and '-', got ''"),
+        ("bus: {mode: dealer}", "bus.mode: expected peer, client or router, got 'dealer'"),
+        ("bus: {listen: 'tcp/0.0.0.0:1'}", "bus.listen: expected array, got 'tcp/0.0.0.0:1'"),
+        ("bus: {listen: [7447]}", "bus.listen[0]: expected str, in quotes, got 7447"),
+        ("bus: {listen: []}", "bus.listen and bus.connect must not both be empty"),
+        ("map: {free_at_most: 101}", "map.free_at_most: expected int <= 100, got 101"),
+        (
+            "map: {free_at_most: 65}",
+            "map.free_at_most must be below map.occupied_at_least, got 65 and 65",
+        ),
+        (
+            "map: {free_at_most: 50, occupied_at_least: 20}",
+            "map.free_at_most must be below map.occupied_at_least, got 50 and 20",
+        ),
+        ("map: {max_lattice_cells: 0}", "map.max_lattice_cells: expected int >= 1, got 0"),
+        (
+            "pose: {schema: nav_msgs/msg/Path}",
+            "pose.schema: expected geometry_msgs/msg/PoseStamped, "
+            "geometry_msgs/msg/PoseWithCovarianceStamped or nav_msgs/msg/Odometry, "
+            "got 'nav_msgs/msg/Path'",
+        ),
+        (
+            "planner: {name: best}",
+            "planner.name: expected fasaco, aco, stc, spiral-stc or zigzag, got 'best'",
+        ),
+        ("planner: {ants: 0}", "planner.ants: expected int >= 1, got 0"),
+        ("planner: {ants: 1.5}", "planner.ants: expected int, got 1.5"),
+        ("planner: {ants: 1e7}", "planner.ants: expected int, got '1e7'"),
+        ("planner: {q0: 1.1}", "planner.q0: expected float <= 1.0, got 1.1"),
+        ("planner: {alpha: 0.0}", "planner.alpha: expected float > 0.0, got 0.0"),
+        ("planner: {tau0: .inf}", "planner.tau0: expected float <= 1000000.0, got inf"),
+        ("planner: {seed: -1}", "planner.seed: expected int >= 0, got -1"),
+        ("planner: {budget_s: .nan}", "planner.budget_s: expected float > 0.0, got nan"),
+        # Without quotes this is a number in YAML 1.1: 8 minutes 1 second.
+        ("planner: {velocities: 8:1}", "planner.velocities: expected str, in quotes, got 481"),
+        ("mission: {state: /var}", "unknown key mission.state"),
+        ("mission: {state_dir: 3}", "mission.state_dir: expected str, in quotes, got 3"),
+        (r'mission: {state_dir: "a\0b"}', "mission.state_dir must be a path"),
+        ("[1, 2]", "the file: expected object, got [1, 2]"),
+        ("robot: {1: 2}", "robot: expected str as key, got {1: 2}"),
+        ("1: 2", "the file: expected str as key, got {1: 2}"),
+        ("robot: {name: [unclosed", "not plain YAML"),
+        ("robot:\n\tname: x", "not plain YAML"),
+        ("robot: 2020-13-45", "not plain YAML: month must be in 1..12"),
+        ("[" * 5000, "not plain YAML: line 1: nested deeper than 32 levels"),
+        ("--- {}\n--- {}", "not plain YAML"),
+        ("!!python/object/apply:os.getcwd []", "not plain YAML"),
+    ],
+)
+def test_what_is_wrong_is_named(load, tmp_path, text, said):
+    with pytest.raises(BadConfiguration) as caught:
+        load(text)
+    assert said in str(caught.value)
+    assert str(tmp_path / "config.yaml") in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("velocities: '8:x'", "velocities must look like 8:1, 1:8, 4 or 8,4,1, got '8:x'"),
+        ("velocities: ''", "velocities must look like 8:1, 1:8, 4 or 8,4,1, got ''"),
+        ("velocities: '0'", "velocities must be in 1..64, got 0"),
+        ("velocities: '8,-1,2'", "velocities must be in 1..64, got -1"),
+        ("ants: 7", "ants must be in 8..1000000, one for each cohort at least, got 7"),
+        ("{ants: 2, velocities: '1,2,3'}", "ants must be in 3..1000000"),
+    ],
+)
+def test_the_colony_is_checked_at_the_start(load, text, said):
+    with pytest.raises(BadConfiguration) as caught:
+        load(yaml.safe_dump({"planner": yaml.safe_load(text)}))
+    assert f"planner.{said}" in str(caught.value)
+
+
+def test_unreadable_files_are_named(tmp_path):
+    with pytest.raises(BadConfiguration, match=r"missing\.yaml: No such file"):
+        load_config(tmp_path / "missing.yaml")
+    with pytest.raises(BadConfiguration, match="Is a directory"):
+        load_config(tmp_path)
+    binary = tmp_path / "binary.yaml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(BadConfiguration, match="not plain YAML"):
+        load_config(binary)
+
+
+@pytest.mark.parametrize(
+    ("configured", "environ", "folder"),
+    [
+        ("/srv/state", {"STATE_DIRECTORY": "/var/lib/fasaco-edge"}, "/srv/state"),
+        ("~/state", {}, "/home/pi/state"),
+        ("", {"STATE_DIRECTORY": "/var/lib/a:/var/lib/b"}, "/var/lib/a"),
+        ("", {"STATE_DIRECTORY": "", "XDG_STATE_HOME": "/x"}, "/x/fasaco-edge"),
+        # The XDG specification: relative paths are to be ignored.
+        ("", {"XDG_STATE_HOME": "x"}, "/home/pi/.local/state/fasaco-edge"),
+        ("", {}, "/home/pi/.local/state/fasaco-edge"),
+    ],
+)
+def test_where_progress_is_kept(monkeypatch, configured, environ, folder):
+    monkeypatch.setenv("HOME", "/home/pi")
+    assert MissionSettings(state_dir=configured).state_folder(environ) == Path(folder)
+
+
+def test_who_has_no_home_has_to_say_where_progress_is_kept():
+    with pytest.raises(BadConfiguration, match=r"mission\.state_dir: ~nobody-of-that-name"):
+        MissionSettings(state_dir="~nobody-of-that-name/x").state_folder({})
+
+
+VALUES = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=10),
+    st.dates(),
+    st.sampled_from(["8:1", "1:8", "4", "tcp/127.0.0.1:1", "robot", "peer"]),
+    st.lists(st.text(max_size=5), max_size=3),
+    st.dictionaries(st.one_of(st.text(max_size=5), st.integers()), st.integers(), max_size=2),
+)
+NAMES = {
+    section: sorted((getattr(DaemonConfig(), section) or RosConfig).__struct_fields__)
+    for section in DaemonConfig.__struct_fields__
+}
+
+
+@st.composite
+def documents(draw: st.DrawFn) -> object:
+    """Draw a document with few mistakes, or with nothing but mistakes."""
+    sections = draw(st.lists(st.sampled_from(sorted(NAMES)), max_size=2, unique=True))
+    document: dict[object, object] = {
+        section: {key: draw(VALUES) for key in draw(st.sets(st.sampled_from(NAMES[section])))}
+        for section in sections
+    }
+    if draw(st.booleans()):
+        document |= draw(st.dictionaries(st.sampled_from([*sorted(NAMES), "x", 1]), VALUES))
+    return document
+
+
+@settings(max_examples=300, deadline=None)
+@given(document=documents())
+def test_whatever_is_written_is_a_configuration_or_refused(tmp_path_factory, document):
+    file = tmp_path_factory.getbasetemp() / "any.yaml"
+    file.write_text(yaml.safe_dump(document))
+    try:
+        config = load_config(file)
+    except BadConfiguration:
+        return
+    planner, robot = config.planner, config.robot
+    assert 0 < robot.radius_m <= 10
+    assert 0 < robot.tool_width_m <= 10
+    assert config.map.free_at_most < config.map.occupied_at_least
+    assert math.isfinite(planner.q0 + planner.alpha + planner.tau0 + planner.budget_s)
+
+
+def test_checking_needs_no_compiler(tmp_path):
+    """A configuration is refused at once: numba takes half a second and 60 MB."""
+    file = tmp_path / "config.yaml"
+    file.write_text("planner: {velocities: '4,2', ants: 100}")
+    code = (
+        "import sys; from pathlib import Path; from fasaco_edge.config.config import load_config; "
+        f"load_config(Path({str(file)!r})); assert 'numba' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("planner: {velocities: '8:x'}", "velocities must look like 8:1, 1:8, 4 or 8,4,1"),
+        ("planner: {ants: 3}", "ants must be in 8..1000000"),
+        ("robot: {radius: 0.2}", "unknown key robot.radius"),
+        (None, "No such file or directory"),
+    ],
+)
+def test_the_command_ends_with_ex_config(tmp_path, text, said):
+    """Exit code 78 tells the service manager not to try again (sysexits.h)."""
+    file = tmp_path / "config.yaml"
+    if text is not None:
+        file.write_text(text)
+    ended = subprocess.run(
+        [*PROGRAM, "run", "--config", str(file)],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=150,
+    )
+    assert ended.returncode == 78
+    assert said in ended.stderr
+    assert str(file) in ended.stderr
+    assert "hint: correct the named key" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_ros_is_left_out_unless_it_stands_there(load):
+    assert not load("").ros2
+    config = load("ros2: {kind: bridge, namespace: /robot1, pose: nav_msgs/msg/Odometry}")
+    assert config.ros2.map.name == "/robot1/map"
+    assert config.ros2.map.latched
+    assert {kind: topic.name for kind, topic in config.ros2.poses.items()} == {
+        "pose": "/robot1/pose"
+    }
+    assert list(load("ros2: {kind: rmw_zenoh}").ros2.poses) == ["tf_static", "pose"]
+
+
+@pytest.mark.parametrize(
+    ("block", "text"),
+    [
+        ("", "ros2: expected object, got None"),
+        ("{}", "ros2: object missing required field kind"),
+        ("{kind: dds}", "ros2.kind: expected bridge or rmw_zenoh, got 'dds'"),
+        ("{kind: bridge, domain: 3}", "ros2.domain and node are for kind rmw_zenoh"),
+        ("{kind: bridge, node: n}", "ros2.domain and node are for kind rmw_zenoh"),
+        ("{kind: rmw_zenoh, domain: -1}", "ros2.domain: expected int >= 0, got -1"),
+        ("{kind: rmw_zenoh, node: a-b}", "ros2.node must be letters, digits and _, got 'a-b'"),
+        ("{kind: rmw_zenoh, namespace: r}", "ros2.namespace must be / or like /robot1, got 'r'"),
+        ("{kind: rmw_zenoh, namespace: /r/}", "ros2.namespace must be / or like"),
+        ("{kind: rmw_zenoh, topics: {map: map}}", "ros2.topics.map must be like /robot1/map"),
+        ("{kind: rmw_zenoh, topics: {tf: /a/*}}", "ros2.topics.tf must be like /robot1/map"),
+        ("{kind: rmw_zenoh, topics: {tf: /1a}}", "ros2.topics.tf must be like /robot1/map"),
+        (f"{{kind: rmw_zenoh, topics: {{tf: /{'a' * 247}}}}}", "ros2.topics.tf must be like"),
+        ("{kind: rmw_zenoh, topics: {pose: /map}}", "topics.map and topics.pose must differ"),
+        ("{kind: rmw_zenoh, topics: {maps: /m}}", "unknown key ros2.topics.maps"),
+        ("{kind: rmw_zenoh, pose: Odometry}", "ros2.pose: expected tf, geometry_msgs/msg/Pose"),
+        ("{kind: rmw_zenoh, frames: {map: ''}}", "ros2.frames.map must be the name of a frame"),
+        ('{kind: rmw_zenoh, frames: {map: "\\ud800"}}', "ros2.frames.map must be the name of"),
+        ("{kind: rmw_zenoh, frames: {robot: map}}", "frames.map and frames.robot must differ"),
+    ],
+)
+def test_what_is_wrong_about_ros_is_named(load, block, text):
+    with pytest.raises(BadConfiguration) as caught:
+        load(f"ros2: {block}")
+    assert text in str(caught.value)
+
+
+def test_the_recorder_gets_its_room_from_the_configuration(tmp_path):
+    from fasaco_edge.cli import _parser
+    from fasaco_edge.daemon.supervisor import _command
+
+    file = tmp_path / "config.yaml"
+    file.write_text("recording: {part_mb: 10, part_min: 2.5, quota_mb: 100, least_free_mb: 7}")
+    command = _command(load_config(file), tmp_path)
+    words = command[command.index("record") :]
+    told = _parser().parse_args(words)
+    assert (told.part_mb, told.part_min, told.quota_mb, told.least_free_mb) == (10, 2.5, 100, 7)
+    file.write_text("recording: {part_mb: 60, quota_mb: 100}")
+    with pytest.raises(BadConfiguration, match=r"recording\.quota_mb must be 0 or at least"):
+        load_config(file)

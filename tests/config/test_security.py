@@ -1,0 +1,213 @@
+"""The daemon does not listen beyond its computer to those it does not know."""
+
+from __future__ import annotations
+
+import subprocess
+
+import pytest
+import yaml
+
+from fasaco_edge.config.config import load_config
+from fasaco_edge.config.endpoints import from_here, is_local
+from fasaco_edge.config.ros import RosConfig
+from fasaco_edge.errors import BadConfiguration, OpenToEveryone
+from tests.support.processes import PROGRAM
+
+BEYOND = "tcp/0.0.0.0:7447"
+TLS_FILES = {"root_ca": "ca.pem", "certificate": "own.pem", "private_key": "own.key"}
+USER = {"name": "robot", "password_file": "own.txt", "dictionary_file": "all.txt"}
+
+
+def load(tmp_path, **bus):
+    file = tmp_path / "config.yaml"
+    file.write_text(yaml.safe_dump({"bus": bus}))
+    return load_config(file)
+
+
+@pytest.mark.parametrize(
+    "endpoint",
+    [
+        "tcp/127.0.0.1:7447",
+        "tcp/127.8.9.1:7447",
+        "tcp/localhost:7447",
+        "tls/LOCALHOST:7447",
+        "tcp/[::1]:7447",
+        "udp/127.0.0.1:7447?rel=1#iface=eth0",
+        "unixsock-stream//run/fasaco.sock",
+        "unixpipe//run/fasaco",
+    ],
+)
+def test_endpoints_of_this_computer(tmp_path, endpoint):
+    assert is_local(endpoint)
+    assert load(tmp_path, listen=[endpoint]).bus.listen == (endpoint,)
+
+
+@pytest.mark.parametrize(
+    "endpoint",
+    [
+        "tcp/0.0.0.0:7447",
+        "tcp/[::]:7447",
+        "tcp/10.0.0.1:7447",
+        "tcp/128.0.0.1:7447",
+        "tcp/[fe80::1%eth0]:7447",
+        "tcp/[::ffff:10.0.0.1]:7447",
+        "quic/192.168.1.1:7447",
+        "tcp/robot:7447",
+        "tcp/localhost.example.org:7447",
+        "tcp/127.0.0.1.example.org:7447",
+        "tcp/127.0.0.1@10.0.0.1:7447",
+        "tcp/0:7447",
+        "tcp/127.1:7447",
+        "tcp/:7447",
+        "tcp/*:7447",
+        "tcp/10.0.0.1:7447#127.0.0.1:7447",
+        "serial//dev/ttyUSB0",
+        "vsock/-1:1234",
+        "127.0.0.1:7447",
+        "",
+    ],
+)
+def test_endpoints_beyond_this_computer(tmp_path, endpoint):
+    """Whatever is not clearly this computer alone."""
+    assert not is_local(endpoint)
+    with pytest.raises(OpenToEveryone) as refused:
+        load(tmp_path, listen=["tcp/127.0.0.1:7447", endpoint])
+    assert f"bus.listen: {endpoint} can be reached" in str(refused.value)
+    assert "bus.open_to_everyone: true" in refused.value.hint
+    opened = load(tmp_path, listen=[endpoint], open_to_everyone=True)
+    assert opened.bus.open_to_everyone
+
+
+def test_to_connect_anywhere_opens_nothing(tmp_path):
+    config = load(tmp_path, listen=[], connect=["tcp/router.example.org:7447"])
+    assert config.bus.security.kind == "none"
+
+
+def test_what_listens_everywhere_is_reached_from_here():
+    assert from_here("tls/0.0.0.0:7447") == "tls/localhost:7447"
+    assert from_here("tcp/[::]:7447#a") == "tcp/localhost:7447#a"
+    for endpoint in ("tcp/127.0.0.1:7447", "tcp/robot:1", "unixsock-stream//run/x.sock"):
+        assert from_here(endpoint) == endpoint
+
+
+def test_a_daemon_that_would_be_open_to_everyone_does_not_start(tmp_path):
+    file = tmp_path / "config.yaml"
+    file.write_text(yaml.safe_dump({"bus": {"listen": [BEYOND]}}))
+    command = [*PROGRAM, "run", "--config", str(file), "--state", str(tmp_path)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
+    assert ended.returncode == 78
+    assert f"{BEYOND} can be reached from other computers" in ended.stderr
+    assert "hint: choose bus.security.kind tls or user" in ended.stderr
+
+
+def tls(**more):
+    return {"kind": "tls", "tls": TLS_FILES, **more}
+
+
+def user(**more):
+    return {"kind": "user", "user": USER, **more}
+
+
+@pytest.mark.parametrize(
+    ("bus", "said"),
+    [
+        (
+            {"listen": ["tls/0.0.0.0:1"], "security": {"kind": "tls"}},
+            "tls.root_ca: needed with bus.security.kind tls",
+        ),
+        (
+            {"listen": ["tls/0.0.0.0:1"], "security": {"kind": "user"}},
+            "user.name: needed with bus.security.kind user",
+        ),
+        (
+            {"security": {"kind": "user", "user": {**USER, "dictionary_file": ""}}},
+            "user.dictionary_file: needed",
+        ),
+        ({"security": tls()}, "bus.listen: tcp/127.0.0.1:7447: only tls/<host>:<port>"),
+        (
+            {"listen": ["tls/0.0.0.0:1"], "connect": ["tcp/10.0.0.1:1"], "security": tls()},
+            "bus.connect: tcp/10.0.0.1:1: only tls/<host>:<port>",
+        ),
+        (
+            {"listen": ["tls/0.0.0.0:1"], "security": user()},
+            "bus.listen: tls/0.0.0.0:1: user and password",
+        ),
+        (
+            {"listen": ["tls/0.0.0.0:1"], "security": tls(), "open_to_everyone": True},
+            "bus.open_to_everyone: contradicts bus.security.kind tls",
+        ),
+        (
+            {"security": {"roles": {"mapper": ["slam"]}}},
+            "bus.security.roles.mapper: with bus.security.kind none nobody shows a name",
+        ),
+        ({"security": {"kind": "tsl"}}, "bus.security.kind: expected none, tls or user"),
+        ({"security": {"roles": {"admin": []}}}, "unknown key bus.security.roles.admin"),
+        ({"security": {"roles": {"viewer": [""]}}}, "bus.security.roles.viewer[0]"),
+        ({"security": {"limits": {"maps_hz": 0}}}, "bus.security.limits.maps_hz: expected float"),
+        (
+            {
+                "listen": ["tls/0.0.0.0:1"],
+                "security": {"kind": "tls", "tls": {**TLS_FILES, "root_ca": "a\0b"}},
+            },
+            "one with a NUL",
+        ),
+    ],
+)
+def test_what_does_not_go_together_is_refused(tmp_path, bus, said):
+    with pytest.raises(BadConfiguration) as refused:
+        load(tmp_path, **bus)
+    assert said in str(refused.value)
+
+
+def test_a_file_that_is_missing_is_named(tmp_path):
+    config = load(tmp_path, listen=["tls/0.0.0.0:1"], security=tls())
+    with pytest.raises(BadConfiguration, match=r"tls\.root_ca: ca\.pem: No such file"):
+        config.bus.settings("fasaco/@v1/robot")
+
+
+def test_a_password_is_read_from_its_file_and_never_shown(tmp_path):
+    for name, text in (("own.txt", "sesame\n"), ("all.txt", "eye:pw\n")):
+        (tmp_path / name).write_text(text)
+    who = {**USER, "password_file": str(tmp_path / "own.txt")}
+    who["dictionary_file"] = str(tmp_path / "all.txt")
+    config = load(tmp_path, listen=[BEYOND], security={"kind": "user", "user": who})
+    settings = config.bus.settings("fasaco/@v1/robot")
+    assert settings.secured["transport"]["auth"]["usrpwd"]["password"] == "sesame"
+    assert "sesame" not in f"{settings!r} {config!r}"
+    (tmp_path / "own.txt").write_text("\n")
+    with pytest.raises(BadConfiguration, match=r"own\.txt is empty"):
+        config.bus.settings("fasaco/@v1/robot")
+
+
+def test_loopback_alone_has_neither_rules_nor_limits(tmp_path):
+    assert load(tmp_path).bus.settings("fasaco/@v1/robot").secured == {}
+    opened = load(tmp_path, listen=[BEYOND], open_to_everyone=True)
+    assert set(opened.bus.settings("fasaco/@v1/robot").secured) == {
+        "low_pass_filter",
+        "downsampling",
+    }
+
+
+def test_a_role_for_ros_needs_topics(tmp_path):
+    with pytest.raises(BadConfiguration, match=r"roles\.ros: without a block ros2"):
+        load(
+            tmp_path,
+            listen=["tcp/127.0.0.1:7447"],
+            security={"kind": "user", "user": USER, "roles": {"ros": ["ros"]}},
+        )
+
+
+def test_a_recorder_hears_the_topics_of_ros(tmp_path):
+    files = {name: tmp_path / USER[name] for name in ("password_file", "dictionary_file")}
+    for file in files.values():
+        file.write_text("robot:secret")
+    user = USER | {name: str(file) for name, file in files.items()}
+    roles = {"kind": "user", "user": user, "roles": {"recorder": ["black-box"]}}
+    config = load(tmp_path, listen=["tcp/127.0.0.1:7447"], security=roles)
+    ros = RosConfig(kind="bridge", namespace="/robot1")
+    rules = config.bus.settings("fasaco/@v1/robot", ros).secured["access_control"]["rules"]
+    heard = [rule for rule in rules if "robot1/map" in rule["key_exprs"]]
+    assert any("declare_subscriber" in rule["messages"] for rule in heard)
+    for rule in heard:
+        assert {"robot1/tf", "robot1/tf_static"} <= set(rule["key_exprs"])
+        assert "put" not in rule["messages"] or rule["flows"] == ["egress"]

@@ -1,0 +1,170 @@
+"""Who listens, and how badly, must not matter to the planner."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.config.config import BusConfig, DaemonConfig
+from fasaco_edge.daemon import supervisor
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process, free_endpoint
+from tests.support.rooms import fill, map_bytes, odometry_bytes, pose_bytes, room
+
+RECORDING = "recording"
+
+
+def plan_times(outsider, count, first_revision):
+    """Send maps that change something; return for each the seconds until its path came."""
+    path = outsider.listen("path")
+    outsider.put("pose", pose_bytes(0.75, 0.75))
+    seconds = []
+    for number in range(count):
+        # A wall that grows, so that each map loses cells.
+        length = 0.5 + 0.3 * (first_revision + number)
+        pixels = fill(room(15.0, 15.0), 6.0, 0.0, 6.2, length, 100)
+        since = len(path.heard)
+        sent = time.monotonic()
+        outsider.put("map", map_bytes(pixels, stamp_ns=1000 + first_revision + number))
+        stamp = f'"map_stamp_ns":{1000 + first_revision + number},'.encode()
+        path.wait(lambda heard, stamp=stamp: stamp in heard.attachment, since)
+        seconds.append(time.monotonic() - sent)
+    return seconds
+
+
+def test_a_frozen_subscriber_does_not_hold_the_planner(daemon, outsider):
+    plan_times(outsider, 1, 0)  # brings the kernels along
+    free = plan_times(outsider, 5, 1)
+    command = [sys.executable, "-m", "tests.support.frozen", daemon.endpoint]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as listener:
+        try:
+            assert listener.stdout.readline() == b"listening\n"
+            listener.send_signal(signal.SIGSTOP)
+            held = plan_times(outsider, 12, 6)
+        finally:
+            listener.kill()
+    print(f"map to path [ms]: free {1e3 * max(free):.0f}, held {1e3 * max(held):.0f}")
+    # The lease of a frozen session ends after ten seconds: nothing waited for that.
+    assert max(held) < 10 * max(free) + 5.0
+    assert outsider.ask_status()["errors"]["total"] == 0
+
+
+def wait_recorder(outsider, state, **more):
+    """Return the recorder's part of the first status that says ``state``."""
+
+    def holds(status):
+        said = status["recorder"] or {}
+        return said.get("state") == state and all(said.get(k) == v for k, v in more.items())
+
+    return outsider.wait_status(holds)["recorder"]
+
+
+def test_a_killed_recorder_is_started_again_and_planning_goes_on(tmp_path):
+    pytest.importorskip("rerun")
+    with (
+        daemon_process(tmp_path, "--record", str(tmp_path)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        plan_times(outsider, 1, 0)
+        first = wait_recorder(outsider, RECORDING)
+        assert first["restarts"] == 0
+        os.kill(first["pid"], signal.SIGKILL)
+        gone = wait_recorder(outsider, "restarting")
+        assert gone["reason"] == "died by signal 9"
+        assert len(plan_times(outsider, 3, 1)) == 3
+        again = wait_recorder(outsider, RECORDING, restarts=1)
+        assert again["pid"] != first["pid"]
+        assert again["malformed"] == 0
+        plan_times(outsider, 1, 4)
+    assert len(list(tmp_path.glob("*.rrd"))) >= 2
+
+
+def test_a_recorder_that_cannot_write_is_told_and_planning_goes_on(tmp_path):
+    """A recorder that ends at once is tried again, ever more rarely."""
+    pytest.importorskip("rerun")
+    no_folder = tmp_path / "file"
+    no_folder.write_text("")
+    with (
+        daemon_process(tmp_path, "--record", str(no_folder)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        said = wait_recorder(outsider, "restarting")
+        assert said["reason"] == "exited with 78"
+        assert len(plan_times(outsider, 2, 0)) == 2
+        assert "cannot record into" in running.log_text()
+
+
+def test_a_recorder_that_starts_slowly_is_waited_for_and_one_that_hangs_is_not(
+    tmp_path, monkeypatch
+):
+    """On a slow computer its libraries alone take longer than a hang may last."""
+    pytest.importorskip("rerun")
+    monkeypatch.setattr(supervisor, "SILENT_AFTER_S", 0.05)
+    endpoint = free_endpoint()
+    config = DaemonConfig(bus=BusConfig(mode="router", listen=(endpoint,)))
+    with open_bus(config.bus.settings(config.keys().prefix)) as bus:
+        watched = supervisor.RecorderSupervisor(config, bus, tmp_path)
+        try:
+            states = [watched.poll(time.monotonic())]
+            # Its words come more than 0.05 s apart: after the first, it counts as hanging.
+            while states[-1]["state"] not in ("silent", "restarting"):
+                time.sleep(0.01)
+                states.append(watched.poll(time.monotonic()))
+        finally:
+            watched.close(60.0)
+    assert {"starting", "recording"} <= {state["state"] for state in states}
+    assert states[-1]["reason"] == "no word for 0 s"
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A disk of 60 MB: 50 MB are the least that a recorder leaves free."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=60m", "tmpfs", str(folder)]
+    if os.geteuid() != 0 or subprocess.run(mount, check=False, capture_output=True).returncode:
+        pytest.skip("needs the right to mount a tmpfs")
+    yield folder
+    subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+def test_a_full_disk_is_told_and_planning_goes_on(tmp_path, small_disk):
+    pytest.importorskip("rerun")
+    with (
+        daemon_process(
+            tmp_path, "--record", str(small_disk), recording={"least_free_mb": 50}
+        ) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        wait_recorder(outsider, RECORDING)
+        ballast = small_disk / "ballast"
+        ballast.write_bytes(bytes(15_000_000))
+        full = wait_recorder(outsider, "disk full")
+        assert "free" in full["reason"]
+        assert len(plan_times(outsider, 3, 0)) == 3
+        ballast.unlink()
+        assert wait_recorder(outsider, RECORDING)["restarts"] == 0
+
+
+def test_the_recorder_takes_untyped_poses_as_the_daemon_does(tmp_path):
+    pytest.importorskip("rerun")
+    with (
+        daemon_process(
+            tmp_path, "--record", str(tmp_path), pose={"schema": "nav_msgs/msg/Odometry"}
+        ) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        wait_recorder(outsider, RECORDING)
+        for _ in range(3):
+            outsider.put("pose", odometry_bytes(0.75, 0.75), "")
+        outsider.put("map", map_bytes(room(3.0, 3.0)))
+        outsider.wait_status(lambda status: status["state"] == "covering")
+        before = outsider.ask_status()["recorder"]["messages"]
+        said = outsider.wait_status(lambda status: status["recorder"]["messages"] > before + 3)
+        assert said["recorder"]["malformed"] == 0

@@ -1,0 +1,327 @@
+"""What the doctor finds on computers and on a bus, with and without a daemon."""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from fasaco_edge.bus.publisher import QOS
+from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.config.config import BusConfig, DaemonConfig, MissionSettings, RobotConfig
+from fasaco_edge.doctor import files as folders
+from fasaco_edge.doctor import files as kernels
+from fasaco_edge.doctor import machine, report, session
+from fasaco_edge.doctor import machine as memory
+from fasaco_edge.doctor.finding import Check, Finding, Level, Patient, Unit, find_unit
+from fasaco_edge.kernels.sealed import write_sealed
+from tests.kernels.harm import HARMS
+from tests.kernels.installations import fill_with
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process, free_endpoint
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes
+
+MEMINFO = "MemTotal:        3884328 kB\nMemFree: 100000 kB\nMemAvailable:    {} kB\n"
+V1_OFF = "#subsys_name\thierarchy\tnum_cgroups\tenabled\nmemory\t0\t70\t0\n"
+
+
+def computer(root: Path, **files: str) -> Patient:
+    """Return a computer whose root folder holds these files, / written as __ in their names."""
+    for name, text in files.items():
+        file = root / name.replace("__", "/")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+    return Patient(DaemonConfig(), root=root)
+
+
+def at(*listen: str, connect: tuple[str, ...] = (), mode: str = "peer", name="robot") -> Patient:
+    bus = BusConfig(listen=listen, connect=connect, mode=mode)
+    return Patient(DaemonConfig(bus=bus, robot=RobotConfig(name=name)))
+
+
+def test_a_raspberry_pi_without_the_memory_controller_is_told_how_to_have_it(tmp_path):
+    files = {
+        "sys__fs__cgroup__cgroup.controllers": "cpuset cpu io pids\n",
+        "proc__meminfo": MEMINFO.format(3_000_000),
+        "proc__cgroups": V1_OFF,
+        "boot__firmware__cmdline.txt": "console=tty1 root=PARTUUID=1 rootwait\n",
+    }
+    pi = computer(tmp_path, **files)
+    found = memory.memory(pi)
+    assert found.level is Level.WARN
+    assert found.found.startswith("3072 MB of 3978 MB free; the memory controller is off")
+    assert found.to_do == (
+        "add cgroup_enable=memory to the one line of /boot/firmware/cmdline.txt, and reboot"
+    )
+    limited = Patient(pi.config, unit=Unit({"MemoryMax": "536870912"}), root=tmp_path)
+    assert "limits of the unit do not hold" in memory.memory(limited).found
+
+
+@pytest.mark.parametrize(
+    ("files", "version"),
+    [
+        ({"sys__fs__cgroup__cgroup.controllers": "cpuset cpu memory pids\n"}, 2),
+        (
+            {
+                "sys__fs__cgroup__memory__memory.limit_in_bytes": "1",
+                "proc__cgroups": V1_OFF.replace("\t0\n", "\t1\n"),
+            },
+            1,
+        ),
+        ({"sys__fs__cgroup__memory__tasks": "", "proc__cgroups": V1_OFF}, None),
+        ({}, None),
+    ],
+)
+def test_both_versions_of_control_groups_are_known(tmp_path, files, version):
+    computer(tmp_path, **files)
+    assert memory.controller(tmp_path) == version
+
+
+@pytest.mark.parametrize(
+    ("free_kb", "limit", "level"),
+    [(3_000_000, "infinity", "ok"), (100_000, "infinity", "warn"), (3_000_000, "1000000", "warn")],
+)
+def test_memory_is_short_or_limited(tmp_path, free_kb, limit, level):
+    files = {
+        "sys__fs__cgroup__cgroup.controllers": "memory",
+        "proc__meminfo": MEMINFO.format(free_kb),
+    }
+    pc = computer(tmp_path, **files)
+    found = memory.memory(Patient(pc.config, unit=Unit({"MemoryMax": limit}), root=tmp_path))
+    assert found.level == level
+    assert bool(found.to_do) == (level == "warn")
+
+
+def test_a_board_is_called_by_its_name(tmp_path):
+    files = {
+        "proc__device-tree__model": "Raspberry Pi 4 Model B Rev 1.4\0",
+        "proc__cpuinfo": "processor\t: 0\nFeatures\t: fp asimd evtstrm crc32\n",
+        "etc__os-release": 'PRETTY_NAME="Debian GNU/Linux 12 (bookworm)"\nID=debian\n',
+    }
+    found = machine.system(computer(tmp_path, **files))
+    assert found.found.startswith("Raspberry Pi 4 Model B Rev 1.4, ")
+    assert found.details[0].startswith("Debian GNU/Linux 12 (bookworm), kernel ")
+    assert found.details[0].endswith("processor features: asimd")
+
+
+def test_this_computer_can_run_what_is_installed():
+    here = Patient(DaemonConfig())
+    found = machine.c_library(here)
+    assert found.level is Level.OK
+    assert any(line.startswith("numba: 2.") for line in found.details)
+    assert machine.system(here).level in (Level.OK, Level.WARN)
+    is_synchronised, error_s = machine.kernel_clock()
+    assert isinstance(is_synchronised, bool)
+    assert error_s >= 0.0
+
+
+def test_a_computer_that_forgot_the_time_is_told(monkeypatch):
+    monkeypatch.setattr(time, "time", lambda: 4.0)
+    found = machine.clock(Patient(DaemonConfig()))
+    assert found.level is Level.FAIL
+    assert "forgot the time" in found.found
+
+
+def test_units_are_asked_only_where_systemd_is_at_work(tmp_path):
+    assert find_unit(tmp_path) is None
+    told = {
+        "MainPID": "0",
+        "Environment": 'A=1 "B=two words" NUMBA_CACHE_DIR=/var/cache/fasaco-edge/numba',
+        "StateDirectory": "fasaco-edge",
+        "MemoryMax": "infinity",
+    }
+    unit = Unit(told)
+    assert unit.pid is None
+    assert unit.environ["NUMBA_CACHE_DIR"] == "/var/cache/fasaco-edge/numba"
+    assert unit.environ["B"] == "two words"
+    assert unit.environ["STATE_DIRECTORY"] == "/var/lib/fasaco-edge"
+    assert (unit.limit("MemoryMax"), unit.limit("MemoryHigh")) == (None, None)
+
+
+def test_folders_and_who_may_write_there(tmp_path):
+    state = tmp_path / "state"
+    state.mkdir(mode=0o700)
+    file = tmp_path / "config.yaml"
+    file.touch(mode=0o644)
+    config = DaemonConfig(
+        mission=MissionSettings(state_dir=str(state)),
+        bus=BusConfig(connect=("tcp/127.0.0.1:1#key=secret",)),
+    )
+    patient = Patient(config, file, recordings=tmp_path / "later" / "recordings")
+    disk = folders.disk(patient)
+    assert disk.level is Level.OK
+    assert [line.partition(":")[0] for line in disk.details] == [
+        "state",
+        "kernel cache",
+        "recordings",
+    ]
+    assert folders.permissions(patient).level is Level.WARN
+    assert "secret" not in folders.permissions(patient).found
+    file.chmod(0o640)
+    assert folders.permissions(patient).level is Level.OK
+    state.chmod(0o777)
+    assert folders.permissions(patient).to_do == f"chmod o-w {state}"
+    file.chmod(0o666)
+    both = folders.permissions(patient)
+    assert both.level is Level.FAIL
+    assert len(both.details) == 2
+    # Nothing was made.
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["config.yaml", "state"]
+
+
+def test_a_read_only_disk_is_told(tmp_path):
+    config = DaemonConfig(mission=MissionSettings(state_dir="/proc/x"))
+    read_only = next(
+        (
+            line.split()[4]
+            for line in Path("/proc/self/mountinfo").read_text().splitlines()
+            if line.split()[5].startswith("ro,")
+        ),
+        None,
+    )
+    assert folders.disk(Patient(config)).level is not Level.OK
+    if read_only is None:
+        pytest.skip("nothing is mounted read-only here")
+    config = DaemonConfig(mission=MissionSettings(state_dir=f"{read_only}/x"))
+    assert "read-only" in folders.disk(Patient(config)).found
+
+
+def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch):
+    told = {"Environment": f"NUMBA_CACHE_DIR={tmp_path}", "DynamicUser": "yes"}
+    patient = Patient(DaemonConfig(), unit=Unit(told | {"CacheDirectory": "fasaco-edge"}))
+    found = kernels.kernels(patient)
+    assert found.level is Level.WARN
+    assert found.found.startswith("not compiled for this version")
+    # As root it would make a folder that the daemon does not trust.
+    assert found.to_do == (
+        "systemd-run --wait -p DynamicUser=yes -p User=fasaco-edge -p CacheDirectory=fasaco-edge "
+        f"-E NUMBA_CACHE_DIR={tmp_path} {Path(sys.executable).with_name('fasaco-edge')} warmup"
+    )
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    from fasaco_edge.kernels.cache import cache_folder
+
+    folder = cache_folder()
+    assert "never all compiled" in kernels.kernels(patient).found
+    folder.chmod(0o770)
+    found = kernels.kernels(Patient(DaemonConfig()))
+    assert found.level is Level.WARN
+    assert found.found.startswith(f"{folder} may be written by its group: the daemon takes no")
+    folder.chmod(0o700)
+    if os.geteuid() != 0:
+        return
+    os.chown(folder, 4242, 4242)
+    found = kernels.kernels(Patient(DaemonConfig()))
+    assert found.found.startswith(f"{folder} belongs to user 4242: the daemon takes no")
+
+
+def test_kernels_that_are_damaged_or_were_written_by_several(tmp_path, monkeypatch):
+    *files, note = fill_with(tmp_path, 3)
+    monkeypatch.setattr(kernels, "wanted_folder", lambda environ: note.parent)
+    assert kernels.kernels(Patient(DaemonConfig())).level is Level.OK
+    # By another process, that compiles at the same time.
+    write_sealed(files[1], b"the same, compiled again")
+    assert kernels.kernels(Patient(DaemonConfig())).level is Level.OK
+    for harm in HARMS.values():
+        before = files[1].read_bytes()
+        harm(files[1])
+        found = kernels.kernels(Patient(DaemonConfig()))
+        assert found.level is Level.WARN
+        assert found.found.startswith(f"{files[1].name} ")
+        assert found.to_do == "fasaco-edge warmup"
+        files[1].write_bytes(before)
+
+
+def test_nobody_is_there():
+    endpoint = free_endpoint()
+    alone = at(endpoint)
+    assert session.session(alone).details == (f"{endpoint}: free",)
+    assert session.peers(alone).found.startswith("nobody to ask")
+    away = session.session(at(endpoint, connect=("tcp/127.0.0.1:1",)))
+    assert away.level is Level.WARN
+    assert "the daemon tries again and again" in away.found
+    assert session.session(at(connect=("tcp/127.0.0.1:1",), mode="client")).level is Level.FAIL
+
+
+def test_an_address_that_is_not_this_computers():
+    found = session.session(at("tcp/192.0.2.1:7447"))
+    assert found.level is Level.FAIL
+    assert "Cannot assign requested address" in found.found
+
+
+def test_a_daemon_is_found_with_what_it_lacks(tmp_path):
+    with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
+        patient = at(daemon.endpoint)
+        met = session.session(patient)
+        assert met.level is Level.OK
+        assert f"process {daemon.pid} listens there" in met.details[0]
+        lacking = session.peers(patient)
+        assert lacking.level is Level.WARN
+        assert lacking.found == (
+            "the daemon runs: waiting for map, no map yet; it has no map and pose"
+        )
+        assert "fasaco/@v1/robot/map" in lacking.to_do
+        other = session.peers(at(daemon.endpoint, name="second"))
+        assert other.found.startswith("no daemon of robot 'second'; neither map nor pose comes in")
+        assert "other robots: robot" in other.details
+        outsider.put("map", map_bytes(pillared_room()))
+        outsider.put("pose", pose_bytes(1.0, 1.0))
+        outsider.wait_status(lambda status: status["state"] == "covering")
+        assert session.peers(patient).level is Level.OK
+        assert session.peers(patient).found.startswith("the daemon runs: covering, path 1")
+
+
+def test_who_publishes_is_heard_without_a_daemon(tmp_path):
+    with (
+        daemon_process(tmp_path) as other,
+        Outsider(other.endpoint),  # there as soon as the daemon is
+        open_bus(BusSettings(connect=(other.endpoint,))) as bus,
+    ):
+        prefix = "fasaco/@v1/second"
+        # Latched, and said before anybody listened; and now and then.
+        bus.publisher(f"{prefix}/map", qos=QOS["map"]).put(map_bytes(pillared_room()))
+        poses = bus.publisher(f"{prefix}/pose", qos=QOS["pose"])
+        stop = threading.Event()
+
+        def tell() -> None:
+            while not stop.wait(0.1):
+                poses.put(pose_bytes(1.0, 1.0))
+
+        teller = threading.Thread(target=tell)
+        teller.start()
+        try:
+            found = session.peers(at(other.endpoint, name="second"))
+        finally:
+            stop.set()
+            teller.join()
+    assert found.found == "no daemon of robot 'second'; maps and poses come in"
+    assert f"map: 1 in {session.LISTEN_S} s" in found.details
+
+
+def test_a_program_that_says_nothing_hangs_nobody():
+    """Something listens and never answers: the report is there in time all the same."""
+    with socket.socket() as mute:
+        mute.bind(("127.0.0.1", 0))
+        mute.listen()
+        patient = at(f"tcp/127.0.0.1:{mute.getsockname()[1]}")
+        slow = Check("slow", lambda _: session.session(patient))
+        began = time.monotonic()
+        told = dict(report.findings(None, (slow,)))
+        assert time.monotonic() - began < report.PATIENCE_S + 30.0
+    assert told["slow"].level in (Level.WARN, Level.FAIL)
+
+
+def test_a_check_that_fails_costs_its_own_line():
+    def stumble(_: Patient) -> Finding:
+        raise KeyError("what")
+
+    fine = Check("fine", lambda _: Finding(Level.OK, "fine"))
+    told = dict(report.findings(None, (Check("stumbles", stumble), fine)))
+    assert told["fine"].found == "fine"
+    assert told["stumbles"].level is Level.WARN
+    assert "KeyError" in told["stumbles"].found

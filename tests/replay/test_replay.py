@@ -1,0 +1,255 @@
+"""One recording, played again as it was and as it might have been."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import pairwise
+
+import msgspec
+import pytest
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.bus.arrival import PATH_DIGEST
+from fasaco_edge.cli import main
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.replay.replay import Replay
+from fasaco_edge.replay.stand_ins import read_run
+from tests.support import scenarios
+from tests.support.commands import fasaco_edge
+from tests.support.recorded import record_mission
+from tests.support.scenarios import driven_m, left, places, played
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    return record_mission(tmp_path_factory.mktemp("recording"))
+
+
+@pytest.fixture(scope="module")
+def samples(recording):
+    return list(RecordedSamples(recording.paths))
+
+
+@pytest.fixture(scope="module")
+def run(samples):
+    return read_run(samples)
+
+
+@pytest.fixture(scope="module")
+def config(run):
+    return run.daemon_config()
+
+
+@pytest.fixture(scope="module")
+def as_it_was(samples, config):
+    return played(samples, config)
+
+
+def assert_told(story):
+    """Check that all is covered, or that the path in force leads over all that is left.
+
+    The robot of the recording does not drive it: it went by the paths of then.
+    """
+    mission = story.mission
+    if mission.state == "done":
+        assert left(mission) == set()
+    else:
+        assert mission.state == "covering", mission.reason
+        assert left(mission) <= {(row, col) for row, col in mission.path.ahead.tolist()}
+
+
+def assert_covered(story):
+    """Check that all is covered, and that the mission says so or waits at most for the robot."""
+    assert left(story.mission) == set()
+    assert_told(story)
+
+
+def test_the_recording_holds_what_scenarios_need(samples, run, recording):
+    topics = [sample.topic for sample in samples]
+    assert topics.count("map") >= 2
+    assert topics.count("map_update") >= 10
+    assert topics.count("pose") > 200
+    commands = [sample.sample.payload for sample in samples if sample.topic == "command"]
+    told = [json.loads(command)["command"] for command in commands]
+    assert told == ["pause", "resume", "replan"]
+    assert topics.count(PATH_DIGEST) == len(run.paths) == recording.status["path"]["revision"]
+    assert run.ready_ns is not None
+    assert run.starts == run.restored_cells == 0
+    assert all(a.at_ns <= b.at_ns for a, b in pairwise(samples))
+
+
+def test_as_it_was_it_ends_as_it_did(as_it_was, recording, run):
+    assert as_it_was.mission.state == "done", as_it_was.mission.reason
+    assert_covered(as_it_was)
+    coverage = as_it_was.mission.coverage()
+    assert coverage.covered == recording.status["coverage"]["covered"]
+    assert as_it_was.faults == []
+    plans = [step.decision.plan for step in as_it_was.news if step.decision.plan is not None]
+    assert [plan.reason for plan in plans].count("asked for") == 1
+    # The first plans follow from nothing but the map and the recorded work.
+    # How many there are depends on what the daemon took together.
+    verdicts = [step.as_recorded for step in as_it_was.news if step.decision.path is not None]
+    print(f"{verdicts.count(True)} of {len(run.paths)} paths as recorded")
+
+
+def test_a_replay_that_was_recorded_is_repeated_path_by_path(samples, config):
+    unguided = scenarios.without(samples, places(samples, PATH_DIGEST))
+    once = played(unguided, config)
+    again = played(scenarios.with_paths(unguided, once), config)
+    paths = [step for step in again.news if step.decision.path is not None]
+    assert len(paths) > 10
+    assert all(step.as_recorded for step in paths)
+    assert [line[1:-1] for line in again.outline()] == [line[1:-1] for line in once.outline()]
+
+
+def test_twice_it_is_the_same_bit_for_bit(as_it_was, samples, config):
+    assert played(samples, config).outline() == as_it_was.outline()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.4, 0.6, 0.8, 0.99])
+def test_an_update_is_lost(samples, config, share):
+    updates = places(samples, "map_update")
+    story = played(scenarios.without(samples, [updates[int(share * len(updates))]]), config)
+    assert_told(story)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_an_update_comes_again_later(samples, config, share):
+    updates = places(samples, "map_update")
+    index = int(share * (len(updates) - 3))
+    story = played(scenarios.repeated(samples, updates[index], updates[index + 2]), config)
+    assert story.faults == []
+    assert_told(story)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_two_updates_are_exchanged(samples, config, share):
+    updates = places(samples, "map_update")
+    index = int(share * (len(updates) - 2))
+    story = played(scenarios.swapped(samples, updates[index], updates[index + 1]), config)
+    assert_told(story)
+
+
+def test_no_update_comes_at_all(samples, config, as_it_was):
+    """The robot drives on into what the map does not know."""
+    last_map = places(samples, "map")[-1]
+    gone = [place for place in places(samples, "map_update") if place > last_map]
+    story = played(scenarios.without(samples, gone), config)
+    known, known_then = (of.mission.lattice.coverable.sum() for of in (story, as_it_was))
+    assert 0 < known < known_then
+    if story.mission.state == "blocked":
+        assert story.mission.reason
+    else:
+        assert_told(story)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_the_mapper_starts_anew(samples, config, as_it_was, share):
+    index = int(share * len(samples))
+    story = played(scenarios.mapper_restarted(samples, index), config)
+    origin, before = (of.mission.grid.geometry.origin for of in (story, as_it_was))
+    assert (origin.x, origin.y) != (before.x, before.y)
+    assert_covered(story)
+    # Cells keep their place in the frame: nothing that was covered is forgotten.
+    assert story.visited <= as_it_was.visited
+    assert story.mission.ledger.total == as_it_was.mission.ledger.total
+
+
+@pytest.mark.parametrize("late_s", [0.1, 0.5, 2.0])
+def test_poses_come_late(samples, config, as_it_was, late_s):
+    story = played(scenarios.late(samples, "pose", round(late_s * 1e9)), config)
+    assert_covered(story)
+    assert story.visited == as_it_was.visited
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_for_a_while_nobody_knows_where_the_robot_is(samples, config, as_it_was, share):
+    """It reappears far from where it was last seen: what lies between is not covered."""
+    poses = places(samples, "pose")
+    begin = int(share * len(poses))
+    gone = poses[begin : begin + len(poses) // 4]
+    # On a busy machine it may have stood all that while.
+    while driven_m(samples, gone) < 1.5:
+        gone = poses[begin : begin + len(gone) + 1]
+    story = played(scenarios.without(samples, gone), config)
+    assert_told(story)
+    assert story.visited <= as_it_was.visited
+    assert story.mission.ledger.total < as_it_was.mission.ledger.total
+
+
+@pytest.mark.parametrize("late_s", [0.2, 1.0])
+def test_plans_come_late(samples, config, late_s):
+    """Robot and map have changed until then."""
+    slow = msgspec.structs.replace(
+        config, planner=msgspec.structs.replace(config.planner, budget_s=late_s)
+    )
+    unguided = scenarios.without(samples, places(samples, PATH_DIGEST))
+    story = played(unguided, slow)
+    assert_covered(story)
+    assert {step.as_recorded for step in story.news} == {None}
+
+
+def test_nobody_says_that_it_may_go_on(samples, config):
+    story = played(scenarios.without(samples, places(samples, "command")[1:]), config)
+    assert story.mission.state == "paused"
+    assert not len(story.mission.path.ahead)
+
+
+def test_a_command_that_is_none_costs_itself(samples, config):
+    pause = places(samples, "command")[0]
+    story = played(scenarios.changed(samples, pause, lambda _: b'{"command": "dance"}'), config)
+    # Nothing to resume, then: that is refused, too, but not a fault of a sample.
+    assert story.faults == ["bad_order"]
+    assert_told(story)
+
+
+def test_a_map_that_is_none_costs_itself(samples, config):
+    last_map = places(samples, "map")[-1]
+    story = played(scenarios.changed(samples, last_map, lambda payload: payload[:-5]), config)
+    assert story.faults[0] == "malformed_message"
+    assert story.mission.reason
+
+
+def test_the_robot_says_only_once_where_it_is(samples, config):
+    poses = places(samples, "pose")
+    story = played(scenarios.without(samples, poses[1:]), config)
+    assert story.mission.state in ("covering", "planning")
+    assert story.visited <= {(2, 2)}
+
+
+def test_with_other_work_paths_are_others(samples, config, run):
+    replay = Replay(config, run, work=0)
+    steps = [step for step in replay.steps(samples) if step.decision.path is not None]
+    assert left(replay.mission) == set()
+    assert not all(step.as_recorded for step in steps)
+
+
+def test_a_configuration_of_another_release_is_named(run):
+    strange = replace(run, config={"robot": {"wings": 2}}, version="9.9")
+    with pytest.raises(BadConfiguration, match=r"9\.9.*wings"):
+        strange.daemon_config()
+
+
+def test_the_command_tells_the_same_twice(recording, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")  # a narrow table breaks its words
+    words = ["replay", *map(str, recording.paths)]
+    assert main([*words, "--json"]) == 0
+    out = capsys.readouterr().out
+    again = fasaco_edge(*words, "--json")
+    assert (again.code, again.out) == (0, out)
+    told = json.loads(out)
+    summary = told["summary"]
+    assert summary["state"] == "done"
+    assert summary["paths_recorded"] == recording.status["path"]["revision"]
+    assert summary["samples_missing"] == 0
+    paths = [step["path"] for step in told["decisions"] if "path" in step]
+    assert len(paths) == summary["paths"]
+    assert all(isinstance(path["as_recorded"], bool) for path in paths[: summary["paths_recorded"]])
+    assert len(paths[0]["cells_digest"]) == 32
+    assert main([*words, "--work", "1000"]) == 0
+    table = capsys.readouterr().out
+    assert paths[0]["reason"].split()[0] in table
+    assert f"{summary['covered_cells']} of {summary['coverable_cells']} cells" in table

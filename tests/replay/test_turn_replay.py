@@ -1,0 +1,180 @@
+"""Missions once more, turn by turn as the daemon took them: the same bit for bit, or told where."""
+
+from __future__ import annotations
+
+import json
+import math
+from zlib import crc32
+
+import pytest
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.cli import main
+from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.replay.stand_ins import read_run
+from fasaco_edge.replay.turn_record import TURNS, read_turns
+from fasaco_edge.replay.turn_replay import TurnReplay
+from fasaco_edge.wire.turns import decode_turns, encode_turns
+from tests.support.recorded import record_mission
+from tests.support.scenarios import changed, places, without
+from tests.wire.schemas import check
+
+# What stands before the pixels of a map update is shorter.
+HEADER_BYTES = 100
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("recording")
+
+
+@pytest.fixture(scope="module")
+def half(folder):
+    """A mission that was ended half-way."""
+    return record_mission(folder, "half", lambda s: (s["coverage"] or {}).get("covered", 0) > 6)
+
+
+@pytest.fixture(scope="module")
+def recording(folder, half):
+    """The mission after it, in the same room and with the same ledger."""
+    return record_mission(folder, "whole")
+
+
+@pytest.fixture(scope="module")
+def samples(recording):
+    return list(RecordedSamples(recording.paths))
+
+
+def played(samples):
+    record = read_turns(samples)
+    assert record is not None
+    replay = TurnReplay(read_run(samples).daemon_config(), record)
+    steps = [step for step in replay.steps(samples) if step.is_news]
+    return replay, record, steps
+
+
+def first_use(samples, topic, checksum_of):
+    """Return the turns that took a sample."""
+    return [
+        turn.number
+        for sample in samples
+        if sample.topic == TURNS
+        for turn in decode_turns(sample.sample.payload).turns
+        for taken in turn.samples
+        if (taken.topic, taken.checksum) == (topic, checksum_of)
+    ]
+
+
+@pytest.mark.parametrize("which", ["half", "recording"])
+def test_every_decision_is_as_it_was(which, request):
+    recording = request.getfixturevalue(which)
+    samples = list(RecordedSamples(recording.paths))
+    replay, record, steps = played(samples)
+    assert record.gap == ""
+    assert (replay.difference, replay.lacking) == (None, [])
+    assert replay.turns == record.turns > 100
+    paths = [step.as_recorded for step in steps if step.decision.path is not None]
+    assert all(paths)
+    assert len(paths) == len(read_run(samples).paths) == recording.status["path"]["revision"]
+    assert replay.plans > 2
+    assert replay.mission.state == recording.status["state"]
+    assert bool(record.beginning.ledger) == (which == "recording")
+    assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
+
+
+def test_what_is_said_on_the_bus_is_that_of_the_contract(samples):
+    for place in places(samples, TURNS):
+        check("turns.json", json.loads(samples[place].sample.payload))
+
+
+def turned_over(samples, share):
+    """Return the samples with free for wall at the end of the largest update, and who took that."""
+    index = max(places(samples, "map_update"), key=lambda place: len(samples[place].sample.payload))
+    payload = samples[index].sample.payload
+    count = math.ceil(share * (len(payload) - HEADER_BYTES))
+    others = bytes(0x00 if pixel == 0x64 else 0x64 for pixel in payload[-count:])
+    (turn,) = first_use(samples, "map_update", crc32(payload))
+    return changed(samples, index, lambda _: payload[:-count] + others), turn
+
+
+def test_a_pixel_that_is_another_is_found(samples):
+    altered, turn = turned_over(samples, 0.001)
+    replay, _, _ = played(altered)
+    assert [(lacking.turn, lacking.replayed) for lacking in replay.lacking] == [
+        (turn, "another one")
+    ]
+    assert replay.difference is None or replay.difference.turn >= turn
+
+
+def test_what_another_map_leads_to_is_found(samples):
+    altered, turn = turned_over(samples, 1.0)
+    replay, _, _ = played(altered)
+    assert replay.lacking[0].turn == turn
+    assert replay.difference is not None
+    assert turn <= replay.difference.turn == replay.turns + 1
+
+
+def test_a_decision_that_is_another_is_found_at_its_turn(samples):
+    """The log itself says that another path was published."""
+    place = next(
+        place
+        for place in reversed(places(samples, TURNS))
+        if any(turn.decided and turn.decided.path for turn in _turns(samples[place]))
+    )
+    turn = next(turn for turn in _turns(samples[place]) if turn.decided and turn.decided.path)
+
+    def lie(payload):
+        batch = decode_turns(payload)
+        plain = json.loads(encode_turns(batch))
+        told = next(t for t in plain["turns"] if t["number"] == turn.number)
+        told["decided"]["path"][2] ^= 1
+        return json.dumps(plain).encode()
+
+    replay, _, _ = played(changed(samples, place, lie))
+    assert (replay.difference.turn, replay.difference.what) == (turn.number, "path")
+    assert replay.turns == turn.number - 1
+
+
+def test_a_map_that_is_missing_is_named(samples):
+    index = places(samples, "map_update")[-1]
+    (turn,) = first_use(samples, "map_update", crc32(samples[index].sample.payload))
+    replay, _, _ = played(without(samples, [index]))
+    assert [lacking.turn for lacking in replay.lacking] == [turn]
+    assert "missing" in replay.lacking[0].replayed
+
+
+def test_a_gap_in_the_log_is_as_far_as_it_goes(samples):
+    logs = places(samples, TURNS)
+    replay, record, _ = played(without(samples, [logs[len(logs) // 2]]))
+    assert "not in the recording" in record.gap
+    assert replay.difference is None
+    assert replay.turns == record.turns > 0
+
+
+def test_without_its_beginning_there_is_no_log(samples):
+    assert read_turns(without(samples, places(samples, TURNS)[:1])) is None
+    assert read_turns(without(samples, places(samples, TURNS))) is None
+
+
+def test_a_log_that_is_none_ends_it(samples):
+    logs = places(samples, TURNS)
+    _, record, _ = played(changed(samples, logs[2], lambda payload: payload[:-9]))
+    assert record.gap.startswith("turn log")
+
+
+def test_the_command_says_that_it_is_equal(recording, capsys):
+    words = ["replay", *map(str, recording.paths)]
+    assert main(words) == 0
+    assert "equal bit for bit" in capsys.readouterr().out
+    assert main([*words, "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)["summary"]
+    assert summary["equal"] is True
+    assert summary["turns_equal"] == summary["turns"]
+    assert summary["paths_as_recorded"] == summary["paths_recorded"] == summary["paths"]
+    assert main([*words, "--work", "0", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["summary"]["equal"] is None
+
+
+def _turns(arrival):
+    return decode_turns(arrival.sample.payload).turns

@@ -1,0 +1,62 @@
+"""The daemon with faults built in: ``python -m tests.support.breaking run ...`` as ``fasaco-edge``.
+
+What breaks is chosen by the width of the map.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fasaco_edge.mission.map import map_state as site
+from fasaco_edge.planners import table
+
+# Width of the map [m] that breaks each of them.
+PLANNER_M, PHEROMONE_M, MISSION_M = 4.6, 5.2, 5.8
+PIXEL_M = 0.05
+
+
+class BreakingPlanner:
+    """Breaks on lattices over one map, and tells an impossible pheromone over another."""
+
+    def __init__(self, planner: Any) -> None:
+        self._planner = planner
+
+    def plan(self, problem: Any, stop: Any, observe: Any) -> Any:
+        cols = problem.lattice.window.cols
+        if cols == cells(PLANNER_M):
+            raise IndexError("index 7 is out of bounds")
+
+        def observed(snapshot: Any) -> None:
+            trail = np.full_like(snapshot.trail, np.nan)
+            observe(replace(snapshot, trail=trail) if cols == cells(PHEROMONE_M) else snapshot)
+
+        return self._planner.plan(problem, stop, observed)
+
+
+def cells(width_m: float) -> int:
+    """Return how many cells of 0.3 m a map that is not a multiple of them is wide."""
+    return int(np.ceil(width_m / 0.3))
+
+
+def main() -> None:
+    """Build the faults in and run."""
+    planner_of, take_map = table.planner_of, site.Site._take_map
+
+    def breaking_map(self: Any, grid: Any, within: Any = None) -> None:
+        take_map(self, grid, within)
+        if grid.geometry.cols == round(MISSION_M / PIXEL_M):
+            raise ZeroDivisionError("division by zero")
+
+    table.planner_of = lambda *args: BreakingPlanner(planner_of(*args))  # type: ignore[assignment]
+    site.Site._take_map = breaking_map  # type: ignore[method-assign]
+    from fasaco_edge.cli import main as run
+
+    sys.exit(run())
+
+
+if __name__ == "__main__":
+    main()

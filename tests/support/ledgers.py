@@ -1,0 +1,55 @@
+"""Ledgers for tests, and what they hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fasaco_edge.daemon.ledger.file import Found, LedgerFile
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.mission.coverage.ledger import TILE, CoverageLedger, LedgerSnapshot
+
+CELL_M = 0.3
+# The newest and the one before.
+NAMES = ("robot.ledger", "robot.ledger.previous")
+Cell = tuple[int, int]
+
+
+def driven(*cells: Cell, cell_m: float = CELL_M, frame: str = "map") -> LedgerSnapshot:
+    """Return the ledger of a robot that stood in one cell (row, col) after the other."""
+    ledger = CoverageLedger(cell_m, frame)
+    for row, col in cells:
+        ledger.record(Pose2D((col + 0.5) * cell_m, (row + 0.5) * cell_m))
+    return ledger.snapshot()
+
+
+def lane(length: int) -> LedgerSnapshot:
+    """Return the ledger of a drive along cells (0, 0), (0, 1) and so on."""
+    return driven(*((0, col) for col in range(length)))
+
+
+def visits_of(ledger: LedgerSnapshot) -> dict[Cell, int]:
+    """Return how often each visited cell (row, col) was visited."""
+    return {
+        (int(row) + TILE * i, int(col) + TILE * j): int(tile[row, col])
+        for (i, j), tile in ledger.tiles.items()
+        for row, col in np.argwhere(tile)
+    }
+
+
+def contents(ledger: LedgerSnapshot | None) -> object:
+    """Return all that a ledger holds, to be compared."""
+    if ledger is None:
+        return None
+    return ledger.cell_m, ledger.frame, ledger.total, ledger.under_tool, visits_of(ledger)
+
+
+def load(folder: Path) -> Found:
+    """Return what a daemon finds that starts now."""
+    return LedgerFile(folder, "robot").load(CELL_M)
+
+
+def names(folder: Path) -> list[str]:
+    """Return the names of all files in a folder."""
+    return sorted(path.name for path in folder.iterdir())

@@ -1,0 +1,207 @@
+"""A short mission of a real daemon with a real recorder: a robot in a room it does not know.
+
+Its mapper sends whole maps while they grow, and else updates. For a while it believes in a
+crate that is not there. Once the robot is told to pause, and to go on.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from fasaco_edge.bus.mailbox import LatestSlot
+from fasaco_edge.bus.publisher import QOS
+from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.errors import BusUnavailable
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.planners.warmup import warm_up
+from fasaco_edge.simulation.config import SimulationConfig
+from fasaco_edge.simulation.world import World
+from fasaco_edge.wire import schemas
+from fasaco_edge.wire.json_text import decode_json, encode_json
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
+from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.poses import encode_pose_stamped
+from tests.support.processes import daemon_process
+from tests.support.rooms import RESOLUTION_M, WALL, fill, room
+
+SIZE_M = (3.6, 2.7)
+START = Pose2D(0.75, 0.75)
+# Where the crate is said to stand [m], and from when to when [simulated s].
+CRATE = (2.4, 1.2, 2.7, 1.5)
+CRATE_S = (8.0, 25.0)
+# What is commanded when [simulated s].
+COMMANDS = ((14.0, "pause"), (16.0, "resume"), (19.0, "replan"))
+# From the first path to the first command, at least [s]: when the daemon took what a recording
+# tells no more exactly than that.
+DRIVES_S = 0.5
+# Simulated seconds per second.
+SPEED = 16.0
+TIMEOUT_S = 250.0
+SIMULATION = SimulationConfig(
+    robot_radius_m=0.18, range_m=1.2, map_chunk_m=1.5, map_hz=1.0, pose_hz=4.0
+)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The parts, what the daemon said, and where the robot was in truth.
+
+    ``statuses`` and ``notes``, those of all paths, come with the seconds they came at.
+    """
+
+    paths: list[Path]
+    status: dict
+    statuses: list[tuple[float, dict]]
+    notes: list[tuple[float, dict]]
+    trail: np.ndarray
+
+
+def is_done(status: dict) -> bool:
+    """Tell whether all is covered."""
+    return status.get("state") == "done"
+
+
+def record_mission(
+    folder: Path, name: str = "runs", ends=is_done, *, broken_poses: int = 0
+) -> Recording:
+    """Record a mission from its first map until a status ends it; some poses may be none."""
+    runs = folder / name
+    warm_up()  # so that the daemon need not compile while the robot waits
+    with daemon_process(folder, "--record", str(runs), planner={"budget_s": 0.05}) as daemon:
+        deadline = time.monotonic() + TIMEOUT_S
+        while (bus := _joined(daemon.endpoint)) is None:
+            assert time.monotonic() < deadline, daemon.log_text()
+            time.sleep(0.05)
+        with bus:
+            robot = MappingRobot(bus, broken_poses)
+            robot.wait(lambda status: (status["recorder"] or {}).get("state") == "recording")
+            robot.drive(ends)
+        # With the recorder's last words it may take a while on a busy machine.
+        daemon.process.terminate()
+        daemon.process.wait(TIMEOUT_S)
+    return Recording(
+        sorted(runs.glob("*.rrd")), robot.status, robot.statuses, robot.notes, robot.trail
+    )
+
+
+def _joined(endpoint: str) -> Bus | None:
+    try:
+        return open_bus(BusSettings("client", (endpoint,)))
+    except BusUnavailable:
+        return None
+
+
+class MappingRobot:
+    """A robot on the bus, and the newest status of the daemon."""
+
+    def __init__(self, bus: Bus, broken_poses: int = 0) -> None:
+        self._bus, self._keys = bus, Keys()
+        self._broken_poses = broken_poses
+        keys = self._keys
+        self._commands = list(COMMANDS)
+        pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
+        geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0))
+        self._world = World(OccupancyGrid(geometry, pixels), START, SIMULATION)
+        self._maps = bus.publisher(keys.map, schemas.OCCUPANCY_GRID, QOS["map"])
+        self._updates = bus.publisher(keys.map_update, schemas.OCCUPANCY_GRID_UPDATE)
+        self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED, QOS["pose"])
+        self._newest_path = LatestSlot[Sample]()
+        self.status: dict = {}
+        self.statuses: list[tuple[float, dict]] = []
+        self.notes: list[tuple[float, dict]] = []
+        self._sent: OccupancyGrid | None = None
+        bus.subscribe(keys.path, self._take_path, latched=True)
+        bus.subscribe(keys.status, self._hear, latched=True)
+
+    def wait(self, holds) -> None:
+        """Wait for a status."""
+        deadline = time.monotonic() + TIMEOUT_S
+        while not (self.status and holds(self.status)):
+            assert time.monotonic() < deadline, f"never came; the last was {self.status}"
+            time.sleep(0.02)
+
+    def drive(self, ends=is_done) -> None:
+        """Drive until the daemon says that all is covered, or what else ends it."""
+        deadline = time.monotonic() + TIMEOUT_S
+        tick_s = SIMULATION.tick_s / SPEED
+        due = time.monotonic()
+        while not ends(self.status):
+            assert time.monotonic() < deadline, f"never done; the last was {self.status}"
+            if (sample := self._newest_path.take(0.0)) is not None:
+                self._world.follow(decode_path(sample.payload).xy)
+            self._publish()
+            if self._is_time():
+                self._command(self._commands.pop(0)[1])
+                due = time.monotonic()
+            due += tick_s
+            time.sleep(max(due - time.monotonic(), 0.0))
+        # The last path, which tells the robot to stop, is to be recorded too, and its turn.
+        time.sleep(0.8)
+
+    def _is_time(self) -> bool:
+        """Tell whether the next command is due; one that waits for its first path gets none."""
+        if not self._commands or 1e-9 * self._world.stamp_ns < self._commands[0][0]:
+            return False
+        if not self.notes or time.monotonic() - self.notes[0][0] < DRIVES_S:
+            return False
+        return self._commands[0][1] == "resume" or self.status.get("state") == "covering"
+
+    def _publish(self) -> None:
+        emission = self._world.tick()
+        if emission.map is not None:
+            self._publish_map(self._believed(emission.map))
+        if emission.pose is not None:
+            pose = encode_pose_stamped(emission.pose)
+            self._poses.put(pose)
+            if self._broken_poses:
+                self._broken_poses -= 1
+                self._poses.put(pose[:-5])
+
+    def _command(self, name: str) -> None:
+        payload = encode_json({"command": name})
+        (reply,) = self._bus.get(self._keys.rpc("mission"), timeout_s=TIMEOUT_S, payload=payload)
+        assert not reply.is_error, reply.payload
+
+    def _believed(self, grid: OccupancyGrid) -> OccupancyGrid:
+        if not CRATE_S[0] <= 1e-9 * self._world.stamp_ns < CRATE_S[1]:
+            return grid
+        (col0, row0), (col1, row1) = (
+            (round(place) for place in grid.geometry.to_pixels(x, y))
+            for x, y in (CRATE[:2], CRATE[2:])
+        )
+        cells = grid.cells.copy()
+        cells[max(row0, 0) : max(row1, 0), max(col0, 0) : max(col1, 0)] = WALL
+        return replace(grid, cells=cells)
+
+    def _publish_map(self, grid: OccupancyGrid) -> None:
+        before, self._sent = self._sent, grid
+        if before is None or before.geometry != grid.geometry:
+            self._maps.put(encode_occupancy_grid(grid))
+            return
+        changed = before.cells != grid.cells
+        if not changed.any():
+            return
+        rows, cols = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
+        window = Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
+        cells = grid.cells[window.row0 : window.row1, window.col0 : window.col1].copy()
+        patch = MapPatch(window, cells, grid.frame, grid.stamp_ns)
+        self._updates.put(encode_map_update(patch))
+
+    @property
+    def trail(self) -> np.ndarray:
+        """Where the robot was in truth: points (x, y) [m], float64 (n, 2)."""
+        return self._world.trail
+
+    def _take_path(self, sample: Sample) -> None:
+        self.notes.append((time.monotonic(), decode_json(sample.attachment)))
+        self._newest_path.put(sample)
+
+    def _hear(self, sample: Sample) -> None:
+        self.status = decode_json(sample.payload)
+        self.statuses.append((time.monotonic(), self.status))

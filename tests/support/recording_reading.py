@@ -1,0 +1,142 @@
+"""Reading a recording back, also one that a crash cut short; no viewer needed."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import UnreadableRecording
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.read.repair import scan_recording
+from fasaco_edge.recording.sdk import RrdReader
+
+SCALAR = "Scalars:scalars"
+STATE = "StateChange:state"
+TEXT = "TextLog:text"
+# What rerun writes about a recording, beside what was logged, begins so.
+RESERVED_PREFIX = "/__"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Column:
+    """One component of one entity over time.
+
+    Attributes:
+        wall_ns: int64 (n,), ascending: when it was logged [ns].
+        values: what was logged, n lists of instances.
+    """
+
+    wall_ns: NDArray[np.int64]
+    values: list[list[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingSummary:
+    """What a recording holds.
+
+    Attributes:
+        rows: how often each entity was logged with a time, by its name.
+        timelines: names of the timelines, sorted.
+        began_ns, ended_ns: first and last time on the timeline ``wall`` [ns]; 0 if empty.
+        complete: whether the recorder ended the file itself.
+        covered: last fraction of the coverable cells that is covered; None if never told.
+        recovered: last fraction of them that was visited again; None if never told.
+        best_steps: steps of the best walk at the last cohort; None without any.
+        paths: lines on new paths, in order.
+        states: states of the mission, in order.
+    """
+
+    rows: dict[str, int]
+    timelines: tuple[str, ...]
+    began_ns: int
+    ended_ns: int
+    complete: bool
+    covered: float | None
+    recovered: float | None
+    best_steps: float | None
+    paths: tuple[str, ...]
+    states: tuple[str, ...]
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first to the last [s]."""
+        return (self.ended_ns - self.began_ns) / 1e9
+
+
+def read_column(path: Path, entity: str, component: str) -> Column:
+    """Return what was logged over time as ``component``, "Scalars:scalars" say, of ``entity``.
+
+    Raises:
+        UnreadableRecording: ``path`` is no recording, or is torn.
+    """
+    rows: list[tuple[int, list[Any]]] = []
+    for chunk in _chunks(path, f"/{entity}"):
+        batch = chunk.to_record_batch()
+        if not chunk.is_static and component in batch.schema.names:
+            rows += zip(_wall_ns(batch).tolist(), batch.column(component).to_pylist(), strict=True)
+    # Chunks come in no order of time.
+    rows.sort(key=lambda row: row[0])
+    return Column(np.array([time for time, _ in rows], np.int64), [value for _, value in rows])
+
+
+def read_summary(path: Path) -> RecordingSummary:
+    """Return what the recording ``path`` holds.
+
+    Raises:
+        UnreadableRecording: ``path`` is no recording, or is torn.
+    """
+    rows: Counter[str] = Counter()
+    timelines: set[str] = set()
+    spans: list[NDArray[np.int64]] = []
+    for chunk in _chunks(path, "/**"):
+        if not chunk.is_static and not chunk.entity_path.startswith(RESERVED_PREFIX):
+            rows[chunk.entity_path.removeprefix("/")] += chunk.num_rows
+            timelines.update(chunk.timeline_names)
+            wall_ns = _wall_ns(chunk.to_record_batch())
+            spans.append(np.array([wall_ns.min(), wall_ns.max()]))
+    with path.open("rb") as recording:
+        scan = scan_recording(recording)
+    return RecordingSummary(
+        rows=dict(rows),
+        timelines=tuple(sorted(timelines)),
+        began_ns=int(np.min(spans)) if spans else 0,
+        ended_ns=int(np.max(spans)) if spans else 0,
+        complete=scan is not None and scan.has_footer,
+        covered=_last_scalar(path, entities.COVERED_FRACTION),
+        recovered=_last_scalar(path, entities.RECOVERED_FRACTION),
+        best_steps=_last_scalar(path, entities.BEST_STEPS),
+        paths=_texts(path, entities.PATH_LOG, TEXT),
+        states=_texts(path, entities.MISSION_STATE, STATE),
+    )
+
+
+def _last_scalar(path: Path, entity: str) -> float | None:
+    values = read_column(path, entity, SCALAR).values
+    return float(values[-1][0]) if values else None
+
+
+def _texts(path: Path, entity: str, component: str) -> tuple[str, ...]:
+    return tuple(str(value[0]) for value in read_column(path, entity, component).values)
+
+
+def _wall_ns(batch: Any) -> NDArray[np.int64]:
+    wall: NDArray[np.int64] = batch.column(entities.WALL).to_numpy(False).astype(np.int64)
+    return wall
+
+
+def _chunks(path: Path, content: str) -> Iterator[Any]:
+    try:
+        with warnings.catch_warnings():
+            # Of a file without its footer: slower to open, and all there.
+            warnings.filterwarnings("ignore", message="RRD file has no footer")
+            reader = RrdReader(str(path))
+        yield from reader.stream().filter(content=content)
+    except (OSError, RuntimeError, ValueError) as error:
+        raise UnreadableRecording(f"{path}: {error}") from error

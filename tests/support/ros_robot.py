@@ -1,0 +1,165 @@
+"""A robot under ROS 2, as it looks on Zenoh: plain Zenoh, payloads by rosbags, no code of ours.
+
+What rmw_zenoh does is written down again here, from its design.md and its sources.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+import zenoh.ext
+
+from fasaco_edge.grid.geometry import Pose2D
+from tests.support.outsider import TIMEOUT_S, Ear
+from tests.wire import oracle
+
+GRID, PATH, POSE = (
+    "nav_msgs/msg/OccupancyGrid",
+    "nav_msgs/msg/Path",
+    "geometry_msgs/msg/PoseStamped",
+)
+UPDATE, TF = "map_msgs/msg/OccupancyGridUpdate", "tf2_msgs/msg/TFMessage"
+
+
+@dataclass(frozen=True)
+class Naming:
+    """How ROS names become keys: ``domain`` None under zenoh-bridge-ros2dds."""
+
+    domain: int | None
+    namespace: str = ""
+
+    def key(self, topic: str, schema: str) -> str:
+        """Return the key of a topic, ``map`` say."""
+        name = f"{self.namespace}/{topic}".strip("/")
+        if self.domain is None:
+            return name
+        package, kind, type_name = schema.split("/")
+        type_hash = oracle.STORE.hash_rihs01(schema)
+        return f"{self.domain}/{name}/{package}::{kind}::dds_::{type_name}_/{type_hash}"
+
+
+class RosPublisher:
+    """Publishes as rmw_zenoh or the bridge does: no encoding; what is latched is kept."""
+
+    def __init__(self, session: zenoh.Session, key: str, *, latched: bool, attached: bool) -> None:
+        self._gid = os.urandom(16) if attached else None
+        self._count = 0
+        ext = zenoh.ext
+        # A bridge has one publisher for all nodes behind it, and a history ten times theirs.
+        cache = ext.CacheConfig(max_samples=1 if attached else 10) if latched else None
+        beats = ext.MissDetectionConfig(sporadic_heartbeat=0.5) if latched and attached else None
+        self._publisher: Any = ext.declare_advanced_publisher(
+            session,
+            key,
+            cache=cache,
+            publisher_detection=latched,
+            sample_miss_detection=beats,
+        )
+
+    def put(self, payload: bytes) -> None:
+        """Send a message."""
+        self._count += 1
+        serial, number = zenoh.ext.z_serialize, zenoh.ext.Int64
+        attachment = None
+        if self._gid is not None:
+            parts = serial(number(self._count)), serial(number(time.time_ns())), serial(self._gid)
+            attachment = b"".join(bytes(part) for part in parts)
+        self._publisher.put(payload, attachment=attachment)
+
+
+class RosRobot:
+    """A session with what a robot's nodes publish, and what they hear."""
+
+    def __init__(self, session: zenoh.Session, naming: Naming) -> None:
+        self.session = session
+        self.naming = naming
+        self._publishers: dict[str, RosPublisher] = {}
+        self._others: list[RosPublisher] = []
+
+    def put(self, topic: str, schema: str, payload: bytes, *, latched: bool = False) -> None:
+        """Publish on a topic."""
+        if topic not in self._publishers:
+            self._publishers[topic] = self.another(topic, schema, latched=latched)
+        self._publishers[topic].put(payload)
+
+    def another(self, topic: str, schema: str, *, latched: bool = False) -> RosPublisher:
+        """Return one more publisher of a topic."""
+        key, attached = self.naming.key(topic, schema), self.naming.domain is not None
+        publisher = RosPublisher(self.session, key, latched=latched, attached=attached)
+        self._others.append(publisher)
+        return publisher
+
+    def put_tf(self, frame: str, child: str, where: Pose2D, topic: str = "tf") -> None:
+        """Publish one transform."""
+        message = oracle.transforms((frame, child, time.time_ns(), oracle.pose(where)))
+        self.put(topic, TF, oracle.to_bytes(TF, message), latched=topic == "tf_static")
+
+    def listen(self, topic: str, schema: str) -> Ear:
+        """Subscribe as to a transient-local topic."""
+        ear = Ear()
+        zenoh.ext.declare_advanced_subscriber(
+            self.session,
+            self.naming.key(topic, schema),
+            ear,
+            history=zenoh.ext.HistoryConfig(max_samples=1, detect_late_publishers=True),
+            recovery=zenoh.ext.RecoveryConfig(heartbeat=True),
+            subscriber_detection=True,
+        )
+        return ear
+
+    def tokens(self) -> list[list[str]]:
+        """Return the parts of all liveliness tokens of the domain."""
+        replies = self.session.liveliness().get(f"@ros2_lv/{self.naming.domain}/**", timeout=2.0)
+        return [str(reply.ok.key_expr).split("/") for reply in replies if reply.ok is not None]
+
+
+@contextmanager
+def ros_robot(
+    endpoint: str, naming: Naming, transport: dict[str, Any] | None = None
+) -> Iterator[RosRobot]:
+    """Run a robot's session, once there is somebody at ``endpoint``.
+
+    ``transport``: what shows who it is, as Zenoh's configuration has it.
+    """
+    deadline = time.monotonic() + TIMEOUT_S
+    while True:
+        try:
+            where = {"endpoints": [endpoint], "timeout_ms": 0}
+            session = _open(mode="client", connect=where, transport=transport or {})
+            break
+        except zenoh.ZError:
+            assert time.monotonic() < deadline, f"nobody listens at {endpoint}"
+            time.sleep(0.05)
+    try:
+        yield RosRobot(session, naming)
+    finally:
+        session.close()  # type: ignore[no-untyped-call]
+
+
+@contextmanager
+def ros_node(router: str, naming: Naming) -> Iterator[RosRobot]:
+    """Run a session as rmw_zenoh's nodes have it by default: peers that meet at a router."""
+    listen = {"endpoints": ["tcp/localhost:0"]}
+    with _open(mode="peer", connect={"endpoints": [router]}, listen=listen) as session:
+        yield RosRobot(session, naming)
+
+
+@contextmanager
+def ros_router(endpoint: str) -> Iterator[None]:
+    """Run a router as rmw_zenohd is by default."""
+    with _open(mode="router", listen={"endpoints": [endpoint]}):
+        yield
+
+
+def _open(**document: Any) -> zenoh.Session:
+    document["scouting"] = {"multicast": {"enabled": False}, "gossip": {"enabled": True}}
+    document["timestamping"] = {"enabled": True}
+    document["transport"] = {"shared_memory": {"enabled": False}} | document.get("transport", {})
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(document)))

@@ -1,0 +1,176 @@
+"""What a stranger sees on the screen."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from rich.cells import cell_len
+from rich.color import ColorSystem
+
+from fasaco_edge.watch.ink import Ink
+from fasaco_edge.watch.known import Known, Token
+from fasaco_edge.watch.page import Page
+from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
+from tests.watch.grids import NOW, console, mid_mission, plain, status, tell
+
+SIZES = [(80, 24), (120, 40), (200, 60), (64, 14), (63, 13), (30, 10), (12, 4), (1, 1), (400, 5)]
+
+
+def page_of(known: Known, width: int = 80, height: int = 24, colours: str | None = None) -> str:
+    """Return what is seen."""
+    lines = Page(console(width, colours=colours)).lines(known, NOW, width, height)
+    return "\n".join(plain(line) for line in lines)
+
+
+def test_two_pixels_make_a_character():
+    kinds = np.array([[WALL, WALL, COVERED], [WALL, COVERED, COVERED]], np.uint8)
+    (line,) = Ink(ColorSystem.TRUECOLOR, unicode=True).lines(kinds)
+    wall, covered = "214;218;226", "24;112;82"
+    assert line == (
+        f"\x1b[38;2;{wall};48;2;{wall}m \x1b[0m"
+        f"\x1b[38;2;{wall};48;2;{covered}m▀\x1b[0m"
+        f"\x1b[38;2;{covered};48;2;{covered}m \x1b[0m"
+    )
+
+
+def test_what_is_alike_is_written_once():
+    (line,) = Ink(ColorSystem.TRUECOLOR, unicode=True).lines(np.full((2, 50), WALL, np.uint8))
+    assert line.count("\x1b") == 2
+    assert plain(line) == " " * 50
+
+
+@pytest.mark.parametrize(
+    ("colours", "code"),
+    [(ColorSystem.EIGHT_BIT, "38;5;"), (ColorSystem.STANDARD, "97;42m")],
+)
+def test_fewer_colours_will_do(colours, code):
+    (line,) = Ink(colours, unicode=True).lines(np.array([[WALL], [COVERED]], np.uint8))
+    assert code in line
+    assert "38;2" not in line
+
+
+def test_no_colours_will_do():
+    kinds = np.array([[WALL, 0, TO_COVER, HEADING + 2], [WALL, COVERED, 0, 0]], np.uint8)
+    assert Ink(None, unicode=True).lines(kinds) == ["#o-↑"]
+    assert Ink(None, unicode=False).lines(kinds) == ["#o-^"]
+
+
+@pytest.mark.parametrize(("width", "height"), SIZES)
+@pytest.mark.parametrize("colours", ["truecolor", "standard", None])
+def test_a_page_fills_the_terminal_and_no_more(width, height, colours):
+    lines = Page(console(width, colours=colours)).lines(mid_mission(), NOW, width, height)
+    assert len(lines) == height
+    assert {cell_len(plain(line)) for line in lines} == {width}
+
+
+def test_the_robot_drives_east_in_the_lower_half_over_what_is_covered():
+    lines = page_of(mid_mission()).splitlines()[1:18]
+    row = next(number for number, line in enumerate(lines) if "→" in line)
+    column = lines[row].index("→")
+    assert "*" in lines[row][column:]
+    assert "o" not in lines[1][:45]
+    assert "o" in lines[-4][:45]
+    assert row > 8
+
+
+def test_it_says_how_it_stands():
+    page = page_of(mid_mission())
+    for said in (
+        "COVERING",
+        "25.0 %, 10 of 40 cells",
+        "0.9 m2, 2.7 m2 to go",
+        "map: 2 cells more",
+        "30 steps, bound 29",
+        "everything reachable",
+        "map to path",
+        "written 0.4 s ago",
+        "errors",
+        "the daemon is there",
+        "path 7, 11 steps: map: 2 cells more",
+        "┤ 1 m",
+    ):
+        assert said in page, page
+
+
+def test_it_says_how_far_an_order_is():
+    known = mid_mission()
+    zones = [
+        {"name": "kitchen", "passes": 2, "pass": 1, "cells": 60, "covered": 15},
+        {"name": "hall", "passes": 1, "pass": 0},
+    ]
+    order = {"ordered": "command", "stage": "covering", "zone": "kitchen", "pass": 1, "passes": 2}
+    more = {"zones": zones, "keep_out": 3, "return_home": True, "unreached": {"cells": 5}}
+    tell(known, "status", status(mission=order | more))
+    page = page_of(known, 120, 40)
+    for said in (
+        "zone kitchen, pass 1 of 2",
+        "kitchen   pass 1 of 2, 25.0 %: 15 of 60 cells",
+        "hall      to come",
+        "keep-out zones: 3, returns home",
+        "5 cells, 0.0 m2",
+    ):
+        assert said in page, page
+
+
+def test_a_path_without_points_is_a_stop():
+    known = mid_mission()
+    path = {"revision": 8, "reason": "paused by command"}
+    tell(known, "status", status(state="paused", reason="paused by command", path=path))
+    page = page_of(known, 120, 40)
+    assert "path 8    stop" in page
+    assert "paused: paused by command" in page
+
+
+def test_a_narrow_terminal_keeps_picture_and_state():
+    page = page_of(mid_mission(), 40, 20)
+    assert "COVERING" in page
+    assert "→" in page
+    assert "10 of 40 cells" not in page
+
+
+def test_a_daemon_that_is_gone_or_silent_is_named_so():
+    known = mid_mission()
+    silent = "\n".join(Page(console(colours=None)).lines(known, NOW + 60.0, 80, 24))
+    assert "silent for 60 s" in silent
+    known.take("token", Token("robot", here=False), NOW)
+    assert "gone for 0.0 s; waiting for it to come back" in page_of(known)
+    known.take("token", Token("robot", here=True), NOW)
+    assert "COVERING" in page_of(known)
+    assert "the daemon is back" in page_of(known)
+
+
+def test_before_anything_came_it_says_what_it_waits_for():
+    known = Known("robot")
+    known.take("token", Token("other", here=True), NOW)
+    page = page_of(known)
+    assert "waiting for a daemon of that name; on this bus: other" in page
+    assert "no map" in page
+    known.trouble = "refused"
+    assert "waiting for the bus at refused" in page_of(known)
+
+
+def test_texts_off_the_bus_do_not_control_the_terminal():
+    known = mid_mission()
+    evil = "\x1b[2J\x07\n[red]gone[/red]\u202e"
+    mission = {"stage": evil, "zones": [{"name": evil}]}
+    errors = {"total": 1, "last": evil, "by_code": {evil: 1}}
+    tell(known, "status", status(state=evil, reason=evil, mission=mission, errors=errors))
+    tell(
+        known,
+        "command",
+        json.dumps({"command": evil, "order": {"zones": [{"name": evil}]}}).encode(),
+    )
+    lines = Page(console(colours=None)).lines(known, NOW, 80, 24)
+    assert len(lines) == 24
+    for line in lines:
+        assert line.isprintable(), line
+    assert "[red]gone[/red]" in "".join(lines)
+
+
+def test_a_page_that_did_not_change_is_not_drawn_anew():
+    page, known = Page(console()), mid_mission()
+    first, second = (page.lines(known, NOW, 80, 24) for _ in range(2))
+    assert first == second
+    assert all(a is b for a, b in zip(first[18:22], second[18:22], strict=True))

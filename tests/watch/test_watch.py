@@ -1,0 +1,256 @@
+"""The command itself: a real daemon, a real terminal."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from tests.support.commands import ENVIRONMENT, PROGRAM, fasaco_edge
+from tests.support.hall import HALL, begin, lanes
+from tests.support.outsider import Outsider
+from tests.support.processes import (
+    Daemon,
+    daemon_process,
+    free_endpoint,
+    mapped_files,
+    resident_mb,
+)
+from tests.support.rooms import map_bytes, pose_bytes
+from tests.support.terminal import Terminal
+
+# What it may be resident with [MB].
+WATCH_MB = 75.0
+
+
+@pytest.fixture(scope="module")
+def covering(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A daemon whose robot is on its way; map and pose are of an outsider who has gone."""
+    with daemon_process(tmp_path_factory.mktemp("daemon")) as running:
+        with Outsider(running.endpoint) as outsider:
+            begin(outsider)
+        yield running
+
+
+def test_it_shows_how_the_mission_stands(covering):
+    with Terminal("--connect", covering.endpoint) as terminal:
+        screen = terminal.wait(lambda seen: "COVERING" in seen and "→" in seen.split("robot", 2)[1])
+        assert "of 234 cells" in screen
+        assert "path 1" in screen
+        assert "▀" in terminal.written
+        assert "38;2;" in terminal.written
+        resident = resident_mb(terminal.process.pid)
+        print(f"watch: {resident:.1f} MB")
+        assert resident < WATCH_MB
+        mapped = mapped_files(terminal.process.pid)
+        assert [name for name in ("numba", "llvmlite", "rerun", "PIL") if name in mapped] == []
+        terminal.type("q")
+        assert terminal.end() == 0
+        assert terminal.is_clean()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_leaves_the_terminal_as_it_was(covering, number):
+    with Terminal("--connect", covering.endpoint) as terminal:
+        terminal.wait_text("COVERING")
+        assert not terminal.is_clean()
+        assert terminal.end(number) == 0
+        assert terminal.is_clean()
+        assert "Traceback" not in terminal.written
+
+
+def test_ctrl_c_typed_ends_it(covering):
+    with Terminal("--connect", covering.endpoint) as terminal:
+        terminal.wait_text("COVERING")
+        terminal.type("\x03")
+        assert terminal.end() == 0
+        assert terminal.is_clean()
+
+
+def test_ctrl_z_gives_the_terminal_back_for_a_while(covering):
+    with Terminal("--connect", covering.endpoint) as terminal:
+        terminal.wait_text("COVERING")
+        terminal.process.send_signal(signal.SIGTSTP)
+        _, status = os.waitpid(terminal.process.pid, os.WUNTRACED)
+        assert os.WIFSTOPPED(status)
+        terminal.read()
+        assert terminal.is_clean()
+        terminal.written = ""
+        terminal.process.send_signal(signal.SIGCONT)
+        terminal.wait_text("COVERING")
+        assert not terminal.is_clean()
+        terminal.type("q")
+        assert terminal.end() == 0
+        assert terminal.is_clean()
+
+
+def test_another_size_is_another_page(covering):
+    with Terminal("--connect", covering.endpoint) as terminal:
+        terminal.wait(lambda seen: seen.count("\n") == 23 and "COVERING" in seen)
+        assert {len(line) for line in terminal.screen()} == {80}
+        for columns, lines in ((120, 40), (30, 8), (80, 24)):
+            terminal.resize(columns, lines)
+            terminal.wait(lambda seen, lines=lines: seen.count("\n") == lines - 1)
+            assert {len(line) for line in terminal.screen()} == {columns}
+
+
+def test_a_terminal_without_colours_gets_none(covering):
+    with Terminal("--connect", covering.endpoint, NO_COLOR="1") as terminal:
+        terminal.wait_text("COVERING")
+        terminal.wait_text("####")
+        terminal.type("q")
+        assert terminal.end() == 0
+        codes = set(terminal.written.replace("\x1b[0m", "").split("\x1b[")[1:])
+        assert not any(code.split("m")[0].replace(";", "").isdigit() for code in codes)
+
+
+def test_a_dumb_terminal_gets_lines(covering):
+    with Terminal("--connect", covering.endpoint, TERM="dumb") as terminal:
+        deadline = time.monotonic() + 120.0
+        while "234 cells" not in terminal.written and time.monotonic() < deadline:
+            terminal.read()
+        assert terminal.end(signal.SIGTERM) == 0
+    assert "covering: " in terminal.written
+    assert "\x1b" not in terminal.written
+
+
+def test_a_terminal_that_is_closed_ends_it(covering):
+    with Terminal("--connect", covering.endpoint) as terminal:
+        terminal.wait_text("COVERING")
+        terminal.hang_up()
+        assert terminal.process.wait(60.0) in (0, 1)
+
+
+def test_it_outlives_the_daemon(tmp_path):
+    endpoint = free_endpoint()
+    with Terminal("--connect", endpoint) as terminal:
+        terminal.wait_text(f"waiting for the bus at {endpoint}")
+        bus = {"listen": [endpoint]}
+        with daemon_process(tmp_path, bus=bus) as first, Outsider(endpoint) as outsider:
+            begin(outsider)
+            terminal.wait_text("COVERING")
+            first.process.send_signal(signal.SIGKILL)
+            first.process.wait()
+        screen = terminal.wait_text("waiting for it to come back")
+        assert "the daemon is gone" in screen
+        with daemon_process(tmp_path, bus=bus):
+            terminal.wait_text("WAITING FOR MAP")
+            terminal.wait_text("the daemon is back")
+            with Outsider(endpoint) as outsider:
+                outsider.put("map", map_bytes(HALL))
+                outsider.put("pose", pose_bytes(*lanes(1)[0]))
+                terminal.wait_text("COVERING")
+            terminal.type("q")
+            assert terminal.end() == 0
+            assert terminal.is_clean()
+
+
+def test_it_ends_in_order_while_the_daemon_is_away(tmp_path):
+    """What Zenoh's threads still do then must not abort it."""
+    with daemon_process(tmp_path) as daemon, Terminal("--connect", daemon.endpoint) as terminal:
+        terminal.wait_text("WAITING FOR MAP")
+        daemon.stop()
+        terminal.wait_text("the daemon is gone")
+        terminal.type("q")
+        assert terminal.end() == 0
+        assert terminal.is_clean()
+
+
+def test_it_draws_no_more_often_than_ten_times_a_second(covering):
+    with Terminal("--connect", covering.endpoint) as terminal, Outsider(covering.endpoint) as robot:
+        terminal.wait_text("COVERING")
+        terminal.read()
+        before = terminal.written.count("\x1b[?2026h")
+        began = time.monotonic()
+        x, y = lanes(1)[0]
+        while (seconds := time.monotonic() - began) < 2.0:
+            robot.put("pose", pose_bytes(x + 0.1 * seconds, y))
+            terminal.read(0.005)
+        pages = terminal.written.count("\x1b[?2026h") - before
+        print(f"{pages} pages in {seconds:.1f} s")
+        assert 2 <= pages <= 10 * seconds + 2
+
+
+def test_lines_where_there_is_no_terminal(covering):
+    with _piped("--connect", covering.endpoint) as process:
+        assert process.stdout is not None
+        said = [process.stdout.readline() for _ in range(4)]
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60.0) == 0
+    assert any("the daemon is there" in line for line in said)
+    assert any("234 cells, path 1" in line for line in said), said
+    assert not any("\x1b" in line for line in said)
+
+
+def test_a_broken_pipe_is_no_traceback(covering):
+    process = _piped("--connect", covering.endpoint, "--json")
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.readline()
+    process.stdout.close()
+    process.wait(60.0)
+    with process.stderr as said:
+        assert said.read() == ""
+
+
+def test_json_is_a_status_a_line(covering):
+    with _piped("--connect", covering.endpoint, "--json") as process:
+        assert process.stdout is not None
+        documents = [json.loads(process.stdout.readline()) for _ in range(2)]
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60.0) == 0
+    assert [document["state"] for document in documents] == ["covering"] * 2
+    assert documents[0]["coverage"]["coverable"] == 234
+
+
+def test_once_is_one_picture(covering):
+    ended = fasaco_edge("watch", "--once", "--connect", covering.endpoint)
+    assert ended.code == 0
+    assert "COVERING" in ended.out
+    assert "of 234 cells" in ended.out
+    assert "\x1b" not in ended.out
+    ended = fasaco_edge("watch", "--once", "--json", "--connect", covering.endpoint)
+    assert json.loads(ended.out)["state"] == "covering"
+
+
+def test_a_host_that_takes_calls_and_says_nothing_holds_nobody_up():
+    with socket.create_server(("127.0.0.1", 0)) as mute:
+        endpoint = f"tcp/127.0.0.1:{mute.getsockname()[1]}"
+        began = time.monotonic()
+        ended = fasaco_edge("watch", "--once", "--timeout", "1", "--connect", endpoint)
+        assert ended.code == 1
+        assert time.monotonic() - began < 120.0
+        with Terminal("--connect", endpoint) as terminal:
+            terminal.wait_text("waiting for a daemon")
+            terminal.type("q")
+            assert terminal.end() == 0
+            assert terminal.is_clean()
+
+
+def test_once_without_a_daemon_is_an_error(covering):
+    for endpoint, robot, said, hint in (
+        (covering.endpoint, "nobody", "no daemon answers at fasaco/@v1/nobody", "there are robot"),
+        (free_endpoint(), "robot", "fasaco-edge: ", "start the daemon"),
+    ):
+        words = ("--once", "--timeout", "1", "--connect", endpoint, "--robot", robot)
+        ended = fasaco_edge("watch", *words)
+        assert ended.code == 1
+        assert said in ended.err
+        assert hint in ended.err
+        assert ended.out == ""
+
+
+def _piped(*words: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*PROGRAM, "watch", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ENVIRONMENT | {"PYTHONUNBUFFERED": "1"},
+    )
