@@ -43,9 +43,9 @@ from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.planners.planner import Noted
 from fasaco_edge.planners.table import planner_of
 from fasaco_edge.planners.work import SearchProgress
+from fasaco_edge.wire.coverage import coverage_grid
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import (
-    coverage_grid,
     decode_map_update,
     decode_occupancy_grid,
     encode_occupancy_grid,

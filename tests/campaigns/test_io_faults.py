@@ -14,6 +14,16 @@ from tests.support.processes import ENVIRONMENT
 
 pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not())
 
+ENDS_A_PART = """
+import logging, pathlib, sys
+from fasaco_edge.recording.sdk import rr
+from fasaco_edge.recording.write.part import Flush, Part
+logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stdout)
+part = Part(pathlib.Path(sys.argv[1], "run-part1.rrd"), "run")
+part.stream.log("text", rr.TextLog("hello"))
+assert part.flush(60.0) is Flush.DONE
+part.close()
+"""
 READS = "import sys; sys.stdout.write(open(sys.argv[1]).read() + open(sys.argv[1]).read())"
 
 
@@ -78,3 +88,14 @@ def test_one_recording_that_the_disk_does_not_give_keeps_no_recorder_from_record
         environment = ENVIRONMENT | watch.environment
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.stdout == "old.rrd could not be looked at: Input/output error\n", done.stderr
+
+
+@pytest.mark.parametrize("at", [6, 7, 8, None])  # of the footer, and of what stands behind it
+def test_a_part_whose_end_the_disk_does_not_take_is_told(tmp_path, at):
+    failure = None if at is None else Failure(Kind.WRITE, at, "EIO")
+    with Watch([tmp_path], failure) as watch:
+        command = [sys.executable, "-c", ENDS_A_PART, str(tmp_path)]
+        environment = ENVIRONMENT | watch.environment
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        assert bool(watch.failed_on()) == (at is not None)
+    assert done.stdout == ("run-part1.rrd: the disk did not take its end\n" if at else "")

@@ -62,15 +62,18 @@ class Repair:
         return f"{self.path.name} was torn: {self.cut_bytes} bytes behind the last frame cut"
 
 
-def scan_recording(recording: BinaryIO) -> Scan | None:
-    """Walk the frames of ``recording``; None where it does not even begin as one."""
+def scan_recording(recording: BinaryIO, known_bytes: int = HEADER_BYTES) -> Scan | None:
+    """Walk the frames of ``recording``; None where it does not even begin as one.
+
+    Of ``known_bytes`` it is known that they are header and whole frames; those are not counted.
+    """
     total = os.fstat(recording.fileno()).st_size
     solid = min(_end_of_data(recording, total) + MOST_ZEROS, total)
     recording.seek(0)
     header = recording.read(HEADER_BYTES)
     if len(header) < HEADER_BYTES or not header.startswith(MAGIC) or solid < HEADER_BYTES:
         return None
-    end, frames, has_footer = HEADER_BYTES, 0, False
+    end, frames, has_footer = max(known_bytes, HEADER_BYTES), 0, False
     while not has_footer:
         recording.seek(end)
         head = recording.read(FRAME.size)

@@ -13,8 +13,10 @@ from __future__ import annotations
 
 import enum
 import fcntl
+import logging
 import os
 import re
+import stat
 import threading
 import time
 from contextlib import suppress
@@ -25,7 +27,7 @@ import rerun_bindings as bindings
 
 from fasaco_edge.host.files import open_own
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.repair import repair_recording
+from fasaco_edge.recording.read.repair import repair_recording, scan_recording
 from fasaco_edge.recording.sdk import rr, rrb
 
 
@@ -84,6 +86,8 @@ class Standing:
         for timeline, number in self.sequences.items():
             stream.set_time(timeline, sequence=number)
 
+
+LOG = logging.getLogger(__name__)
 
 # Rows gather until the journal flushes, or at most this long [s].
 FLUSH_TICK_S = 10.0
@@ -187,9 +191,26 @@ class Part:
         return Flush.DONE
 
     def close(self) -> None:
-        """Write the footer and end the file; call it only after a flush that succeeded."""
+        """Write the footer and end the file; call it only after a flush that succeeded.
+
+        What was flushed can be read without a footer, too.
+        """
         self.stream.disconnect()
+        if not self._has_footer():
+            LOG.warning("%s: the disk did not take its end", self.path.name)
         os.close(self._lock)
+
+    def _has_footer(self) -> bool:
+        """Tell whether the file was ended; where it could not be, rerun does not say so."""
+        try:
+            with os.fdopen(os.dup(self._lock), "rb") as file:
+                if not stat.S_ISREG(os.fstat(self._lock).st_mode):
+                    return True  # what went through a pipe is gone
+                scan = scan_recording(file, self._flushed_bytes)
+        except OSError:
+            return False
+        # Behind it stands where it begins.
+        return scan is not None and scan.has_footer and scan.torn_bytes > 0
 
     def abandon(self) -> None:
         """Save of a broken part what can be read: what was flushed, or nothing.
