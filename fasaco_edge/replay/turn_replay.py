@@ -155,7 +155,7 @@ class TurnReplay:
         decided = self._news.of(decision, mission)
         self._compare(turn, decided)
         before, self._state = self._state, str(mission.state)
-        then, path = turn.decided, decided.path if decided else None
+        path = decided.path if decided else None
         return ReplayStep(
             at_s=self._at_s,
             state=self._state,
@@ -163,7 +163,9 @@ class TurnReplay:
             changed=self._state != before,
             decision=decision,
             refused=tuple(refused),
-            as_recorded=None if path is None else then is not None and then.path == path,
+            as_recorded=None
+            if path is None
+            else _facts(turn.decided)["path"] == _facts(decided)["path"],
         )
 
     def _items(self, turn: Turn) -> list[tuple[str, object]]:
@@ -207,18 +209,30 @@ class TurnReplay:
         return [PlanReady(taken.number, path, taken.seconds, tuple(taken.stops))]
 
     def _compare(self, turn: Turn, decided: Decided | None) -> None:
-        then = turn.decided
-        if decided == then:
-            return
-        for name in Decided.__struct_fields__:
-            was, is_now = getattr(then, name, None), getattr(decided, name, None)
-            if was != is_now:
-                self._differ(turn, name, was, is_now)
+        # A turn without a decision leaves the state as it is.
+        then, now = (_facts(one or Decided(self._state, "")) for one in (turn.decided, decided))
+        for name, was in then.items():
+            if was != now[name]:
+                self._differ(turn, name, was, now[name])
                 return
 
     def _differ(self, turn: Turn, what: str, recorded: object, replayed: object) -> None:
         if self.difference is None:
             self.difference = Difference(turn.number, self._at_s, what, recorded, replayed)
+
+
+def _facts(decided: Decided | None) -> dict[str, object]:
+    """Return what is compared of a decision: all but the reasons, which each release may word."""
+    if decided is None:
+        return {"path": None}
+    asked, path = decided.asked, decided.path
+    return {
+        "state": decided.state,
+        "plan asked for": None if asked is None else asked[0],
+        "path": None if path is None else (path[0], path[2]),
+        "faults": decided.faults,
+        "answers": decided.answers,
+    }
 
 
 def _plan_words(plan: PlanTaken) -> str:

@@ -136,6 +136,27 @@ def test_a_decision_that_is_another_is_found_at_its_turn(samples):
     assert replay.turns == turn.number - 1
 
 
+def test_other_words_for_a_reason_are_no_other_decision(samples):
+    """Each release may word reasons anew; what they are the reasons of counts."""
+
+    def reworded(payload):
+        plain = json.loads(payload)
+        for turn in plain["turns"]:
+            if (decided := turn.get("decided")) is not None:
+                decided["reason"] = "other words"
+                for name in ("asked", "path"):
+                    if decided.get(name):
+                        decided[name][1] = "other words"
+        return json.dumps(plain).encode()
+
+    for place in places(samples, TURNS):
+        samples = changed(samples, place, reworded)
+    replay, record, steps = played(samples)
+    assert replay.difference is None
+    assert replay.turns == record.turns
+    assert all(step.as_recorded for step in steps if step.decision.path is not None)
+
+
 def test_a_map_that_is_missing_is_named(samples):
     index = places(samples, "map_update")[-1]
     (turn,) = first_use(samples, "map_update", crc32(samples[index].sample.payload))

@@ -1,0 +1,103 @@
+"""Files that an earlier release wrote are still read, and mean the same."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import lzma
+import shutil
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+import yaml
+
+from fasaco_edge.bus.arrival import digest
+from fasaco_edge.cli import main
+from fasaco_edge.config.config import load_config
+from fasaco_edge.daemon.ledger.file import LedgerFile
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.replay.replay import Replay
+from fasaco_edge.replay.stand_ins import read_run
+
+DATA = Path(__file__).parents[1] / "data"
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    path = tmp_path_factory.mktemp("recording") / "mission.rrd"
+    path.write_bytes(lzma.decompress((DATA / "mission.rrd.xz").read_bytes()))
+    return str(path)
+
+
+def printed(capsys, *words):
+    assert main([*words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def digest_of(digests):
+    """Return how many paths there are, and the SHA-256 of all their cells."""
+    return len(digests), hashlib.sha256("".join(digests).encode()).hexdigest()[:16]
+
+
+def test_a_recording_replays_equal(recording, capsys):
+    document = printed(capsys, "replay", recording)
+    summary = document["summary"]
+    assert summary["equal"] is True
+    assert summary["difference"] is None
+    assert summary["turns_equal"] == summary["turns"] == 559
+    assert summary["plans_repeated"] == 29
+    paths = [step["path"]["cells_digest"] for step in document["decisions"] if "path" in step]
+    assert digest_of(paths) == (30, "b6f3145eae7ef36c")
+    assert [summary["covered_cells"], summary["coverable_cells"]] == [63, 63]
+
+
+def test_samples_lead_to_the_same_paths(recording):
+    """By the times of the samples alone, and with the same work for each plan."""
+    samples = RecordedSamples([Path(recording)])
+    replay = Replay(read_run(samples).daemon_config(), work=100)
+    paths = [step.decision.path for step in replay.steps(samples) if step.decision.path is not None]
+    digests = [digest(path.cells.astype("<i4").tobytes()).hex() for path in paths]
+    assert digest_of(digests) == (30, "da43b079c2a8eab9")
+    assert replay.mission.coverage().covered == 51
+
+
+def test_a_recording_is_reviewed(recording, capsys):
+    review = printed(capsys, "review", recording)
+    figures = ("covered_cells", "steps", "revisits", "turns_90", "paths", "replans")
+    assert [review[name] for name in figures] == [63, 51, 1, 15, 30, 27]
+    assert review["driven_m"] == pytest.approx(15.23)
+    assert (review["state"], review["complete"]) == ("done", True)
+
+
+def test_a_ledger_is_restored(tmp_path):
+    shutil.copy(DATA / "robot.ledger", tmp_path)
+    found = LedgerFile(tmp_path, "robot").load(cell_m=0.3)
+    assert found.fault is None
+    assert (found.ledger.frame, found.ledger.total) == ("map", 15)
+    visits = found.ledger.tiles[0, 0]
+    assert np.count_nonzero(visits) == 15
+    order = json.loads(found.ledger.note)
+    assert (order["stage"], order["paused"], order["home"]) == ("covering", False, [2, 2])
+
+
+def test_a_configuration_is_read():
+    path = DATA / "config.yaml"
+    written = yaml.safe_load(path.read_text(encoding="utf-8"))
+    read = msgspec.json.decode(msgspec.json.encode(load_config(path)))
+    assert missing_in(read, written) == []
+
+
+def missing_in(read, written):
+    """Return the keys whose value is another one, or that are no longer there."""
+    if not isinstance(written, dict):
+        return [] if read == written else [f"{read!r} in place of {written!r}"]
+    return [
+        f"{key}: {fault}"
+        for key, value in written.items()
+        for fault in missing_in(read.get(key), value)
+    ]
