@@ -29,9 +29,9 @@ from fasaco_edge.cli import (
 from fasaco_edge.cli.console import exits
 from fasaco_edge.cli.console.arguments import with_negative_pairs
 from fasaco_edge.cli.console.logs import begin_logging, say_why
-from fasaco_edge.cli.console.signals import end_with_parent
 from fasaco_edge.cli.console.streams import clean_streams
 from fasaco_edge.errors import BadConfiguration, DiskFailed, FasacoError
+from fasaco_edge.host.signals import end_with_parent
 
 COMMANDS = (
     demo, plan, run, mission, ask, watch, record, review, replay, simulate, bench, maps, warmup,

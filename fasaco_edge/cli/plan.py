@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fasaco_edge.cli.console import exits
-from fasaco_edge.cli.console.signals import ctrl_c_asks
 from fasaco_edge.cli.plan_options import ANYWHERE, EPILOG, HOME, add_options, check, settle
+from fasaco_edge.host.signals import ctrl_c_asks
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.console.arguments import Subparsers

@@ -32,7 +32,7 @@ PATIENCE_S = 15.0
 _ID = re.compile(r"[0-9a-f]{1,32}")
 
 
-class Stand(StrEnum):
+class ClaimState(StrEnum):
     """What a daemon does with its claim; all but the first are chunks of tokens.
 
     One that ``yields`` waits, and planned before: by its last path the robot was to stand.
@@ -44,7 +44,7 @@ class Stand(StrEnum):
     PLANS = "plans"
 
 
-_SHOWN = (Stand.WAITS, Stand.YIELDS, Stand.PLANS)
+_SHOWN = (ClaimState.WAITS, ClaimState.YIELDS, ClaimState.PLANS)
 
 
 class Claim:
@@ -57,7 +57,7 @@ class Claim:
     """
 
     def __init__(self, own: str) -> None:
-        self.stand = Stand.LOOKS
+        self.stand = ClaimState.LOOKS
         self.rival = ""
         self.hears_of_yielding = False
         self._own = own
@@ -73,9 +73,11 @@ class Claim:
 
         So it is after a pause in which the others may have taken this one for dead.
         """
-        return self.stand is Stand.PLANS and now < self._doubts_until
+        return self.stand is ClaimState.PLANS and now < self._doubts_until
 
-    def decide(self, others: Mapping[str, Stand], now: float, *, in_touch: bool = True) -> None:
+    def decide(
+        self, others: Mapping[str, ClaimState], now: float, *, in_touch: bool = True
+    ) -> None:
         """Take up a stand.
 
         Args:
@@ -87,11 +89,13 @@ class Claim:
         self._notice_absence(now, in_touch=in_touch)
         if not in_touch:
             return
-        planning = {one for one, stand in others.items() if stand is Stand.PLANS}
-        yielding = {one for one, stand in others.items() if stand is Stand.YIELDS}
-        plans = self.stand is Stand.PLANS
+        planning = {one for one, stand in others.items() if stand is ClaimState.PLANS}
+        yielding = {one for one, stand in others.items() if stand is ClaimState.YIELDS}
+        plans = self.stand is ClaimState.PLANS
         if planning and (not plans or min(planning) < self._own):
-            self.stand = Stand.YIELDS if plans or self.stand is Stand.YIELDS else Stand.WAITS
+            self.stand = (
+                ClaimState.YIELDS if plans or self.stand is ClaimState.YIELDS else ClaimState.WAITS
+            )
             self.rival, self._calm_since = min(planning), None
         elif plans:
             self.hears_of_yielding = bool(yielding - self._yielding)
@@ -117,10 +121,10 @@ class Claim:
             return
         if first and first < self._own and is_calm_for_s < PATIENCE_S:
             self.rival = first
-            if self.stand is Stand.LOOKS:
-                self.stand = Stand.WAITS
+            if self.stand is ClaimState.LOOKS:
+                self.stand = ClaimState.WAITS
         else:
-            self.stand, self._calm_s = Stand.PLANS, SETTLE_S
+            self.stand, self._calm_s = ClaimState.PLANS, SETTLE_S
 
 
 class NameClaim:
@@ -131,14 +135,14 @@ class NameClaim:
         self._keys = keys
         self._claim = Claim(bus.id)
         self._roll = bus.roll(keys.claims)
-        self._token = bus.token(keys.claim(bus.id, Stand.WAITS))
-        self._others: dict[str, Stand] = {}
+        self._token = bus.token(keys.claim(bus.id, ClaimState.WAITS))
+        self._others: dict[str, ClaimState] = {}
         self._version = 0
         self._is_settled = False
         self._stands_back = False
 
     @property
-    def stand(self) -> Stand:
+    def stand(self) -> ClaimState:
         """What this daemon does."""
         return self._claim.stand
 
@@ -154,7 +158,7 @@ class NameClaim:
     @property
     def waits(self) -> bool:
         """Whether another daemon is to plan."""
-        return self._claim.stand in (Stand.WAITS, Stand.YIELDS)
+        return self._claim.stand in (ClaimState.WAITS, ClaimState.YIELDS)
 
     @property
     def hears_of_yielding(self) -> bool:
@@ -180,7 +184,7 @@ class NameClaim:
             self._others = claims_in(self._roll.there())
             self._others.pop(self._bus.id, None)
             # Where nobody plans, somebody soon will.
-            self._is_settled = Stand.PLANS in (self._claim.stand, *self._others.values())
+            self._is_settled = ClaimState.PLANS in (self._claim.stand, *self._others.values())
         self._claim.decide(self._others, now, in_touch=self._bus.is_in_touch())
         if self._claim.hears_of_yielding:
             LOG.warning("another daemon of this name planned, too, and has yielded to this one")
@@ -200,12 +204,14 @@ class NameClaim:
             LOG.warning("%s is gone: this daemon plans", self._claim.rival)
 
 
-def claims_in(keys: Iterable[str]) -> dict[str, Stand]:
+def claims_in(keys: Iterable[str]) -> dict[str, ClaimState]:
     """Return the daemons whose tokens these are, by id; what is no claim is left out."""
-    claims: dict[str, Stand] = {}
+    claims: dict[str, ClaimState] = {}
     for key in keys:
         _, own, stand = key.rsplit("/", 2)
         if _ID.fullmatch(own) and stand in _SHOWN:
             # Who takes up another stand has two tokens for a moment: to plan comes before all.
-            claims[own] = max(Stand(stand), claims.get(own, Stand.WAITS), key=_SHOWN.index)
+            claims[own] = max(
+                ClaimState(stand), claims.get(own, ClaimState.WAITS), key=_SHOWN.index
+            )
     return claims

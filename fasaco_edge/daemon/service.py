@@ -21,13 +21,14 @@ from fasaco_edge.daemon.loop.inbox import Inbox, make_mailbox
 from fasaco_edge.daemon.loop.loop import Loop
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
-from fasaco_edge.daemon.loop.watchdog import Vitals
+from fasaco_edge.daemon.loop.watchdog import Watchdog
 from fasaco_edge.daemon.memory import afforded, memory_limit, needed_bytes
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.host.processes import return_soon
+from fasaco_edge.host.signals import call_on
 
 LOG = logging.getLogger(__name__)
 
@@ -66,14 +67,13 @@ def run_daemon(
     # Without it every thread keeps what its largest map took: 430 MB resident in place of 250.
     return_soon()
     stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+    call_on(signal.SIGTERM, signal.SIGINT, call=stop.set)
     manager = ServiceManager()
     # Others are ready to answer; a service is ready to plan, see sd_notify(3).
     reload = Reload(read or (lambda: config), manager)
     if manager.is_there:
         # Elsewhere it is what a terminal sends that is closed.
-        signal.signal(signal.SIGHUP, lambda *_: reload.asked.set())
+        call_on(signal.SIGHUP, call=reload.asked.set)
     config = _afforded(config)
     compiler = KernelCompiler(manager) if manager.is_there else None
     try:
@@ -129,7 +129,7 @@ def _serve(
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
     commands = Commands(bus, keys, mailbox)
     turns = TurnLog(bus.publisher(keys.turns, qos=QOS["turns"]), config, ledger.restored)
-    vitals = Vitals(manager)
+    vitals = Watchdog(manager)
     claim = NameClaim(bus, keys)
     loop = Loop(
         config, mailbox, inbox, commands, outbox, ledger, recorder, turns, vitals, reload, claim

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from fasaco_edge.daemon.ledger.writer import Keeping
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, fitting
 from fasaco_edge.mission.core.events import (
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
 
 
-class Beginning:
+class Startup:
     """Holds events, takes commands, and hands both over to the mission.
 
     Attributes:
@@ -54,7 +54,7 @@ class Beginning:
     """
 
     def __init__(
-        self, keeping: Keeping, load: Callable[[], Loader], held: Sequence[Event] = ()
+        self, keeping: LedgerKeeper, load: Callable[[], Loader], held: Sequence[Event] = ()
     ) -> None:
         self.assignment = keeping.first
         self.held: list[Event] = []
@@ -174,7 +174,7 @@ def _frame(event: Event) -> str:
     return ""  # it lies in none
 
 
-def heard_of(mission: Mission) -> list[Event]:
+def map_and_pose_of(mission: Mission) -> list[Event]:
     """Return the events after which another mission knows map and pose, too."""
     heard: list[Event] = []
     if mission.grid is not None:

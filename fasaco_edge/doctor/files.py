@@ -10,7 +10,7 @@ import stat
 import sys
 from pathlib import Path
 
-from fasaco_edge.doctor.finding import Finding, Level, Patient, worst
+from fasaco_edge.doctor.finding import CheckContext, Finding, Level, worst
 from fasaco_edge.host.files import why_not_trusted
 from fasaco_edge.kernels.cache import missing_from, outdated, wanted_folder
 
@@ -18,7 +18,7 @@ from fasaco_edge.kernels.cache import missing_from, outdated, wanted_folder
 LEAST_MB = {"state": 20.0, "kernel cache": 50.0}
 
 
-def disk(patient: Patient) -> Finding:
+def disk(patient: CheckContext) -> Finding:
     """Tell how much room there is where the daemon writes."""
     least_mb = LEAST_MB | {"recordings": float(patient.config.recording.least_free_mb)}
     rooms = [_room(name, folder, least_mb[name]) for name, folder in _folders(patient).items()]
@@ -30,7 +30,7 @@ def disk(patient: Patient) -> Finding:
     return Finding(level, bad.found, bad.to_do, details)
 
 
-def _folders(patient: Patient) -> dict[str, Path]:
+def _folders(patient: CheckContext) -> dict[str, Path]:
     environ = patient.environ
     folders = {
         "state": patient.config.mission.state_folder(environ),
@@ -59,7 +59,7 @@ def _room(name: str, folder: Path, least_mb: float) -> Finding:
     return Finding(Level.OK, found)
 
 
-def permissions(patient: Patient) -> Finding:
+def permissions(patient: CheckContext) -> Finding:
     """Tell whether others may read or write what is the daemon's alone."""
     faults = [*_config_faults(patient), *_state_faults(patient)]
     if not faults:
@@ -69,7 +69,7 @@ def permissions(patient: Patient) -> Finding:
     return Finding(first.level, first.found, first.to_do, details)
 
 
-def _config_faults(patient: Patient) -> list[Finding]:
+def _config_faults(patient: CheckContext) -> list[Finding]:
     file = patient.file
     if file is None:
         return []
@@ -86,7 +86,7 @@ def _config_faults(patient: Patient) -> list[Finding]:
     return faults
 
 
-def _state_faults(patient: Patient) -> list[Finding]:
+def _state_faults(patient: CheckContext) -> list[Finding]:
     folder = patient.config.mission.state_folder(patient.environ)
     try:
         status = folder.stat()
@@ -103,7 +103,7 @@ def _state_faults(patient: Patient) -> list[Finding]:
     return []
 
 
-def kernels(patient: Patient) -> Finding:
+def kernels(patient: CheckContext) -> Finding:
     """Tell whether the kernels are there, whole, and where only the daemon could have put them."""
     folder, user = wanted_folder(patient.environ), _user(patient)
     command = _warmup(patient)
@@ -137,7 +137,7 @@ def _distrusted(why: str, details: tuple[str, ...] = ()) -> Finding:
     return Finding(Level.WARN, found, to_do, details)
 
 
-def _warmup(patient: Patient) -> str:
+def _warmup(patient: CheckContext) -> str:
     """Return the command that compiles them into that folder, as the user who is to trust it."""
     if patient.unit is None:
         return "fasaco-edge warmup"
@@ -146,7 +146,7 @@ def _warmup(patient: Patient) -> str:
     return patient.unit.run_as(f"{variable}{Path(sys.executable).with_name('fasaco-edge')} warmup")
 
 
-def _user(patient: Patient) -> int | None:
+def _user(patient: CheckContext) -> int | None:
     """Return the user the daemon runs as; None where systemd would choose one, and chown."""
     if patient.unit is None:
         return os.geteuid()

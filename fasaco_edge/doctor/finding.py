@@ -106,7 +106,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Patient:
+class CheckContext:
     """What checks look at; more may come to it.
 
     Attributes:
@@ -140,7 +140,7 @@ class Check:
     """
 
     name: str
-    look: Callable[[Patient], Finding]
+    look: Callable[[CheckContext], Finding]
     of_machine: bool = False
 
 

@@ -16,7 +16,7 @@ from importlib import metadata
 from pathlib import Path
 
 from fasaco_edge.daemon.memory import afforded, limits_mib, needed_bytes
-from fasaco_edge.doctor.finding import Finding, Level, Patient
+from fasaco_edge.doctor.finding import CheckContext, Finding, Level
 
 MACHINES = ("x86_64", "aarch64")
 # What makes a difference to array code, as /proc/cpuinfo spells it.
@@ -29,7 +29,7 @@ STA_UNSYNC = 0x40
 TIME_ERROR = 5
 
 
-def system(patient: Patient) -> Finding:
+def system(patient: CheckContext) -> Finding:
     """Tell about the processor, the system and Python."""
     bits, machine = 8 * struct.calcsize("P"), platform.machine()
     cores = len(os.sched_getaffinity(0))
@@ -53,7 +53,7 @@ def system(patient: Patient) -> Finding:
     return Finding(Level.OK, found, details=details)
 
 
-def c_library(patient: Patient) -> Finding:
+def c_library(patient: CheckContext) -> Finding:
     """Tell whether the C library is as new as the installed packages want it."""
     name, _, version = (os.confstr("CS_GNU_LIBC_VERSION") or "").partition(" ")
     if name != "glibc":
@@ -68,7 +68,7 @@ def c_library(patient: Patient) -> Finding:
     return Finding(Level.OK, found, details=details)
 
 
-def clock(patient: Patient) -> Finding:
+def clock(patient: CheckContext) -> Finding:
     """Tell whether the clock is right: recordings, certificates and stamps go by it."""
     written = (Path(__file__)).stat().st_mtime
     now = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime())
@@ -152,7 +152,7 @@ WANTED_MB = 350
 PI_CMDLINES = ("boot/firmware/cmdline.txt", "boot/cmdline.txt")
 
 
-def memory(patient: Patient) -> Finding:
+def memory(patient: CheckContext) -> Finding:
     """Tell how much memory there is, and whether its limits hold."""
     total_mb, free_mb = _meminfo_mb(patient.root, "Total"), _meminfo_mb(patient.root, "Available")
     found = f"{free_mb:.0f} MB of {total_mb:.0f} MB free"
@@ -190,7 +190,7 @@ def controller(root: Path) -> int | None:
     return 1 if enabled and (root / "sys/fs/cgroup/memory").is_dir() else None
 
 
-def _told(patient: Patient, version: int | None) -> str:
+def _told(patient: CheckContext, version: int | None) -> str:
     groups = f"control groups version {version}" if version else "no memory controller"
     if patient.unit is None:
         return f"{groups}; no unit fasaco-edge.service here: nothing limits the daemon"

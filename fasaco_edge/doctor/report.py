@@ -17,7 +17,7 @@ from fasaco_edge.doctor import machine, session
 from fasaco_edge.doctor import machine as memory
 from fasaco_edge.doctor import security as access
 from fasaco_edge.doctor import security as credentials
-from fasaco_edge.doctor.finding import Check, Finding, Level, Patient, find_unit
+from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, find_unit
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
 CHECKS = (
@@ -45,7 +45,7 @@ PATIENCE_S = 2.0
 class _Looking:
     """A check under way, in a thread that nobody waits for in the end."""
 
-    def __init__(self, check: Check, patient: Patient) -> None:
+    def __init__(self, check: Check, patient: CheckContext) -> None:
         self._check, self._patient = check, patient
         self._found: Finding | None = None
         self._thread = threading.Thread(target=self._look, name=check.name, daemon=True)
@@ -90,7 +90,7 @@ def findings(
     except BadConfiguration as error:
         config, refused = DaemonConfig(), error
         yield "configuration", Finding(Level.FAIL, str(error), error.hint)
-    patient = Patient(config, path, find_unit(), recordings)
+    patient = CheckContext(config, path, find_unit(), recordings)
     possible = [check for check in checks if refused is None or check.of_machine]
     for check, looking in [(check, _Looking(check, patient)) for check in possible]:
         yield check.name, looking.finding(deadline)

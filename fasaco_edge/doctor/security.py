@@ -14,7 +14,7 @@ from fasaco_edge.config.config import BusConfig
 from fasaco_edge.config.credentials import read_certificate
 from fasaco_edge.config.endpoints import UNIX, is_local, protocol_of
 from fasaco_edge.daemon.loop.inbox import MAP_SPACING_S
-from fasaco_edge.doctor.finding import Finding, Level, Patient, worst
+from fasaco_edge.doctor.finding import CheckContext, Finding, Level, worst
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
 
 SHOWS = {
@@ -24,7 +24,7 @@ SHOWS = {
 }
 
 
-def endpoints(patient: Patient) -> Finding:
+def endpoints(patient: CheckContext) -> Finding:
     """Tell where the daemon listens, from where that can be reached, and by whom."""
     bus = patient.config.bus
     kind = bus.security.kind
@@ -52,7 +52,7 @@ def endpoints(patient: Patient) -> Finding:
     return Finding(Level.OK, found, details=tuple(details))
 
 
-def roles(patient: Patient) -> Finding:
+def roles(patient: CheckContext) -> Finding:
     """Tell who may do what."""
     security = patient.config.bus.security
     if security.kind == "none":
@@ -79,7 +79,7 @@ def roles(patient: Patient) -> Finding:
     )
 
 
-def limits(patient: Patient) -> Finding:
+def limits(patient: CheckContext) -> Finding:
     """Tell how much each who sends may send."""
     bus = patient.config.bus
     if bus.security.kind == "none" and not bus.open_to_everyone:
@@ -107,7 +107,7 @@ SECRETS = {
 HOW_TO = "protocol/README.md, Security, tells how to make them"
 
 
-def identity(patient: Patient) -> Finding:
+def identity(patient: CheckContext) -> Finding:
     """Tell by what name others know the daemon, and until when."""
     bus = patient.config.bus
     security, listens = bus.security, bool(bus.listen)
@@ -133,7 +133,7 @@ def identity(patient: Patient) -> Finding:
     return Finding(Level.OK, found, details=tuple(details))
 
 
-def secret_files(patient: Patient) -> Finding:
+def secret_files(patient: CheckContext) -> Finding:
     """Tell whether others on this computer can read keys and passwords."""
     security = patient.config.bus.security
     if security.kind == "none":

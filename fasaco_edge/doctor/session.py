@@ -19,7 +19,7 @@ from fasaco_edge.bus.session import Bus, BusSettings, Sample, check_settings, op
 from fasaco_edge.config.endpoints import from_here, host_of, protocol_of
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.daemon.claim import claims_in
-from fasaco_edge.doctor.finding import Finding, Level, Patient
+from fasaco_edge.doctor.finding import CheckContext, Finding, Level
 from fasaco_edge.errors import BadConfiguration, BusUnavailable, MalformedMessage
 from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.keys import VERSION
@@ -105,7 +105,7 @@ LISTEN_S = 0.7
 ASK_S = 0.7
 
 
-def session(patient: Patient) -> Finding:
+def session(patient: CheckContext) -> Finding:
     """Tell whether a session can be opened as the daemon would, or who is in its place."""
     bus = patient.config.bus
     try:
@@ -143,7 +143,7 @@ def session(patient: Patient) -> Finding:
         return Finding(Level.FAIL, found, to_do, told)
 
 
-def peers(patient: Patient) -> Finding:
+def peers(patient: CheckContext) -> Finding:
     """Tell who is on the bus: the daemon, its recorder, other robots, maps and poses."""
     if not any(answers(endpoint) is not False for endpoint in _ways(patient)):
         return Finding(Level.OK, "nobody to ask: neither daemon nor router is there")
@@ -154,7 +154,7 @@ def peers(patient: Patient) -> Finding:
         return Finding(Level.WARN, f"could not be asked: {error}", error.hint)
 
 
-def _seen(patient: Patient, bus: Bus) -> Finding:
+def _seen(patient: CheckContext, bus: Bus) -> Finding:
     keys, ros = patient.config.keys(), patient.config.ros2
     wanted = {"map": [keys.map], "pose": [keys.pose]}
     if ros:
@@ -230,13 +230,13 @@ def _status(bus: Bus, key: str) -> dict[str, Any] | None:
     return None
 
 
-def _ways(patient: Patient) -> list[str]:
+def _ways(patient: CheckContext) -> list[str]:
     bus = patient.config.bus
     return [*map(from_here, bus.listen), *bus.connect]
 
 
 @contextmanager
-def _joined(patient: Patient) -> Iterator[Bus]:
+def _joined(patient: CheckContext) -> Iterator[Bus]:
     """Join the bus as one client more, by the endpoints at which somebody answers."""
     ways = tuple(way for way in _ways(patient) if answers(way) is not False)
     secured = patient.config.bus.security.of_client()

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 from fasaco_edge.bus.arrival import Arrival, digest
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.ledger.writer import Keeping
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.inbox import Inbox, Received, make_mailbox
 from fasaco_edge.daemon.loop.loop import TICK_S
-from fasaco_edge.daemon.startup import Beginning
+from fasaco_edge.daemon.startup import Startup
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.core.events import CommandReceived, Decision, Event, PathUpdate
 from fasaco_edge.mission.orders.order import read_command
@@ -88,8 +88,10 @@ class Replay:
         self._heard = {*bus.heard, COMMAND}
         self.mission, loader, planner = load_mission(config, self._mailbox)
         self.plans = ReplayPlanner(planner, self._run, config.planner.budget_s, work)
-        keeping = Keeping(NoDisk(), config.robot.tool_width_m, autostart=config.mission.autostart)
-        self._beginning = Beginning(keeping, lambda: loader)
+        keeping = LedgerKeeper(
+            NoDisk(), config.robot.tool_width_m, autostart=config.mission.autostart
+        )
+        self._beginning = Startup(keeping, lambda: loader)
         self._is_begun = False
         self._commands = 0
         self._state = ""

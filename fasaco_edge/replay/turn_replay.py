@@ -14,11 +14,16 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger
-from fasaco_edge.daemon.ledger.writer import Keeping
-from fasaco_edge.daemon.loop.decided import DecidedNews, cells_checksum, kernels_name
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.inbox import Inbox, Received, make_mailbox
-from fasaco_edge.daemon.loop.turn_log import POSE, POSE_BYTES
-from fasaco_edge.daemon.startup import Beginning
+from fasaco_edge.daemon.loop.turn_log import (
+    POSE,
+    POSE_BYTES,
+    DecisionFilter,
+    cells_checksum,
+    kernels_name,
+)
+from fasaco_edge.daemon.startup import Startup
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.core.events import (
     CommandReceived,
@@ -78,13 +83,13 @@ class TurnReplay:
         self.mission, loader, self._planner = load_mission(config, mailbox)
         cell_m, ledger = config.robot.tool_width_m, record.beginning.ledger
         disk = NoDisk(decode_ledger(ledger, cell_m) if ledger else None)
-        keeping = Keeping(disk, cell_m, autostart=config.mission.autostart)
-        self._beginning = Beginning(keeping, lambda: loader)
+        keeping = LedgerKeeper(disk, cell_m, autostart=config.mission.autostart)
+        self._beginning = Startup(keeping, lambda: loader)
         self._is_begun = False
         self._waiting = Waiting(record.taken)
         self._decoder = SampleDecoder()
         self._told: dict[str, deque[Sample]] = defaultdict(deque)
-        self._news = DecidedNews()
+        self._news = DecisionFilter()
         self._request: PlanRequest | None = None
         self._began: float | None = None
         self._at_s = 0.0

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import logging
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +15,7 @@ from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.host.signals import stop_event
 from fasaco_edge.simulation.pace import Pace
 from fasaco_edge.simulation.world import Activity, Emission, World
 from fasaco_edge.wire.keys import Keys
@@ -105,11 +103,11 @@ def run_simulation(
     """
     if not speed > 0.0:
         raise BadConfiguration(f"speed must be above 0, got {speed}")
-    with open_bus(settings) as bus, _told_to_end() as ended:
+    with open_bus(settings) as bus, stop_event() as stop:
         robot = _RobotOnBus(world, keys, bus)
         meter = _Meter(robot, report)
         pace = Pace(speed, world.config.tick_s, time.monotonic())
-        while not (ended.is_set() or should_stop()):
+        while not (stop.is_set() or should_stop()):
             behind_s = pace.behind_s(time.monotonic())
             robot.take_path(0.0 if behind_s >= 0.0 else min(max(-behind_s, WAIT_S), TURN_S))
             turn_ends_s = time.monotonic() + TURN_S
@@ -188,19 +186,3 @@ def _waypoints(sample: Sample, frame: str) -> NDArray[np.float64]:
     if path.frame != frame:
         raise WrongFrame(f"path in frame {path.frame!r}, map in {frame!r}")
     return path.xy
-
-
-@contextmanager
-def _told_to_end() -> Iterator[threading.Event]:
-    """Yield an event that SIGINT and SIGTERM set, where this thread may ask for them."""
-    ended = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield ended
-        return
-    signals = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, lambda *_: ended.set()) for number in signals]
-    try:
-        yield ended
-    finally:
-        for number, handler in zip(signals, before, strict=True):
-            signal.signal(number, handler)

@@ -13,14 +13,13 @@ import sys
 import termios
 import time
 import tty
-from collections.abc import Iterator
-from contextlib import contextmanager
 from types import FrameType
 from typing import Any, Self, TextIO
 
 from rich.console import Console
 
 from fasaco_edge.bus.session import Sample
+from fasaco_edge.host.signals import stop_event
 from fasaco_edge.text import json_line, one_line
 from fasaco_edge.watch import phrases
 from fasaco_edge.watch.feed import Feed
@@ -28,21 +27,12 @@ from fasaco_edge.watch.known import Known
 from fasaco_edge.watch.page import Page
 from fasaco_edge.wire.json_text import decode_json
 
+END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # At most ten pages a second, and only where something changed or the clock did [s].
 FRAME_S = 0.1
 LINE_EVERY_S = 1.0
 # Of what comes with the status, so much is waited for where there is none of it [s].
 REST_S = 1.0
-
-
-class Told:
-    """Whether SIGINT, SIGTERM or SIGHUP asked for the end."""
-
-    def __init__(self) -> None:
-        self.to_end = False
-
-    def __call__(self, _number: int, _frame: FrameType | None) -> None:
-        self.to_end = True
 
 
 def take(feed: Feed, known: Known, timeout_s: float) -> list[tuple[str, object]]:
@@ -62,8 +52,8 @@ def watch_on_screen(feed: Feed, known: Known, console: Console) -> None:
         OSError: the terminal is gone.
     """
     page, shown_at = Page(console), (0, (0, 0), "")
-    with told_to_end() as told, Screen(sys.stdout) as screen:
-        while not told.to_end:
+    with stop_event(*END_SIGNALS) as stop, Screen(sys.stdout) as screen:
+        while not stop.is_set():
             came = take(feed, known, 0.0)
             now = phrases.steady_now()
             key = (int(now), screen.size(), known.trouble)
@@ -78,8 +68,8 @@ def watch_in_lines(feed: Feed, known: Known) -> None:
     """Print what happens, and once a second how it stands, until a signal asks for the end."""
     # What is there already comes within the first second.
     told_entries, said, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
-    with told_to_end() as told:
-        while not told.to_end:
+    with stop_event(*END_SIGNALS) as stop:
+        while not stop.is_set():
             take(feed, known, FRAME_S)
             now = phrases.steady_now()
             for entry in known.journal.since(told_entries):
@@ -94,8 +84,8 @@ def watch_in_lines(feed: Feed, known: Known) -> None:
 
 def watch_as_json(feed: Feed, known: Known) -> None:
     """Print each status as a line of JSON, until a signal asks for the end."""
-    with told_to_end() as told:
-        while not told.to_end:
+    with stop_event(*END_SIGNALS) as stop:
+        while not stop.is_set():
             for topic, item in take(feed, known, FRAME_S):
                 if topic == "status" and isinstance(item, Sample):
                     print_json(item.payload)
@@ -104,13 +94,13 @@ def watch_as_json(feed: Feed, known: Known) -> None:
 def look_once(feed: Feed, known: Known, timeout_s: float) -> bool:
     """Wait up to ``timeout_s`` [s] until enough is known for a picture; return whether it is."""
     deadline = time.monotonic() + timeout_s
-    with told_to_end() as told:
+    with stop_event(*END_SIGNALS) as stop:
         while known.report is None or not known.is_here:
-            if told.to_end or time.monotonic() > deadline:
+            if stop.is_set() or time.monotonic() > deadline:
                 return False
             take(feed, known, FRAME_S)
         deadline = time.monotonic() + REST_S
-        while not (told.to_end or _is_whole(known)) and time.monotonic() < deadline:
+        while not (stop.is_set() or _is_whole(known)) and time.monotonic() < deadline:
             take(feed, known, FRAME_S)
     return True
 
@@ -144,19 +134,6 @@ def status_line(known: Known, now: float) -> str:
 def print_json(payload: bytes) -> None:
     """Print a JSON object as one line, however it came."""
     print(json_line(decode_json(payload)), flush=True)
-
-
-@contextmanager
-def told_to_end() -> Iterator[Told]:
-    """Let SIGINT, SIGTERM and SIGHUP ask for the end instead of being it."""
-    told = Told()
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = [signal.signal(number, told) for number in numbers]
-    try:
-        yield told
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
 
 
 def _is_whole(known: Known) -> bool:

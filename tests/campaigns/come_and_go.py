@@ -32,7 +32,7 @@ import yaml
 import zenoh
 
 from fasaco_edge.bench.processes import warm_kernels
-from fasaco_edge.daemon.claim import Stand, claims_in
+from fasaco_edge.daemon.claim import ClaimState, claims_in
 from tests.campaigns import passing_mappers
 from tests.campaigns.services import show
 from tests.support.outsider import Outsider, open_client
@@ -186,11 +186,11 @@ class Campaign:
                 self.violations.append(f"{name}: never said {word!r}: {daemon.log_text()[-300:]}")
                 return
             time.sleep(0.02)
-        planning = [own for own, stand in self.claims().items() if stand is Stand.PLANS]
+        planning = [own for own, stand in self.claims().items() if stand is ClaimState.PLANS]
         if is_second and len(planning) != 1:
             self.violations.append(f"{len(planning)} daemons of one name plan")
 
-    def claims(self) -> dict[str, Stand]:
+    def claims(self) -> dict[str, ClaimState]:
         """Return the daemons of the name there are."""
         replies = self.client.liveliness().get(f"{PREFIX}/claim/*/*", timeout=5.0)
         return claims_in(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
@@ -296,7 +296,7 @@ def _check_works(campaign: Campaign, seat: Outsider) -> None:
     if status["state"] != "covering" or status["errors"]["total"]:
         campaign.violations.append(f"in the end {status['state']}: {status['errors']}")
     stands = list(campaign.claims().values())
-    if stands != [Stand.PLANS]:
+    if stands != [ClaimState.PLANS]:
         campaign.violations.append(f"claims in the end: {stands}")
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from fasaco_edge.bench.processes import warm_kernels
-from fasaco_edge.daemon.ledger.file import Found, LedgerFile
+from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger
 from tests.support.ledgers import CELL_M, Cell, visits_of
 from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process
@@ -79,7 +79,7 @@ class Campaign:
         self.counted["new cells"] += len(on_disk - self.known)
         self.known = on_disk
 
-    def _found(self) -> Found:
+    def _found(self) -> LoadedLedger:
         """Look at a copy: to finish a write that was cut short is for the next daemon."""
         with tempfile.TemporaryDirectory() as folder:
             copied = shutil.copytree(self.folder, Path(folder, "copy"))

@@ -12,7 +12,7 @@ from fasaco_edge.daemon.claim import (
     REJOIN_S,
     SETTLE_S,
     Claim,
-    Stand,
+    ClaimState,
     claims_in,
 )
 
@@ -25,9 +25,9 @@ def planning(own, now=0.0):
     """A claim that found nobody."""
     claim = Claim(own)
     claim.decide({}, now)
-    assert claim.stand is Stand.LOOKS
+    assert claim.stand is ClaimState.LOOKS
     claim.decide({}, now + CALM_S)
-    assert claim.stand is Stand.PLANS
+    assert claim.stand is ClaimState.PLANS
     return claim
 
 
@@ -40,90 +40,90 @@ def test_who_comes_to_where_another_plans_waits(own):
     """Whoever has the smaller id: who plans goes on."""
     claim = Claim(own)
     for now in (0.0, 1.0, 2.0, 100.0):
-        claim.decide({B: Stand.PLANS}, now)
-        assert (claim.stand, claim.rival) == (Stand.WAITS, B)
+        claim.decide({B: ClaimState.PLANS}, now)
+        assert (claim.stand, claim.rival) == (ClaimState.WAITS, B)
     before = planning(B)
-    before.decide({own: Stand.WAITS}, 1.0)
-    assert before.stand is Stand.PLANS
+    before.decide({own: ClaimState.WAITS}, 1.0)
+    assert before.stand is ClaimState.PLANS
 
 
 def test_of_two_that_start_at_once_one_plans():
     first, second = Claim(A), Claim(B)
     for now in (0.0, CALM_S):
-        first.decide({B: Stand.WAITS}, now)
-        second.decide({A: Stand.WAITS}, now)
-    assert (first.stand, second.stand) == (Stand.PLANS, Stand.WAITS)
+        first.decide({B: ClaimState.WAITS}, now)
+        second.decide({A: ClaimState.WAITS}, now)
+    assert (first.stand, second.stand) == (ClaimState.PLANS, ClaimState.WAITS)
     assert second.rival == A
 
 
 def test_who_waits_takes_over_when_the_other_is_gone():
     claim = Claim(B)
     for now in range(50):
-        claim.decide({A: Stand.PLANS}, float(now))
+        claim.decide({A: ClaimState.PLANS}, float(now))
     claim.decide({}, 50.0)
-    assert claim.stand is Stand.WAITS
+    assert claim.stand is ClaimState.WAITS
     claim.decide({}, 50.0 + CALM_S)
-    assert claim.stand is Stand.PLANS
+    assert claim.stand is ClaimState.PLANS
 
 
 def test_of_two_that_wait_the_one_with_the_smaller_id_takes_over():
     claims = {B: Claim(B), C: Claim(C)}
     for own, other in ((B, C), (C, B)):
-        claims[own].decide({A: Stand.PLANS, other: Stand.WAITS}, 0.0)
-        claims[own].decide({other: Stand.WAITS}, 1.0)
-        claims[own].decide({other: Stand.WAITS}, 1.0 + CALM_S)
-    assert (claims[B].stand, claims[C].stand) == (Stand.PLANS, Stand.WAITS)
+        claims[own].decide({A: ClaimState.PLANS, other: ClaimState.WAITS}, 0.0)
+        claims[own].decide({other: ClaimState.WAITS}, 1.0)
+        claims[own].decide({other: ClaimState.WAITS}, 1.0 + CALM_S)
+    assert (claims[B].stand, claims[C].stand) == (ClaimState.PLANS, ClaimState.WAITS)
 
 
 def test_one_that_could_plan_and_does_not_is_not_waited_for_for_ever():
     claim, now = Claim(B), 0.0
-    claim.decide({A: Stand.WAITS}, now)
+    claim.decide({A: ClaimState.WAITS}, now)
     while now < SETTLE_S + PATIENCE_S:
-        assert claim.stand is not Stand.PLANS
+        assert claim.stand is not ClaimState.PLANS
         now += 1.0
-        claim.decide({A: Stand.WAITS}, now)
-    claim.decide({A: Stand.WAITS}, now + 1.0)
-    assert claim.stand is Stand.PLANS
+        claim.decide({A: ClaimState.WAITS}, now)
+    claim.decide({A: ClaimState.WAITS}, now + 1.0)
+    assert claim.stand is ClaimState.PLANS
 
 
 def test_where_two_plan_one_goes_on_and_knows_when_the_other_has_stopped():
     """A network that was in two parts, each with its own."""
     first, second = planning(A), planning(B)
-    first.decide({B: Stand.PLANS}, 5.0)
-    second.decide({A: Stand.PLANS}, 5.0)
-    assert (first.stand, second.stand) == (Stand.PLANS, Stand.YIELDS)
+    first.decide({B: ClaimState.PLANS}, 5.0)
+    second.decide({A: ClaimState.PLANS}, 5.0)
+    assert (first.stand, second.stand) == (ClaimState.PLANS, ClaimState.YIELDS)
     assert not first.hears_of_yielding
-    first.decide({B: Stand.YIELDS}, 5.1)
+    first.decide({B: ClaimState.YIELDS}, 5.1)
     assert first.hears_of_yielding
-    first.decide({B: Stand.YIELDS}, 5.2)
+    first.decide({B: ClaimState.YIELDS}, 5.2)
     assert not first.hears_of_yielding
     # It may have yielded unseen.
     first.decide({}, 6.0, in_touch=False)
     first.decide({}, 7.0)
-    first.decide({B: Stand.YIELDS}, 7.1)
+    first.decide({B: ClaimState.YIELDS}, 7.1)
     assert first.hears_of_yielding
 
 
 def test_out_of_touch_nobody_takes_over():
     """The router is gone, and with it the other's token."""
     claim = Claim(B)
-    claim.decide({A: Stand.PLANS}, 0.0)
+    claim.decide({A: ClaimState.PLANS}, 0.0)
     for now in range(1, 60):
         claim.decide({}, float(now), in_touch=False)
-        assert (claim.stand, claim.rival) == (Stand.WAITS, A)
+        assert (claim.stand, claim.rival) == (ClaimState.WAITS, A)
     # It is back, and the other needs a moment longer to find it.
     claim.decide({}, 60.0)
     claim.decide({}, 60.0 + SETTLE_S)
-    assert claim.stand is Stand.WAITS
-    claim.decide({A: Stand.PLANS}, 61.0)
-    claim.decide({A: Stand.PLANS}, 61.0 + REJOIN_S)
-    assert (claim.stand, claim.rival) == (Stand.WAITS, A)
+    assert claim.stand is ClaimState.WAITS
+    claim.decide({A: ClaimState.PLANS}, 61.0)
+    claim.decide({A: ClaimState.PLANS}, 61.0 + REJOIN_S)
+    assert (claim.stand, claim.rival) == (ClaimState.WAITS, A)
     # Who planned goes on, but for a moment in which it looks.
     claim = planning(A)
     claim.decide({}, 1.0, in_touch=False)
     assert not claim.doubts(1.0)
     claim.decide({}, 9.0)
-    assert claim.stand is Stand.PLANS
+    assert claim.stand is ClaimState.PLANS
     assert claim.doubts(9.0)
     assert not claim.doubts(9.0 + SETTLE_S)
 
@@ -135,14 +135,14 @@ def test_who_was_frozen_says_nothing_until_it_has_seen_who_plans_now():
     woken = 3 * LEASE_S
     claim.decide({}, woken)
     assert claim.doubts(woken)
-    claim.decide({A: Stand.PLANS}, woken + 1.0)
-    assert claim.stand is Stand.YIELDS
+    claim.decide({A: ClaimState.PLANS}, woken + 1.0)
+    assert claim.stand is ClaimState.YIELDS
 
 
 def test_only_what_is_a_claim_counts():
     keys = ["x/claim/0a/plans", "x/claim/0a/waits", "x/claim/0b/waits", "x/claim/0c/sleeps"]
     keys += ["x/claim/ZZ/plans", f"x/claim/{'a' * 33}/plans", "x/claim/\x1b[2J/plans"]
-    assert claims_in(keys) == {A: Stand.PLANS, B: Stand.WAITS}
+    assert claims_in(keys) == {A: ClaimState.PLANS, B: ClaimState.WAITS}
 
 
 @pytest.mark.parametrize("seed", range(50))
@@ -163,4 +163,4 @@ def test_any_course_of_things_ends_with_one_that_plans(seed):
                     seen[own].pop(other, None)
             if settled or rng.random() < 0.9:
                 claim.decide(dict(seen[own]), now, in_touch=settled or rng.random() < 0.95)
-    assert [claim.stand for claim in claims.values()].count(Stand.PLANS) == 1
+    assert [claim.stand for claim in claims.values()].count(ClaimState.PLANS) == 1

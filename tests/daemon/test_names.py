@@ -12,10 +12,10 @@ import zenoh
 from msgspec import convert
 
 from fasaco_edge.config.config import BusConfig, DaemonConfig
-from fasaco_edge.daemon.claim import Stand, claims_in
+from fasaco_edge.daemon.claim import ClaimState, claims_in
 from fasaco_edge.daemon.memory import needed_bytes
 from fasaco_edge.doctor import session
-from fasaco_edge.doctor.finding import Level, Patient
+from fasaco_edge.doctor.finding import CheckContext, Level
 from fasaco_edge.host.processes import peak_mb
 from tests.campaigns.memory import Flood, map_payload, update_payload
 from tests.support.outsider import Ear, Outsider
@@ -68,7 +68,7 @@ class Robot:
 
         def holds():
             claims = self.claims()
-            plan = list(claims.values()).count(Stand.PLANS)
+            plan = list(claims.values()).count(ClaimState.PLANS)
             return claims if (plan, len(claims) - plan) == (planning, waiting) else None
 
         return until(holds)
@@ -122,7 +122,7 @@ def test_of_two_begun_at_once_one_plans_and_the_other_follows_it(tmp_path, robot
     with router_process(endpoint), two_daemons(tmp_path, endpoint, endpoint) as daemons:
         robot = robot_at(endpoint)
         claims = robot.wait_claims(1, 1)
-        (planner,) = (own for own, stand in claims.items() if stand is Stand.PLANS)
+        (planner,) = (own for own, stand in claims.items() if stand is ClaimState.PLANS)
         robot.wait_path()
         told = [status.json() for status in robot.statuses.heard]
         (blocked,) = {one["reason"] for one in told if one["state"] == "blocked"} or {""}
@@ -133,7 +133,7 @@ def test_of_two_begun_at_once_one_plans_and_the_other_follows_it(tmp_path, robot
                 assert outsider.ask("@rpc/status").json()["state"] != "blocked"
                 assert outsider.ask("@rpc/path").payload
         config = DaemonConfig(bus=BusConfig(listen=(), connect=(endpoint,), mode="client"))
-        seen = session.peers(Patient(config))
+        seen = session.peers(CheckContext(config))
         assert seen.level is Level.WARN
         assert seen.found.startswith("2 daemons have the name 'robot', of which one plans; ")
         assert f"daemon {planner} plans" in seen.details
@@ -229,7 +229,7 @@ def test_where_a_network_grows_together_one_goes_on(tmp_path, robot_at):
                         else ""
                     )
                 )
-            assert claims[min(claims)] is Stand.PLANS, "the smaller id goes on"
+            assert claims[min(claims)] is ClaimState.PLANS, "the smaller id goes on"
             assert sorted(map(waits, daemons)) == [False, True]
             # Who joins now gets one path, and it is one to drive.
             with Outsider(one) as late:

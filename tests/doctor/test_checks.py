@@ -18,7 +18,7 @@ from fasaco_edge.doctor import files as folders
 from fasaco_edge.doctor import files as kernels
 from fasaco_edge.doctor import machine, report, session
 from fasaco_edge.doctor import machine as memory
-from fasaco_edge.doctor.finding import Check, Finding, Level, Patient, Unit, find_unit
+from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
 from fasaco_edge.kernels.sealed import write_sealed
 from tests.kernels.harm import HARMS
 from tests.kernels.installations import fill_with
@@ -30,18 +30,20 @@ MEMINFO = "MemTotal:        3884328 kB\nMemFree: 100000 kB\nMemAvailable:    {} 
 V1_OFF = "#subsys_name\thierarchy\tnum_cgroups\tenabled\nmemory\t0\t70\t0\n"
 
 
-def computer(root: Path, **files: str) -> Patient:
+def computer(root: Path, **files: str) -> CheckContext:
     """Return a computer whose root folder holds these files, / written as __ in their names."""
     for name, text in files.items():
         file = root / name.replace("__", "/")
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text)
-    return Patient(DaemonConfig(), root=root)
+    return CheckContext(DaemonConfig(), root=root)
 
 
-def at(*listen: str, connect: tuple[str, ...] = (), mode: str = "peer", name="robot") -> Patient:
+def at(
+    *listen: str, connect: tuple[str, ...] = (), mode: str = "peer", name="robot"
+) -> CheckContext:
     bus = BusConfig(listen=listen, connect=connect, mode=mode)
-    return Patient(DaemonConfig(bus=bus, robot=RobotConfig(name=name)))
+    return CheckContext(DaemonConfig(bus=bus, robot=RobotConfig(name=name)))
 
 
 def test_a_raspberry_pi_without_the_memory_controller_is_told_how_to_have_it(tmp_path):
@@ -58,7 +60,7 @@ def test_a_raspberry_pi_without_the_memory_controller_is_told_how_to_have_it(tmp
     assert found.to_do == (
         "add cgroup_enable=memory to the one line of /boot/firmware/cmdline.txt, and reboot"
     )
-    limited = Patient(pi.config, unit=Unit({"MemoryMax": "536870912"}), root=tmp_path)
+    limited = CheckContext(pi.config, unit=Unit({"MemoryMax": "536870912"}), root=tmp_path)
     assert "limits of the unit do not hold" in memory.memory(limited).found
 
 
@@ -92,7 +94,7 @@ def test_memory_is_short_or_limited(tmp_path, free_kb, limit, level):
         "proc__meminfo": MEMINFO.format(free_kb),
     }
     pc = computer(tmp_path, **files)
-    found = memory.memory(Patient(pc.config, unit=Unit({"MemoryMax": limit}), root=tmp_path))
+    found = memory.memory(CheckContext(pc.config, unit=Unit({"MemoryMax": limit}), root=tmp_path))
     assert found.level == level
     assert bool(found.to_do) == (level == "warn")
 
@@ -110,7 +112,7 @@ def test_a_board_is_called_by_its_name(tmp_path):
 
 
 def test_this_computer_can_run_what_is_installed():
-    here = Patient(DaemonConfig())
+    here = CheckContext(DaemonConfig())
     found = machine.c_library(here)
     assert found.level is Level.OK
     assert any(line.startswith("numba: 2.") for line in found.details)
@@ -122,7 +124,7 @@ def test_this_computer_can_run_what_is_installed():
 
 def test_a_computer_that_forgot_the_time_is_told(monkeypatch):
     monkeypatch.setattr(time, "time", lambda: 4.0)
-    found = machine.clock(Patient(DaemonConfig()))
+    found = machine.clock(CheckContext(DaemonConfig()))
     assert found.level is Level.FAIL
     assert "forgot the time" in found.found
 
@@ -152,7 +154,7 @@ def test_folders_and_who_may_write_there(tmp_path):
         mission=MissionSettings(state_dir=str(state)),
         bus=BusConfig(connect=("tcp/127.0.0.1:1#key=secret",)),
     )
-    patient = Patient(config, file, recordings=tmp_path / "later" / "recordings")
+    patient = CheckContext(config, file, recordings=tmp_path / "later" / "recordings")
     disk = folders.disk(patient)
     assert disk.level is Level.OK
     assert [line.partition(":")[0] for line in disk.details] == [
@@ -184,16 +186,16 @@ def test_a_read_only_disk_is_told(tmp_path):
         ),
         None,
     )
-    assert folders.disk(Patient(config)).level is not Level.OK
+    assert folders.disk(CheckContext(config)).level is not Level.OK
     if read_only is None:
         pytest.skip("nothing is mounted read-only here")
     config = DaemonConfig(mission=MissionSettings(state_dir=f"{read_only}/x"))
-    assert "read-only" in folders.disk(Patient(config)).found
+    assert "read-only" in folders.disk(CheckContext(config)).found
 
 
 def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch):
     told = {"Environment": f"NUMBA_CACHE_DIR={tmp_path}", "DynamicUser": "yes"}
-    patient = Patient(DaemonConfig(), unit=Unit(told | {"CacheDirectory": "fasaco-edge"}))
+    patient = CheckContext(DaemonConfig(), unit=Unit(told | {"CacheDirectory": "fasaco-edge"}))
     found = kernels.kernels(patient)
     assert found.level is Level.WARN
     assert found.found.startswith("not compiled for this version")
@@ -209,28 +211,28 @@ def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch)
     folder = cache_folder()
     assert "never all compiled" in kernels.kernels(patient).found
     folder.chmod(0o770)
-    found = kernels.kernels(Patient(DaemonConfig()))
+    found = kernels.kernels(CheckContext(DaemonConfig()))
     assert found.level is Level.WARN
     assert found.found.startswith(f"{folder} may be written by its group: the daemon takes no")
     folder.chmod(0o700)
     if os.geteuid() != 0:
         return
     os.chown(folder, 4242, 4242)
-    found = kernels.kernels(Patient(DaemonConfig()))
+    found = kernels.kernels(CheckContext(DaemonConfig()))
     assert found.found.startswith(f"{folder} belongs to user 4242: the daemon takes no")
 
 
 def test_kernels_that_are_damaged_or_were_written_by_several(tmp_path, monkeypatch):
     *files, note = fill_with(tmp_path, 3)
     monkeypatch.setattr(kernels, "wanted_folder", lambda environ: note.parent)
-    assert kernels.kernels(Patient(DaemonConfig())).level is Level.OK
+    assert kernels.kernels(CheckContext(DaemonConfig())).level is Level.OK
     # By another process, that compiles at the same time.
     write_sealed(files[1], b"the same, compiled again")
-    assert kernels.kernels(Patient(DaemonConfig())).level is Level.OK
+    assert kernels.kernels(CheckContext(DaemonConfig())).level is Level.OK
     for harm in HARMS.values():
         before = files[1].read_bytes()
         harm(files[1])
-        found = kernels.kernels(Patient(DaemonConfig()))
+        found = kernels.kernels(CheckContext(DaemonConfig()))
         assert found.level is Level.WARN
         assert found.found.startswith(f"{files[1].name} ")
         assert found.to_do == "fasaco-edge warmup"
@@ -317,7 +319,7 @@ def test_a_program_that_says_nothing_hangs_nobody():
 
 
 def test_a_check_that_fails_costs_its_own_line():
-    def stumble(_: Patient) -> Finding:
+    def stumble(_: CheckContext) -> Finding:
         raise KeyError("what")
 
     fine = Check("fine", lambda _: Finding(Level.OK, "fine"))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fasaco_edge.daemon.ledger.file import Found, LedgerFile
+from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.mission.coverage.ledger import TILE, CoverageLedger, LedgerSnapshot
 
@@ -45,7 +45,7 @@ def contents(ledger: LedgerSnapshot | None) -> object:
     return ledger.cell_m, ledger.frame, ledger.total, ledger.under_tool, visits_of(ledger)
 
 
-def load(folder: Path) -> Found:
+def load(folder: Path) -> LoadedLedger:
     """Return what a daemon finds that starts now."""
     return LedgerFile(folder, "robot").load(CELL_M)
 

@@ -33,7 +33,7 @@ KEPT_ASIDE = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class LoadedLedger:
     """What there was on disk: a ledger, or none; and what was wrong, if anything."""
 
     ledger: LedgerSnapshot | None = None
@@ -69,7 +69,7 @@ class LedgerFile:
         with contextlib.suppress(OSError):
             self._take_lock()
 
-    def load(self, cell_m: float) -> Found:
+    def load(self, cell_m: float) -> LoadedLedger:
         """Return the newest whole ledger, and finish a write that was cut short.
 
         Args:
@@ -82,7 +82,7 @@ class LedgerFile:
             except (FileNotFoundError, NotADirectoryError):
                 continue
             except LedgerMismatchError as error:
-                return Found(fault=self._refused(error))
+                return LoadedLedger(fault=self._refused(error))
             except (OSError, LedgerFileError) as error:
                 # A write that was cut short is no fault: what was there before still is.
                 if path != self._new:
@@ -90,10 +90,10 @@ class LedgerFile:
                 continue
             return self._taken(path, ledger, broken)
         if broken:
-            return Found(fault=self._lost(broken))
+            return LoadedLedger(fault=self._lost(broken))
         # What appears later, on a disk that is mounted late, was not read: not overwritten either.
         self._unwanted = [(path, "unread") for path in (self.path, self._previous)]
-        return Found()
+        return LoadedLedger()
 
     def write(self, ledger: LedgerSnapshot) -> list[str]:
         """Write a ledger so that it outlives a loss of power from the moment this returns.
@@ -151,21 +151,23 @@ class LedgerFile:
 
     def _taken(
         self, path: Path, ledger: LedgerSnapshot, broken: list[tuple[Path, FasacoError]]
-    ) -> Found:
+    ) -> LoadedLedger:
         self._moving = path == self._new
         try:
             if self._moving:
                 self._move_on()
         except OSError as error:
-            return Found(ledger, LedgerFileError(f"cannot write {self.path}: {reason_of(error)}"))
+            return LoadedLedger(
+                ledger, LedgerFileError(f"cannot write {self.path}: {reason_of(error)}")
+            )
         if path in (self.path, self._new):
-            return Found(ledger)
+            return LoadedLedger(ledger)
         why = "; ".join(f"{bad.name}: {error}" for bad, error in broken) or f"no {self.path.name}"
         fault = LedgerFileError(
             f"gone on from the ledger before the newest ({why})",
             hint="the last second or two before the end may be lost; check the disk",
         )
-        return Found(ledger, self._after_aside(fault, [bad for bad, _ in broken], "broken"))
+        return LoadedLedger(ledger, self._after_aside(fault, [bad for bad, _ in broken], "broken"))
 
     def _refused(self, error: LedgerMismatchError) -> FasacoError:
         everything = [self._new, self.path, self._previous]

@@ -26,15 +26,15 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
+from fasaco_edge.daemon.faults import fault_text, log_fault
 from fasaco_edge.daemon.ledger.codec import LedgerFileError
-from fasaco_edge.daemon.ledger.file import Found, LedgerFile, reason_of
-from fasaco_edge.daemon.loop.faults import fault_text, log_fault
+from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger, reason_of
 
 # An answer to a command waits so long for a slow disk [s].
 MOST_WAIT_S = 1.0
 
 
-class Keeping:
+class LedgerKeeper:
     """Keeps the ledger with the order; also before there is a mission.
 
     Attributes:
@@ -138,9 +138,9 @@ def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False)
         kept = file.set_aside("fresh")
         if kept:
             LOG.info("begun anew; what was covered before is kept as %s", ", ".join(kept))
-        return LedgerWriter(file, Found())
+        return LedgerWriter(file, LoadedLedger())
     except OSError as error:
-        return LedgerWriter(file, Found(fault=_cannot_write(file, error)))
+        return LedgerWriter(file, LoadedLedger(fault=_cannot_write(file, error)))
 
 
 class LedgerWriter:
@@ -150,7 +150,7 @@ class LedgerWriter:
         restored: the ledger to go on with, if any.
     """
 
-    def __init__(self, file: LedgerFile, found: Found) -> None:
+    def __init__(self, file: LedgerFile, found: LoadedLedger) -> None:
         self.restored = found.ledger
         self._restored_cells = found.ledger.cells if found.ledger else 0
         LOG.info("ledger %s: %d cells covered before", file.path, self._restored_cells)

@@ -41,7 +41,7 @@ class Received:
 
 
 @dataclass(frozen=True, slots=True)
-class TooLong:
+class Oversized:
     """A sample that was let go as it came: of what kind, how long it was, and might be [bytes]."""
 
     kind: str
@@ -70,7 +70,7 @@ def poster(mailbox: Mailbox[object], kind: str, max_pixels: int) -> Callable[[Sa
 
     def post(sample: Sample) -> None:
         if sample.size > most:
-            mailbox.post(TOO_LONG, TooLong(kind, sample.size, most))
+            mailbox.post(TOO_LONG, Oversized(kind, sample.size, most))
         else:
             mailbox.post(kind, Received(sample, time.monotonic()))
 
@@ -126,7 +126,7 @@ class Inbox:
         maps, faults = self._newest_maps(items)
         events = list[Event](map(MapReceived, (grid for grid, _ in maps.values())))
         map_at = {frame: at for frame, (_, at) in maps.items()}
-        faults.extend(_fault(item) for _, item in items if isinstance(item, TooLong))
+        faults.extend(_fault(item) for _, item in items if isinstance(item, Oversized))
         for kind, item in items:
             if not isinstance(item, Received) or kind == "map":
                 continue
@@ -183,7 +183,7 @@ def _bare(error: FasacoError) -> FasacoError:
     return error.with_traceback(None)
 
 
-def _fault(told: TooLong) -> FasacoError:
+def _fault(told: Oversized) -> FasacoError:
     kind = told.kind.replace("_", " ")
     text = f"a {kind} of {told.size} bytes was let go: it may have at most {told.most}"
     return MapTooLarge(text) if told.kind in MAPS else MalformedMessage(text)

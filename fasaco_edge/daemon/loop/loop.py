@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, cast
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.claim import NameClaim, Stand
-from fasaco_edge.daemon.ledger.writer import Keeping, LedgerWriter
+from fasaco_edge.daemon.claim import ClaimState, NameClaim
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
 from fasaco_edge.daemon.loop.commands import Commands
 from fasaco_edge.daemon.loop.inbox import Inbox, Received
-from fasaco_edge.daemon.loop.outbox import CoverageNews, Outbox
+from fasaco_edge.daemon.loop.outbox import CoveragePublisher, Outbox
 from fasaco_edge.daemon.loop.status import StatusBoard, path_note
 from fasaco_edge.daemon.loop.turn_log import TurnLog, TurnNote
-from fasaco_edge.daemon.loop.watchdog import MapClock, Vitals
+from fasaco_edge.daemon.loop.watchdog import MapLatency, Watchdog
 from fasaco_edge.daemon.reload import Reload
-from fasaco_edge.daemon.startup import Beginning, Loader, heard_of
+from fasaco_edge.daemon.startup import Loader, Startup, map_and_pose_of
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.errors import BadConfiguration, FasacoError, MissionBroke, PatchWithoutBase
 from fasaco_edge.mission.core.events import (
@@ -35,7 +35,7 @@ from fasaco_edge.mission.core.events import (
 from fasaco_edge.mission.orders.assignment import Assignment
 
 if TYPE_CHECKING:
-    from fasaco_edge.daemon.loop.worker import Observed, PlanningWorker
+    from fasaco_edge.daemon.loop.worker import PlanningWorker, PlanSnapshot
     from fasaco_edge.mission.core.mission import Mission
 
 LOG = logging.getLogger(__name__)
@@ -62,7 +62,7 @@ class Loop:
         ledger: LedgerWriter,
         recorder: RecorderSupervisor | None,
         turns: TurnLog,
-        vitals: Vitals,
+        vitals: Watchdog,
         reload: Reload,
         claim: NameClaim,
     ) -> None:
@@ -72,10 +72,10 @@ class Loop:
         self._commands = commands
         self._outbox = outbox
         self._ledger = ledger
-        self._keeping = Keeping(
+        self._keeping = LedgerKeeper(
             ledger, config.robot.tool_width_m, autostart=config.mission.autostart
         )
-        self._beginning = Beginning(self._keeping, self._load)
+        self._beginning = Startup(self._keeping, self._load)
         self._recorder = recorder
         self._turns = turns
         self._vitals = vitals
@@ -84,8 +84,8 @@ class Loop:
         self._status = StatusBoard(config)
         self._mission: Mission | None = None
         self._worker: PlanningWorker | None = None
-        self._maps = MapClock()
-        self._coverage = CoverageNews(outbox)
+        self._maps = MapLatency()
+        self._coverage = CoveragePublisher(outbox)
         self._gate = outbox.gate
         self._broke_at = float("-inf")
         if self._keeping.fault is not None:
@@ -158,7 +158,7 @@ class Loop:
         return items
 
     def _heed_claim(self, now: float) -> bool:
-        """Stand back where another daemon of this name plans; tell whether a turn is to be made."""
+        """Wait while another daemon of this name plans; tell whether to make a cycle."""
         claim, mission = self._claim, self._mission
         if claim.look(now):
             self._status.stands_back = claim.reason if claim.waits else ""
@@ -180,7 +180,7 @@ class Loop:
         """Let another mission go on from the ledger, as after a restart."""
         self.config = config
         self._status.show(config)
-        held = heard_of(self._mission) if self._mission is not None else self._beginning.held
+        held = map_and_pose_of(self._mission) if self._mission is not None else self._beginning.held
         self._begin_again(why, held)
 
     def _begin_again(self, why: str, held: Sequence[Event]) -> None:
@@ -193,8 +193,8 @@ class Loop:
             self._keeping.first = self._beginning.assignment
             self._beginning.end()
         self._mission = self._worker = None
-        self._maps = MapClock()
-        self._beginning = Beginning(self._keeping, self._load, held)
+        self._maps = MapLatency()
+        self._beginning = Startup(self._keeping, self._load, held)
         self._coverage.forget()
 
     def _begin(self, events: list[Event]) -> Mission | None:
@@ -203,7 +203,7 @@ class Loop:
         if self._claim.waits:
             return None
         self._beginning.load()
-        loaded = self._beginning.loaded() if self._claim.stand is Stand.PLANS else None
+        loaded = self._beginning.loaded() if self._claim.stand is ClaimState.PLANS else None
         if loaded is None:
             return None
         self._mission, self._worker = loaded
@@ -239,7 +239,7 @@ class Loop:
         self._status.faults.count([fault])
         now, broke_at = time.monotonic(), self._broke_at
         self._broke_at = now
-        held = heard_of(mission) if now - broke_at > SOON_S else []
+        held = map_and_pose_of(mission) if now - broke_at > SOON_S else []
         self._status.waits = f"{fault}: waits for another map"
         self._let_stand(mission, str(fault))
         self._begin_again("the mission broke off", held)
@@ -273,7 +273,7 @@ class Loop:
         self._maps.arrived = None
         for kind, item in items:
             if kind == "snapshot":
-                self._publish_snapshot(cast("Observed", item))
+                self._publish_snapshot(cast("PlanSnapshot", item))
             elif isinstance(item, BaseException):
                 raise item
             elif isinstance(item, PlanReady):
@@ -311,7 +311,7 @@ class Loop:
         if update.plan is not None and (seconds := self._maps.answer()) is not None:
             self._status.map_to_path_s = seconds
 
-    def _publish_snapshot(self, seen: Observed) -> None:
+    def _publish_snapshot(self, seen: PlanSnapshot) -> None:
         mission = self._mission
         frame = mission.grid.frame if mission and mission.grid else "map"
         self._outbox.pheromone(seen, frame)

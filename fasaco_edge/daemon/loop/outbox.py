@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.queries import Reply, Shared
 from fasaco_edge.bus.session import Bus
+from fasaco_edge.daemon.faults import PublishGuard
 from fasaco_edge.daemon.loop.answers import LastSamples
-from fasaco_edge.daemon.loop.faults import Gate
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived
@@ -30,7 +30,7 @@ from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
 
 if TYPE_CHECKING:
-    from fasaco_edge.daemon.loop.worker import Observed
+    from fasaco_edge.daemon.loop.worker import PlanSnapshot
 
 
 from typing import TYPE_CHECKING
@@ -49,7 +49,7 @@ class Outbox:
     """
 
     def __init__(self, bus: Bus, keys: Keys, ros: RosBridge | None = None) -> None:
-        self.gate = Gate()
+        self.gate = PublishGuard()
         self._ros = ros
         self._last = LastSamples(bus, keys)
         self._path = bus.publisher(keys.path, schemas.PATH, QOS["path"])
@@ -121,11 +121,11 @@ class Outbox:
         if self._ros is not None:
             self._ros.coverage.put(coverage)
 
-    def pheromone(self, seen: Observed, frame: str) -> None:
+    def pheromone(self, seen: PlanSnapshot, frame: str) -> None:
         """Keep the pheromone field, and publish it if anyone listens."""
         self.gate.let_out("pheromone", lambda: self._say_pheromone(seen, frame))
 
-    def _say_pheromone(self, seen: Observed, frame: str) -> None:
+    def _say_pheromone(self, seen: PlanSnapshot, frame: str) -> None:
         payload = encode_pheromone(seen.snapshot, frame, time.time_ns())
         reply = Reply(payload, schemas.PHEROMONE_GRID)
         self._last.keep_trail(seen.plan, seen.snapshot.cohort, reply)
@@ -145,7 +145,7 @@ def headings(xy: NDArray[np.float64]) -> NDArray[np.float64]:
 PERIOD_S = 0.5
 
 
-class CoverageNews:
+class CoveragePublisher:
     """Knows what was published last."""
 
     def __init__(self, outbox: Outbox) -> None:

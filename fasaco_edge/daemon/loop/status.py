@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from fasaco_edge import __version__
 from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.daemon.faults import log_fault
 from fasaco_edge.daemon.loop.answers import config_document
-from fasaco_edge.daemon.loop.faults import log_fault
 from fasaco_edge.daemon.loop.mission_report import mission_report
-from fasaco_edge.daemon.loop.watchdog import TurnTimes
+from fasaco_edge.daemon.loop.watchdog import CycleTimes
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.host.processes import resident_mb, thread_count
 from fasaco_edge.mission.orders.assignment import Assignment
@@ -79,7 +79,7 @@ class StatusBoard:
 
     def __init__(self, config: DaemonConfig) -> None:
         self.faults = Faults()
-        self.turns = TurnTimes()
+        self.turns = CycleTimes()
         self.ingest_s: float | None = None
         self.plan_s: float | None = None
         self.map_to_path_s: float | None = None

@@ -1,7 +1,8 @@
-"""The turn log: tells a recorder what each turn of the loop took in and decided.
+"""The turn log: what each cycle of the loop took in and decided, published for the recorder.
 
-It is told from the beginning or not at all: what is missing at its beginning, no replay can
-make up for. Samples that came before anybody listened are in it themselves.
+It is complete from the first cycle or not published at all: a replay cannot make up for a
+missing start. Samples that arrived before anybody listened are part of the log itself. A replay
+compares its own decisions in the same form (``DecisionFilter``).
 """
 
 from __future__ import annotations
@@ -20,14 +21,15 @@ from fasaco_edge.bus.session import Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import encode_ledger
 from fasaco_edge.daemon.loop.answers import config_document
-from fasaco_edge.daemon.loop.decided import DecidedNews, cells_checksum, kernels_name
 from fasaco_edge.daemon.loop.inbox import Received
+from fasaco_edge.kernels.cache import sources_digest
 from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanBroken, PlanReady
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.orders.order import command_document
 from fasaco_edge.samples.codec import SampleEncoder
 from fasaco_edge.wire.turns import (
     Beginning,
+    Decided,
     PlanTaken,
     Taken,
     Told,
@@ -37,7 +39,11 @@ from fasaco_edge.wire.turns import (
 )
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from fasaco_edge.mission.core.mission import Mission
+
 
 LOG = logging.getLogger(__name__)
 
@@ -91,7 +97,7 @@ class TurnLog:
         self._turns: list[Turn] = []
         self._told_room, self._deflated_room = TOLD_BYTES, DEFLATED_BYTES
         self._samples = SampleEncoder(run=0)
-        self._news = DecidedNews()
+        self._news = DecisionFilter()
         self._has_begun = self._kernels_told = False
 
     def note(self, turn: TurnNote, mission: Mission | None) -> None:
@@ -233,3 +239,44 @@ def _is_pose(turn: Turn) -> bool:
 
 def _numbered(turn: Turn, number: int) -> Turn:
     return Turn(number, turn.is_begun, turn.samples)
+
+
+class DecisionFilter:
+    """Tells turns in which something was decided, or the state has changed, from the others."""
+
+    def __init__(self) -> None:
+        self._state = ("", "")
+
+    def of(self, decision: Decision, mission: Mission | None) -> Decided | None:
+        """Return what is to be said of the next turn; None for nothing."""
+        state = (str(mission.state), mission.reason) if mission else ("", "")
+        decided = decided_of(decision, *state)
+        is_news = state != self._state or decided != Decided(*state)
+        self._state = state
+        return decided if is_news else None
+
+
+def decided_of(decision: Decision, state: str, reason: str) -> Decided:
+    """Return what the log says of a decision."""
+    plan, path = decision.plan, decision.path
+    return Decided(
+        state=state,
+        reason=reason,
+        asked=None if plan is None else (plan.number, plan.reason),
+        path=None if path is None else (path.revision, path.reason, cells_checksum(path.cells)),
+        faults=[fault.code for fault in decision.faults],
+        answers=[
+            (answer.number, answer.error.code if answer.error else "")
+            for answer in decision.answers
+        ],
+    )
+
+
+def cells_checksum(cells: NDArray[np.int32]) -> int:
+    """Return the CRC-32 of cells, int32 (n, 2), on any machine."""
+    return zlib.crc32(cells.astype("<i4").tobytes())
+
+
+def kernels_name() -> str:
+    """Return the name of the kernels in use, by what they compute."""
+    return f"kernels-{sources_digest()}"

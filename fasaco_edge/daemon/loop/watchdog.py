@@ -29,7 +29,7 @@ LATE_S = 0.1
 LEAST_S, PER_DOUBLING, BUCKETS = 1e-6, 8, 8 * 30
 
 
-class TurnTimes:
+class CycleTimes:
     """How long the turns of a loop took, since it began."""
 
     def __init__(self) -> None:
@@ -63,7 +63,7 @@ class TurnTimes:
         return self._longest_s
 
 
-class Vitals:
+class Watchdog:
     """Feeds the watchdog from the loop itself, and only while the planning thread gets on, too.
 
     A thread of its own that fed it would do so beside a loop that hangs.
@@ -117,7 +117,7 @@ def _doing(status: dict[str, Any]) -> str:
     return f"{status['state']}: {status['reason']}" if status["reason"] else str(status["state"])
 
 
-class MapClock:
+class MapLatency:
     """Follows a map from its arrival over the plan it calls for to that plan's path.
 
     Attributes:

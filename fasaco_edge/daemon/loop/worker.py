@@ -23,7 +23,7 @@ SPARE_S = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Observed:
+class PlanSnapshot:
     """What plan ``plan`` lets others see."""
 
     plan: int
@@ -109,4 +109,4 @@ class PlanningWorker:
 
     def _observe(self, plan: int, snapshot: ColonySnapshot) -> None:
         if not self._stopping.is_set():
-            self._post("snapshot", Observed(plan, snapshot))
+            self._post("snapshot", PlanSnapshot(plan, snapshot))

@@ -7,21 +7,18 @@ post; one thread decodes, draws and writes.
 from __future__ import annotations
 
 import os
-import signal
-import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from types import FrameType
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.publisher import QOS, Publisher
 from fasaco_edge.bus.session import Bus, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, FasacoError
 from fasaco_edge.host.processes import resident_mb, return_soon
+from fasaco_edge.host.signals import stop_event
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.recording.scene.blueprint import build_blueprint
@@ -48,8 +45,8 @@ LAST_WORDS_NS = 300_000_000
 EXIT_STALLED = 1
 
 
-def run_recorder(settings: RecorderSettings, stop: threading.Event | None = None) -> int:
-    """Record until SIGTERM, SIGINT or ``stop``; return the process's exit code.
+def run_recorder(settings: RecorderSettings) -> int:
+    """Record until SIGTERM or SIGINT; return the process's exit code.
 
     Importing this module raises MissingExtra where rerun is not installed. After a disk
     failed, the process ends here (``os._exit``), because rerun would never let it.
@@ -59,9 +56,8 @@ def run_recorder(settings: RecorderSettings, stop: threading.Event | None = None
         BadConfiguration: the folder cannot be made or written to.
     """
     return_soon()
-    stop = stop or threading.Event()
     repairs = _repaired(settings.out)
-    with _stopped_by_signals(stop), open_bus(settings.bus) as bus:
+    with stop_event() as stop, open_bus(settings.bus) as bus:
         recorder = Recorder(settings, bus)
         for line in repairs:
             recorder.note(line)
@@ -260,21 +256,3 @@ def _repaired(folder: Path) -> list[str]:
     except OSError as error:
         raise BadConfiguration(f"cannot record into {folder}: {error}") from error
     return [str(repair) for repair in repairs]
-
-
-@contextmanager
-def _stopped_by_signals(stop: threading.Event) -> Iterator[None]:
-    """Set ``stop`` on SIGTERM and SIGINT; where this is not the main thread, leave them be."""
-
-    def ask(_number: int, _frame: FrameType | None) -> None:
-        stop.set()
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.signal(number, ask) for number in (signal.SIGTERM, signal.SIGINT)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

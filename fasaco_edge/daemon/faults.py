@@ -28,7 +28,7 @@ def fault_text(fault: FasacoError) -> str:
     return f"{fault}: {fault.hint}" if fault.hint else str(fault)
 
 
-class Gate:
+class PublishGuard:
     """The one way out for all that the loop publishes: what fails costs that message alone.
 
     Of a topic one failure in ``PERIOD_S`` is logged, all are counted.

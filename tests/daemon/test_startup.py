@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fasaco_edge.daemon.ledger.writer import Keeping
-from fasaco_edge.daemon.startup import Beginning
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper
+from fasaco_edge.daemon.startup import Startup
 from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
@@ -22,7 +22,7 @@ class NoDisk:
 
 
 def beginning():
-    return Beginning(Keeping(NoDisk(), 0.3, autostart=True), lambda: None)
+    return Startup(LedgerKeeper(NoDisk(), 0.3, autostart=True), lambda: None)
 
 
 def a_map(frame="map"):

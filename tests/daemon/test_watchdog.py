@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from fasaco_edge.daemon.loop.watchdog import LATE_S, TurnTimes, Vitals, status_line
+from fasaco_edge.daemon.loop.watchdog import LATE_S, CycleTimes, Watchdog, status_line
 from fasaco_edge.daemon.loop.worker import PlanningWorker
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
@@ -61,7 +61,7 @@ def problem():
 def beats(worker: PlanningWorker, turns: int = 5) -> int:
     """Return how often a loop that turns at times two seconds apart feeds the watchdog."""
     told = Told()
-    vitals = Vitals(told)
+    vitals = Watchdog(told)
     for turn in range(turns):
         vitals.beat(worker, 2.0 * turn)
         time.sleep(0.3)
@@ -93,7 +93,7 @@ def test_a_planner_that_hangs_starves_it(problem):
 
 def test_it_is_fed_in_time_and_not_at_every_turn():
     told = Told()
-    vitals = Vitals(told)
+    vitals = Watchdog(told)
     for turn in range(101):
         vitals.beat(None, 0.1 * turn)
     # Ten seconds, a watchdog of four: each second.
@@ -118,7 +118,7 @@ def test_a_status_is_told_in_a_line():
 
 def test_how_long_turns_take_is_told_to_within_ten_percent():
     seconds = np.random.default_rng(1).lognormal(-7.0, 2.0, 20_000)
-    times = TurnTimes()
+    times = CycleTimes()
     assert set(times.document().values()) == {0, None}
     for each in seconds:
         times.note(float(each))
@@ -132,7 +132,7 @@ def test_how_long_turns_take_is_told_to_within_ten_percent():
 
 
 def test_turns_beyond_every_bucket_are_told_too():
-    times = TurnTimes()
+    times = CycleTimes()
     for seconds in (0.0, 1e-9, 1e7):
         times.note(seconds)
     assert times.document() == {
