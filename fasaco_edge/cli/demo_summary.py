@@ -20,7 +20,7 @@ from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
-from fasaco_edge.mission.map.reachable_area import Ground, anchor_cell
+from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +109,7 @@ def _truth(args: argparse.Namespace, out: Path) -> _Truth:
         ledger.record(Pose2D(float(x), float(y)))
     start = anchor_cell(lattice, Pose2D(float(trail[0, 0]), float(trail[0, 1])))
     nowhere = np.zeros(lattice.states.shape, bool)
-    reachable = nowhere if start is None else Ground.around(lattice, start).reachable
+    reachable = nowhere if start is None else ReachableArea.around(lattice, start).reachable
     return _Truth(grid, lattice, reachable, trail, ledger.visits(lattice.window))
 
 

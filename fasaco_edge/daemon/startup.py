@@ -24,7 +24,7 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     in_runs,
 )
-from fasaco_edge.mission.orders.assignment import CommandError
+from fasaco_edge.mission.orders.order_state import CommandError
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker
@@ -149,7 +149,7 @@ class Startup:
             try:
                 if rival:
                     raise CommandError(rival, hint="command the one that plans")
-                self.assignment = self.assignment.after(asked.command, asked.order)
+                self.assignment = self.assignment.commanded(asked.command, asked.order)
                 if asked.command == "replan":
                     raise CommandError("nothing to plan: the first plan is still to come")
             except FasacoError as error:
@@ -227,7 +227,7 @@ class Loader:
         from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
         from fasaco_edge.mission.config import MissionConfig  # noqa: PLC0415
         from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415
-        from fasaco_edge.mission.orders.assignment import NO_ORDER, Assignment  # noqa: PLC0415
+        from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState  # noqa: PLC0415
         from fasaco_edge.planners.near_optimal import NearOptimal  # noqa: PLC0415
         from fasaco_edge.planners.table import planner_of  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
@@ -251,7 +251,7 @@ class Loader:
             stale_map_s=patience.stale_map_s,
             spare_share=planner.spare_share if isinstance(chosen, NearOptimal) else 0.0,
         )
-        first = Assignment.by_itself() if patience.autostart else Assignment.none(NO_ORDER)
+        first = OrderState.autostart() if patience.autostart else OrderState.idle(NO_ORDER)
         return Mission(mission, first), worker
 
     def _report(self, stage: str) -> None:

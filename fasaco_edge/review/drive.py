@@ -17,7 +17,7 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS, CoverageLedger
 from fasaco_edge.mission.coverage.progress import Coverage
-from fasaco_edge.mission.map.reachable_area import Ground, anchor_cell
+from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
 MILESTONES = (50, 90, 99, 100)
 """Shares of the cells that can be covered at the end [percent]."""
@@ -144,7 +144,7 @@ def _reachable(lattice: CoverageLattice, trail: NDArray[np.float64]) -> NDArray[
     for x, y, _ in trail[::-1].tolist():
         cell = anchor_cell(lattice, Pose2D(x, y))
         if cell is not None:
-            return Ground.around(lattice, cell).reachable
+            return ReachableArea.around(lattice, cell).reachable
     return np.zeros(lattice.states.shape, np.bool_)
 
 

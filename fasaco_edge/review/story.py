@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival
 from fasaco_edge.errors import FasacoError, MalformedMessage
+from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.orders.order import MissionOrder, read_command
-from fasaco_edge.mission.orders.polygons import Polygon
 from fasaco_edge.recording.fields import Json, integer, number, section, text
 from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid

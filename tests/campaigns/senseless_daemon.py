@@ -25,7 +25,7 @@ import zenoh.ext
 
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.host.processes import peak_mb, resident_mb
-from fasaco_edge.mission.map.reachable_area import Ground
+from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
@@ -165,7 +165,7 @@ class Judge:
 
 def _holds(lattice: CoverageLattice, cells: np.ndarray[Any, Any]) -> bool:
     nothing = np.zeros(lattice.states.shape, bool)
-    return Ground(lattice, nothing).holding(cells.astype(np.int32)) == len(cells)
+    return ReachableArea(lattice, nothing).drivable_prefix(cells.astype(np.int32)) == len(cells)
 
 
 class Campaign:

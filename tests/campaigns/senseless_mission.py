@@ -36,8 +36,8 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.mission.core.mission import Mission
-from fasaco_edge.mission.orders.assignment import Assignment
 from fasaco_edge.mission.orders.order import read_command
+from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.observation import ColonySnapshot
 from fasaco_edge.planners.planner import Noted
@@ -148,8 +148,8 @@ class MissionTrial:
             snapshot = decode_ledger(encode_ledger(kept), kept.cell_m)
             if snapshot.cell_m == robot.tool_width_m:
                 if snapshot.tiles:
-                    mission.resume(snapshot)
-                mission.assign(Assignment.of_note(snapshot.note))
+                    mission.restore_ledger(snapshot)
+                mission.restore_order(OrderState.from_json(snapshot.note))
             if keeps_site and before.grid is not None:
                 self._batch.append(MapReceived(before.grid))
         self._mission = mission
@@ -248,7 +248,7 @@ class MissionTrial:
                 "coverage",
                 lambda: encode_occupancy_grid(coverage_grid(*values, grid.frame, grid.stamp_ns)),
             )
-        report = encode_json({"report": mission_report(mission, mission.assignment)})
+        report = encode_json({"report": mission_report(mission, mission.order_state)})
         json.loads(report)
 
     def _say(self, what: str, encode: Callable[[], bytes]) -> bytes | None:
@@ -278,7 +278,7 @@ class MissionTrial:
         _hold(set(again.tiles) == set(snapshot.tiles), "tiles")
         for place, tile in snapshot.tiles.items():
             _hold(bool((again.tiles[place] == tile).all()), f"tile {place}")
-        _hold(Assignment.of_note(again.note).note() == snapshot.note, "note")
+        _hold(OrderState.from_json(again.note).to_json() == snapshot.note, "note")
         self.counts["ledgers read again"] += 1
         self.counts["largest ledger [tiles]"] = max(
             self.counts["largest ledger [tiles]"], len(snapshot.tiles)
@@ -286,7 +286,7 @@ class MissionTrial:
 
     def _check_lattice(self) -> None:
         """Check that the lattice is, bit for bit, the one that the newest map has."""
-        mission, order = self._mission, self._mission.assignment.order
+        mission, order = self._mission, self._mission.order_state.order
         if mission.grid is None or mission.lattice is None or (order and order.keep_out):
             return
         fresh = CoverageLattice.from_map(mission.grid, self._footprint, MOST_CELLS)

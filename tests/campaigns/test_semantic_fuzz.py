@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fasaco_edge.mission.map.reachable_area import Ground
+from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.wire.paths import encode_path
 from tests.campaigns.semantic_fuzz import (
     Findings,
@@ -61,9 +61,9 @@ def test_a_seed_says_the_same_again():
 
 def test_what_breaks_is_written_down_and_said_again(tmp_path, monkeypatch):
     """With the fault that the fuzz found first: a path cut off at a cell that is lost."""
-    holding = Ground.holding
+    holding = ReachableArea.holding
     monkeypatch.setattr(
-        Ground, "holding", lambda on, cells: max(holding(on, cells), min(1, len(cells)))
+        ReachableArea, "holding", lambda on, cells: max(holding(on, cells), min(1, len(cells)))
     )
     findings = Findings(tmp_path)
     fuzz_missions(8_000, 5, findings)

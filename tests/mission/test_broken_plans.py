@@ -3,9 +3,8 @@
 import numpy as np
 
 from fasaco_edge.errors import PlanFailed
-from fasaco_edge.mission.core.events import MapReceived, PlanBroken
-from fasaco_edge.mission.core.spare_time import BROKEN_S
-from fasaco_edge.mission.coverage.progress import State
+from fasaco_edge.mission.core.events import MapReceived, PlanBroken, State
+from fasaco_edge.mission.core.route import BROKEN_S
 from tests.support.mission_world import building, patch, pose_at, started
 
 ROOM = ("......",) * 4

@@ -3,10 +3,9 @@
 import pytest
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.mission.core.events import MapReceived, PoseReceived
-from fasaco_edge.mission.coverage.progress import State
-from fasaco_edge.mission.orders.assignment import Assignment, CommandError
+from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.orders.order import OrderError
+from fasaco_edge.mission.orders.order_state import CommandError, OrderState
 from tests.support.mission_world import (
     CONFIG,
     Drive,
@@ -30,7 +29,7 @@ def cells(row0, col0, row1, col1):
 def idle(*rows, cell=(0, 0)):
     """A robot that waits for an order."""
     events = MapReceived(building(*rows)), pose_at(*cell)
-    return Drive(cell, *events, assignment=Assignment.none("no order yet"))
+    return Drive(cell, *events, assignment=OrderState.idle("no order yet"))
 
 
 def follow(drive, ticks=600):
@@ -48,7 +47,7 @@ def follow(drive, ticks=600):
 
 
 def test_without_an_order_it_stands_and_says_so():
-    drive = Drive((0, 0), assignment=Assignment.none("no order yet"))
+    drive = Drive((0, 0), assignment=OrderState.idle("no order yet"))
     assert (drive.mission.state, drive.mission.reason) == (State.IDLE, "no order yet")
     drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0))
     assert drive.mission.state is State.IDLE
@@ -172,7 +171,7 @@ def test_home_is_where_the_mission_began():
     states = follow(drive)
     assert drive.cell == (3, 3)
     assert states[-1] is State.DONE
-    assert drive.mission.assignment.home == (3, 3)
+    assert drive.mission.order_state.home == (3, 3)
     assert cells(0, 6, 6, 8) | cells(0, 0, 6, 2) <= drive.visited
     assert drive.mission.reason == "every reachable cell of the zones is covered"
 
@@ -340,8 +339,8 @@ def test_unknown_parts_of_a_zone_are_named():
 def resumed(drive, cell, *rows):
     """What comes after a kill -9: all that was kept, and nothing else."""
     kept = drive.mission.snapshot()
-    again = Drive(cell, assignment=Assignment.of_note(kept.note))
-    again.mission.resume(kept)
+    again = Drive(cell, assignment=OrderState.from_json(kept.note))
+    again.mission.restore_ledger(kept)
     again.tell(MapReceived(building(*rows)), pose_at(*cell))
     return again
 
@@ -355,9 +354,9 @@ def test_order_zone_pass_and_home_outlive_the_daemon(driven):
         if first.request is not None:
             first.plan()
         first.go()
-    before = first.mission.assignment
+    before = first.mission.order_state
     again = resumed(first, first.cell, *ROOM)
-    assert again.mission.assignment == before
+    assert again.mission.order_state == before
     if again.mission.state is not State.DONE:
         follow(again)
     assert again.cell == (3, 4)
@@ -473,7 +472,7 @@ HOUSE = ("....#.......", "....#.####..", "....#.#..#..", "......#.....", "....#.
 
 def test_a_zone_nobody_has_seen_yet_is_looked_for():
     mapper = Mapper(*HOUSE)
-    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), assignment=Assignment.none("none"))
+    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), assignment=OrderState.idle("none"))
     # Through the door in the middle, around the corner, and in from behind.
     decision = drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(0, 7, 3, 9)}]})
     assert decision.plan.reason == "looking for a way to zone 'a'"
@@ -486,7 +485,7 @@ def test_a_zone_nobody_has_seen_yet_is_looked_for():
 
 def test_a_zone_without_a_way_to_it_is_given_up_once_all_is_seen():
     mapper = Mapper(*(line.replace("#..#", "####", 1) for line in HOUSE))
-    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), assignment=Assignment.none("none"))
+    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), assignment=OrderState.idle("none"))
     drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(1, 7, 2, 9)}]})
     mapper.rows = tuple(line[:6] + "######" for line in HOUSE)
     explore(drive, mapper)

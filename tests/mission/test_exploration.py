@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import MapPatch
-from fasaco_edge.mission.core.events import MapReceived, PatchReceived
-from fasaco_edge.mission.coverage.progress import State
+from fasaco_edge.mission.core.events import MapReceived, PatchReceived, State
 from tests import naive
 from tests.support.mission_world import FOOTPRINT, PIXELS, Drive, placed, pose_at, reachable_cells
 

@@ -8,11 +8,10 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
-from fasaco_edge.mission.core.events import Decision, MapReceived
+from fasaco_edge.mission.core.events import Decision, MapReceived, State
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerMismatchError
-from fasaco_edge.mission.coverage.ledger_owner import Fit, Verdict
-from fasaco_edge.mission.coverage.progress import State
-from fasaco_edge.mission.map.reachable_area import Ground, anchor_cell
+from fasaco_edge.mission.coverage.ledger_keeper import Fit, Verdict
+from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from tests.support.mission_world import CELL, Drive, building, patch, placed, pose_at, started
 
 MAPS = ("office", "flat", "basement", "walled_grid", "warehouse")
@@ -53,7 +52,7 @@ def seen_within(grid, reach_m):
 def covered_all(grid):
     """The ledger of a robot that has covered all it could reach."""
     lattice = CoverageLattice.from_map(grid, ROBOT)
-    reachable = Ground.around(lattice, anchor_cell(lattice, Pose2D(0, 0))).reachable
+    reachable = ReachableArea.around(lattice, anchor_cell(lattice, Pose2D(0, 0))).reachable
     ledger = CoverageLedger(ROBOT.cell_m, "map")
     for row, col in np.argwhere(reachable).tolist():
         x, y = col + lattice.window.col0 + 0.5, row + lattice.window.row0 + 0.5
@@ -118,7 +117,7 @@ def after(drive):
 def resumed(before, cell, *events):
     """A robot whose mission goes on after a restart."""
     drive = Drive(cell)
-    drive.mission.resume(before)
+    drive.mission.restore_ledger(before)
     drive.tell(*events)
     return drive
 

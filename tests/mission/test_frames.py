@@ -5,10 +5,9 @@ from dataclasses import replace
 import pytest
 
 from fasaco_edge.errors import WrongFrame
-from fasaco_edge.mission.core.events import MapReceived
+from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.coverage.ledger import LedgerMismatchError
-from fasaco_edge.mission.coverage.progress import State
-from fasaco_edge.mission.map.frames import PATIENCE_S
+from fasaco_edge.mission.map.inputs import PATIENCE_S
 from tests.support.mission_world import CONFIG, Drive, building, patch, pose_at, started
 
 HALL = ("########", *("#......#",) * 4, "########")
@@ -19,7 +18,7 @@ HERE, THERE = pose_at(1, 1), pose_at(1, 1, frame="odom")
 def restarted(first, *events):
     """A mission that goes on from what another one covered."""
     drive = Drive((1, 1))
-    drive.mission.resume(first.mission.snapshot())
+    drive.mission.restore_ledger(first.mission.snapshot())
     drive.tell(*events)
     return drive
 

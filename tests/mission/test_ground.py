@@ -12,13 +12,13 @@ from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.coverage.progress import FAR_CELLS, LOOK_AHEAD, DrivenPath
 from fasaco_edge.mission.map import reachable_area as ground_module
-from fasaco_edge.mission.map.reachable_area import Ground, GroundChange, anchor_cell
+from fasaco_edge.mission.map.reachable_area import AreaChange, ReachableArea, anchor_cell
 from tests import naive
 from tests.support.grids import lattice, placed, problems, with_passages_closed
 
 
 def ground(*rows, at=(0, 0), cell=None):
-    return Ground.around(placed(lattice(*rows), *at), cell or at)
+    return ReachableArea.around(placed(lattice(*rows), *at), cell or at)
 
 
 def path(*cells):
@@ -28,10 +28,10 @@ def path(*cells):
 def test_changes_are_counted_over_reachable_cells_only():
     before = ground("....#..", "....#..")
     assert not ground("....#.#", "....#..").change_since(before)
-    assert ground("...##..", "....#..").change_since(before) == GroundChange(0, 1, 2)
-    assert ground(".......", "....#..").change_since(before) == GroundChange(5, 0, 1)
-    assert ground("....", "....").change_since(before) == GroundChange(0, 0, 0)
-    assert ground("..", "..", at=(50, 50)).change_since(before) == GroundChange(4, 8, 0)
+    assert ground("...##..", "....#..").change_since(before) == AreaChange(0, 1, 2)
+    assert ground(".......", "....#..").change_since(before) == AreaChange(5, 0, 1)
+    assert ground("....", "....").change_since(before) == AreaChange(0, 0, 0)
+    assert ground("..", "..", at=(50, 50)).change_since(before) == AreaChange(4, 8, 0)
 
 
 def test_a_change_knows_where_it_is():
@@ -85,7 +85,7 @@ def reworked(draw, lattice):
 @given(problems(max_side=24), st.data())
 def test_after_a_change_the_same_is_reachable_as_if_all_were_searched(given_ground, data):
     lattice, start = given_ground
-    before = Ground.around(lattice, start)
+    before = ReachableArea.around(lattice, start)
     for _ in range(3):
         after = reworked(data.draw, before.lattice)
         corner = np.array((after.window.row0, after.window.col0))
@@ -97,9 +97,9 @@ def test_after_a_change_the_same_is_reachable_as_if_all_were_searched(given_grou
         with pytest.MonkeyPatch.context() as patch:
             # However much has changed, first it is tried to look at that alone.
             patch.setattr(ground_module, "LOCAL_SHARE", 1.0)
-            ground = before.after(change_to(before.lattice, after), start)
+            ground = before.updated(change_to(before.lattice, after), start)
         assert ground.lattice is after
-        assert np.array_equal(ground.reachable, Ground.around(after, start).reachable)
+        assert np.array_equal(ground.reachable, ReachableArea.around(after, start).reachable)
         before = ground
 
 
@@ -107,13 +107,13 @@ def forged(ground):
     """A ground that holds a blocked cell in its corner: lost once all is searched anew."""
     reachable = ground.reachable.copy()
     reachable[-1, -1] = True
-    return Ground(ground.lattice, reachable)
+    return ReachableArea(ground.lattice, reachable)
 
 
 def is_searched(before, *rows, cell=(0, 0)):
     """Tell whether the whole lattice was searched for a change to a drawing."""
     after = lattice(*rows)
-    ground = forged(before).after(change_to(before.lattice, after), cell)
+    ground = forged(before).updated(change_to(before.lattice, after), cell)
     return not ground.reachable[-1, -1]
 
 
@@ -155,41 +155,41 @@ def test_a_map_that_no_longer_shows_the_way_between_two_rooms_parts_them(monkeyp
     before = ground("......##", "........", "#######.", "........", "......##")
     after = lattice("......#", ".......", "#######", ".......", "......#")
     monkeypatch.setattr(ground_module, "LOCAL_SHARE", 1.0)
-    here = before.after(change_to(before.lattice, after), (0, 0))
-    assert before.holds((4, 0))
-    assert not here.holds((4, 0))
+    here = before.updated(change_to(before.lattice, after), (0, 0))
+    assert before.contains((4, 0))
+    assert not here.contains((4, 0))
 
 
 def test_a_robot_that_was_carried_elsewhere_while_the_map_changed():
     before = ground(*ROOMS)
     after = lattice(*drawn_over(ROOMS, (10, 12), "##"))
-    there = before.after(change_to(before.lattice, after), (0, 50))
-    assert there.holds((0, 50))
-    assert not there.holds((0, 0))
+    there = before.updated(change_to(before.lattice, after), (0, 50))
+    assert there.contains((0, 50))
+    assert not there.contains((0, 0))
 
 
 def test_the_ground_of_another_lattice_is_searched():
     before = ground("...", "...")
     other = lattice("...", "...")
     after = lattice("..#", "...")
-    assert before.after(change_to(other, after), (0, 0)).reachable.sum() == 5
+    assert before.updated(change_to(other, after), (0, 0)).reachable.sum() == 5
 
 
 def test_a_robot_that_stands_elsewhere_has_another_ground():
     rooms = lattice("..#..", "..#..")
-    before = Ground.around(rooms, (0, 0))
+    before = ReachableArea.around(rooms, (0, 0))
     unchanged = LatticeChange(rooms, rooms, np.empty((0, 2), np.int32))
-    assert before.after(unchanged, (1, 1)) is before
-    assert before.after(unchanged, (0, 3)).reachable.tolist() == [[False] * 3 + [True] * 2] * 2
+    assert before.updated(unchanged, (1, 1)) is before
+    assert before.updated(unchanged, (0, 3)).reachable.tolist() == [[False] * 3 + [True] * 2] * 2
 
 
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (GroundChange(3, 0, 5), "map: 3 cells more"),
-        (GroundChange(0, 2, 5), "map: 2 cells fewer"),
-        (GroundChange(3, 2, 0), "map: 3 cells more, 2 cells fewer"),
-        (GroundChange(0, 0, 4), "map: passages changed at 4 cells"),
+        (AreaChange(3, 0, 5), "map: 3 cells more"),
+        (AreaChange(0, 2, 5), "map: 2 cells fewer"),
+        (AreaChange(3, 2, 0), "map: 3 cells more, 2 cells fewer"),
+        (AreaChange(0, 0, 4), "map: passages changed at 4 cells"),
     ],
 )
 def test_a_change_says_what_it_is(change, text):
@@ -212,24 +212,26 @@ def test_cells_hold_up_to_the_first_illegal_step(given_ground, headings, jump_at
         for here, there in itertools.pairwise(map(lattice.local, walk))
     ]
     expected = 1 + legal.index(False) if False in legal else len(walk)
-    assert Ground.around(lattice, start).holding(path(*walk)) == expected
+    assert ReachableArea.around(lattice, start).drivable_prefix(path(*walk)) == expected
 
 
 def test_a_walk_that_begins_where_nobody_can_be_does_not_hold():
     room = ground("..#")
-    assert room.holding(path()) == 0
-    assert room.holding(path((0, 1))) == 1
+    assert room.drivable_prefix(path()) == 0
+    assert room.drivable_prefix(path((0, 1))) == 1
     for nowhere in ((7, 7), (0, 2), (-1, 1)):
-        assert room.holding(path(nowhere)) == room.holding(path(nowhere, (0, 1))) == 0
+        assert (
+            room.drivable_prefix(path(nowhere)) == room.drivable_prefix(path(nowhere, (0, 1))) == 0
+        )
 
 
 def test_the_way_is_in_cells_of_the_map_frame():
     room = ground("...", ".#.", "...", at=(-2, 10))
-    assert len(room.way((-2, 10), (0, 12))) == 5
-    assert room.way((0, 11), (0, 12)).tolist() == [[0, 11], [0, 12]]
-    assert room.way((-2, 10), (-2, 10)).tolist() == [[-2, 10]]
+    assert len(room.shortest_path((-2, 10), (0, 12))) == 5
+    assert room.shortest_path((0, 11), (0, 12)).tolist() == [[0, 11], [0, 12]]
+    assert room.shortest_path((-2, 10), (-2, 10)).tolist() == [[-2, 10]]
     for goal in ((-1, 11), (1, 10), (-2, 13)):
-        assert room.way((-2, 10), goal).shape == (0, 2)
+        assert room.shortest_path((-2, 10), goal).shape == (0, 2)
 
 
 def test_a_robot_is_in_its_cell_or_next_to_the_nearest_coverable_one():

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.host.resources import folder
-from fasaco_edge.mission.orders.assignment import Assignment, CommandError, Stage
 from fasaco_edge.mission.orders.order import (
     EVERYTHING_ONCE,
     MissionOrder,
@@ -22,6 +21,7 @@ from fasaco_edge.mission.orders.order import (
     read_command,
     read_order,
 )
+from fasaco_edge.mission.orders.order_state import CommandError, OrderState, Stage
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
 KITCHEN = {"name": "kitchen", "polygon": SQUARE}
@@ -155,28 +155,28 @@ TWO = read_order(zones(SQUARE, SQUARE, passes=2))
 
 
 def test_the_legs_of_an_order():
-    leg, titles = Assignment(TWO), []
+    leg, titles = OrderState(TWO), []
     while True:
         titles.append(leg.title)
-        if leg.next_leg() is leg:
+        if leg.next_pass() is leg:
             break
-        leg = leg.next_leg()
+        leg = leg.next_pass()
     assert titles == [f"zone 'z{zone}', pass {turn} of 2" for zone in (0, 1) for turn in (1, 2)]
-    assert Assignment.by_itself().title == "everything reachable"
+    assert OrderState.autostart().title == "everything reachable"
 
 
 @pytest.mark.parametrize(
     "assignment",
     [
-        Assignment.by_itself(),
-        Assignment.none("cancelled"),
-        Assignment(TWO, paused=True, zone=1, turn=2, begun=True, home=(-3, 4)),
-        Assignment(TWO, stage=Stage.RETRYING, tries=2),
-        Assignment(MissionOrder(return_home=True), stage=Stage.OVER),
+        OrderState.autostart(),
+        OrderState.idle("cancelled"),
+        OrderState(TWO, paused=True, zone=1, pass_number=2, begun=True, home=(-3, 4)),
+        OrderState(TWO, stage=Stage.RETRYING, tries=2),
+        OrderState(MissionOrder(return_home=True), stage=Stage.OVER),
     ],
 )
 def test_what_is_kept_is_what_was(assignment):
-    assert Assignment.of_note(assignment.note()) == assignment
+    assert OrderState.from_json(assignment.to_json()) == assignment
 
 
 @pytest.mark.parametrize(
@@ -194,40 +194,40 @@ def test_what_is_kept_is_what_was(assignment):
     ],
 )
 def test_a_note_that_cannot_be_right_is_refused(change):
-    note = json.loads(Assignment(TWO).note()) | change
+    note = json.loads(OrderState(TWO).to_json()) | change
     with pytest.raises(OrderError):
-        Assignment.of_note(json.dumps(note))
+        OrderState.from_json(json.dumps(note))
     for torn in ("", "{", "[]", "null", '{"version":1}'):
         with pytest.raises(OrderError):
-            Assignment.of_note(torn)
+            OrderState.from_json(torn)
 
 
 def test_commands_may_come_twice():
-    running = Assignment(TWO, zone=1)
-    assert running.after("start", TWO) == running
-    paused = running.after("pause", TWO)
+    running = OrderState(TWO, zone=1)
+    assert running.commanded("start", TWO) == running
+    paused = running.commanded("pause", TWO)
     assert paused.paused
-    assert paused.after("pause", TWO) == paused
-    assert paused.after("start", TWO) == paused.after("resume", TWO) == running
-    assert running.after("resume", TWO) == running
-    idle = running.after("cancel", TWO)
+    assert paused.commanded("pause", TWO) == paused
+    assert paused.commanded("start", TWO) == paused.commanded("resume", TWO) == running
+    assert running.commanded("resume", TWO) == running
+    idle = running.commanded("cancel", TWO)
     assert idle.order is None
-    assert idle.after("cancel", TWO) == idle
+    assert idle.commanded("cancel", TWO) == idle
     # The one that began by itself is the same as one for everything.
-    assert Assignment.by_itself().after("start", EVERYTHING_ONCE) == Assignment.by_itself()
+    assert OrderState.autostart().commanded("start", EVERYTHING_ONCE) == OrderState.autostart()
 
 
 def test_another_order_replaces_the_one_before_and_the_same_one_begins_again_when_over():
-    running = Assignment(TWO, zone=1)
-    assert running.after("start", EVERYTHING_ONCE) == Assignment(EVERYTHING_ONCE)
-    over = Assignment(TWO, zone=1, stage=Stage.OVER)
-    assert over.after("start", TWO) == Assignment(TWO)
+    running = OrderState(TWO, zone=1)
+    assert running.commanded("start", EVERYTHING_ONCE) == OrderState(EVERYTHING_ONCE)
+    over = OrderState(TWO, zone=1, stage=Stage.OVER)
+    assert over.commanded("start", TWO) == OrderState(TWO)
 
 
 @pytest.mark.parametrize("command", ["pause", "resume"])
 @pytest.mark.parametrize(
-    "assignment", [Assignment.none("cancelled"), Assignment(TWO, stage=Stage.OVER)]
+    "assignment", [OrderState.idle("cancelled"), OrderState(TWO, stage=Stage.OVER)]
 )
 def test_there_has_to_be_a_mission_to_pause(command, assignment):
     with pytest.raises(CommandError, match=f"there is no mission to {command}"):
-        assignment.after(command, TWO)
+        assignment.commanded(command, TWO)

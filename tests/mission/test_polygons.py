@@ -6,9 +6,8 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.geometry import Window, polygon_flaw
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.orders.polygons import flaw
 from fasaco_edge.mission.orders.zones import cells_inside, cells_near, counts_in, without
 from tests import naive
 
@@ -62,7 +61,7 @@ def all_cells():
 @settings(max_examples=150, deadline=None)
 @given(polygons)
 def test_a_zone_holds_the_cells_whose_centre_it_holds(polygon):
-    assume(not flaw(polygon))
+    assume(not polygon_flaw(polygon))
     expected = {cell for cell in all_cells() if is_inside(centre(*cell), polygon)}
     assert cells(cells_inside(polygon, WINDOW, CELL_M)) == expected
     backwards = cells_inside(polygon[::-1], WINDOW, CELL_M)
@@ -72,7 +71,7 @@ def test_a_zone_holds_the_cells_whose_centre_it_holds(polygon):
 @settings(max_examples=80, deadline=None)
 @given(polygons, st.sampled_from([0.15, 0.18, 0.4]))
 def test_near_is_what_the_polygon_touches(polygon, reach):
-    assume(not flaw(polygon))
+    assume(not polygon_flaw(polygon))
     near = cells(cells_near(polygon, WINDOW, CELL_M, reach))
     sure = {cell for cell in all_cells() if comes_near(centre(*cell), polygon, reach - 0.004)}
     possible = {cell for cell in all_cells() if comes_near(centre(*cell), polygon, reach + 0.004)}
@@ -82,7 +81,7 @@ def test_near_is_what_the_polygon_touches(polygon, reach):
 @settings(max_examples=40, deadline=None)
 @given(polygons, st.sampled_from([0.18, 0.4]))
 def test_a_robot_that_keeps_out_touches_no_keep_out_zone_on_its_way(polygon, radius):
-    assume(not flaw(polygon))
+    assume(not polygon_flaw(polygon))
     free = CoverageLattice.from_free(np.ones((WINDOW.rows, WINDOW.cols), bool), CELL_M)
     free = CoverageLattice(WINDOW, CELL_M, free.states.copy(), free.steps.copy())
     lattice = without(free, cells_near(polygon, WINDOW, CELL_M, radius))
@@ -159,7 +158,7 @@ small = st.tuples(st.integers(0, 4), st.integers(0, 4)).map(lambda p: (float(p[0
 @settings(max_examples=400, deadline=None)
 @given(st.lists(small, min_size=3, max_size=7).map(tuple))
 def test_polygons_that_cross_or_touch_themselves_are_refused(polygon):
-    said = flaw(polygon)
+    said = polygon_flaw(polygon)
     assume("twice in a row" not in said)
     assume("repeat its first" not in said)
     assert ("crosses" in said) == brute_crossing(polygon)

@@ -6,7 +6,7 @@ import pytest
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.core.events import MapReceived
-from fasaco_edge.mission.orders.assignment import Assignment, CommandError
+from fasaco_edge.mission.orders.order_state import CommandError, OrderState
 from tests.support.mission_world import Drive, building, pose_at, started
 
 ROOM = ("........",) * 6
@@ -60,7 +60,7 @@ def test_what_the_map_shows_meanwhile_does_not_hide_that_it_was_asked_for():
     [
         (lambda: Drive((0, 0)), "there is no map yet"),
         (lambda: Drive((0, 0), MapReceived(building(*ROOM))), "there is no pose yet"),
-        (lambda: Drive((0, 0), assignment=Assignment.none("")), "there is no mission"),
+        (lambda: Drive((0, 0), assignment=OrderState.idle("")), "there is no mission"),
         (lambda: Drive((9, 9), MapReceived(building(*ROOM)), pose_at(9, 9)), "outside of the map"),
     ],
 )

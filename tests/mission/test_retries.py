@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.mission.core.events import MapReceived, PoseReceived
-from fasaco_edge.mission.coverage.progress import State
+from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.coverage.unreached import viewpoints
 from tests.support.mission_world import (
     CELL,
@@ -173,7 +172,7 @@ def test_cells_left_over_in_one_zone_do_not_keep_the_robot_from_the_next():
     drive.plan()
     drive.go()
     for _ in range(30):
-        if drive.mission.assignment.zone == 1:
+        if drive.mission.order_state.zone == 1:
             break
         stands_short(drive, 1)
     assert drive.now < 25.0

@@ -16,9 +16,9 @@ from fasaco_edge.mission.core.events import (
     PatchesLost,
     PlanReady,
     PoseReceived,
+    State,
 )
 from fasaco_edge.mission.core.executive import PATIENCE_S
-from fasaco_edge.mission.coverage.progress import State
 from fasaco_edge.planners.path import CoveragePath
 from tests.support.mission_world import (
     Drive,

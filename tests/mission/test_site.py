@@ -10,8 +10,8 @@ from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.map.map_state import Site
-from fasaco_edge.mission.map.reachable_area import Ground
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.zones import kept_out, without
 from tests.support.maps import displaced, grid, occupancy_grids, part_of, repainted
 
@@ -46,7 +46,7 @@ def take_something_in(draw, site, whole, zones):
 @settings(max_examples=150, deadline=None)
 @given(st.data(), occupancy_grids(max_side=30))
 def test_from_map_to_map_a_site_is_what_its_last_map_says(data, whole):
-    site = Site(MissionConfig(FOOTPRINT))
+    site = MapState(MissionConfig(FOOTPRINT))
     zones, radius_m = (), FOOTPRINT.robot_radius_m
     x0, y0, x1, y1 = whole.geometry.bounds()
     for _ in range(6):
@@ -64,13 +64,13 @@ def test_from_map_to_map_a_site_is_what_its_last_map_says(data, whole):
         cell = site.cell()
         assert (site.ground is None) == (cell is None)
         if cell is not None:
-            reachable = Ground.around(driven, cell).reachable
+            reachable = ReachableArea.around(driven, cell).reachable
             assert np.array_equal(site.ground.reachable, reachable)
 
 
 def test_a_map_that_says_nothing_new_changes_nothing():
     """Mappers send their map again and again: nothing that hangs on it is to be made anew."""
-    site = Site(MissionConfig(FOOTPRINT))
+    site = MapState(MissionConfig(FOOTPRINT))
     cells = np.zeros((60, 60), np.int8)
     first = grid(cells)
     site.take_map(first)

@@ -8,12 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.mission.core.events import CommandReceived, MapReceived
+from fasaco_edge.mission.core.events import CommandReceived, MapReceived, State
 from fasaco_edge.mission.core.executive import PATIENCE_S
 from fasaco_edge.mission.core.mission import Mission
-from fasaco_edge.mission.coverage.progress import State
-from fasaco_edge.mission.orders.assignment import Assignment
 from fasaco_edge.mission.orders.order import read_order
+from fasaco_edge.mission.orders.order_state import OrderState
 from tests.support.mission_world import (
     CONFIG,
     Drive,
@@ -209,9 +208,9 @@ def test_whatever_happens_it_is_a_state_with_a_reason_and_the_same_every_time(se
     random = np.random.default_rng(seed)
     truth = np.zeros((8, 20), np.int8)
     config = replace(WATCHFUL, retries=1, retry_s=5.0)
-    drive = Drive((0, 0), config=config, assignment=Assignment.none("no order"))
+    drive = Drive((0, 0), config=config, assignment=OrderState.idle("no order"))
     heard = [((), drive.now)]
-    again = Mission(config, Assignment.none("no order"))
+    again = Mission(config, OrderState.idle("no order"))
 
     def tell(*events, after=0.1):
         drive.tell(*events, after=after)
@@ -243,8 +242,8 @@ def test_whatever_happens_it_is_a_state_with_a_reason_and_the_same_every_time(se
             tell(pose_at(*drive.cell))
         else:
             tell(after=1.0)
-        kept = drive.mission.assignment
-        assert Assignment.of_note(kept.note()) == kept
+        kept = drive.mission.order_state
+        assert OrderState.from_json(kept.to_json()) == kept
     told = [copy.copy(decision) for decision in drive.decisions]
     for (events, now), before in zip(heard, told, strict=True):
         decision = again.step(events, now)
@@ -255,4 +254,4 @@ def test_whatever_happens_it_is_a_state_with_a_reason_and_the_same_every_time(se
         assert (decision.plan is None) == (before.plan is None)
         assert [str(a.error) for a in decision.answers] == [str(a.error) for a in before.answers]
     assert (again.state, again.reason) == (drive.mission.state, drive.mission.reason)
-    assert again.assignment == drive.mission.assignment
+    assert again.order_state == drive.mission.order_state

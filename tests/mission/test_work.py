@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 from fasaco_edge.daemon.loop.mission_report import mission_report
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, polygon_flaw
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PoseReceived
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.mission.coverage.unreached import MOST_AREAS, MOST_VIEWPOINTS, viewpoints
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
-from fasaco_edge.mission.orders.polygons import flaw
 
 FOOTPRINT = Footprint(0.3, 0.14)
 # Pixels of a chamber's side with one wall; it holds a few cells.
@@ -60,7 +59,7 @@ def mission_in(grid, order=None):
 def report(mission):
     """Return a report as of something having changed."""
     mission._parts.log.ledger.total += 1
-    return mission_report(mission, mission.assignment)
+    return mission_report(mission, mission.order_state)
 
 
 @pytest.mark.parametrize("side", [5, 40])
@@ -104,6 +103,6 @@ def test_a_polygon_is_looked_through_edge_by_edge_in_few_calls():
         up = [(float(tooth), float(tooth % 2) * 50.0 + 1.0) for tooth in range(teeth)]
         return (*up, (float(teeth), -1.0), (-1.0, -1.0))
 
-    (good, few), (_, many) = (calls_of(flaw, comb(teeth)) for teeth in (100, 998))
+    (good, few), (_, many) = (calls_of(polygon_flaw, comb(teeth)) for teeth in (100, 998))
     assert good == ""
     assert many - few < 2 * 898

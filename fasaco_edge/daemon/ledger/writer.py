@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.coverage.ledger import LedgerMismatchError, LedgerSnapshot
-from fasaco_edge.mission.orders.assignment import NO_ORDER, Assignment
 from fasaco_edge.mission.orders.order import OrderError
+from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
@@ -49,17 +49,17 @@ class LedgerKeeper:
         self._kept = self._before.total, self.first
         self._kept_at = float("-inf")
 
-    def restore(self, mission: Mission, assignment: Assignment) -> None:
+    def restore(self, mission: Mission, assignment: OrderState) -> None:
         """Let a mission go on where the one before ended."""
         if self._before.cells:
-            mission.resume(self._before)
-        mission.assign(assignment)
+            mission.restore_ledger(self._before)
+        mission.restore_order(assignment)
 
     def take_back(self, mission: Mission) -> None:
         """Keep what a mission has done for the one that goes on in its place."""
-        self._before, self.first = mission.snapshot(), mission.assignment
+        self._before, self.first = mission.snapshot(), mission.order_state
 
-    def keep(self, mission: Mission | None, assignment: Assignment, now: float) -> None:
+    def keep(self, mission: Mission | None, assignment: OrderState, now: float) -> None:
         """Hand over what has changed: an order at once, coverage once a period."""
         total = mission.ledger.total if mission else self._before.total
         kept_total, kept_assignment = self._kept
@@ -71,7 +71,7 @@ class LedgerKeeper:
         if mission is not None:
             self._writer.put(mission.snapshot())
         else:
-            self._before = replace(self._before, note=assignment.note())
+            self._before = replace(self._before, note=assignment.to_json())
             self._writer.put(self._before)
 
     def is_kept(self, now: float) -> bool:
@@ -91,21 +91,21 @@ class LedgerKeeper:
 
     def _begin_anew(self, fault: FasacoError | None, why: str) -> None:
         self._writer.begin_anew(fault, why)
-        self._kept, self._kept_at = (-1, Assignment()), float("-inf")
+        self._kept, self._kept_at = (-1, OrderState()), float("-inf")
 
-    def _first_assignment(self, autostart: bool) -> Assignment:
+    def _first_assignment(self, autostart: bool) -> OrderState:
         """Return what to do first: what was being done, if anything."""
-        kept = Assignment.none(NO_ORDER)
+        kept = OrderState.idle(NO_ORDER)
         try:
             if self._before.note:
-                kept = Assignment.of_note(self._before.note)
+                kept = OrderState.from_json(self._before.note)
         except OrderError as error:
             self.fault = error
-            return Assignment.none(str(error))
-        if autostart and kept == Assignment.none(NO_ORDER):
-            return Assignment.by_itself()
-        if not autostart and kept.standing:
-            return Assignment.none(NO_ORDER)
+            return OrderState.idle(str(error))
+        if autostart and kept == OrderState.idle(NO_ORDER):
+            return OrderState.autostart()
+        if not autostart and kept.automatic:
+            return OrderState.idle(NO_ORDER)
         return kept
 
 

@@ -12,13 +12,13 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.loop.answers import check, error_reply
 from fasaco_edge.errors import BadQuery, FasacoError
 from fasaco_edge.mission.core.events import Answer, CommandReceived
-from fasaco_edge.mission.orders.assignment import CommandError
 from fasaco_edge.mission.orders.order import (
     EVERYTHING_ONCE,
     CommandName,
     MissionOrder,
     read_command,
 )
+from fasaco_edge.mission.orders.order_state import CommandError
 from fasaco_edge.wire.json_text import decode_json, encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES

@@ -32,7 +32,7 @@ from fasaco_edge.mission.core.events import (
     PlanBroken,
     PlanReady,
 )
-from fasaco_edge.mission.orders.assignment import Assignment
+from fasaco_edge.mission.orders.order_state import OrderState
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker, PlanSnapshot
@@ -132,8 +132,8 @@ class Loop:
             self._status.turns.note(ended - taken)
 
     @property
-    def _assignment(self) -> Assignment:
-        return self._mission.assignment if self._mission else self._beginning.assignment
+    def _assignment(self) -> OrderState:
+        return self._mission.order_state if self._mission else self._beginning.assignment
 
     @property
     def _loading(self) -> str:

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from fasaco_edge.mission.orders.assignment import Assignment
+from fasaco_edge.mission.orders.order_state import OrderState
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
 
 
-def mission_report(mission: Mission | None, assignment: Assignment) -> dict[str, Any]:
+def mission_report(mission: Mission | None, assignment: OrderState) -> dict[str, Any]:
     """Return this part of the status."""
-    order, zone = assignment.order, assignment.current
+    order, zone = assignment.order, assignment.current_zone
     home = assignment.home
     lattice = mission.lattice if mission else None
     return {
-        "ordered": None if order is None else ("itself" if assignment.standing else "command"),
+        "ordered": None if order is None else ("itself" if assignment.automatic else "command"),
         "stage": None if order is None else str(assignment.stage),
         "paused": assignment.paused,
         "zone": None if zone is None or zone.polygon is None else zone.name,
-        "pass": None if zone is None else assignment.turn,
+        "pass": None if zone is None else assignment.pass_number,
         "passes": None if zone is None else zone.passes,
         "zones": _zones(mission, assignment),
         "keep_out": 0 if order is None else len(order.keep_out),
@@ -31,7 +31,7 @@ def mission_report(mission: Mission | None, assignment: Assignment) -> dict[str,
     }
 
 
-def _zones(mission: Mission | None, assignment: Assignment) -> list[dict[str, Any]]:
+def _zones(mission: Mission | None, assignment: OrderState) -> list[dict[str, Any]]:
     if mission is None:
         zones = assignment.order.zones if assignment.order else ()
         return [

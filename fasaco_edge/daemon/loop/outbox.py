@@ -160,7 +160,7 @@ class CoveragePublisher:
     def publish(self, mission: Mission, now: float) -> None:
         """Publish the coverage if that is due."""
         # An order may forget what was covered, and keep the robot out of cells.
-        key = (mission.ledger.total, mission.map_revision, mission.assignment)
+        key = (mission.ledger.total, mission.map_revision, mission.order_state)
         if key == self._key or now - self._published_at < PERIOD_S:
             return
         lattice, grid = mission.lattice, mission.grid

@@ -16,7 +16,7 @@ from fasaco_edge.daemon.loop.mission_report import mission_report
 from fasaco_edge.daemon.loop.watchdog import CycleTimes
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.host.processes import resident_mb, thread_count
-from fasaco_edge.mission.orders.assignment import Assignment
+from fasaco_edge.mission.orders.order_state import OrderState
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.geometry import Window
@@ -100,7 +100,7 @@ class StatusBoard:
         self._shown_config = config_document(config)
 
     def due(
-        self, mission: Mission | None, assignment: Assignment, loading: str, now: float
+        self, mission: Mission | None, assignment: OrderState, loading: str, now: float
     ) -> dict[str, Any] | None:
         """Return the status if it changed or a second has passed, else None.
 
@@ -128,7 +128,7 @@ class StatusBoard:
         }
 
     def report(
-        self, mission: Mission | None, assignment: Assignment, loading: str
+        self, mission: Mission | None, assignment: OrderState, loading: str
     ) -> dict[str, Any]:
         """Return what the answer to a command says."""
         state, reason = self._state(mission, assignment, loading)
@@ -141,7 +141,7 @@ class StatusBoard:
         }
 
     def _state(
-        self, mission: Mission | None, assignment: Assignment, loading: str
+        self, mission: Mission | None, assignment: OrderState, loading: str
     ) -> tuple[str, str]:
         if self.stands_back:
             return "blocked", self.stands_back

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -175,3 +176,18 @@ class Decision:
     faults: tuple[FasacoError, ...] = ()
     answers: tuple[Answer, ...] = ()
     forgotten: bool = False
+
+
+class State(StrEnum):
+    """What the mission is doing."""
+
+    IDLE = "idle"
+    WAITING_FOR_MAP = "waiting for map"
+    WAITING_FOR_POSE = "waiting for pose"
+    PLANNING = "planning"
+    COVERING = "covering"
+    RETURNING = "returning"
+    PAUSED = "paused"
+    BLOCKED = "blocked"
+    DEGRADED = "degraded"
+    DONE = "done"

@@ -8,10 +8,10 @@ import numpy as np
 
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import Decision, PathUpdate, PlanRequest
+from fasaco_edge.mission.core.events import Decision, PathUpdate, PlanRequest, State
 from fasaco_edge.mission.core.parts import Parts
-from fasaco_edge.mission.coverage.progress import DrivenPath, State
-from fasaco_edge.mission.orders.assignment import Stage
+from fasaco_edge.mission.coverage.progress import DrivenPath
+from fasaco_edge.mission.orders.order_state import Stage
 
 # A robot that left its path, or stands still at its end, gets a new one, but not
 # more often than this [s]: a flickering pose must not keep the planner busy.
@@ -21,7 +21,7 @@ PATIENCE_S = 1.0
 DRIVING = (State.PLANNING, State.COVERING, State.RETURNING)
 
 
-class Pilot:
+class Executive:
     """Decides; the parts tell what there is to decide on."""
 
     def __init__(self, parts: Parts) -> None:
@@ -88,7 +88,7 @@ class Pilot:
             return State.IDLE, assignment.why
         if assignment.paused:
             return State.PAUSED, "paused by command"
-        if assignment.stage is Stage.OVER and not assignment.standing:
+        if assignment.stage is Stage.OVER and not assignment.automatic:
             return State.DONE, agenda.ending
         if site.lattice is None:
             return State.WAITING_FOR_MAP, site.without_map()
@@ -191,7 +191,7 @@ class Pilot:
         if home is None or cell == home:
             parts.agenda.go_on(parts.now)
             return self._settle(update)
-        way = parts.site.ground.way(cell, home)
+        way = parts.site.ground.shortest_path(cell, home)
         if not len(way):
             return self._rest(State.BLOCKED, "no way home: waits for a map that shows one")
         self._state, self._reason = State.RETURNING, "on the way home"

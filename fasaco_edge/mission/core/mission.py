@@ -15,15 +15,14 @@ from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.core.event_handler import EventHandler
 from fasaco_edge.mission.core.events import Decision, Event, PathUpdate, in_runs
-from fasaco_edge.mission.core.executive import Pilot
-from fasaco_edge.mission.core.inputs import Intake
+from fasaco_edge.mission.core.executive import Executive
 from fasaco_edge.mission.core.parts import Parts
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
-from fasaco_edge.mission.coverage.progress import Coverage, DrivenPath
+from fasaco_edge.mission.coverage.progress import Coverage, DrivenPath, ZoneProgress, zone_progress
 from fasaco_edge.mission.coverage.unreached import Unreached
-from fasaco_edge.mission.orders.assignment import Assignment
-from fasaco_edge.mission.orders.zone_progress import ZoneProgress, zone_progress
+from fasaco_edge.mission.orders.order_state import OrderState
 
 __all__ = ["Mission", "MissionConfig"]
 
@@ -35,14 +34,14 @@ class Mission:
         state, reason: what it is doing, and why.
     """
 
-    def __init__(self, config: MissionConfig, assignment: Assignment | None = None) -> None:
+    def __init__(self, config: MissionConfig, assignment: OrderState | None = None) -> None:
         """Begin with an assignment; by default with everything that can be reached."""
         self._parts = Parts.of(config)
-        self._parts.take_order(assignment or Assignment.by_itself())
-        self._pilot = Pilot(self._parts)
+        self._parts.take_order(assignment or OrderState.autostart())
+        self._pilot = Executive(self._parts)
         self.state, self.reason = self._pilot.told()
 
-    def resume(self, before: LedgerSnapshot) -> None:
+    def restore_ledger(self, before: LedgerSnapshot) -> None:
         """Go on where a ledger from before a restart ended, unless the map contradicts it.
 
         To be called before the first step. A contradiction, see ``mission.fit``, is reported
@@ -52,7 +51,7 @@ class Mission:
         self._parts.log.resume(before)
         self._parts.site.frames.counts = before.frame
 
-    def assign(self, assignment: Assignment) -> None:
+    def restore_order(self, assignment: OrderState) -> None:
         """Go on with an assignment from before a restart; to be called before the first step."""
         self._parts.take_order(assignment)
         self.state, self.reason = self._pilot.told()
@@ -66,7 +65,7 @@ class Mission:
             now: time [s] of any steady clock.
         """
         self._parts.now = self._parts.route.now = now
-        intake = Intake(self._parts)
+        intake = EventHandler(self._parts)
         path: PathUpdate | None = None
         for event in in_runs(events):
             try:
@@ -95,14 +94,14 @@ class Mission:
 
     def zone_progress(self) -> list[ZoneProgress]:
         """Return how far each zone of the order is."""
-        return zone_progress(self.assignment, self._parts.site.ground, self.ledger)
+        return zone_progress(self.order_state, self._parts.site.ground, self.ledger)
 
     def snapshot(self) -> LedgerSnapshot:
         """Return all that is to outlive a restart: what is covered, and how far the order is."""
-        return replace(self.ledger.snapshot(), note=self.assignment.note())
+        return replace(self.ledger.snapshot(), note=self.order_state.to_json())
 
     @property
-    def assignment(self) -> Assignment:
+    def order_state(self) -> OrderState:
         """The order, and how far it is carried out."""
         return self._parts.agenda.assignment
 

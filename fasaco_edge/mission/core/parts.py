@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.core.spare_time import SpareTime
-from fasaco_edge.mission.coverage.ledger_owner import Logbook
-from fasaco_edge.mission.map.freshness import Watch
-from fasaco_edge.mission.map.map_state import Site
-from fasaco_edge.mission.orders.agenda import Agenda
-from fasaco_edge.mission.orders.assignment import Assignment
+from fasaco_edge.mission.core.route import Route, SpareTime
+from fasaco_edge.mission.coverage.ledger_keeper import LedgerKeeper
+from fasaco_edge.mission.map.inputs import InputMonitor
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.sequencer import Sequencer
 
 
 @dataclass(slots=True)
@@ -28,10 +27,10 @@ class Parts:
         now: time of the step [s].
     """
 
-    site: Site
-    log: Logbook
-    watch: Watch
-    agenda: Agenda
+    site: MapState
+    log: LedgerKeeper
+    watch: InputMonitor
+    agenda: Sequencer
     route: Route
     spare: SpareTime
     now: float = 0.0
@@ -39,12 +38,12 @@ class Parts:
     @classmethod
     def of(cls, config: MissionConfig) -> Parts:
         """Return the parts of a mission that has heard nothing yet."""
-        site, log = Site(config), Logbook(config.footprint.cell_m)
-        agenda = Agenda(config, site, log)
+        site, log = MapState(config), LedgerKeeper(config.footprint.cell_m)
+        agenda = Sequencer(config, site, log)
         route, spare = Route(site, agenda), SpareTime(config.spare_share)
-        return cls(site, log, Watch(config), agenda, route, spare)
+        return cls(site, log, InputMonitor(config), agenda, route, spare)
 
-    def take_order(self, assignment: Assignment) -> None:
+    def take_order(self, assignment: OrderState) -> None:
         """Begin with another order, or with none; a survey has to follow."""
         self.route.disown()
         self.site.keep_out(assignment.order.keep_out if assignment.order else ())

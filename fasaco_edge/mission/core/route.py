@@ -1,19 +1,112 @@
-"""The route: the path the robot was given, and the plan under way for the next one."""
+"""Spare time: while the robot drives, what lies further on of its path is made better.
+
+The route: the path the robot was given, and the plan under way for the next one.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.events import PathUpdate, PlanBroken, PlanReady, PlanRequest
-from fasaco_edge.mission.core.spare_time import BROKEN_S, Attempt
 from fasaco_edge.mission.coverage.progress import DrivenPath
-from fasaco_edge.mission.map.map_state import Site
-from fasaco_edge.mission.map.reachable_area import Ground
-from fasaco_edge.mission.orders.agenda import Agenda
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.repair import HELD_CELLS
+
+# A path is worth another only if that saves so many steps, and such a share of what is left.
+LEAST_STEPS, LEAST_SHARE = 2, 0.002
+# The share of time is halved so often at most.
+MOST_VAIN = 4
+# Where there is nothing to attempt it is asked again so late [s]: to find that out takes a look
+# at the whole lattice, and the answer rarely changes from one pose to the next.
+SKIPPED_S = 1.0
+# After a plan that broke [s].
+BROKEN_S = 30.0
+
+
+class SpareTime:
+    """Keeps attempts to a share of a processor core; a share of 0 is none at all.
+
+    Of a path that attempt after attempt makes no better, ever fewer are made.
+    """
+
+    def __init__(self, share: float) -> None:
+        self._share = share
+        self._resting_until = 0.0
+        # The path of the last attempt, and how many came to nothing since it is there.
+        self._revision = self._vain = 0
+
+    def is_there(self, now: float) -> bool:
+        """Tell whether another attempt may begin at ``now`` [s]."""
+        return self._share > 0.0 and now >= self._resting_until
+
+    def spend(self, seconds: float, now: float, revision: int) -> None:
+        """Note that an attempt at path ``revision`` took so many seconds, and ended at ``now``."""
+        self._vain = min(self._vain + 1, MOST_VAIN) if revision == self._revision else 0
+        self._revision = revision
+        share = self._share / 2**self._vain
+        self._resting_until = now + seconds * (1.0 / share - 1.0)
+
+    def rest(self, now: float) -> None:
+        """Note that a plan broke at ``now`` [s]."""
+        self._resting_until = max(self._resting_until, now + BROKEN_S)
+
+    def skip(self, now: float) -> None:
+        """Note that there was nothing to attempt at ``now`` [s]."""
+        self._resting_until = now + SKIPPED_S
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """An attempt to make a path better from one of its cells on.
+
+    Attributes:
+        revision: of the path.
+        index: where on it the robot is.
+        joint: index of that cell.
+        problem: that the rest of the path solves, the end of the one that is left.
+    """
+
+    revision: int
+    index: int
+    joint: int
+    problem: CoverageProblem
+
+    @classmethod
+    def at(cls, path: DrivenPath, revision: int, agenda: Sequencer, number: int) -> Attempt | None:
+        """Return attempt ``number``, on a path; None where too little of it is left."""
+        # What the robot is about to drive holds still; less than twice that is not worth a thought.
+        joint = path.index + HELD_CELLS
+        if joint + HELD_CELLS > len(path.cells):
+            return None
+        row, col = path.cells[path.index].tolist()
+        try:
+            problem = agenda.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
+        except FasacoError:
+            return None  # the map has changed: a repair is due
+        return cls(revision, path.index, joint, problem)
+
+    def joined(self, path: DrivenPath, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
+        """Return what is ahead of a better path, int32 (n, 2); None if it is not worth it."""
+        if path.index > self.joint:
+            return None
+        ahead = better[path.index - self.index :]
+        return ahead if _is_worth_it(self.problem.cost, path.ahead, ahead) else None
+
+
+def _is_worth_it(cost: CoverageCost, before: NDArray[np.int32], after: NDArray[np.int32]) -> bool:
+    costs_s = cost.of_walk(before)
+    least_s = max(LEAST_STEPS * cost.step_s, LEAST_SHARE * costs_s)
+    return costs_s - cost.of_walk(after) >= least_s
 
 
 class Route:
@@ -31,7 +124,7 @@ class Route:
         published_at: when a path was last published, or found to be still right [s].
     """
 
-    def __init__(self, site: Site, agenda: Agenda) -> None:
+    def __init__(self, site: MapState, agenda: Sequencer) -> None:
         self.path = DrivenPath.none()
         self.revision = 0
         self.plans = self.attempts = 0
@@ -48,7 +141,7 @@ class Route:
         # What has changed since the last plan was asked for, and whether that is why one is wanted.
         self._changed: Window | None = None
         self._is_by_map = False
-        self._checked_on: Ground | None = None
+        self._checked_on: ReachableArea | None = None
         self._attempt: Attempt | None = None
         # How the last plan broke, and when [s]; "" where it did not.
         self._broken = "", 0.0
@@ -149,7 +242,7 @@ class Route:
         if attempt is not None:
             return self._take_better(attempt, event, ground)
         cells = self._from_here(event.path.cells, cell, ground)
-        if not len(cells) or ground.holding(cells) < len(cells):
+        if not len(cells) or ground.drivable_prefix(cells) < len(cells):
             self.outdated += 1
             self._changed = Window.around(self._changed, asked.changed)
             if not self.wanted:
@@ -162,16 +255,20 @@ class Route:
             return None
         return self.publish(cells, asked.reason, event, asked.changed)
 
-    def _take_better(self, attempt: Attempt, event: PlanReady, ground: Ground) -> PathUpdate | None:
+    def _take_better(
+        self, attempt: Attempt, event: PlanReady, ground: ReachableArea
+    ) -> PathUpdate | None:
         """Publish the path with a better rest; None where that is not worth it."""
         if attempt.revision != self.revision:
             return None
         cells = attempt.joined(self.path, event.path.cells)
-        if cells is None or ground.holding(cells) < len(cells):
+        if cells is None or ground.drivable_prefix(cells) < len(cells):
             return None
         return self.publish(cells, "better further on", event)
 
-    def _from_here(self, cells: NDArray[np.int32], here: Cell, ground: Ground) -> NDArray[np.int32]:
+    def _from_here(
+        self, cells: NDArray[np.int32], here: Cell, ground: ReachableArea
+    ) -> NDArray[np.int32]:
         """Return a fresh plan without what was covered while it was made.
 
         The robot went on meanwhile: it joins the plan at the first cell that still
@@ -184,7 +281,7 @@ class Route:
         still_open = np.ones(len(cells), bool)
         still_open[inside] = open_cells[rows[inside], cols[inside]]
         first = int(np.argmax(still_open)) if still_open.any() else len(cells) - 1
-        lead = ground.way(here, (int(cells[first, 0]), int(cells[first, 1])))
+        lead = ground.shortest_path(here, (int(cells[first, 0]), int(cells[first, 1])))
         return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead
 
     def publish(
@@ -217,7 +314,7 @@ class Route:
             return None
         self._checked_on = ground
         ahead = self.path.ahead
-        holding = ground.holding(ahead)
+        holding = ground.drivable_prefix(ahead)
         if holding == len(ahead):
             return None
         row, col = ahead[holding]

@@ -1,16 +1,22 @@
-"""How far a mission is: its state, its coverage, its place on the path."""
+"""How far a mission is: its state, its coverage, its place on the path.
+
+How far each zone of an order is.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.orders.order_state import OrderState, Stage
+from fasaco_edge.mission.orders.zones import counts_in
 
 # The robot is looked for this many cells ahead on its path; further on, the
 # path may come back to the same cell for another reason.
@@ -20,21 +26,6 @@ FAR_CELLS = 4
 # A robot that stops short of its path's end, out of the tool's reach of the last
 # cell, is sent there so often and no more.
 MOST_TRIES = 3
-
-
-class State(StrEnum):
-    """What the mission is doing."""
-
-    IDLE = "idle"
-    WAITING_FOR_MAP = "waiting for map"
-    WAITING_FOR_POSE = "waiting for pose"
-    PLANNING = "planning"
-    COVERING = "covering"
-    RETURNING = "returning"
-    PAUSED = "paused"
-    BLOCKED = "blocked"
-    DEGRADED = "degraded"
-    DONE = "done"
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,3 +161,51 @@ class LeftOver:
     def given_up(self) -> bool:
         """Whether there is no point in trying again at once."""
         return self.cells > 0 and self.tries > MOST_TRIES
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneProgress:
+    """How far a zone is.
+
+    Attributes:
+        name: of the zone.
+        passes: how often it is to be covered.
+        begun: the number of its newest pass; 0 before the first.
+        cells: of it that the robot can reach.
+        covered: those of them that are covered in that pass.
+    """
+
+    name: str
+    passes: int
+    begun: int
+    cells: int
+    covered: int
+
+
+def zone_progress(
+    assignment: OrderState, ground: ReachableArea | None, ledger: CoverageLedger
+) -> list[ZoneProgress]:
+    """Return how far each zone is, in order; none of an order for everything."""
+    order = assignment.order
+    if order is None:
+        return []
+    polygons = tuple(zone.polygon for zone in order.zones if zone.polygon)
+    cells = covered = [0] * len(polygons)
+    if ground is not None and polygons:
+        lattice, reachable = ground.lattice, ground.reachable
+        visited = reachable & (ledger.visits(lattice.window) > 0)
+        cells = counts_in(polygons, lattice.window, lattice.cell_m, reachable)
+        covered = counts_in(polygons, lattice.window, lattice.cell_m, visited)
+    found = []
+    # Either all zones have polygons, or there is but one, without: for everything.
+    for index, counted in enumerate(zip(cells, covered, strict=True)):
+        zone = order.zones[index]
+        if assignment.stage is not Stage.COVERING or index < assignment.zone:
+            begun = zone.passes
+        elif index > assignment.zone:
+            begun = 0
+        else:
+            begun = assignment.pass_number if assignment.begun else assignment.pass_number - 1
+        reached, done = counted
+        found.append(ZoneProgress(zone.name, zone.passes, begun, reached, done if begun else 0))
+    return found

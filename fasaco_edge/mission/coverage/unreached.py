@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
-from fasaco_edge.mission.coverage.ledger_owner import Logbook
-from fasaco_edge.mission.map.map_state import Site
-from fasaco_edge.mission.map.reachable_area import Ground
-from fasaco_edge.mission.orders.assignment import Assignment, Stage
+from fasaco_edge.mission.coverage.ledger_keeper import LedgerKeeper
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import MissionOrder
+from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.zones import in_zones
 
 # So many areas are named, the largest first; the others are counted.
@@ -85,7 +85,7 @@ class Sighted:
     mask: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, ground: Ground) -> Sighted:
+    def of(cls, ground: ReachableArea) -> Sighted:
         """Return what can be reached now."""
         return cls(ground.lattice.window, ground.reachable)
 
@@ -98,7 +98,7 @@ class Sighted:
             mask[common.slices_in(window)] = self.mask[common.slices_in(self.window)]
         return mask
 
-    def and_now(self, ground: Ground) -> Sighted:
+    def and_now(self, ground: ReachableArea) -> Sighted:
         """Return what could be reached before, or can be now."""
         window = ground.lattice.window
         return Sighted(window, self.on(window) | ground.reachable)
@@ -119,7 +119,7 @@ class Situation:
     """
 
     free: CoverageLattice
-    ground: Ground
+    ground: ReachableArea
     uncovered: NDArray[np.bool_]
     sighted: NDArray[np.bool_]
     zoned: bool
@@ -167,7 +167,11 @@ class Situation:
         if reachable.any():
             row, col = divmod(int(np.argmax(reachable)), reachable.shape[1])
             somewhere = row + lattice.window.row0, col + lattice.window.col0
-            behind = Ground.around(self.free, somewhere).reachable & lattice.coverable & ~reachable
+            behind = (
+                ReachableArea.around(self.free, somewhere).reachable
+                & lattice.coverable
+                & ~reachable
+            )
             causes[behind] = Cause.BEHIND_KEEP_OUT
 
 
@@ -192,12 +196,12 @@ class Leftovers:
         failures: paths after which cells were left over.
     """
 
-    def __init__(self, site: Site, log: Logbook) -> None:
+    def __init__(self, site: MapState, log: LedgerKeeper) -> None:
         self.failures = 0
         self._site = site
         self._log = log
         self._sighted: Sighted | None = None
-        self._seen: Ground | None = None
+        self._seen: ReachableArea | None = None
         self._found: tuple[object, Unreached] = (None, Unreached())
 
     def begin_anew(self) -> None:
@@ -212,7 +216,7 @@ class Leftovers:
             self._sighted = before.and_now(ground) if before else Sighted.of(ground)
             self._seen = ground
 
-    def unreached(self, assignment: Assignment) -> Unreached:
+    def unreached(self, assignment: OrderState) -> Unreached:
         """Return what is not reached.
 
         While the robot stands where it cannot be, what was so before is all there is to say.
@@ -226,14 +230,14 @@ class Leftovers:
             self._found = key, self._situation(assignment.order, ground, given_up).unreached()
         return self._found[1]
 
-    def viewpoints(self, order: MissionOrder, ground: Ground) -> set[Cell]:
+    def viewpoints(self, order: MissionOrder, ground: ReachableArea) -> set[Cell]:
         """Return the cells (row, col) to look at areas from that were closed."""
         window = ground.lattice.window
         situation = self._situation(order, ground, given_up=True)
         found = viewpoints(situation.closed(), ground.reachable)
         return {(row + window.row0, col + window.col0) for row, col in found}
 
-    def _situation(self, order: MissionOrder, ground: Ground, given_up: bool) -> Situation:
+    def _situation(self, order: MissionOrder, ground: ReachableArea, given_up: bool) -> Situation:
         window = ground.lattice.window
         assert self._site.free is not None
         uncovered = in_zones(order.zones, window, ground.lattice.cell_m)

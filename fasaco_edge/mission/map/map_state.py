@@ -12,7 +12,7 @@ from fasaco_edge.errors import (
     WrongFrame,
 )
 from fasaco_edge.grid.changes import LatticeChange
-from fasaco_edge.grid.geometry import StampedPose, Window
+from fasaco_edge.grid.geometry import Polygon, StampedPose, Window, polygon_bounds
 from fasaco_edge.grid.lattice import (
     COVERABLE,
     UNKNOWN,
@@ -24,15 +24,14 @@ from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, fitting
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.coverage.progress import Coverage
-from fasaco_edge.mission.map.frames import Frames
+from fasaco_edge.mission.map.inputs import FrameSelector
 from fasaco_edge.mission.map.loop_closure import has_moved
-from fasaco_edge.mission.map.reachable_area import FreeArea, Ground, anchor_cell
+from fasaco_edge.mission.map.reachable_area import FreeArea, ReachableArea, anchor_cell
 from fasaco_edge.mission.orders.order import MissionOrder, OrderError
-from fasaco_edge.mission.orders.polygons import Polygon, bounds
 from fasaco_edge.mission.orders.zones import kept_out, without
 
 
-class Site:
+class MapState:
     """Takes maps and poses in.
 
     Attributes:
@@ -52,9 +51,9 @@ class Site:
         self.free: CoverageLattice | None = None
         self.lattice: CoverageLattice | None = None
         self.pose: StampedPose | None = None
-        self.ground: Ground | None = None
+        self.ground: ReachableArea | None = None
         self.map_moved = False
-        self.frames = Frames()
+        self.frames = FrameSelector()
         self._config = config
         self._change: LatticeChange | None = None
         self._keep_out: tuple[Polygon, ...] = ()
@@ -212,7 +211,9 @@ class Site:
             return
         west, south, east, north = self.grid.geometry.bounds()
         for index, zone in enumerate(order.zones):
-            x0, y0, x1, y1 = bounds(zone.polygon) if zone.polygon else (west, south, east, north)
+            x0, y0, x1, y1 = (
+                polygon_bounds(zone.polygon) if zone.polygon else (west, south, east, north)
+            )
             if x1 <= west or x0 >= east or y1 <= south or y0 >= north:
                 raise OrderError(
                     f"zones[{index}].polygon: zone {zone.name!r} lies outside of the map, "
@@ -225,9 +226,9 @@ class Site:
         if cell is None or self.lattice is None:
             return
         if before is None or self._change is None or self._change.after is not self.lattice:
-            self.ground = Ground.around(self.lattice, cell)
+            self.ground = ReachableArea.around(self.lattice, cell)
         else:
-            self.ground = before.after(self._change, cell)
+            self.ground = before.updated(self._change, cell)
 
     def coverage(self, ledger: CoverageLedger) -> Coverage | None:
         """Return how much of it is covered; None before there is a map."""

@@ -71,7 +71,7 @@ LOCAL_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class GroundChange:
+class AreaChange:
     """How many reachable cells came, went, or have other steps than before.
 
     ``window`` is the smallest around all of them; None where nobody has looked.
@@ -97,7 +97,7 @@ class GroundChange:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ground:
+class ReachableArea:
     """A lattice and what of it is reachable, bool (rows, cols)."""
 
     lattice: CoverageLattice
@@ -109,16 +109,16 @@ class Ground:
         reachable = reachable_from(lattice.steps, *lattice.local(cell)).astype(bool)
         return cls(lattice, reachable)
 
-    def after(self, change: LatticeChange, cell: Cell) -> Ground:
+    def updated(self, change: LatticeChange, cell: Cell) -> ReachableArea:
         """Return the ground that can be reached from ``cell`` after the lattice has changed.
 
         The same as ``around`` finds, at the cost of what changed where that is possible.
         """
         lattice = change.after
-        if lattice is self.lattice and self.holds(cell):
+        if lattice is self.lattice and self.contains(cell):
             return self
         if change.before is not self.lattice:
-            return Ground.around(lattice, cell)
+            return ReachableArea.around(lattice, cell)
         old, new = self.lattice.window, lattice.window
         changed = change.cells - np.array((new.row0, new.col0), np.int32)
         is_local = 0 < len(changed) <= lattice.states.size * LOCAL_SHARE
@@ -127,27 +127,27 @@ class Ground:
             steps.flags.writeable = False
             reachable = carried(self.reachable, old, new).copy()
             if update_reach(steps, lattice.steps, changed, reachable, *lattice.local(cell)):
-                return Ground(lattice, reachable)
-        return Ground.around(lattice, cell)
+                return ReachableArea(lattice, reachable)
+        return ReachableArea.around(lattice, cell)
 
-    def holds(self, cell: Cell) -> bool:
+    def contains(self, cell: Cell) -> bool:
         """Tell whether a coverable ``cell`` is reachable."""
         return bool(self.reachable[self.lattice.local(cell)])
 
-    def change_since(self, before: Ground) -> GroundChange:
+    def change_since(self, before: ReachableArea) -> AreaChange:
         """Compare with the ground before; cells outside an array are not reachable."""
         mine, theirs = self.lattice.window, before.lattice.window
         common = mine.intersection(theirs)
         total, total_before = np.count_nonzero(self.reachable), np.count_nonzero(before.reachable)
         if common is None:
             window = Window.around(_around(self.reachable, mine), _around(before.reachable, theirs))
-            return GroundChange(int(total), int(total_before), 0, window)
+            return AreaChange(int(total), int(total_before), 0, window)
         here, there = common.slices_in(mine), common.slices_in(theirs)
         now, then = self.reachable[here], before.reachable[there]
         both = now & then
         kept = np.count_nonzero(both)
         rewired = (self.lattice.steps[here] != before.lattice.steps[there]) & both
-        change = GroundChange(
+        change = AreaChange(
             gained=int(total - kept),
             lost=int(total_before - kept),
             rewired=int(np.count_nonzero(rewired)),
@@ -161,7 +161,7 @@ class Ground:
         window = Window.around(_around(rewired, common), _around(came, mine), _around(went, theirs))
         return replace(change, window=window)
 
-    def holding(self, cells: NDArray[np.int32]) -> int:
+    def drivable_prefix(self, cells: NDArray[np.int32]) -> int:
         """Return how many leading cells of a walk, int32 (n, 2), can be driven here.
 
         None where the first one is not coverable: nobody may be sent there.
@@ -184,7 +184,7 @@ class Ground:
             legal |= heading & (allowed >> direction & 1).astype(bool)
         return 1 + int(np.argmin(legal)) if not legal.all() else len(cells)
 
-    def way(self, start: Cell, goal: Cell) -> NDArray[np.int32]:
+    def shortest_path(self, start: Cell, goal: Cell) -> NDArray[np.int32]:
         """Return a shortest walk, int32 (n, 2); empty where there is none."""
         lattice = self.lattice
         if not (lattice.contains(start) and lattice.contains(goal)):

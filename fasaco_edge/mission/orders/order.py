@@ -16,8 +16,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.grid.geometry import FARTHEST_M
-from fasaco_edge.mission.orders.polygons import Polygon, flaw
+from fasaco_edge.grid.geometry import FARTHEST_M, Polygon, polygon_flaw
 
 # What an order may hold at most: it is kept with the ledger, written once a second.
 MOST_ZONES = 100
@@ -124,7 +123,7 @@ def _check_polygon(where: str, polygon: Polygon) -> None:
             raise OrderError(
                 f"{where}[{index}] must be finite and within {FARTHEST_M:g} m of 0, got ({x}, {y})"
             )
-    if why := flaw(polygon):
+    if why := polygon_flaw(polygon):
         raise OrderError(f"{where} {why}")
 
 

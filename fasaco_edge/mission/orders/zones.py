@@ -7,12 +7,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.geometry import Polygon, Window
 from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
 from fasaco_edge.kernels.cells import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.mission.orders.order import Zone
-from fasaco_edge.mission.orders.polygons import Polygon
 
 # A polygon drawn along the border of a cell does not touch it; rounding must not decide [m].
 TOUCH_TOLERANCE_M = 1e-6

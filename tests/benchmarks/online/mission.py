@@ -24,9 +24,15 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.core.events import Decision, Event, PlanReady, PlanRequest, PoseReceived
+from fasaco_edge.mission.core.events import (
+    Decision,
+    Event,
+    PlanReady,
+    PlanRequest,
+    PoseReceived,
+    State,
+)
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
-from fasaco_edge.mission.coverage.progress import State
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import WorkLimit

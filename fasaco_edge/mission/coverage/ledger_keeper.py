@@ -163,7 +163,7 @@ class ResumedLedger:
         )
 
 
-class Logbook:
+class LedgerKeeper:
     """Keeps the ledger; one from before a restart only as long as no map contradicts it.
 
     Attributes:

@@ -21,10 +21,10 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.parts import Parts
 from fasaco_edge.mission.coverage.ledger import LedgerMismatchError
-from fasaco_edge.mission.orders.assignment import CommandError
+from fasaco_edge.mission.orders.order_state import CommandError
 
 
-class Intake:
+class EventHandler:
     """Takes events in, one after the other.
 
     Attributes:
@@ -91,7 +91,7 @@ class Intake:
         """Find out what can be reached; begin anew where the ledger is of another place."""
         parts = self._parts
         if misfit is not None:
-            parts.take_order(parts.agenda.assignment.elsewhere(str(misfit)))
+            parts.take_order(parts.agenda.assignment.in_other_building(str(misfit)))
         parts.survey()
         if misfit is not None:
             parts.route.want(parts.log.opening)
@@ -105,7 +105,7 @@ class Intake:
         misfit = parts.log.move_to(frame)
         if misfit is None and before not in ("", frame):
             why = f"map and poses are in frame {frame!r} now, no more in {before!r}"
-            parts.take_order(parts.agenda.assignment.anywhere(why))
+            parts.take_order(parts.agenda.assignment.in_other_frame(why))
         if is_other_map or misfit is not None:
             self._leave(f"map and poses are in frame {frame!r} now")
             parts.watch.map_came(parts.now)
@@ -134,7 +134,7 @@ class Intake:
         cell = site.cell()
         if cell is None:
             return
-        if astray or site.ground is None or not site.ground.holds(cell):
+        if astray or site.ground is None or not site.ground.contains(cell):
             parts.survey()
         if again:
             route.want(f"map and pose moved: {again} cells to be covered again")
@@ -168,7 +168,7 @@ class Intake:
         try:
             if event.command == "start":
                 parts.site.check_zones(event.order)
-            after = before.after(event.command, event.order)
+            after = before.commanded(event.command, event.order)
             plan = self._replan() if event.command == "replan" else None
         except FasacoError as error:
             self.answers.append(Answer(event.number, error))

@@ -48,16 +48,16 @@ class Stage(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Assignment:
+class OrderState:
     """An order, and how far it is carried out.
 
     Attributes:
         order: what to do; None for nothing at all.
-        standing: whether it began by itself, and goes on whenever the map shows more.
+        automatic: whether it began by itself, and goes on whenever the map shows more.
         stage: what is being done: zones covered pass by pass, then what was left over tried
             again, then the way home.
         zone: index of the zone.
-        turn: number of the pass over it, from 1.
+        pass_number: number of the pass over it, from 1.
         begun: whether that pass has begun.
         tries: how often what was left over was tried again.
         home: the cell (row, col) the mission began in.
@@ -66,10 +66,10 @@ class Assignment:
     """
 
     order: MissionOrder | None = None
-    standing: bool = False
+    automatic: bool = False
     stage: Stage = Stage.COVERING
     zone: int = 0
-    turn: int = 1
+    pass_number: int = 1
     begun: bool = False
     tries: int = 0
     home: tuple[int, int] | None = None
@@ -77,17 +77,17 @@ class Assignment:
     why: str = ""
 
     @classmethod
-    def by_itself(cls) -> Assignment:
+    def autostart(cls) -> OrderState:
         """Return what a daemon does that was told nothing: cover all that is not covered yet."""
-        return cls(MissionOrder(keep_covered=True), standing=True)
+        return cls(MissionOrder(keep_covered=True), automatic=True)
 
     @classmethod
-    def none(cls, why: str) -> Assignment:
+    def idle(cls, why: str) -> OrderState:
         """Return the assignment of a mission that waits for an order."""
         return cls(why=why)
 
     @property
-    def current(self) -> Zone | None:
+    def current_zone(self) -> Zone | None:
         """The zone being covered; None where none is."""
         if self.order is None or self.stage is not Stage.COVERING:
             return None
@@ -96,28 +96,28 @@ class Assignment:
     @property
     def title(self) -> str:
         """The zone and pass in words."""
-        zone = self.current
+        zone = self.current_zone
         if zone is None:
             return str(self.stage)
         name = "everything reachable" if zone.polygon is None else f"zone {zone.name!r}"
-        return name if zone.passes == 1 else f"{name}, pass {self.turn} of {zone.passes}"
+        return name if zone.passes == 1 else f"{name}, pass {self.pass_number} of {zone.passes}"
 
     @property
-    def returns_after_this(self) -> bool:
+    def returns_home_next(self) -> bool:
         """Whether nothing comes after this zone and pass but the way home."""
-        return self.order is not None and self.order.return_home and self.next_leg() is self
+        return self.order is not None and self.order.return_home and self.next_pass() is self
 
-    def next_leg(self) -> Assignment:
+    def next_pass(self) -> OrderState:
         """Return the assignment in its next pass, or the next zone; itself after the last."""
         if self.order is None or self.stage is not Stage.COVERING:
             return self
-        if self.turn < self.order.zones[self.zone].passes:
-            return replace(self, turn=self.turn + 1, begun=False)
+        if self.pass_number < self.order.zones[self.zone].passes:
+            return replace(self, pass_number=self.pass_number + 1, begun=False)
         if self.zone + 1 < len(self.order.zones):
-            return replace(self, zone=self.zone + 1, turn=1, begun=False)
+            return replace(self, zone=self.zone + 1, pass_number=1, begun=False)
         return self
 
-    def after(self, command: CommandName, order: MissionOrder) -> Assignment:
+    def commanded(self, command: CommandName, order: MissionOrder) -> OrderState:
         """Return what a command makes of it.
 
         What is so already stays as it is: a command may be sent twice. ``start`` replaces
@@ -130,7 +130,7 @@ class Assignment:
             case "start":
                 return self._started(order)
             case "pause" | "resume":
-                if self.order is None or (self.stage is Stage.OVER and not self.standing):
+                if self.order is None or (self.stage is Stage.OVER and not self.automatic):
                     raise CommandError(f"there is no mission to {command}")
                 return replace(self, paused=command == "pause")
             case "replan":
@@ -138,18 +138,18 @@ class Assignment:
                     why = "the mission is paused" if self.paused else "there is no mission"
                     raise CommandError(f"nothing to plan: {why}")
             case "cancel" if self.order is not None:
-                return Assignment.none("cancelled")
+                return OrderState.idle("cancelled")
             case "reset":
-                return Assignment.none("reset: what was covered is forgotten")
+                return OrderState.idle("reset: what was covered is forgotten")
         return self
 
-    def elsewhere(self, why: str) -> Assignment:
+    def in_other_building(self, why: str) -> OrderState:
         """Return what is left of it in another building, where its zones mean nothing."""
-        if self.standing:
-            return replace(Assignment.by_itself(), paused=self.paused)
-        return self if self.order is None else Assignment.none(f"{why}: the order was dropped")
+        if self.automatic:
+            return replace(OrderState.autostart(), paused=self.paused)
+        return self if self.order is None else OrderState.idle(f"{why}: the order was dropped")
 
-    def anywhere(self, why: str) -> Assignment:
+    def in_other_frame(self, why: str) -> OrderState:
         """Return what is left of it in another frame, before anything was covered.
 
         To cover everything means the same there; zones do not.
@@ -157,27 +157,27 @@ class Assignment:
         has_places = self.order is not None and (
             bool(self.order.keep_out) or any(zone.polygon for zone in self.order.zones)
         )
-        if self.order is None or self.standing or has_places:
-            return self.elsewhere(why)
-        return Assignment(self.order, paused=self.paused)
+        if self.order is None or self.automatic or has_places:
+            return self.in_other_building(why)
+        return OrderState(self.order, paused=self.paused)
 
-    def _started(self, order: MissionOrder) -> Assignment:
+    def _started(self, order: MissionOrder) -> OrderState:
         same = self.order is not None and order == replace(
             self.order, keep_covered=order.keep_covered
         )
         if same and self.stage is not Stage.OVER:
             return replace(self, paused=False)
-        return Assignment(order)
+        return OrderState(order)
 
-    def note(self) -> str:
+    def to_json(self) -> str:
         """Return it as JSON, to be kept with the ledger."""
         plain: dict[str, Any] = {
             "version": VERSION,
             "order": None if self.order is None else order_document(self.order),
-            "standing": self.standing,
+            "standing": self.automatic,
             "stage": str(self.stage),
             "zone": self.zone,
-            "pass": self.turn,
+            "pass": self.pass_number,
             "begun": self.begun,
             "tries": self.tries,
             "home": self.home,
@@ -187,7 +187,7 @@ class Assignment:
         return msgspec.json.encode(plain).decode()
 
     @classmethod
-    def of_note(cls, note: str) -> Assignment:
+    def from_json(cls, note: str) -> OrderState:
         """Return the assignment that ``note`` gave.
 
         Raises:
@@ -202,15 +202,17 @@ class Assignment:
             ) from error
         order = None if kept.order is None else order_of(kept.order)
         if order is not None and not (
-            kept.zone < len(order.zones) and kept.turn <= order.zones[kept.zone].passes
+            kept.zone < len(order.zones) and kept.pass_number <= order.zones[kept.zone].passes
         ):
-            raise OrderError(f"the order kept has no zone {kept.zone} with a pass {kept.turn}")
+            raise OrderError(
+                f"the order kept has no zone {kept.zone} with a pass {kept.pass_number}"
+            )
         return cls(
             order,
             kept.standing,
             Stage(kept.stage),
             kept.zone,
-            kept.turn,
+            kept.pass_number,
             kept.begun,
             kept.tries,
             kept.home,
@@ -227,7 +229,7 @@ class _Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     standing: bool
     stage: Literal["covering", "retrying", "returning", "over"]
     zone: Annotated[int, Meta(ge=0)]
-    turn: Annotated[int, Meta(ge=1)] = msgspec.field(name="pass")
+    pass_number: Annotated[int, Meta(ge=1)] = msgspec.field(name="pass")
     begun: bool
     tries: int
     home: tuple[int, int] | None

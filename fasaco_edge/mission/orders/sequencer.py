@@ -1,23 +1,110 @@
-"""The agenda: what of the order is still to be done, on the map as it is now."""
+"""The frontier: cells the robot can come to, beside what the map does not know yet.
+
+Where the robot is sent only to look: for a way to a zone, or into what is closed off.
+
+The agenda: what of the order is still to be done, on the map as it is now.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.grid.geometry import Polygon, Window
+from fasaco_edge.grid.lattice import UNKNOWN, Cell
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.coverage.ledger_owner import Logbook
+from fasaco_edge.mission.coverage.ledger_keeper import LedgerKeeper
 from fasaco_edge.mission.coverage.progress import MOST_TRIES, LeftOver
 from fasaco_edge.mission.coverage.unreached import Leftovers, Unreached
-from fasaco_edge.mission.map.map_state import Site
-from fasaco_edge.mission.orders.assignment import NO_ORDER, Assignment, Stage
-from fasaco_edge.mission.orders.lookout import Lookout
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.orders.order import Zone
+from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.problem import CoverageProblem
+
+# Around a cell from which nothing new was seen, others show nothing new either [cells].
+SEEN_AROUND = 1
+
+
+def next_frontier(ground: ReachableArea, polygon: Polygon, looked: Iterable[Cell]) -> Cell | None:
+    """Return the frontier cell (row, col) nearest to a polygon's corners [m], in a straight line.
+
+    Args:
+        ground: what the robot can come to.
+        polygon: where it wants to get.
+        looked: cells it has looked from already; what is close to them is left out.
+    """
+    lattice, window = ground.lattice, ground.lattice.window
+    # Beyond the lattice nothing is known.
+    unknown = np.pad(lattice.states == UNKNOWN, 1, constant_values=True)
+    beside = unknown[:-2, 1:-1] | unknown[2:, 1:-1] | unknown[1:-1, :-2] | unknown[1:-1, 2:]
+    rows, cols = np.nonzero(ground.reachable & beside)
+    rows, cols = rows + window.row0, cols + window.col0
+    for row, col in looked:
+        away = np.maximum(abs(rows - row), abs(cols - col)) > SEEN_AROUND
+        rows, cols = rows[away], cols[away]
+    if not len(rows):
+        return None
+    x, y = (cols + 0.5) * lattice.cell_m, (rows + 0.5) * lattice.cell_m
+    nearest = np.min([np.hypot(x - px, y - py) for px, py in polygon], axis=0)
+    best = int(np.argmin(nearest))
+    return int(rows[best]), int(cols[best])
+
+
+@dataclass(slots=True)
+class Exploration:
+    """Cells to look from.
+
+    Attributes:
+        viewpoints: cells (row, col) to look from, and not yet driven to.
+        looked: cells from which a way to the zone was looked for.
+    """
+
+    viewpoints: set[Cell] = field(default_factory=set)
+    looked: set[Cell] = field(default_factory=set)
+
+    def seek(self, zone: Zone | None, ground: ReachableArea | None, cell: Cell) -> str:
+        """Look for a way to a zone the robot cannot come to; return why a plan is wanted, or "".
+
+        At the border of the known, cell by cell, until the zone is in reach or all was looked at.
+        """
+        if zone is None or zone.polygon is None or ground is None or is_in_reach(zone, ground):
+            return ""
+        self.looked |= {cell}
+        goal = next_frontier(ground, zone.polygon, self.looked)
+        if goal is None:
+            return ""
+        self.looked.add(goal)
+        self.viewpoints = {goal}
+        return f"looking for a way to zone {zone.name!r}"
+
+    def note(self, zone: Zone | None, ground: ReachableArea) -> None:
+        """Look no more for a zone that can be reached now."""
+        if zone is not None and self.viewpoints and is_in_reach(zone, ground):
+            self.viewpoints.clear()
+
+    def gives_up(self) -> bool:
+        """Note that a viewpoint was not come to; tell whether the zone may be seen from others."""
+        another = bool(self.looked and self.viewpoints)
+        if another:
+            self.viewpoints.clear()
+        return another
+
+    def mark(self, cells: NDArray[np.bool_], window: Window) -> None:
+        """Set the viewpoints in ``cells``, bool (rows, cols) of ``window``."""
+        for row, col in self.viewpoints:
+            if window.row0 <= row < window.row1 and window.col0 <= col < window.col1:
+                cells[row - window.row0, col - window.col0] = True
+
+
+def is_in_reach(zone: Zone, ground: ReachableArea) -> bool:
+    """Tell whether the robot can come to any cell of a zone."""
+    inside = in_zones((zone,), ground.lattice.window, ground.lattice.cell_m)
+    return bool((inside & ground.reachable).any())
 
 
 @dataclass(slots=True)
@@ -31,21 +118,21 @@ class _Memory:
         ending: how the order came to its end.
     """
 
-    lookout: Lookout = field(default_factory=Lookout)
+    lookout: Exploration = field(default_factory=Exploration)
     left_over: LeftOver = field(default_factory=LeftOver)
     retry_at: float | None = None
     ending: str = "the order was carried out"
 
 
-class Agenda:
+class Sequencer:
     """Goes through an order: zones pass by pass, what was left over once more, the way home.
 
     Attributes:
         assignment: the order, and how far it is.
     """
 
-    def __init__(self, config: MissionConfig, site: Site, log: Logbook) -> None:
-        self.assignment = Assignment.none(NO_ORDER)
+    def __init__(self, config: MissionConfig, site: MapState, log: LedgerKeeper) -> None:
+        self.assignment = OrderState.idle(NO_ORDER)
         self._config = config
         self._site = site
         self._log = log
@@ -69,7 +156,7 @@ class Agenda:
         """How the order came to its end."""
         return self._memory.ending
 
-    def take(self, assignment: Assignment) -> None:
+    def take(self, assignment: OrderState) -> None:
         """Begin with another order, or with none."""
         self.assignment, self._memory = assignment, _Memory()
         self._counted = (None, False)
@@ -92,15 +179,15 @@ class Agenda:
         assignment = self.assignment
         if assignment.begun or assignment.order is None or assignment.stage is Stage.OVER:
             return ""
-        zone = assignment.current
-        if zone is not None and not (assignment.order.keep_covered and assignment.turn == 1):
+        zone = assignment.current_zone
+        if zone is not None and not (assignment.order.keep_covered and assignment.pass_number == 1):
             cell_m = self._config.footprint.cell_m
             self._log.forget(lambda window: in_zones((zone,), window, cell_m))
         self.assignment = replace(assignment, begun=True, home=assignment.home or cell)
         self._memory.left_over = LeftOver()
-        if assignment.turn == 1:
+        if assignment.pass_number == 1:
             self._memory.lookout.looked.clear()
-        return "" if assignment.standing else assignment.title
+        return "" if assignment.automatic else assignment.title
 
     def problem(
         self,
@@ -122,12 +209,12 @@ class Agenda:
         ground, assignment = self._site.ground, self.assignment
         assert ground is not None
         lattice, home = ground.lattice, assignment.home
-        self._memory.lookout.note(assignment.current, ground)
+        self._memory.lookout.note(assignment.current_zone, ground)
         ends_home = (
             home is not None
-            and assignment.returns_after_this
+            and assignment.returns_home_next
             and lattice.contains(home)
-            and ground.holds(home)
+            and ground.contains(home)
         )
         covered = ~self.open_cells(lattice.window)
         return CoverageProblem.of(
@@ -142,14 +229,14 @@ class Agenda:
 
     def seek(self, cell: Cell) -> str:
         """Look for a way to a zone out of reach; return why a plan is wanted, or ""."""
-        return self._memory.lookout.seek(self.assignment.current, self._site.ground, cell)
+        return self._memory.lookout.seek(self.assignment.current_zone, self._site.ground, cell)
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
         order = self.assignment.order
         if order is None:
             return np.zeros((window.rows, window.cols), bool)
-        zone = self.assignment.current
+        zone = self.assignment.current_zone
         zones = order.zones if zone is None else (zone,)
         wanted = in_zones(zones, window, self._config.footprint.cell_m)
         open_cells: NDArray[np.bool_] = wanted & (self._log.ledger.visits(window) == 0)
@@ -167,7 +254,7 @@ class Agenda:
         """Go on to what comes next: all that could be done now is done."""
         assignment, memory = self.assignment, self._memory
         memory.lookout.viewpoints.clear()
-        following = assignment.next_leg()
+        following = assignment.next_pass()
         if following is not assignment:
             self.assignment = following
             return
@@ -181,7 +268,7 @@ class Agenda:
         if assignment.tries < self._config.retries and self._worth_trying():
             if memory.retry_at is None:
                 memory.retry_at = now + self._config.retry_s
-        elif assignment.returns_after_this:
+        elif assignment.returns_home_next:
             memory.retry_at = None
             self.assignment = replace(assignment, stage=Stage.RETURNING, begun=False)
         else:
@@ -189,7 +276,7 @@ class Agenda:
 
     def reopen(self) -> None:
         """Let an order that stands go on: the map has changed since it was over."""
-        if self.assignment.standing and self.assignment.stage is Stage.OVER:
+        if self.assignment.automatic and self.assignment.stage is Stage.OVER:
             self.assignment = replace(self.assignment, stage=Stage.COVERING)
 
     def waits_for(self) -> str:
