@@ -7,6 +7,7 @@ import re
 from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console import asking, exits
+from fasaco_edge.cli.console.arguments import add_command
 from fasaco_edge.wire.keys import RPC_NAMES
 
 if TYPE_CHECKING:
@@ -29,13 +30,14 @@ exit codes: 0 answered; 1 refused, or nobody answered; 2 not understood; 78 no n
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "ask",
-        parents=[common],
-        help="ask a running daemon: status, path, coverage, pheromone, config, replan ...",
+        run,
+        about="ask a running daemon: status, path, coverage, pheromone, config, replan ...",
         description="Put a question to a running daemon over Zenoh, and show the answer.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("question", choices=RPC_NAMES, metavar="NAME", help=", ".join(RPC_NAMES))
     parser.add_argument(
@@ -47,12 +49,11 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         help="parameter of the question; may be repeated",
     )
     asking.add_question(parser)
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Ask, and show the answer."""
-    from fasaco_edge.cli.ask_view import print_answer, show
+    from fasaco_edge.cli.answers import print_answer, show
 
     reply = asking.ask(args, args.question, ";".join(args.param))
     if args.json:

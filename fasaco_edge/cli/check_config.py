@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.arguments import add_command
 from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
@@ -29,14 +30,15 @@ examples:
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "check-config",
-        parents=[common],
-        help="check a configuration: all that is wrong, with line, value and what is allowed",
+        run,
+        about="check a configuration: all that is wrong, with line, value and what is allowed",
         description="Check a configuration before a daemon starts with it: all that is wrong, "
         "each with its line, the value, and what is allowed.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="YAML configuration")
     parser.add_argument(
@@ -45,7 +47,6 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         help="print the configuration in force, defaults included, as YAML; without secrets",
     )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:

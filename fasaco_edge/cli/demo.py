@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.console.arguments import DEFAULT_CELL_M, DEFAULT_RADIUS_M
+from fasaco_edge.cli.console.arguments import DEFAULT_CELL_M, DEFAULT_RADIUS_M, add_command
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.console.arguments import Subparsers
@@ -17,10 +17,12 @@ RUNS = Path("runs")
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "demo",
-        parents=[common],
-        help="watch a simulated robot map and cover a building",
+        run,
+        about="watch a simulated robot map and cover a building",
         description="Start daemon, recorder and a simulated robot as processes of their own that "
         "talk Zenoh over loopback; show the mission; end when every reachable cell is covered. "
         "Leaves a recording (.rrd), a picture and the figures in the output folder.",
@@ -47,7 +49,6 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--timeout", type=float, default=1800.0, metavar="S", help="give up after so long [s]"
     )
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,7 +1,4 @@
-"""The demo in a terminal: one bar and a few figures; plain lines where there is no terminal.
-
-The demo's processes: daemon with recorder, and robot; and what is heard of them.
-"""
+"""The processes of the demo: daemon with recorder, and robot; watched in a terminal."""
 
 from __future__ import annotations
 
@@ -31,6 +28,10 @@ from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.keys import Keys
 
 PLAIN_LINE_EVERY_S = 5.0
+START_TIMEOUT_S = 20.0
+STOP_TIMEOUT_S = 8.0
+# "Done" has to hold for some maps [simulated s]: the last one may still be on its way.
+SETTLE_SIM_S = 3.0
 
 
 class DemoView:
@@ -86,12 +87,6 @@ def _figures(status: dict[str, Any], coverage: dict[str, Any]) -> str:
         status["plan"]["plans"],
         status["latency_ms"]["plan"] or 0.0,
     )
-
-
-START_TIMEOUT_S = 20.0
-STOP_TIMEOUT_S = 8.0
-# "Done" has to hold for some maps [simulated s]: the last one may still be on its way.
-SETTLE_SIM_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""``fasaco-edge doctor``: look a daemon's configuration through, and say what to do."""
+"""``fasaco-edge doctor``: check host, bus and configuration, and say what to do."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.arguments import add_command
 from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
@@ -18,25 +19,25 @@ if TYPE_CHECKING:
 
 EPILOG = """\
 Nothing is started or changed: it joins the bus for a second, listens, and asks. Run it as the user
-the daemon runs as, or as root, so that it may read what the daemon reads. What it looks at:
+the daemon runs as, or as root, so that it may read what the daemon reads. The checks:
   configuration   whether the file is in order
   platform        processor, system, Python
-  C library       whether it is as new as the installed packages want it
+  C library       whether it is new enough for the installed packages
   memory          how much there is, and whether limits on it hold
   clock           whether it is synchronised
-  kernels         whether they are compiled, for this code and processor, and whose they are
+  kernels         whether they are compiled for this code and processor, and who owns them
   disk            room for state, kernels and, with --recordings, recordings
   permissions     whether others may change configuration or state
-  session         whether the daemon can join the bus, and who is in its place
+  session         whether the daemon can join the bus, or another one has its name
   peers           daemon, other robots, maps and poses on the bus
-  endpoints       where the daemon listens, from where that can be reached, by whom
-  identity        certificate, key and CA: whether they fit together, and until when;
+  endpoints       where the daemon listens, and who can reach it
+  identity        certificate, key and CA: whether they match, and until when;
                   or user and password
   secret files    whether others on this computer can read keys and passwords
-  roles           who may give maps, command, view and record
-  limits          how much each who sends may send
+  roles           who may publish maps, command, view and record
+  limits          how much each sender may send
 
-each line is ok; warn: it works, but think about it; or fail, with what to do.
+each line is ok; warn: it works, but should be looked at; or fail, with what to do.
 exit codes: 0 nothing failed, 1 something did
 
 examples:
@@ -48,14 +49,15 @@ COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "doctor",
-        parents=[common],
-        help="look through computer, bus and configuration, and say what to do",
-        description="Look through a computer on which a daemon runs or is to run, the bus and the "
+        run,
+        about="check host, bus and configuration, and say what to do",
+        description="Check the host on which a daemon runs or will run, the bus and the "
         "configuration: what is missing, what is open to whom, and what to do about it.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "--config",
@@ -65,7 +67,6 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--recordings", type=Path, metavar="DIR", help="where recordings are to go")
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:

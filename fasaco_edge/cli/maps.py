@@ -5,20 +5,23 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from fasaco_edge.cli.console.arguments import add_command
+
 if TYPE_CHECKING:
     from fasaco_edge.cli.console.arguments import Subparsers
 
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    add_command(
+        commands,
+        common,
         "maps",
-        parents=[common],
-        help="list the maps that come with the package",
+        run,
+        about="list the maps that come with the package",
         description="List the maps that come with the package; plan, simulate and demo "
         "take them by name.",
     )
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:

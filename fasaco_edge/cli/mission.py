@@ -102,7 +102,7 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Ask, and show the answer."""
-    from fasaco_edge.cli.mission_view import show
+    from fasaco_edge.cli.answers import show_mission
     from fasaco_edge.wire.json_text import decode_json, encode_json
 
     asked: dict[str, Any] = {"command": args.mission_command}
@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print_json(decode_json(reply.payload))
     else:
-        show(decode_json(reply.payload))
+        show_mission(decode_json(reply.payload))
     return exits.OK
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.arguments import add_command
 from fasaco_edge.cli.plan_options import ANYWHERE, EPILOG, HOME, add_options, check, settle
 from fasaco_edge.host.signals import ctrl_c_asks
 
@@ -27,16 +28,16 @@ if TYPE_CHECKING:
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "plan",
-        parents=[common],
-        help="plan a coverage path offline",
+        run,
+        about="plan a coverage path offline",
         description="Plan a walk over all cells the robot can reach, and say how good it is.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_options(parser)
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:

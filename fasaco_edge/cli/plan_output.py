@@ -1,11 +1,11 @@
-"""What ``fasaco-edge plan`` says about a walk: figures, and a picture.
-
-The progress bar of ``fasaco-edge plan``.
-"""
+"""The output of ``fasaco-edge plan``: progress bar, figures, picture."""
 
 from __future__ import annotations
 
 import argparse
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,24 +13,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.console.terminal import progress, progress_of_time
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.lattice import CoverageLattice
     from fasaco_edge.grid.occupancy import OccupancyGrid
+    from fasaco_edge.planners.colony import ColonyConfig
     from fasaco_edge.planners.path import CoveragePath
     from fasaco_edge.planners.problem import CoverageProblem
-
-
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING
-
-from fasaco_edge.cli.console.terminal import progress, progress_of_time
-
-if TYPE_CHECKING:
-    from fasaco_edge.planners.colony import ColonyConfig
     from fasaco_edge.planners.work import SearchProgress
+
+# A terminal shows no more pictures a second; drawing them costs the search time.
+LEAST_INTERVAL_S = 0.05
 
 
 def figures_of(
@@ -109,10 +103,6 @@ def print_figures(args: argparse.Namespace, figures: dict[str, Any]) -> None:
     for file in (args.path_out, args.png):
         if file is not None:
             terminal.out().print(f"wrote {file}")
-
-
-# A terminal shows no more pictures a second; drawing them costs the search time.
-LEAST_INTERVAL_S = 0.05
 
 
 @contextmanager

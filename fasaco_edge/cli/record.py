@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.session import BusSettings
-from fasaco_edge.cli.console.arguments import add_robot_on_bus, client_settings
+from fasaco_edge.cli.console.arguments import add_command, add_robot_on_bus, client_settings
 from fasaco_edge.config.config import load_config
 from fasaco_edge.config.endpoints import from_here
 from fasaco_edge.config.ros import RosConfig
@@ -90,10 +90,12 @@ DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "record",
-        parents=[common],
-        help="record a robot's mission into a Rerun recording (.rrd)",
+        run,
+        about="record a robot's mission into a Rerun recording (.rrd)",
         description="Record map, coverage, pheromone, path, pose, states and latencies of one "
         "robot, and byte for byte what its mission hears, until SIGTERM or SIGINT. Open the result "
         "with `rerun FILE.rrd`, play it again with `fasaco-edge replay FILE.rrd`.",
@@ -131,7 +133,6 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         f"the port may (default: {DEFAULT_HOST}:{DEFAULT_PORT})",
     )
     add_robot_on_bus(parser)
-    parser.set_defaults(command=run)
 
 
 def ros_config(text: str) -> RosConfig:

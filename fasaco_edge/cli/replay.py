@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fasaco_edge.cli.console.arguments import add_command
 from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
@@ -36,13 +37,14 @@ replay is of another mission, and approximate, too.
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "replay",
-        parents=[common],
-        help="play a recorded mission again and compare its decisions",
+        run,
+        about="play a recorded mission again and compare its decisions",
         description=DESCRIPTION,
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "recordings",
@@ -64,7 +66,6 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         help="proposals of each plan (default: what was recorded with its path)",
     )
     parser.add_argument("--json", action="store_true", help="print a JSON document")
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fasaco_edge.cli.console.arguments import add_command
 from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
@@ -23,13 +24,14 @@ a crash cut short: of them, what is whole is told.
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "review",
-        parents=[common],
-        help="tell what happened in a recorded mission",
+        run,
+        about="tell what happened in a recorded mission",
         description=DESCRIPTION,
         epilog=_epilog(),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "recordings", nargs="+", type=Path, metavar="FILE.rrd", help="the parts of one run"
@@ -55,7 +57,6 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         help="write CSV files of trail, paths, states, coverage and plots, and the map as .npz",
     )
     parser.add_argument("--view", action="store_true", help="open the recording in Rerun's viewer")
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.arguments import add_command
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.console.arguments import Subparsers
@@ -35,13 +36,14 @@ mission's patience) does; what cannot is named; a file that is wrong is kept out
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "run",
-        parents=[common],
-        help="run the daemon: maps come in over Zenoh, paths go out",
+        run,
+        about="run the daemon: maps come in over Zenoh, paths go out",
         description="Run the daemon until SIGTERM or SIGINT.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--config", type=Path, metavar="FILE", help="YAML configuration")
     parser.add_argument(
@@ -59,7 +61,6 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         action="store_true",
         help="cover everything anew; the progress there is is kept aside",
     )
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 
 from fasaco_edge.cli.console.arguments import (
     DEFAULT_RADIUS_M,
+    add_command,
     add_robot_on_bus,
     client_settings,
     pair_of_floats,
@@ -22,10 +23,12 @@ if TYPE_CHECKING:
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "simulate",
-        parents=[common],
-        help="simulate a robot with a laser scanner on the bus",
+        run,
+        about="simulate a robot with a laser scanner on the bus",
         description="A differential-drive robot with a 360-degree scanner in a building it does "
         "not know. It publishes the map it has scanned so far and its pose, and follows the "
         "newest path, until SIGTERM or SIGINT.",
@@ -50,15 +53,14 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         "--trail-out", type=Path, metavar="FILE.csv", help="write where it drove, header x,y"
     )
     add_robot_on_bus(parser)
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Drive until told to stop."""
     from fasaco_edge.cli.console.arguments import check_output, writing
-    from fasaco_edge.cli.places import start_point
     from fasaco_edge.grid.geometry import Pose2D
     from fasaco_edge.grid.map_files import find_map, read_map
+    from fasaco_edge.planners.start import start_point
     from fasaco_edge.simulation.config import SimulationConfig
     from fasaco_edge.simulation.node import run_simulation
     from fasaco_edge.simulation.world import World

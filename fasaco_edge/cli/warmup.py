@@ -7,6 +7,7 @@ import time
 from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.arguments import add_command
 from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
@@ -30,13 +31,14 @@ examples:
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "warmup",
-        parents=[common],
-        help="compile the kernels into the cache, so that the first plan starts at once",
+        run,
+        about="compile the kernels into the cache, so that the first plan starts at once",
         description="Compile the kernels into the cache, so that the first plan starts at once.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "--check", action="store_true", help="compile nothing, tell whether all is there"
@@ -45,7 +47,6 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         "--prune", action="store_true", help="then remove what other versions have left there"
     )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:

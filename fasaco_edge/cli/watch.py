@@ -8,7 +8,12 @@ import sys
 from typing import TYPE_CHECKING, NoReturn
 
 from fasaco_edge.cli.console import exits
-from fasaco_edge.cli.console.arguments import add_robot_on_bus, client_settings, seconds
+from fasaco_edge.cli.console.arguments import (
+    add_command,
+    add_robot_on_bus,
+    client_settings,
+    seconds,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,14 +40,15 @@ exit codes: 0 ended as asked; 1 --once and nobody answered, or the terminal is g
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
+        common,
         "watch",
-        parents=[common],
-        help="watch a robot's mission live in this terminal",
+        run,
+        about="watch a robot's mission live in this terminal",
         description="Show map, coverage, the path ahead and the robot, with state, figures and "
         "what happened lately, as they come over Zenoh; on the robot or on any other machine.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--once", action="store_true", help="print one picture and end")
     parser.add_argument("--json", action="store_true", help="print each status as a line of JSON")
@@ -54,7 +60,6 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         help="with --once, how long to wait for the daemon (default: %(default)s)",
     )
     add_robot_on_bus(parser)
-    parser.set_defaults(command=run)
 
 
 def run(args: argparse.Namespace) -> int:

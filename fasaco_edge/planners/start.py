@@ -1,4 +1,4 @@
-"""Where a walk starts when nobody says."""
+"""The start of a walk, or of a simulated robot, where none is given."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from fasaco_edge.errors import NothingToCover, StartBlocked
-from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import suggested_start
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.reach import reachable_from
 
 
 def start_cell(lattice: CoverageLattice, map_file: Path) -> Cell:
-    """Return the start of a plan nobody gave a start for.
+    """Return the start of a plan for which none is given.
 
     A built-in map names its own; else it is the cell nearest to the map frame's
     origin within the largest connected area.
@@ -42,3 +43,22 @@ def start_cell(lattice: CoverageLattice, map_file: Path) -> Cell:
     cells = np.argwhere(largest) + np.array((window.row0, window.col0))
     row, col = cells[np.argmin(((cells + 0.5) ** 2).sum(axis=1))]
     return int(row), int(col)
+
+
+def start_point(map_file: Path, truth: OccupancyGrid, radius_m: float) -> tuple[float, float]:
+    """Return a built-in map's start (x, y) [m], and the map frame's origin for any other map.
+
+    Where that is not on the map, as in UTM, it is the place in the largest area nearest to it.
+
+    Raises:
+        NothingToCover: a robot of this radius [m] fits nowhere.
+    """
+    suggested = suggested_start(map_file)
+    if suggested is not None:
+        return suggested
+    col, row = truth.geometry.to_pixels(0.0, 0.0)
+    if 0 <= col < truth.geometry.cols and 0 <= row < truth.geometry.rows:
+        return 0.0, 0.0
+    lattice = CoverageLattice.from_map(truth, Footprint(2.0 * radius_m, radius_m))
+    row, col = start_cell(lattice, map_file)
+    return (col + 0.5) * lattice.cell_m, (row + 0.5) * lattice.cell_m

@@ -1,31 +1,57 @@
-"""Arguments that several commands share, and how their texts are read.
+"""Arguments that several commands share: how they are declared, read, and checked early.
 
-Files that commands write: looked at before the work begins, so that none is done in vain.
+A file that a command writes is checked before the work begins, so that none is done in vain.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.limits import MAX_COORDINATE_M
 
 if TYPE_CHECKING:
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
 
-
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-
-from fasaco_edge.errors import BadConfiguration
-
 DEFAULT_CELL_M = 0.3
 DEFAULT_RADIUS_M = 0.18
+
+
+def add_command(
+    commands: Subparsers,
+    common: argparse.ArgumentParser,
+    name: str,
+    run: Callable[[argparse.Namespace], int],
+    *,
+    about: str,
+    description: str,
+    epilog: str | None = None,
+) -> argparse.ArgumentParser:
+    """Add the command ``name``, which ``run`` carries out; return its parser.
+
+    Args:
+        about: its line in the list of commands.
+        description: what ``--help`` begins with.
+        epilog: what it ends with, printed as it stands.
+    """
+    parser = commands.add_parser(
+        name,
+        parents=[common],
+        help=about,
+        description=textwrap.fill(description, 79),
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(command=run)
+    return parser
 
 
 def pair_of_ints(text: str) -> tuple[int, int]:

@@ -1,4 +1,4 @@
-"""A daemon's answers for people, and for programs that read no CDR."""
+"""A daemon's answers as tables for people, or as JSON where they came as CDR."""
 
 from __future__ import annotations
 
@@ -6,16 +6,64 @@ from typing import Any
 
 import numpy as np
 import yaml
+from rich.table import Table
 
 from fasaco_edge.bus.queries import Reply
-from fasaco_edge.cli import mission_view
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import figures, out
+from fasaco_edge.watch import phrases
 from fasaco_edge.wire import coverage, schemas
 from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
+
+
+def show_mission(report: dict[str, Any]) -> None:
+    """Print a daemon's answer."""
+    mission = report["mission"]
+    console = out()
+    console.print(figures(_rows(report, mission)))
+    if mission["zones"]:
+        console.print(_zones(mission["zones"]))
+    if mission["unreached"]["areas"]:
+        console.print(_unreached(mission["unreached"]))
+
+
+def _rows(report: dict[str, Any], mission: dict[str, Any]) -> list[tuple[str, str]]:
+    rows = [(name, str(report[name])) for name in ("robot", "state", "reason")]
+    if mission["ordered"] is not None:
+        began = "begun by itself" if mission["ordered"] == "itself" else "as ordered"
+        stage = phrases.stage(*(mission[name] for name in ("stage", "zone", "pass", "passes")))
+        rows.append(("mission", f"{stage}, {began}"))
+    if coverage := report["coverage"]:
+        cells = coverage["covered"], coverage["coverable"]
+        told = phrases.covered(coverage["fraction"], *cells, coverage["covered_m2"])
+        rows.append(("covered", told))
+    if mission["keep_out"]:
+        rows.append(("keep-out zones", str(mission["keep_out"])))
+    if mission["return_home"]:
+        home = mission["home"]
+        rows.append(("home", f"({home['x']:.2f}, {home['y']:.2f}) m" if home else "not known yet"))
+    return rows
+
+
+def _zones(zones: list[dict[str, Any]]) -> Table:
+    table = Table("zone", "pass", "covered", title="Zones", title_justify="left")
+    for zone in zones:
+        counts = (zone[name] for name in ("pass", "passes", "covered", "cells"))
+        table.add_row(str(zone["name"]), *phrases.zone_progress(*counts))
+    return table
+
+
+def _unreached(unreached: dict[str, Any]) -> Table:
+    table = Table("cells", "m2", "at", "why", title="Not reached", title_justify="left")
+    for area in unreached["areas"]:
+        place = f"({area['x']:.2f}, {area['y']:.2f}) m"
+        table.add_row(str(area["cells"]), f"{area['m2']:.2f}", place, str(area["reason"]))
+    if unreached["areas_left_out"]:
+        table.caption = f"and {unreached['areas_left_out']} smaller areas"
+    return table
 
 
 def print_answer(reply: Reply) -> None:
@@ -29,7 +77,7 @@ def show(name: str, reply: Reply) -> None:
         rows = [(title, str(value)) for title, value in _figures(reply).items()]
         out().print(figures(rows))
     elif name in ("status", "mission"):
-        mission_view.show(decode_json(reply.payload))
+        show_mission(decode_json(reply.payload))
     else:
         document = decode_json(reply.payload)
         print(yaml.safe_dump(document, sort_keys=False), end="")
