@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fasaco_edge.mission.map import map_state as site
+from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.planners import table
 
 # Width of the map [m] that breaks each of them.
@@ -44,7 +44,7 @@ def cells(width_m: float) -> int:
 
 def main() -> None:
     """Build the faults in and run."""
-    planner_of, take_map = table.planner_of, site.Site._take_map
+    planner_of, take_map = table.planner_of, MapState._take_map
 
     def breaking_map(self: Any, grid: Any, within: Any = None) -> None:
         take_map(self, grid, within)
@@ -52,7 +52,7 @@ def main() -> None:
             raise ZeroDivisionError("division by zero")
 
     table.planner_of = lambda *args: BreakingPlanner(planner_of(*args))  # type: ignore[assignment]
-    site.Site._take_map = breaking_map  # type: ignore[method-assign]
+    MapState._take_map = breaking_map  # type: ignore[method-assign]
     from fasaco_edge.cli import main as run
 
     sys.exit(run())
