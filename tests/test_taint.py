@@ -29,7 +29,7 @@ pytest.importorskip("rerun")
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.part import Part

@@ -13,9 +13,10 @@ from fasaco_edge.bench.grids import NamedGrid, read_grid
 from fasaco_edge.bench.naive_twin import load_naive, naive_file
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.fasaco import Fasaco
-from fasaco_edge.planners.planner import ignore, never
+from fasaco_edge.planners.planner import ignore
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.table import PLANNERS
+from fasaco_edge.planners.registry import planner_of
+from fasaco_edge.planners.stopping import never
 from fasaco_edge.planners.warmup import warm_up
 
 BASELINES = ("stc", "spiral-stc", "zigzag")
@@ -129,7 +130,7 @@ def _time_baseline(
     naive: ModuleType, grid: NamedGrid, problem: CoverageProblem, name: str
 ) -> Generator[Timing, None, None]:
     """Yield the compiled baseline's quickest run, and its twin's."""
-    planner = PLANNERS[name](_NO_COLONY, 1)
+    planner = planner_of(name, _NO_COLONY)
     runs = [_timed(lambda: planner.plan(problem, never, ignore)) for _ in range(BASELINE_RUNS)]
     path, wall_s, cpu_s = min(runs, key=lambda run: run[1])
     yield Timing(grid.name, problem.cells, path.steps, 0, wall_s, cpu_s, planner=name)

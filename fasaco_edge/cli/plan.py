@@ -21,9 +21,8 @@ if TYPE_CHECKING:
     from fasaco_edge.grid.occupancy import OccupancyGrid
     from fasaco_edge.planners.colony import ColonyConfig
     from fasaco_edge.planners.path import CoveragePath
-    from fasaco_edge.planners.planner import Interrupt, StoppingCriterion
     from fasaco_edge.planners.problem import CoverageProblem
-    from fasaco_edge.planners.work import SearchProgress
+    from fasaco_edge.planners.stopping import Interrupt, SearchProgress, StoppingCriterion
 
 
 def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
@@ -47,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.cli.warmup import compile_kernels
     from fasaco_edge.grid.map_files import find_map
     from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
-    from fasaco_edge.planners.planner import Interrupt
+    from fasaco_edge.planners.stopping import Interrupt
 
     settle(args)
     check(args)
@@ -121,7 +120,7 @@ def _plan(
     from fasaco_edge.cli.plan_output import watching
     from fasaco_edge.planners.graph import lower_bound_steps
     from fasaco_edge.planners.planner import ignore
-    from fasaco_edge.planners.table import planner_of
+    from fasaco_edge.planners.registry import planner_of
 
     planner = planner_of(args.planner, colony, args.threads, args.local_search)
     bound = 0 if args.local_search else lower_bound_steps(problem)
@@ -151,7 +150,7 @@ def _plan(
 
 def _criteria(args: argparse.Namespace, asked: Interrupt) -> dict[str, StoppingCriterion]:
     """Return what ends the search early, by its name; a budget begins to run here."""
-    from fasaco_edge.planners.planner import GapReached, TimeBudget
+    from fasaco_edge.planners.stopping import GapReached, TimeBudget
 
     criteria: dict[str, StoppingCriterion] = {"Ctrl-C": asked}
     if args.target_gap is not None:

@@ -14,7 +14,7 @@ from fasaco_edge.cli.console.arguments import (
 )
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.colony import VISIBILITIES
-from fasaco_edge.planners.names import PLANNER_NAMES
+from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
 from fasaco_edge.simulation.config import SimulationConfig
 
 ANYWHERE, HOME = "anywhere", "home"
@@ -81,7 +81,8 @@ def check(args: argparse.Namespace) -> None:
 
 def settle(args: argparse.Namespace) -> None:
     """Fill in the defaults that depend on whether local search is used."""
-    args.local_search = args.planner == "fasaco" and not args.no_local_search
+    has_local_search = bool(PLANNERS[args.planner].with_local_search)
+    args.local_search = has_local_search and not args.no_local_search
     if args.q0 is None:
         args.q0 = SEARCH_Q0 if args.local_search else PAPER_Q0
     if args.visibility is None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from fasaco_edge.planners.colony import ColonyConfig
     from fasaco_edge.planners.path import CoveragePath
     from fasaco_edge.planners.problem import CoverageProblem
-    from fasaco_edge.planners.work import SearchProgress
+    from fasaco_edge.planners.stopping import SearchProgress
 
 # A terminal shows no more pictures a second; drawing them costs the search time.
 LEAST_INTERVAL_S = 0.05

@@ -12,13 +12,19 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
+from fasaco_edge.planners.registry import PLANNER_NAMES
+
+if TYPE_CHECKING:
+    PlannerName = str
+else:
+    PlannerName = Literal[PLANNER_NAMES]
 
 
 class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -31,14 +37,15 @@ class PlannerConfig(Section, frozen=True):
     While the robot drives, ``spare_share`` of a processor core goes into making the rest of its
     path better; fasaco with local search alone can do that.
 
-    ``local_search`` is for fasaco alone; without it a plan may end before its budget.
+    ``local_search`` is for planners that have it (``planners.registry``), which is fasaco alone;
+    without it a plan may end before its budget.
 
     ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
     The paper's ants see no further than their neighbours; a robot's see what will soon
     be cut off, which saves it revisits (``fasaco_edge/bench/RESULTS.md``).
     """
 
-    name: Literal["fasaco", "aco", "stc", "spiral-stc", "zigzag"] = "fasaco"
+    name: PlannerName = "fasaco"
     local_search: bool = True
     ants: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
     velocities: str = "8:1"

@@ -229,7 +229,7 @@ class Loader:
         from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415
         from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState  # noqa: PLC0415
         from fasaco_edge.planners.near_optimal import NearOptimal  # noqa: PLC0415
-        from fasaco_edge.planners.table import planner_of  # noqa: PLC0415
+        from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
         warm_up(self._report)

@@ -12,7 +12,7 @@ from fasaco_edge.drawing.plot import Plot
 from fasaco_edge.drawing.sheet import Sheet
 from fasaco_edge.drawing.view import View, bounds_around
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.planner import ColonySnapshot
 
 FIELD_PX = 640
 

@@ -1,35 +1,53 @@
-"""Spanning-tree coverage, Gabriely and Rimon 2001; see ``kernels.spanning`` for any grid.
+"""Walks by fixed rules: the paper's baselines, and the first complete walk of a search.
 
-The walk is closed. Where it may end anywhere, it ends with the last cell that still
-wants a visit; from there a shortest way leads to an end that is not the start. Read
-backwards the same walk may come out nearer to that end: the cheaper reading is taken.
+Spanning-tree coverage, Gabriely and Rimon 2001 (``kernels.ants.baselines`` for any grid), is
+a closed walk. Where it may end anywhere, it ends with the last cell that still needs a visit;
+from there a shortest way leads to an end that is not the start. Read backwards the same walk
+may come out nearer to that end: the cheaper reading is taken.
 
-Spiral-STC and ZigZag as the paper's authors ran them, its baselines.
-
-The authors' Spiral-STC is a backtracking spiral: it keeps to the wall on its
-right, counter-clockwise, until nothing open is beside it, and goes on from the
-nearest open cell. Their ZigZag tries the directions in one fixed order at every
-cell and leaves dead ends the same way. Both are given here without the extra
-steps that their code makes at dead ends, which Table I counts too; see
-``fasaco_edge/bench/RESULTS.md``.
+Spiral-STC and ZigZag are as the paper's authors ran them. Their Spiral-STC is a backtracking
+spiral: it keeps to the wall on its right, counter-clockwise, until nothing open is beside it,
+and goes on from the nearest open cell. Their ZigZag tries the directions in one fixed order at
+every cell and leaves dead ends the same way. Both are given here without the extra steps that
+their code makes at dead ends, which Table I counts too; see ``fasaco_edge/bench/RESULTS.md``.
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.ants.baselines import spanning_tree_walk, sweep
+from fasaco_edge.kernels.ants.colony import FEWEST_OPEN, Rules, walk_ants
 from fasaco_edge.kernels.ants.growth import Graph
+from fasaco_edge.kernels.costs import walk_cost
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk
-from fasaco_edge.planners.graph import cells_of, flat_end, flat_start, graph_of, scratch_for
-from fasaco_edge.planners.observation import Observer
+from fasaco_edge.planners.graph import (
+    cells_of,
+    flat_cells,
+    flat_end,
+    flat_start,
+    graph_of,
+    scratch_for,
+)
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import StoppingCriterion, ignore, never
+from fasaco_edge.planners.planner import Observer, ignore
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.stopping import StoppingCriterion, never
+
+# Directions in the order they are tried. From the heading: to the right, straight on, to the
+# left, back.
+RIGHT_HAND = (3, 0, 1, 2)
+# Along the rows first: west, east, south, north.
+ROWS_FIRST = (2, 0, 3, 1)
+# An ant of this velocity goes straight on as long as it can.
+STRAIGHT_ON = 64
+# Initial capacity for a walk.
+STEPS_PER_CELL = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +61,9 @@ class SpanningTree:
         began = time.perf_counter()
         lattice = problem.lattice
         row, col = lattice.local(problem.start)
-        # The tree spans covered ground too: what is left of it need not hang together.
-        ground = reachable_from(lattice.steps, row, col)
-        walk = spanning_tree_walk(lattice.steps, ground, row, col)
+        # The tree spans covered cells too: those to cover need not be connected.
+        reachable = reachable_from(lattice.steps, row, col)
+        walk = spanning_tree_walk(lattice.steps, reachable, row, col)
         if problem.end is None:
             walk = walk[: _last_needed(problem, walk) + 1]
         elif not problem.closed:
@@ -80,12 +98,6 @@ def _last_needed(problem: CoverageProblem, walk: NDArray[np.int32]) -> int:
     return int(first_visits[wanted].max())
 
 
-# From the heading: to the right, straight on, to the left, back.
-RIGHT_HAND = (3, 0, 1, 2)
-# Along the rows first: west, east, south, north.
-ROWS_FIRST = (2, 0, 3, 1)
-
-
 @dataclass(frozen=True, slots=True)
 class _Sweep:
     """A walk by a fixed rule; nothing in it is drawn at random."""
@@ -111,19 +123,72 @@ class _Sweep:
     def walk(self, problem: CoverageProblem, graph: Graph) -> NDArray[np.int32]:
         """Return the walk as flat cells, int32 (n,)."""
         scratch, start, end = scratch_for(graph), flat_start(problem), flat_end(problem)
-        length = room = 2 * problem.cells
-        while length >= room:
-            room = 2 * length
-            walk = np.empty(room, np.int32)
+        length = capacity = 2 * problem.cells
+        while length >= capacity:
+            capacity = 2 * length
+            walk = np.empty(capacity, np.int32)
             length = sweep(graph, scratch, start, self.order, self.turns_along, end, walk)
         return walk[:length]
 
 
-def spiral_stc() -> _Sweep:
+def stc(*unused: object) -> SpanningTree:
+    """Return spanning-tree coverage; it needs no colony and no threads, nor do those below."""
+    return SpanningTree()
+
+
+def spiral_stc(*unused: object) -> _Sweep:
     """Return the backtracking spiral."""
     return _Sweep("spiral-stc", RIGHT_HAND, turns_along=True)
 
 
-def zigzag() -> _Sweep:
+def zigzag(*unused: object) -> _Sweep:
     """Return the sweep in a fixed order of directions."""
     return _Sweep("zigzag", ROWS_FIRST, turns_along=False)
+
+
+def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[tuple[NDArray[np.int32], int]]:
+    """Yield complete walks, flat cells int32 (n,), each with its cost [us].
+
+    The first is that of an ant which always goes where the fewest open neighbours
+    are left, Warnsdorff's rule. Where turns count, there follow an ant that goes
+    straight on, the spiral, the zigzag and the walk around a spanning tree: each is
+    best on some grids.
+    """
+    cost = problem.cost
+    for walk in _walks(problem, graph):
+        yield walk, walk_cost(walk, cost.step_us, cost.quarter_turn_us)
+
+
+def _walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.int32]]:
+    yield _ant(problem, graph, velocity=1)
+    if problem.cost.quarter_turn_us:
+        yield _ant(problem, graph, velocity=STRAIGHT_ON)
+        yield spiral_stc().walk(problem, graph)
+        yield zigzag().walk(problem, graph)
+        yield flat_cells(problem, SpanningTree().plan(problem).cells)
+
+
+def _ant(problem: CoverageProblem, graph: Graph, velocity: int) -> NDArray[np.int32]:
+    """Let one ant walk without a trail and without chance."""
+    cost = problem.cost
+    rules = Rules(
+        q0=1.0,
+        alpha=0.0,
+        tau0=1.0,
+        end=flat_end(problem),
+        step_us=cost.step_us,
+        quarter_turn_us=cost.quarter_turn_us,
+        visibility=FEWEST_OPEN,
+        powers=1.0 / np.arange(1.0, max(velocity, 4) + 1.0),
+    )
+    trail, scratch = np.ones((graph.steps.size, 4)), scratch_for(graph)
+    lengths = np.full(1, STEPS_PER_CELL * problem.cells + 2)
+    walks = np.empty((1, 0), np.int32)
+    while walks.shape[1] < lengths[0]:
+        # The first try, or a walk that did not fit: the same ant again, with more memory.
+        walks = np.empty((1, int(lengths[0])), np.int32)
+        stream = np.ones((1, 4), np.int64)
+        walk_ants(
+            graph, trail, rules, scratch, flat_start(problem), velocity, stream, walks, lengths
+        )
+    return walks[0, : lengths[0]].copy()

@@ -18,12 +18,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.observation import Observer
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import StoppingCriterion, ignore, never
+from fasaco_edge.planners.planner import Observer, ignore
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.repair import can_repair, repaired
 from fasaco_edge.planners.search import ANTS, Search, SearchPlan
+from fasaco_edge.planners.stopping import StoppingCriterion, never
 
 # A repaired walk with more steps than this above its bound is not worth keeping, unless
 # a search finds no better one.

@@ -28,7 +28,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
     Walk,
     recount,
 )
-from fasaco_edge.planners.work import SearchWork
+from fasaco_edge.planners.stopping import SearchWork
 
 EVERYWHERE = np.empty(0, np.int32)
 

@@ -1,4 +1,4 @@
-"""What a coverage planner is asked, and how a walk answers."""
+"""The coverage problem: which cells to cover, from where, at what cost."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class CoverageProblem:
             cannot be reached; reported, never attempted.
         end: the cell (row, col) the walk ends in, which need not be one to cover; the
             start itself for a walk back home; None for anywhere.
-        cost: what a walk is to have little of.
+        cost: what a walk is to minimise.
         before: int32 (n, 2), the walk that was still to be driven when the problem changed
-            to this one; a planner that can keeps of it what holds. None for none.
-        attempt: where all of ``before`` holds, and is only to be made better, which attempt at
-            that it is, from 1 on: each looks elsewhere. 0 for a plan that is needed.
+            to this one; a planner that repairs keeps what is still valid of it. None for none.
+        attempt: where all of ``before`` is valid and is only to be improved, the number of the
+            attempt, from 1: each looks elsewhere. 0 for a plan that is needed.
         whole: the problem that this one is the end of, see ``after``: a path that solves this
             one begins with what comes before, and its figures are those of the whole. None for
             a problem that is whole itself.
@@ -97,7 +97,7 @@ class CoverageProblem:
         return cls(lattice, start, to_cover, unreachable, end, cost, before, attempt)
 
     def after(self, driven: int) -> CoverageProblem:
-        """Return what is left of it once so many steps of the walk ``before`` are driven.
+        """Return what remains after so many steps of the walk ``before``.
 
         Raises:
             NothingToCover: all is covered on the way.
@@ -115,7 +115,7 @@ class CoverageProblem:
 
     @property
     def lead(self) -> NDArray[np.int32]:
-        """What is driven before this problem begins, int32 (n, 2)."""
+        """The walk before this problem begins, int32 (n, 2)."""
         nothing = np.empty((0, 2), np.int32)
         if self.whole is None or self.whole.before is None or self.before is None:
             return nothing
@@ -123,7 +123,7 @@ class CoverageProblem:
 
     @property
     def only_better(self) -> bool:
-        """Whether there is a walk that does, and a better one is looked for."""
+        """Whether there is a valid walk already, and a better one is looked for."""
         return self.attempt > 0
 
     @property

@@ -29,10 +29,9 @@ from fasaco_edge.planners.effort import repair_for
 from fasaco_edge.planners.graph import FramedGround, cells_of, flat_start, lower_bound_steps
 from fasaco_edge.planners.patch import Patch
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.regions import Neighbourhood, neighbourhoods, spot
-from fasaco_edge.planners.work import NO_WORK, SearchProgress
+from fasaco_edge.planners.stopping import NO_WORK, SearchProgress, StoppingCriterion
 
 
 def mended(

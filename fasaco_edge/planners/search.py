@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.costs import walk_cost
 from fasaco_edge.kernels.local_search.regions import Box
 from fasaco_edge.kernels.local_search.walk_array import Prices
-from fasaco_edge.planners.ants import Colony, group_size, snapshot_of, streams_of
+from fasaco_edge.planners.baselines import first_walks
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import MICROSECONDS
 from fasaco_edge.planners.effort import effort_for
-from fasaco_edge.planners.first_walk import first_walks
+from fasaco_edge.planners.fasaco import Colony, group_size, snapshot_of, streams_of
 from fasaco_edge.planners.graph import FramedGround, cells_of, graph_of, lower_bound_steps
-from fasaco_edge.planners.observation import Observer
 from fasaco_edge.planners.patch import Patch
 from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import Observer
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.regions import EDGE, is_one_region, regions_of
-from fasaco_edge.planners.work import SearchProgress, SearchWork
+from fasaco_edge.planners.stopping import SearchProgress, SearchWork
 
 # A search is asked whether to stop after about so many proposals: a millisecond.
 PROPOSALS_AT_ONCE = 30_000

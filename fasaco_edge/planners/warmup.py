@@ -1,4 +1,4 @@
-"""Compile, or load from the cache, every kernel that a mission uses."""
+"""Warm-up: compile, or load from the cache, every kernel that a mission uses."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.graph import lower_bound_steps
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
-from fasaco_edge.planners.planner import ignore, never
+from fasaco_edge.planners.planner import ignore
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
 from fasaco_edge.planners.repair import repaired
-from fasaco_edge.planners.table import PLANNERS
-from fasaco_edge.planners.work import SearchProgress
+from fasaco_edge.planners.stopping import SearchProgress, never
 
 LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
 WALKS, BOUND = "shortest walks", "lower bound"
 LOCAL_SEARCH, REPAIR = "local search", "repair"
-STAGES = (LATTICE, CHANGES, REACH, AREAS, WALKS, BOUND, LOCAL_SEARCH, REPAIR, *PLANNERS)
+STAGES = (LATTICE, CHANGES, REACH, AREAS, WALKS, BOUND, LOCAL_SEARCH, REPAIR, *PLANNER_NAMES)
 
 
 def warm_up(report: Callable[[str], None] | None = None) -> None:
-    """Run every kernel once on a tiny map; ``report`` hears each stage's name before it."""
+    """Run every kernel once on a tiny map; ``report`` gets each stage's name first."""
     for stage in _stages():
         if report is not None:
             report(stage)
@@ -64,9 +64,9 @@ def _stages() -> Iterator[str]:
     path = NearOptimal(ColonyConfig(ants=1, velocities=(1,))).plan(costly, _after_a_kick, ignore)
     yield REPAIR
     repaired(replace(costly, before=path.cells[2:]), path.planner, 0, _after_a_kick)
-    for name, make in PLANNERS.items():
+    for name in PLANNER_NAMES:
         yield name
-        make(ColonyConfig(ants=1, velocities=(1,)), 1).plan(problem, never, ignore)
+        planner_of(name, ColonyConfig(ants=1, velocities=(1,))).plan(problem, never, ignore)
 
 
 def _take_changes_in(grid: OccupancyGrid, lattice: CoverageLattice, footprint: Footprint) -> None:

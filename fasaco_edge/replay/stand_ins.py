@@ -25,9 +25,9 @@ from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.mission.core.events import PlanReady, PlanRequest
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
-from fasaco_edge.planners.planner import AnyOf, CoveragePlanner, WorkLimit, ignore
-from fasaco_edge.planners.table import planner_of
-from fasaco_edge.planners.work import SearchWork
+from fasaco_edge.planners.planner import CoveragePlanner, ignore
+from fasaco_edge.planners.registry import planner_of
+from fasaco_edge.planners.stopping import AnyOf, SearchWork, WorkLimit
 from fasaco_edge.wire.json_text import decode_json
 
 LOAD_S = 1.0

@@ -33,7 +33,8 @@ from fasaco_edge.mission.core.events import (
     PlanRequest,
 )
 from fasaco_edge.mission.orders.order import read_command
-from fasaco_edge.planners.planner import StopAt, ignore
+from fasaco_edge.planners.planner import ignore
+from fasaco_edge.planners.stopping import StopAt
 from fasaco_edge.replay.replay import ReplayStep
 from fasaco_edge.replay.stand_ins import NoDisk, SilentBus, load_mission
 from fasaco_edge.replay.turn_record import TURNS, TurnRecord, Waiting, told_sample

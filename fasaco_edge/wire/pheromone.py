@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry
-from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
 from fasaco_edge.wire.coverage import lattice_geometry
 from fasaco_edge.wire.fields import (

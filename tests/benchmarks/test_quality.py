@@ -13,7 +13,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.work import NO_WORK
+from fasaco_edge.planners.stopping import NO_WORK
 from tests.benchmarks.__main__ import main
 from tests.benchmarks.planner import WrongWalkError, judged, planner_for
 from tests.benchmarks.quality.figures import by_grid

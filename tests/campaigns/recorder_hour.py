@@ -27,7 +27,7 @@ from fasaco_edge.bus.session import Sample
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import resident_mb, return_soon
-from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene

@@ -39,10 +39,9 @@ from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.observation import ColonySnapshot
-from fasaco_edge.planners.planner import Noted
-from fasaco_edge.planners.table import planner_of
-from fasaco_edge.planners.work import SearchProgress
+from fasaco_edge.planners.planner import ColonySnapshot
+from fasaco_edge.planners.registry import planner_of
+from fasaco_edge.planners.stopping import SearchProgress, StopRecorder
 from fasaco_edge.wire.coverage import coverage_grid
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import (
@@ -219,7 +218,7 @@ class MissionTrial:
             return asked >= patience
 
         seen: list[ColonySnapshot] = []
-        noted = Noted(stop)
+        noted = StopRecorder(stop)
         path = self._planner.plan(request.problem, noted, seen.append)
         if seen:
             self._say("pheromone", lambda: encode_pheromone(seen[0], "map", 1))

@@ -7,7 +7,7 @@ from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.comparison import LabelledWalk, draw_walks
 from fasaco_edge.drawing.pheromone import draw_pheromone
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.planner import ColonySnapshot
 
 LINES = ["a caption"]
 

@@ -11,9 +11,8 @@ from fasaco_edge.mission.core.route import SKIPPED_S, Attempt
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.graph import lower_bound_steps
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.repair import HELD_CELLS
-from fasaco_edge.planners.work import SearchWork
+from fasaco_edge.planners.stopping import SearchWork, WorkLimit, never
 from tests.benchmarks.judge import check_walk
 from tests.support.mission_world import CONFIG, Drive, building, patch, pose_at
 

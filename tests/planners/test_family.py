@@ -13,9 +13,10 @@ from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
-from fasaco_edge.planners.planner import ignore, never
+from fasaco_edge.planners.planner import ignore
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.table import PLANNERS
+from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
+from fasaco_edge.planners.stopping import never
 from tests import naive
 from tests.support.grids import ENDS, ROOMS, end_of, lattice, problems, reference
 
@@ -33,7 +34,7 @@ def assert_answers(problem, path):
     assert path.cost_s == naive.walk_us(walk, problem.cost) / 1e6
 
 
-@pytest.mark.parametrize("name", PLANNERS)
+@pytest.mark.parametrize("name", PLANNER_NAMES)
 @settings(max_examples=1000, deadline=None)
 @given(
     ground=problems(),
@@ -49,7 +50,7 @@ def test_every_planner_covers_all_and_ends_where_asked(name, ground, end, turn_s
     end = end_of(end, lattice, start)
     cost = CoverageCost(1.2, turn_s)
     problem = CoverageProblem.of(lattice, start, covered=done, end=end, cost=cost)
-    planner = PLANNERS[name](ColonyConfig(ants=8, seed=seed), 1)
+    planner = planner_of(name, ColonyConfig(ants=8, seed=seed))
     path = planner.plan(problem, never, ignore)
     assert path.planner == name
     assert_answers(problem, path)
@@ -59,7 +60,7 @@ def test_every_planner_covers_all_and_ends_where_asked(name, ground, end, turn_s
 def test_aco_is_fasaco_with_one_cohort_of_velocity_1_bit_for_bit(room):
     ground, start = ROOMS[room]
     problem = CoverageProblem.of(ground, start)
-    aco = PLANNERS["aco"](ColonyConfig(ants=40, seed=6), 1).plan(problem, never, ignore)
+    aco = planner_of("aco", ColonyConfig(ants=40, seed=6)).plan(problem, never, ignore)
     fasaco = Fasaco(ColonyConfig(ants=40, velocities=(1,), seed=6)).plan(problem)
     assert aco.cells.tobytes() == fasaco.cells.tobytes()
     assert (aco.planner, fasaco.planner) == ("aco", "fasaco")
@@ -184,7 +185,7 @@ def test_baselines_are_no_worse_than_the_authors_own(name, planner, most):
         pytest.skip("the paper's grids are not at hand")
     ground, start = found
     problem = CoverageProblem.of(ground, start, end=start)
-    path = PLANNERS[planner](ColonyConfig(), 1).plan(problem, never, ignore)
+    path = planner_of(planner, ColonyConfig()).plan(problem, never, ignore)
     assert walk_figures(ground, path.cells).revisits <= most
 
 

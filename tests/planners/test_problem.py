@@ -18,11 +18,11 @@ from fasaco_edge.errors import (
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, CoverageLattice
 from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.names import PLANNER_NAMES
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import ignore, never
+from fasaco_edge.planners.planner import ignore
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.table import PLANNERS
+from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
+from fasaco_edge.planners.stopping import never
 from fasaco_edge.planners.warmup import STAGES, warm_up
 from tests.support.grids import lattice, placed
 
@@ -82,8 +82,8 @@ def test_an_end_may_be_a_covered_cell():
     covered[0, 2] = True
     problem = CoverageProblem.of(GROUND, (-2, 5), covered=covered, end=(-2, 7))
     assert problem.cells == 2
-    for name, make in PLANNERS.items():
-        walk = make(ColonyConfig(ants=8), 1).plan(problem, never, ignore).cells.tolist()
+    for name in PLANNER_NAMES:
+        walk = planner_of(name, ColonyConfig(ants=8)).plan(problem, never, ignore).cells.tolist()
         assert walk == [[-2, 5], [-2, 6], [-2, 7]], name
 
 
@@ -131,16 +131,15 @@ def test_warm_up_names_each_stage_once():
     assert tuple(heard) == STAGES
 
 
-def test_the_planners_names_are_those_of_the_table_and_of_the_configuration():
-    assert tuple(PLANNERS) == PLANNER_NAMES
+def test_the_configuration_takes_the_planners_of_the_registry():
     names = get_args(get_type_hints(PlannerConfig)["name"])
     assert names == PLANNER_NAMES
 
 
-def test_every_planner_of_the_table_plans():
+def test_every_planner_of_the_registry_plans():
     problem = CoverageProblem.of(GROUND, (-2, 6))
-    for name, make in PLANNERS.items():
-        path = make(ColonyConfig(ants=8), 1).plan(problem, never, ignore)
+    for name in PLANNER_NAMES:
+        path = planner_of(name, ColonyConfig(ants=8)).plan(problem, never, ignore)
         assert path.planner == name
         assert path.first_walk_s > 0.0
         walk = [tuple(cell) for cell in path.cells.tolist()]

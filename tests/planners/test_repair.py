@@ -12,10 +12,9 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.effort import repair_for
 from fasaco_edge.planners.graph import FramedGround
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.repair import can_repair, mended, repaired
-from fasaco_edge.planners.work import SearchWork
+from fasaco_edge.planners.stopping import SearchWork, WorkLimit, never
 from tests.benchmarks.judge import check_walk
 
 SHORT = WorkLimit(SearchWork(kicks=8))

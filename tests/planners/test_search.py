@@ -14,8 +14,8 @@ from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.graph import FramedGround
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.planner import AnyOf, GapReached, Interrupt, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.stopping import AnyOf, GapReached, Interrupt, WorkLimit, never
 from tests.benchmarks.buildings import building
 from tests.support.grids import ENDS, ROOMS, end_of, problems
 from tests.support.searches import (

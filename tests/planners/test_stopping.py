@@ -5,8 +5,15 @@ import time
 
 import pytest
 
-from fasaco_edge.planners.planner import AnyOf, GapReached, Interrupt, TimeBudget, WorkLimit
-from fasaco_edge.planners.work import SearchProgress, SearchWork
+from fasaco_edge.planners.stopping import (
+    AnyOf,
+    GapReached,
+    Interrupt,
+    SearchProgress,
+    SearchWork,
+    TimeBudget,
+    WorkLimit,
+)
 
 
 def progress(steps=100, bound=0, **work):

@@ -6,9 +6,9 @@ import pytest
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.near_optimal import NearOptimal, is_poor
-from fasaco_edge.planners.planner import Noted, StopAt, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.repair import repaired
+from fasaco_edge.planners.stopping import StopAt, StopRecorder, WorkLimit, never
 
 
 def poor_problem(seed=0, visits=1000):
@@ -29,7 +29,7 @@ def poor_problem(seed=0, visits=1000):
 
 def stopping_at(*questions):
     asked = iter(range(1, 1_000_000))
-    return Noted(lambda progress: next(asked) in questions)
+    return StopRecorder(lambda progress: next(asked) in questions)
 
 
 def test_a_repair_that_was_stopped_and_the_search_after_it_are_repeated():
@@ -40,7 +40,7 @@ def test_a_repair_that_was_stopped_and_the_search_after_it_are_repeated():
     path = NearOptimal().plan(problem, stop)
     assert stop.stops == [1, 3]
     assert path.work.ants > 0
-    again = Noted(StopAt(stop.stops))
+    again = StopRecorder(StopAt(stop.stops))
     repeated = NearOptimal().plan(problem, again)
     assert again.stops == stop.stops
     assert np.array_equal(repeated.cells, path.cells)
@@ -64,7 +64,7 @@ def test_a_search_is_repeated(planner, question):
 
 def test_one_that_was_never_stopped_is_not_stopped():
     problem = poor_problem()
-    stop = Noted(never)
+    stop = StopRecorder(never)
     path = NearOptimal().plan(problem, stop)
     assert stop.stops == []
     assert np.array_equal(NearOptimal().plan(problem, StopAt(())).cells, path.cells)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.planners import table
+from fasaco_edge.planners import registry
 
 # Width of the map [m] that breaks each of them.
 PLANNER_M, PHEROMONE_M, MISSION_M = 4.6, 5.2, 5.8
@@ -44,14 +44,14 @@ def cells(width_m: float) -> int:
 
 def main() -> None:
     """Build the faults in and run."""
-    planner_of, take_map = table.planner_of, MapState._take_map
+    planner_of, take_map = registry.planner_of, MapState._take_map
 
     def breaking_map(self: Any, grid: Any, within: Any = None) -> None:
         take_map(self, grid, within)
         if grid.geometry.cols == round(MISSION_M / PIXEL_M):
             raise ZeroDivisionError("division by zero")
 
-    table.planner_of = lambda *args: BreakingPlanner(planner_of(*args))  # type: ignore[assignment]
+    registry.planner_of = lambda *args: BreakingPlanner(planner_of(*args))  # type: ignore[assignment]
     MapState._take_map = breaking_map  # type: ignore[method-assign]
     from fasaco_edge.cli import main as run
 

@@ -20,7 +20,7 @@ from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire.coverage import BLOCKED, COVERED, RECOVERED, TO_COVER, UNKNOWN
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
 from fasaco_edge.wire.paths import PathMessage, encode_path

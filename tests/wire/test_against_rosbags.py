@@ -7,7 +7,7 @@ import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.maps import (
     decode_map_update,

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as hnp
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid import lattice
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.planners.observation import ColonySnapshot
+from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import coverage
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.pheromone import decode_pheromone, encode_pheromone

@@ -12,9 +12,8 @@ from functools import partial
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.errors import PlanFailed
 from fasaco_edge.mission.core.events import PlanBroken, PlanReady, PlanRequest
-from fasaco_edge.planners.observation import ColonySnapshot
-from fasaco_edge.planners.planner import AnyOf, CoveragePlanner, Interrupt, Noted, TimeBudget
-from fasaco_edge.planners.work import SearchProgress
+from fasaco_edge.planners.planner import ColonySnapshot, CoveragePlanner
+from fasaco_edge.planners.stopping import AnyOf, Interrupt, SearchProgress, StopRecorder, TimeBudget
 
 LOG = logging.getLogger(__name__)
 
@@ -88,7 +87,7 @@ class PlanningWorker:
         if self._stopping.is_set():
             return
         budget_s = SPARE_S if request.problem.only_better else self._budget_s
-        stop = Noted(AnyOf(self._count, TimeBudget(budget_s), Interrupt(self._interrupt)))
+        stop = StopRecorder(AnyOf(self._count, TimeBudget(budget_s), Interrupt(self._interrupt)))
         try:
             # Costs some percent of a full plan, and a repair nothing.
             path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))

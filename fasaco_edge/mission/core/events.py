@@ -53,7 +53,7 @@ class PoseReceived:
 class PlanReady:
     """The plan asked for by request ``number`` is there, made in ``seconds``.
 
-    ``stops`` tells where it was stopped, see ``planners.stopping.Noted``.
+    ``stops`` tells where it was stopped, see ``planners.stopping.StopRecorder``.
     """
 
     number: int

@@ -13,10 +13,9 @@ from fasaco_edge.bench.grids import NamedGrid, read_grid
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import TimeBudget
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.stopping import SearchWork, TimeBudget
 from fasaco_edge.planners.warmup import warm_up
-from fasaco_edge.planners.work import SearchWork
 from tests.benchmarks.planner import WrongWalkError, judged, planner_for
 from tests.benchmarks.quality.reference import UNKNOWN, Known, Reference, read_references
 from tests.benchmarks.table1.runs import check_names, grid_name

@@ -11,11 +11,11 @@ from fasaco_edge.bench.benchmark import Say
 from fasaco_edge.bench.grids import NamedGrid, read_grid
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.observation import Observer
 from fasaco_edge.planners.path import CoveragePath, WalkFigures, walk_figures
-from fasaco_edge.planners.planner import ignore, never
+from fasaco_edge.planners.planner import Observer, ignore
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.table import PLANNERS
+from fasaco_edge.planners.registry import planner_of
+from fasaco_edge.planners.stopping import never
 from fasaco_edge.planners.warmup import warm_up
 
 
@@ -25,7 +25,7 @@ class Variant:
 
     Attributes:
         name: its name in figures.
-        planner: its name in ``PLANNERS``.
+        planner: its name in the registry.
         velocities: of its cohorts [cells/step]; () where there are no ants.
         q0, visibility: of the colony; the faithful rows have the defaults.
         closed: whether its walk ends where it began, as all the faithful ones do.
@@ -50,7 +50,7 @@ class Variant:
             visibility=self.visibility,
         )
         posed = replace(problem, end=problem.start if self.closed else None)
-        return PLANNERS[self.planner](colony, 1).plan(posed, never, observe)
+        return planner_of(self.planner, colony).plan(posed, never, observe)
 
 
 RISING = tuple(range(1, 9))

@@ -1,0 +1,52 @@
+"""The registry of planners, the only list of their names.
+
+A new planner is a module here, a row of ``PLANNERS`` and a test; configuration and command
+line take the names from here. Factories are imported when a planner is made: to read the
+names does not load the compiler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import NamedTuple, cast
+
+from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.planner import CoveragePlanner
+
+Factory = Callable[[ColonyConfig, int], CoveragePlanner]
+
+
+class Entry(NamedTuple):
+    """Factories of a planner as "module:callable", the module in ``fasaco_edge.planners``.
+
+    Each takes the colony's configuration and a number of threads.
+
+    Attributes:
+        factory: the planner as its source has it.
+        with_local_search: the planner with local search; "" where there is none.
+    """
+
+    factory: str
+    with_local_search: str = ""
+
+
+PLANNERS = {
+    "fasaco": Entry("fasaco:Fasaco", with_local_search="near_optimal:NearOptimal"),
+    "aco": Entry("fasaco:plain_aco"),
+    "stc": Entry("baselines:stc"),
+    "spiral-stc": Entry("baselines:spiral_stc"),
+    "zigzag": Entry("baselines:zigzag"),
+}
+PLANNER_NAMES = tuple(PLANNERS)
+
+
+def planner_of(
+    name: str, colony: ColonyConfig, threads: int = 1, local_search: bool = False
+) -> CoveragePlanner:
+    """Return the planner ``name``; with local search where that is asked for and there is one."""
+    entry = PLANNERS[name]
+    place = (local_search and entry.with_local_search) or entry.factory
+    module, _, factory = place.partition(":")
+    make = cast(Factory, getattr(import_module(f"fasaco_edge.planners.{module}"), factory))
+    return make(colony, threads)
