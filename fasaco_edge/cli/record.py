@@ -1,89 +1,22 @@
-"""What a recorder is told: by the options of its command, or by the daemon's configuration.
-
-``fasaco-edge record``: write what is said on the bus into a recording.
-"""
+"""``fasaco-edge record``: write what is published on the bus into a recording."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bus.session import BusSettings
 from fasaco_edge.cli.console.arguments import add_command, add_robot_on_bus, client_settings
-from fasaco_edge.config.config import load_config
-from fasaco_edge.config.endpoints import from_here
-from fasaco_edge.config.ros import RosConfig
-from fasaco_edge.recording.write.settings import MEGABYTE, RecorderSettings, RosInput
-from fasaco_edge.wire.pose_decoding import DEFAULT_FRAMES
 from fasaco_edge.wire.poses import POSE_SCHEMAS
-from fasaco_edge.wire.ros_keys import RosTopic
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
 if TYPE_CHECKING:
+    from fasaco_edge.bus.session import BusSettings
     from fasaco_edge.cli.console.arguments import Subparsers
+    from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.config.ros import RosConfig
-
-
-def of_options(args: argparse.Namespace) -> RecorderSettings:
-    """Return what the options of ``fasaco-edge record`` say."""
-    return RecorderSettings(
-        out=args.out,
-        robot=args.robot,
-        base=args.base,
-        bus=client_settings(args),
-        pose_schema=args.pose_schema,
-        ros=_ros_inputs(args.ros2) if args.ros2 else (),
-        frames=_frames(args.ros2),
-        part_bytes=args.part_mb * MEGABYTE,
-        part_s=60.0 * args.part_min,
-        quota_bytes=args.quota_mb * MEGABYTE,
-        least_free_bytes=args.least_free_mb * MEGABYTE,
-        serve=args.serve,
-    )
-
-
-def of_daemon(args: argparse.Namespace) -> RecorderSettings:
-    """Return what the daemon's configuration, ``args.config``, says.
-
-    Raises:
-        BadConfiguration: the file is wrong.
-    """
-    config = load_config(args.config)
-    bus, room = config.bus, config.recording
-    bus.security.warn_of_clock()
-    endpoints = tuple(map(from_here, bus.listen or bus.connect))
-    return RecorderSettings(
-        out=args.out,
-        robot=config.robot.name,
-        base=bus.base,
-        bus=BusSettings("client", endpoints, secured=bus.security.of_client()),
-        pose_schema=config.pose.schema,
-        ros=_ros_inputs(config.ros2) if config.ros2 else (),
-        frames=_frames(config.ros2 or None),
-        part_bytes=room.part_mb * MEGABYTE,
-        part_s=60.0 * room.part_min,
-        quota_bytes=room.quota_mb * MEGABYTE,
-        least_free_bytes=room.least_free_mb * MEGABYTE,
-        serve=args.serve,
-    )
-
-
-def _frames(config: RosConfig | None) -> tuple[str, str]:
-    return (config.frames.map, config.frames.robot) if config else DEFAULT_FRAMES
-
-
-def _ros_inputs(config: RosConfig) -> tuple[RosInput, ...]:
-    def key(topic: RosTopic) -> str:
-        is_bridge = config.kind == "bridge"
-        return topic.bridge_key if is_bridge else topic.rmw_key(config.domain, any_hash=True)
-
-    topics = {"map": config.map, "map_update": config.map_updates, **config.poses}
-    return tuple(
-        RosInput(name, key(topic), topic.schema, topic.latched, topic.depth)
-        for name, topic in topics.items()
-    )
-
+    from fasaco_edge.recording.write.settings import RecorderSettings, RosInput
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
 
@@ -97,8 +30,8 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         run,
         about="record a robot's mission into a Rerun recording (.rrd)",
         description="Record map, coverage, pheromone, path, pose, states and latencies of one "
-        "robot, and byte for byte what its mission hears, until SIGTERM or SIGINT. Open the result "
-        "with `rerun FILE.rrd`, play it again with `fasaco-edge replay FILE.rrd`.",
+        "robot, and byte for byte what its mission receives, until SIGTERM or SIGINT. Open the "
+        "result with `rerun FILE.rrd`, play it again with `fasaco-edge replay FILE.rrd`.",
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
     parser.add_argument(
@@ -106,7 +39,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="the daemon's YAML configuration: robot, bus, pose and recording, in place of the "
-        "options for those",
+        "options for those; - reads it as JSON from standard input",
     )
     parser.add_argument(
         "--pose-schema",
@@ -120,7 +53,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         "--ros2",
         type=ros_config,
         metavar="JSON",
-        help="the block ros2 of the daemon's configuration: hear these topics, too",
+        help="the block ros2 of the daemon's configuration: record these topics, too",
     )
     _add_room(parser)
     parser.add_argument(
@@ -193,7 +126,83 @@ def _add_room(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record."""
-    from fasaco_edge.cli.record import of_daemon, of_options
     from fasaco_edge.recording.write.recorder import run_recorder
 
-    return run_recorder(of_options(args) if args.config is None else of_daemon(args))
+    if args.config is None:
+        config, bus = config_of_options(args), client_settings(args)
+    else:
+        config, bus = read_config(args.config)
+    return run_recorder(recorder_settings(config, bus, args.out, args.serve))
+
+
+def config_of_options(args: argparse.Namespace) -> DaemonConfig:
+    """Return the configuration that the options state; the bus is in ``client_settings``."""
+    import msgspec
+
+    from fasaco_edge.config.config import BusConfig, DaemonConfig, PoseConfig, RobotConfig
+    from fasaco_edge.config.sections import RecordingConfig
+
+    return DaemonConfig(
+        robot=RobotConfig(name=args.robot),
+        bus=BusConfig(base=args.base),
+        pose=PoseConfig(schema=args.pose_schema),
+        recording=RecordingConfig(
+            part_mb=args.part_mb,
+            part_min=args.part_min,
+            quota_mb=args.quota_mb,
+            least_free_mb=args.least_free_mb,
+        ),
+        ros2=args.ros2 or msgspec.UNSET,
+    )
+
+
+def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
+    """Return the daemon's configuration, and how a client on its computer joins its bus.
+
+    Raises:
+        BadConfiguration: the file, or the document on standard input, is wrong.
+    """
+    from fasaco_edge.bus.session import BusSettings
+    from fasaco_edge.config.config import decode_config, load_config
+    from fasaco_edge.config.endpoints import from_here
+
+    on_input = str(file) == "-"
+    config = decode_config(sys.stdin.buffer.read()) if on_input else load_config(file)
+    bus = config.bus
+    bus.security.warn_of_clock()
+    endpoints = tuple(map(from_here, bus.listen or bus.connect))
+    return config, BusSettings("client", endpoints, secured=bus.security.of_client())
+
+
+def recorder_settings(
+    config: DaemonConfig, bus: BusSettings, out: Path, serve: tuple[str, int] | None
+) -> RecorderSettings:
+    """Return a configuration as the recorder takes it."""
+    from fasaco_edge.recording.write.settings import MEGABYTE, RecorderSettings
+    from fasaco_edge.wire.pose_decoding import DEFAULT_FRAMES
+
+    ros, limits = config.ros2, config.recording
+    return RecorderSettings(
+        out=out,
+        robot=config.robot.name,
+        base=config.bus.base,
+        bus=bus,
+        pose_schema=config.pose.schema,
+        ros=_ros_inputs(ros) if ros else (),
+        frames=(ros.frames.map, ros.frames.robot) if ros else DEFAULT_FRAMES,
+        part_bytes=limits.part_mb * MEGABYTE,
+        part_s=60.0 * limits.part_min,
+        quota_bytes=limits.quota_mb * MEGABYTE,
+        least_free_bytes=limits.least_free_mb * MEGABYTE,
+        serve=serve,
+    )
+
+
+def _ros_inputs(config: RosConfig) -> tuple[RosInput, ...]:
+    from fasaco_edge.recording.write.settings import RosInput
+
+    topics = {"map": config.map, "map_update": config.map_updates, **config.poses}
+    return tuple(
+        RosInput(name, config.input_key(topic), topic.schema, topic.latched, topic.depth)
+        for name, topic in topics.items()
+    )

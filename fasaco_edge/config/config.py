@@ -147,6 +147,18 @@ def load_config(path: Path | None) -> DaemonConfig:
     raise type(first.error)(f"{where}: {first.error}", hint=hint) from first.error
 
 
+def decode_config(document: bytes) -> DaemonConfig:
+    """Return a configuration from the JSON that another process of the package has encoded.
+
+    Raises:
+        BadConfiguration: it is none.
+    """
+    try:
+        return msgspec.json.decode(document, type=DaemonConfig)
+    except msgspec.DecodeError as error:
+        raise BadConfiguration(f"configuration on standard input: {error}") from error
+
+
 def inspect_config(path: Path | None) -> tuple[DaemonConfig | None, tuple[Fault, ...]]:
     """Read a YAML file; return the configuration, or None and all that is wrong.
 

@@ -100,19 +100,22 @@ class RosConfig(Section, frozen=True):
         name = self._name(self.topics.coverage_grid)
         return RosTopic(name, schemas.OCCUPANCY_GRID, latched=True)
 
+    def input_key(self, topic: RosTopic) -> str:
+        """Return the key to subscribe to for a topic, whatever hash rmw_zenoh puts behind it."""
+        if self.kind == "bridge":
+            return topic.bridge_key
+        return topic.rmw_key(self.domain, any_hash=True)
+
+    def output_key(self, topic: RosTopic) -> str:
+        """Return the key to publish a topic under."""
+        return topic.bridge_key if self.kind == "bridge" else topic.rmw_key(self.domain)
+
     def rights(self) -> Role:
         """Return what those may do that have the role ``ros``."""
         heard = [self.map, self.map_updates, *self.poses.values()]
         said = [self.coverage_path, self.coverage_grid]
-        if self.kind == "bridge":
-            return ros_rights(
-                [topic.bridge_key for topic in heard], [topic.bridge_key for topic in said], []
-            )
-        return ros_rights(
-            [topic.rmw_key(self.domain, any_hash=True) for topic in heard],
-            [topic.rmw_key(self.domain) for topic in said],
-            [graph_key(self.domain)],
-        )
+        graph = [] if self.kind == "bridge" else [graph_key(self.domain)]
+        return ros_rights([*map(self.input_key, heard)], [*map(self.output_key, said)], graph)
 
     def faults(self) -> Iterator[BadConfiguration]:
         """Yield what no single value's type shows.

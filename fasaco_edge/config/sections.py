@@ -128,12 +128,3 @@ class RecordingConfig(Section, frozen=True):
     part_min: Annotated[float, Meta(ge=0, le=10_000)] = 10.0
     quota_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 2000
     least_free_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 200
-
-    def words(self) -> list[str]:
-        """Return these as options of ``fasaco-edge record``."""
-        return [
-            *("--part-mb", str(self.part_mb)),
-            *("--part-min", f"{self.part_min:g}"),
-            *("--quota-mb", str(self.quota_mb)),
-            *("--least-free-mb", str(self.least_free_mb)),
-        ]

@@ -8,6 +8,7 @@ changes keys, attachments and tokens alone.
 from __future__ import annotations
 
 import time
+from typing import Literal
 
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
@@ -51,25 +52,25 @@ class RosBridge:
         def post(sample: Sample) -> None:
             take(sample.as_type(topic.schema))  # ROS names no type beside a sample
 
-        if self._config.kind == "bridge":
-            return self._bus.subscribe(topic.bridge_key, post, topic.latched, topic.depth)
-        key = topic.rmw_key(self._config.domain, any_hash=True)
+        key = self._config.input_key(topic)
         subscription = self._bus.subscribe(key, post, topic.latched, topic.depth)
-        self._endpoints += 1
-        self._bus.token(self._node.endpoint_token(self._endpoints, "MS", topic))
+        self._announce("MS", topic)
         return subscription
 
     def _publisher(self, topic: RosTopic, like: str) -> RosPublisher:
         """Publish ``topic`` with the quality of service of the native key ``like``."""
+        publisher = self._bus.publisher(self._config.output_key(topic), topic.schema, QOS[like])
+        token = self._announce("MP", topic)
+        return RosPublisher(publisher, gid_of(token) if token else b"")
+
+    def _announce(self, kind: Literal["MS", "MP"], topic: RosTopic) -> str:
+        """Return the liveliness token of a new endpoint; "" with a bridge, which has its own."""
         if self._config.kind == "bridge":
-            publisher = self._bus.publisher(topic.bridge_key, topic.schema, QOS[like])
-            return RosPublisher(publisher)
-        key = topic.rmw_key(self._config.domain)
-        publisher = self._bus.publisher(key, topic.schema, QOS[like])
+            return ""
         self._endpoints += 1
-        token = self._node.endpoint_token(self._endpoints, "MP", topic)
+        token = self._node.endpoint_token(self._endpoints, kind, topic)
         self._bus.token(token)
-        return RosPublisher(publisher, gid_of(token))
+        return token
 
 
 class RosPublisher:

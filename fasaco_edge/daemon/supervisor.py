@@ -14,8 +14,6 @@ import msgspec
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.config.credentials import client_words
-from fasaco_edge.config.endpoints import from_here
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.host.processes import python_program
 from fasaco_edge.wire.json_text import decode_json
@@ -34,7 +32,10 @@ class RecorderSupervisor:
     """Starts ``fasaco-edge record``, starts it again when it dies, and tells how it is."""
 
     def __init__(self, config: DaemonConfig, bus: Bus, folder: Path) -> None:
-        self._command = _command(config, folder)
+        self._config = msgspec.json.encode(config)
+        parent = ["--with-parent", str(os.getpid())]
+        program = python_program("fasaco_edge", "record")
+        self._command = [*program, *parent, "--config", "-", "--out", str(folder)]
         self._word = LatestSlot[Sample]()
         self._heard: dict[str, Any] = {}
         self._heard_at = time.monotonic()
@@ -68,7 +69,11 @@ class RecorderSupervisor:
     def _launch(self) -> None:
         """Start the process; a machine without memory or processes left may refuse."""
         try:
-            self._process = subprocess.Popen(self._command)
+            # In memory and not in a pipe, which would have to be written while it is read.
+            with open(os.memfd_create("configuration"), "w+b") as document:
+                document.write(self._config)
+                document.seek(0)
+                self._process = subprocess.Popen(self._command, stdin=document)
         except OSError as error:
             self._process, self._death = None, f"could not be started: {error.strerror}"
 
@@ -106,25 +111,3 @@ class RecorderSupervisor:
         else:
             state = self._heard or {"state": "starting"}
         return {**state, "restarts": self._restarts}
-
-
-def _command(config: DaemonConfig, folder: Path) -> list[str]:
-    endpoints = config.bus.listen or config.bus.connect
-    connect = [word for endpoint in endpoints for word in ("--connect", from_here(endpoint))]
-    connect += client_words(config.bus.security)
-    robot = ["--robot", config.robot.name, "--base", config.bus.base]
-    pose = ["--pose-schema", config.pose.schema]
-    if config.ros2:
-        pose += ["--ros2", msgspec.json.encode(config.ros2).decode()]
-    program = python_program("fasaco_edge", "record")
-    parent = ["--with-parent", str(os.getpid())]
-    return [
-        *program,
-        *parent,
-        "--out",
-        str(folder),
-        *connect,
-        *robot,
-        *pose,
-        *config.recording.words(),
-    ]

@@ -17,13 +17,11 @@ from typing import Any
 
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, check_settings, open_bus
 from fasaco_edge.config.endpoints import from_here, host_of, protocol_of
-from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.daemon.claim import claims_in
 from fasaco_edge.doctor.finding import CheckContext, Finding, Level
 from fasaco_edge.errors import BadConfiguration, BusUnavailable, MalformedMessage
 from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.keys import VERSION
-from fasaco_edge.wire.ros_keys import RosTopic
 
 ANSWER_S = 0.5
 LISTENING = "0A"  # proc(5), /proc/net/tcp
@@ -158,8 +156,8 @@ def _seen(patient: CheckContext, bus: Bus) -> Finding:
     keys, ros = patient.config.keys(), patient.config.ros2
     wanted = {"map": [keys.map], "pose": [keys.pose]}
     if ros:
-        wanted["map"].append(_ros_key(ros, ros.map))
-        wanted["pose"] += [_ros_key(ros, topic) for topic in ros.poses.values()]
+        wanted["map"].append(ros.input_key(ros.map))
+        wanted["pose"] += [ros.input_key(topic) for topic in ros.poses.values()]
     heard = _listen(bus, wanted)
     alive = bus.alive(f"{keys.base}/{VERSION}/*/alive", ASK_S)
     others = sorted(key.split("/")[-2] for key in alive if key != keys.alive)
@@ -188,12 +186,6 @@ def _seen(patient: CheckContext, bus: Bus) -> Finding:
             Level.WARN, f"{found}; it has no {lacking}", f"publish on {topics}", tuple(details)
         )
     return Finding(Level.OK, found, details=tuple(details))
-
-
-def _ros_key(ros: RosConfig, topic: RosTopic) -> str:
-    if ros.kind == "bridge":
-        return topic.bridge_key
-    return topic.rmw_key(ros.domain, any_hash=True)
 
 
 def _listen(bus: Bus, wanted: dict[str, list[str]]) -> dict[str, int]:

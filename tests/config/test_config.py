@@ -8,12 +8,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.config.config import DaemonConfig, load_config
+from fasaco_edge.bus.session import BusSettings
+from fasaco_edge.cli.record import recorder_settings
+from fasaco_edge.config.config import DaemonConfig, decode_config, load_config
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.sections import MissionSettings
 from fasaco_edge.errors import BadConfiguration
@@ -326,16 +329,28 @@ def test_what_is_wrong_about_ros_is_named(load, block, text):
     assert text in str(caught.value)
 
 
-def test_the_recorder_gets_its_room_from_the_configuration(tmp_path):
-    from fasaco_edge.cli import _parser
-    from fasaco_edge.daemon.supervisor import _command
-
+def test_the_recorder_gets_its_settings_from_the_configuration(tmp_path):
     file = tmp_path / "config.yaml"
-    file.write_text("recording: {part_mb: 10, part_min: 2.5, quota_mb: 100, least_free_mb: 7}")
-    command = _command(load_config(file), tmp_path)
-    words = command[command.index("record") :]
-    told = _parser().parse_args(words)
-    assert (told.part_mb, told.part_min, told.quota_mb, told.least_free_mb) == (10, 2.5, 100, 7)
+    file.write_text(
+        "recording: {part_mb: 10, part_min: 2.5, quota_mb: 100, least_free_mb: 7}\n"
+        "robot: {name: left}\npose: {schema: nav_msgs/msg/Odometry}\n"
+        "planner: {tau0: 1.0e-12}\nros2: {kind: bridge, frames: {map: floor}}\n"
+    )
+    config = load_config(file)
+    handed = decode_config(msgspec.json.encode(config))
+    assert handed == config
+    told = recorder_settings(handed, BusSettings(), tmp_path, None)
+    assert (told.part_bytes, told.part_s) == (10_000_000, 150.0)
+    assert (told.quota_bytes, told.least_free_bytes) == (100_000_000, 7_000_000)
+    assert (told.robot, told.pose_schema) == ("left", "nav_msgs/msg/Odometry")
+    assert told.frames == ("floor", "base_link")
+    assert [topic.topic for topic in told.ros] == ["map", "map_update", "tf_static", "pose"]
+    with pytest.raises(BadConfiguration, match="unknown field `colour`"):
+        decode_config(b'{"colour": 1}')
+
+
+def test_recordings_have_room_for_two_parts(tmp_path):
+    file = tmp_path / "config.yaml"
     file.write_text("recording: {part_mb: 60, quota_mb: 100}")
     with pytest.raises(BadConfiguration, match=r"recording\.quota_mb must be 0 or at least"):
         load_config(file)
