@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
         with writing(args.export):
             export(review, args.export)
     if args.view:
-        from fasaco_edge.recording.read.viewing import view
+        from fasaco_edge.recording.read.repair import view
 
         view([*args.recordings, *(args.against or ())])
     return 0
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _read(paths: Sequence[Path], name: str) -> Review:
     from fasaco_edge.cli.console import terminal
-    from fasaco_edge.review.reading import read_review
+    from fasaco_edge.review.review import read_review
 
     with terminal.progress() as bar:
         task = bar.add_task(name, total=None)

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.cli.console import terminal
-from fasaco_edge.review.charts import covered_share
-from fasaco_edge.review.curve import EIGHTHS, PLAIN_EIGHTHS, curve
+from fasaco_edge.review.charts import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
 from fasaco_edge.review.document import troubles
 from fasaco_edge.review.rows import (
     MOST_REPLANS,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.watch.feed import Feed
-    from fasaco_edge.watch.known import Known
+    from fasaco_edge.watch.robot_view import RobotView
 
 EPILOG = """\
 examples:
@@ -69,20 +69,20 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.errors import FasacoError
     from fasaco_edge.watch import live
     from fasaco_edge.watch.feed import Feed
-    from fasaco_edge.watch.known import Known
+    from fasaco_edge.watch.robot_view import RobotView
     from fasaco_edge.wire.keys import Keys
 
-    keys, console, known = Keys(args.robot, args.base), out(), Known(args.robot)
+    keys, console, view = Keys(args.robot, args.base), out(), RobotView(args.robot)
     with Feed(client_settings(args), keys) as feed:
         try:
             if args.once:
-                _once(args, feed, known, console)
+                _once(args, feed, view, console)
             elif args.json:
-                live.watch_as_json(feed, known)
+                live.watch_as_json(feed, view)
             elif sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in ("dumb", "unknown"):
-                live.watch_on_screen(feed, known, console)
+                live.watch_on_screen(feed, view, console)
             else:
-                live.watch_in_lines(feed, known)
+                live.watch_in_lines(feed, view)
             sys.stdout.flush()
             code = exits.OK
         except FasacoError as error:
@@ -104,22 +104,22 @@ def _leave(code: int) -> NoReturn:
     os._exit(code)
 
 
-def _once(args: argparse.Namespace, feed: Feed, known: Known, console: Console) -> None:
+def _once(args: argparse.Namespace, feed: Feed, view: RobotView, console: Console) -> None:
     from fasaco_edge.cli.console.asking import NobodyAnswersError
     from fasaco_edge.errors import BusUnavailable
     from fasaco_edge.watch.live import look_once, print_json
     from fasaco_edge.watch.page import Page
     from fasaco_edge.watch.phrases import steady_now
 
-    if not look_once(feed, known, args.timeout):
-        if known.trouble:
-            raise BusUnavailable(known.trouble)
-        raise NobodyAnswersError(f"{args.base}/@v1/{args.robot}", known.robots)
+    if not look_once(feed, view, args.timeout):
+        if view.trouble:
+            raise BusUnavailable(view.trouble)
+        raise NobodyAnswersError(f"{args.base}/@v1/{args.robot}", view.robots)
     if args.json:
-        print_json(known.document)
+        print_json(view.document)
         return
     # The prompt takes a line.
     width, height = console.width, console.height - 1
-    for line in Page(console).lines(known, steady_now(), width, height):
+    for line in Page(console).lines(view, steady_now(), width, height):
         # Its colours have to go through; its texts are clean.
         console.file.write(f"{line.rstrip()}\n")

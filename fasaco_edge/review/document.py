@@ -13,14 +13,14 @@ from fasaco_edge.recording.scene.runcard import flat_settings
 from fasaco_edge.review.drive import milestones
 from fasaco_edge.review.moments import RECORDER_IN_ORDER, TROUBLES, Span
 from fasaco_edge.review.review import Review, seconds_by_state
+from fasaco_edge.review.run_data import TakenPath
 from fasaco_edge.review.setups import ANYWAY, do_compare, setup_differences
-from fasaco_edge.review.story import TakenPath
 
 
 def document(review: Review) -> dict[str, Any]:
     """Return all figures of a review; null where a recording does not hold them."""
-    record, story = review.record, review.story
-    grid, counts, walk, drive = story.grid, review.counts, review.walk, review.drive
+    record, data = review.record, review.data
+    grid, counts, walk, drive = data.grid, review.counts, review.walk, review.drive
     replans, faults = review.replans, review.faults
     geometry = grid.geometry if grid else None
     began = datetime.fromtimestamp(1e-9 * record.began_ns, UTC)
@@ -35,9 +35,9 @@ def document(review: Review) -> dict[str, Any]:
             }
             for part in record.parts
         ],
-        "robot": story.robot or None,
-        "version": story.version or None,
-        "config": dict(flat_settings(story.config)),
+        "robot": data.robot or None,
+        "version": data.version or None,
+        "config": dict(flat_settings(data.config)),
         "map": geometry
         and {
             "rows": geometry.rows,
@@ -72,7 +72,7 @@ def document(review: Review) -> dict[str, Any]:
         "turns_90": walk and walk.turns_90,
         "turns_180": walk and walk.turns_180,
         "driven_m": drive and round(drive.driven_m, 2),
-        "paths": len(story.paths),
+        "paths": len(data.paths),
         "replans": len(replans.later),
         "replans_by_reason": replans.by_reason,
         "first_plan_ms": replans.first and _rounded(replans.first.plan_ms),
@@ -102,7 +102,7 @@ def document(review: Review) -> dict[str, Any]:
         "faults_by_code": faults.by_code,
         "recorder_lost": faults.lost,
         "samples_missing": review.missing,
-        "unreadable": dict(story.undecodable),
+        "unreadable": dict(data.undecodable),
         "remarks": list(faults.complaints),
     }
     return told | {"not_recorded": _not_recorded(review)}
@@ -170,7 +170,7 @@ def _replan(path: TakenPath) -> dict[str, Any]:
 
 def _plans(review: Review) -> dict[str, Any]:
     """Return what the turn log tells of plans; null where there is none."""
-    made = review.story.made.plans
+    made = review.data.made.plans
     plans = [plan for plan in made if not plan.is_attempt]
     attempts = [plan for plan in made if plan.is_attempt]
     took = [plan.took_ms for plan in plans]
@@ -207,15 +207,15 @@ def _reached(review: Review) -> dict[str, float | None] | None:
 
 
 def _restored(review: Review) -> int:
-    return max((status.restored_cells for status in review.story.statuses), default=0)
+    return max((status.restored_cells for status in review.data.statuses), default=0)
 
 
 def _not_recorded(review: Review) -> dict[str, str]:
-    story, why = review.story, {}
-    if not story.statuses:
+    data, why = review.data, {}
+    if not data.statuses:
         why["robot, version, config, state"] = "there is no status of a daemon"
     if review.drive is None:
-        lacks = "no map" if story.grid is None else "no configuration"
+        lacks = "no map" if data.grid is None else "no configuration"
         why["steps, revisits, turns_90, turns_180, driven_m, reached_s"] = f"there is {lacks}"
     elif _restored(review):
         why["reached_s"] = (
@@ -227,7 +227,7 @@ def _not_recorded(review: Review) -> dict[str, str]:
         )
     if not review.replans.later:
         why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "no plan was made anew"
-    if not story.made.plans:
+    if not data.made.plans:
         why["plans, plans_unused, plan_ms_p50, plan_ms_p99, plan_ms_max, attempts"] = (
             "there is no turn log"
         )

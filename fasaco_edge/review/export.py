@@ -43,8 +43,8 @@ def export(review: Review, folder: Path) -> None:
         OSError: a file cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    story = review.story
-    trail = zip(story.pose_s, story.poses, strict=True)
+    data = review.data
+    trail = zip(data.pose_s, data.poses, strict=True)
     _write(
         folder / "trail.csv",
         ("at_s", "x_m", "y_m", "yaw_rad"),
@@ -65,7 +65,7 @@ def export(review: Review, folder: Path) -> None:
                     p.reason,
                 ),
             )
-            for p in story.paths
+            for p in data.paths
         ),
     )
     _write(
@@ -73,7 +73,7 @@ def export(review: Review, folder: Path) -> None:
         ("at_s", "took_ms", "attempt", "used", "reason"),
         (
             (f"{p.at_s:.6f}", f"{p.took_ms:.3f}", int(p.is_attempt), int(p.is_used), p.reason)
-            for p in story.made.plans
+            for p in data.made.plans
         ),
     )
     _write(
@@ -115,7 +115,7 @@ def _cell(value: object) -> object:
 
 
 def _write_arrays(review: Review, file: Path) -> None:
-    grid, lattice, drive = review.story.grid, review.lattice, review.drive
+    grid, lattice, drive = review.data.grid, review.lattice, review.drive
     arrays: dict[str, NDArray[Any]] = {}
     if grid is not None:
         origin = grid.geometry.origin

@@ -14,7 +14,7 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.fields import integer
 from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.moments import RECORDER_IN_ORDER
-from fasaco_edge.review.story import Story
+from fasaco_edge.review.run_data import RunData
 
 _ERROR = re.compile(r"error (\d+): ")
 # What the recorder says of itself where nothing is wrong.
@@ -45,15 +45,15 @@ class Faults:
         return sum(self.by_code.values())
 
 
-def faults_of(story: Story, record: RunRecord) -> Faults:
+def faults_of(data: RunData, record: RunRecord) -> Faults:
     """Return what a recording tells of faults."""
-    by_code = _over_restarts(status.faults for status in story.statuses)
+    by_code = _over_restarts(status.faults for status in data.statuses)
     # As curves they are recorded up to the end; of a daemon that was started again not each one.
     by_code |= _plotted(record.plots)
     total = _counted(line for _, line in record.log.get(entities.MISSION_LOG, ()))
     if total > by_code.total():
         by_code[NOT_TOLD] = total - by_code.total()
-    lost = [integer(status.recorder, "lost") for status in story.statuses]
+    lost = [integer(status.recorder, "lost") for status in data.statuses]
     told = [count for count in lost if count is not None]
     return Faults(
         by_code=dict(sorted(by_code.items())),

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.drawing.spread import percentile
-from fasaco_edge.review.story import Story, TakenPath
+from fasaco_edge.review.run_data import RunData, TakenPath
 
 # Less than this is no drive, and no turn on the spot.
 STILL_M = 0.05
@@ -215,7 +215,7 @@ def kind_of(reason: str) -> str:
 
 
 def worst_moments(
-    story: Story,
+    data: RunData,
     states: tuple[Span, ...],
     replans: Replans,
     fractions: NDArray[np.float64],
@@ -223,7 +223,7 @@ def worst_moments(
     """Return the worst of each kind of moment there was.
 
     Args:
-        story: what the samples tell.
+        data: what the samples tell.
         states: of the mission, in order.
         replans: plans made anew.
         fractions: float64 (n, 2), when [s] and the covered share as the daemon told it.
@@ -231,14 +231,14 @@ def worst_moments(
     found: list[Moment | None] = []
     for during in under_way(states):
         found += [
-            longest_stand(story.times, story.trail, during, states),
-            longest_gap("longest time without a pose", story.pose_s, during),
-            longest_gap("longest time without a map", story.map_s, during),
+            longest_stand(data.times, data.trail, during, states),
+            longest_gap("longest time without a pose", data.pose_s, during),
+            longest_gap("longest time without a map", data.map_s, during),
         ]
     slowest = replans.slowest
     if slowest is not None and slowest.plan_ms is not None:
         found.append(Moment("slowest replan", slowest.plan_ms, "ms", slowest.at_s, slowest.reason))
-    found.append(largest_drop(fractions, story.map_s, [at_s for at_s, _, _ in story.commands]))
+    found.append(largest_drop(fractions, data.map_s, [at_s for at_s, _, _ in data.commands]))
     # A mission that was begun again has its moments each time: the worst one counts.
     worst: dict[str, Moment] = {}
     for moment in found:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.recording.fields import integer
 from fasaco_edge.review.moments import Span
-from fasaco_edge.review.story import HeardStatus, Story
+from fasaco_edge.review.run_data import HeardStatus, RunData
 
 # What comes so soon after a status [s] is still of the same step.
 SAME_STEP_S = 1.5
@@ -46,19 +46,19 @@ class OrderChapter:
 
 
 def chapters(
-    story: Story, states: Sequence[Span], fractions: NDArray[np.float64], end_s: float
+    data: RunData, states: Sequence[Span], fractions: NDArray[np.float64], end_s: float
 ) -> tuple[OrderChapter, ...]:
     """Return the chapters of a recording, in order; one at least.
 
     Args:
-        story: what its samples tell.
+        data: what its samples tell.
         states: of the mission, in order.
         fractions: float64 (n, 2), when [s], and the covered share as the daemon told it.
         end_s: of the recording [s].
     """
-    held = list(_held(story, states, end_s))
+    held = list(_held(data, states, end_s))
     return tuple(
-        _chapter(story, states, fractions, *one)
+        _chapter(data, states, fractions, *one)
         for one in held
         # Before the first command there may have been nothing.
         if len(held) == 1 or one[0] == "command" or _has_begun(states, one[1], one[2])
@@ -76,12 +76,12 @@ def is_complete(state: str, status: HeardStatus | None, covered: int, coverable:
 
 
 def _held(
-    story: Story, states: Sequence[Span], end_s: float
+    data: RunData, states: Sequence[Span], end_s: float
 ) -> Iterator[tuple[str, float, float, str]]:
     """Yield who gave each order, from when to when it held [s], and what ended it."""
     ordered, began, order = "itself", 0.0, None
     is_open = True
-    for at_s, name, given in story.commands:
+    for at_s, name, given in data.commands:
         if name == "start" and is_open and _goes_on(order, given, _state_at(states, at_s)):
             continue
         if name == "start" or (name in ENDS and is_open):
@@ -110,7 +110,7 @@ def _has_begun(states: Sequence[Span], begin_s: float, end_s: float) -> bool:
 
 
 def _chapter(
-    story: Story,
+    data: RunData,
     states: Sequence[Span],
     fractions: NDArray[np.float64],
     ordered: str,
@@ -120,7 +120,7 @@ def _chapter(
 ) -> OrderChapter:
     until = end_s if ended_by else float("inf")
     state = _state_at(states, until)
-    told = [s for s in story.statuses if begin_s <= s.at_s < until and s.coverage]
+    told = [s for s in data.statuses if begin_s <= s.at_s < until and s.coverage]
     own = fractions[(fractions[:, 0] >= begin_s) & (fractions[:, 0] < until)]
     last = told[-1] if told and is_still_true(told[-1], own) else None
     coverage: Mapping[str, Any] = last.coverage if last else {}

@@ -49,8 +49,8 @@ def draw_map(review: Review, room: tuple[int, int]) -> Image.Image | None:
         review: of what.
         room: the most the map may take (width, height) [px].
     """
-    grid, lattice, drive = review.story.grid, review.lattice, review.drive
-    trail = _thinned(review.story.trail[:, :2])
+    grid, lattice, drive = review.data.grid, review.lattice, review.drive
+    trail = _thinned(review.data.trail[:, :2])
     if grid is None or lattice is None or drive is None or not len(trail):
         return None
     return draw_mission(

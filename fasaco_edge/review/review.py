@@ -1,8 +1,12 @@
-"""A review: all figures of one recorded mission, from what its recording holds."""
+"""A review: all figures of one recorded mission, from the files of its recording."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +16,49 @@ from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.mission.orders.zones import kept_out, without
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fields import integer, number, section
-from fasaco_edge.recording.read.run import RunRecord, Told
+from fasaco_edge.recording.read.run import RunRecord, Told, count_frames, read_run_record
+from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.review.drive import Drive, WalkFigures, drive_over, first_covered, walk_figures
 from fasaco_edge.review.faults import Faults, faults_of
 from fasaco_edge.review.moments import Moment, Replans, Span, spans_of, worst_moments
 from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_still_true
-from fasaco_edge.review.story import Story
+from fasaco_edge.review.run_data import RunData, gather
+
+# So often is progress told: each so many-th frame or sample.
+EVERY = 200
+
+Tell = Callable[[str, int, int], None]
+"""Hears what is being done, how much of it is done, and how much there is in all."""
+Item = TypeVar("Item")
+
+
+def read_review(paths: Sequence[Path], tell: Tell = lambda *_: None) -> Review:
+    """Read the parts of one run, and review it.
+
+    Args:
+        paths: the files, in any order; they are left as they are.
+        tell: hears of progress now and then.
+
+    Raises:
+        UnreadableRecording: a file is missing, no recording, or without samples.
+        DifferentRuns: the parts are not of one run.
+    """
+    total, numbers = count_frames(paths), count(1)
+    record = read_run_record(paths, lambda: tell("reading", next(numbers), total))
+    samples = RecordedSamples.of(record.batches)
+    # Samples are numbered: the last batch tells about how many there are.
+    about = max(batch.place.first for batch in record.batches) + 1
+    data = gather(_told(samples, tell, "decoding", about), record.began_ns)
+    tell("following the robot", 0, 1)
+    return review_of(record, data, samples.missing)
+
+
+def _told(items: Iterable[Item], tell: Tell, task: str, total: int) -> Iterator[Item]:
+    for done, item in enumerate(items):
+        if done % EVERY == 0:
+            tell(task, min(done, total), total)
+        yield item
+
 
 Entered = tuple[float, str, str]
 """When [s] which state was entered, and why."""
@@ -40,7 +81,7 @@ class Review:
 
     Attributes:
         record: its files, plots, states and log.
-        story: what its samples tell.
+        data: what its samples tell.
         lattice: over the map at the end; None without a map or a configuration.
         drive, walk: what the robot drove over it.
         first_s: float64 (n,), when each cell was first covered, ascending.
@@ -54,7 +95,7 @@ class Review:
     """
 
     record: RunRecord
-    story: Story
+    data: RunData
     lattice: CoverageLattice | None
     drive: Drive | None
     walk: WalkFigures | None
@@ -70,7 +111,7 @@ class Review:
     @property
     def duration_s(self) -> float:
         """From the first entry of the recording to its last [s]."""
-        return _end_s(self.record, self.story)
+        return _end_s(self.record, self.data)
 
     @property
     def state(self) -> str:
@@ -91,53 +132,53 @@ class Review:
             return None
         if self.counts is None:
             return False
-        last = self.story.statuses[-1] if self.story.statuses else None
+        last = self.data.statuses[-1] if self.data.statuses else None
         return is_complete(self.state, last, self.counts.covered, self.counts.coverable)
 
     @property
     def orders(self) -> tuple[OrderChapter, ...]:
         """What was ordered, and what came of each."""
-        return chapters(self.story, self.states, self.known_fractions, self.duration_s)
+        return chapters(self.data, self.states, self.known_fractions, self.duration_s)
 
 
-def review_of(record: RunRecord, story: Story, missing: int) -> Review:
+def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
     """Return the review of a recording.
 
     Args:
         record: what was read of it.
-        story: what its samples tell.
+        data: what its samples tell.
         missing: how many samples were lost in between.
     """
-    end_s = _end_s(record, story)
-    lattice = _lattice(story)
-    lost_pose_s = number(section(story.config, "mission"), "lost_pose_s") or 0.0
-    drive = drive_over(lattice, story.times, story.trail, lost_pose_s) if lattice else None
-    states = spans_of(_mission_states(story, record), end_s)
-    replans = Replans.of(story.paths)
+    end_s = _end_s(record, data)
+    lattice = _lattice(data)
+    lost_pose_s = number(section(data.config, "mission"), "lost_pose_s") or 0.0
+    drive = drive_over(lattice, data.times, data.trail, lost_pose_s) if lattice else None
+    states = spans_of(_mission_states(data, record), end_s)
+    replans = Replans.of(data.paths)
     fractions = record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
     return Review(
         record=record,
-        story=story,
+        data=data,
         lattice=lattice,
         drive=drive,
         walk=walk_figures(drive.cells) if drive else None,
         first_s=first_covered(drive, lattice) if drive and lattice else np.zeros(0),
-        counts=_counts(story, drive, fractions),
+        counts=_counts(data, drive, fractions),
         replans=replans,
         states=states,
         recorder_states=spans_of(
             _entered(record, entities.RECORDER_STATE, entities.RECORDER_LOG), end_s
         ),
-        moments=worst_moments(story, states, replans, fractions),
-        faults=faults_of(story, record),
+        moments=worst_moments(data, states, replans, fractions),
+        faults=faults_of(data, record),
         missing=missing,
     )
 
 
-def _lattice(story: Story) -> CoverageLattice | None:
-    robot, maps = section(story.config, "robot"), section(story.config, "map")
+def _lattice(data: RunData) -> CoverageLattice | None:
+    robot, maps = section(data.config, "robot"), section(data.config, "map")
     cell_m, radius_m = number(robot, "tool_width_m"), number(robot, "radius_m")
-    if story.grid is None or not cell_m or not radius_m:
+    if data.grid is None or not cell_m or not radius_m:
         return None
     free, occupied = integer(maps, "free_at_most"), integer(maps, "occupied_at_least")
     usual = Footprint(cell_m, radius_m)
@@ -148,22 +189,22 @@ def _lattice(story: Story) -> CoverageLattice | None:
         usual.occupied_at_least if occupied is None else occupied,
     )
     try:
-        lattice = CoverageLattice.from_map(story.grid, footprint)
+        lattice = CoverageLattice.from_map(data.grid, footprint)
     except MapTooLarge:
         return None
-    if not story.keep_out:
+    if not data.keep_out:
         return lattice
-    return without(lattice, kept_out(story.keep_out, lattice.window, cell_m, radius_m))
+    return without(lattice, kept_out(data.keep_out, lattice.window, cell_m, radius_m))
 
 
-def _end_s(record: RunRecord, story: Story) -> float:
+def _end_s(record: RunRecord, data: RunData) -> float:
     """Return when the recording ended [s]; samples are written before what is drawn of them."""
-    return max(1e-9 * (record.ended_ns - record.began_ns), story.last_s)
+    return max(1e-9 * (record.ended_ns - record.began_ns), data.last_s)
 
 
-def _mission_states(story: Story, record: RunRecord) -> list[Entered]:
+def _mission_states(data: RunData, record: RunRecord) -> list[Entered]:
     """Return when the mission entered its states, by its statuses and by what was drawn."""
-    told = [(status.at_s, status.state, status.reason) for status in story.statuses]
+    told = [(status.at_s, status.state, status.reason) for status in data.statuses]
     drawn = _entered(record, entities.MISSION_STATE, entities.MISSION_LOG)
     return sorted((*told, *drawn), key=lambda entry: entry[0])
 
@@ -184,10 +225,10 @@ def _reason(said: tuple[Told, ...], at_ns: int, state: str) -> str:
 
 
 def _counts(
-    story: Story, drive: Drive | None, fractions: NDArray[np.float64]
+    data: RunData, drive: Drive | None, fractions: NDArray[np.float64]
 ) -> CoverageCounts | None:
     """Return the daemon's own counts if its last status is still true, else those of the trail."""
-    told = [status for status in story.statuses if status.coverage]
+    told = [status for status in data.statuses if status.coverage]
     if told and is_still_true(told[-1], fractions):
         coverage = told[-1].coverage
         covered, coverable = integer(coverage, "covered"), integer(coverage, "coverable")
@@ -198,7 +239,7 @@ def _counts(
             )
             return CoverageCounts(covered, coverable, recovered, unreachable, source="status")
     # What was covered before the recording began, no trail tells.
-    if drive is None or any(status.restored_cells for status in story.statuses):
+    if drive is None or any(status.restored_cells for status in data.statuses):
         return None
     cover = drive.coverage
     return CoverageCounts(

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from fasaco_edge.review.drive import MILESTONES
+from fasaco_edge.review.run_data import TakenPath
 from fasaco_edge.review.setups import ANOTHER_PROBLEM, ANYWAY, do_compare, setup_differences
-from fasaco_edge.review.story import TakenPath
 
 Row = tuple[str, str, str, str]
 """Name, the texts of one recording and of the other, and the difference; "" for none."""

@@ -9,7 +9,7 @@ from typing import Self
 from fasaco_edge.bus.mailbox import Mailbox, Queue
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BusUnavailable
-from fasaco_edge.watch.known import Token
+from fasaco_edge.watch.robot_view import Token
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 

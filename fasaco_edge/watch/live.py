@@ -23,8 +23,8 @@ from fasaco_edge.host.signals import stop_event
 from fasaco_edge.text import json_line, one_line
 from fasaco_edge.watch import phrases
 from fasaco_edge.watch.feed import Feed
-from fasaco_edge.watch.known import Known
 from fasaco_edge.watch.page import Page
+from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.json_text import decode_json
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -35,17 +35,17 @@ LINE_EVERY_S = 1.0
 REST_S = 1.0
 
 
-def take(feed: Feed, known: Known, timeout_s: float) -> list[tuple[str, object]]:
+def take(feed: Feed, view: RobotView, timeout_s: float) -> list[tuple[str, object]]:
     """Take in what came; wait up to ``timeout_s`` [s] for it. Return it as well."""
     items = feed.take(timeout_s)
     now = phrases.steady_now()
     for topic, item in items:
-        known.take(topic, item, now)
-    known.trouble = feed.trouble
+        view.take(topic, item, now)
+    view.trouble = feed.trouble
     return items
 
 
-def watch_on_screen(feed: Feed, known: Known, console: Console) -> None:
+def watch_on_screen(feed: Feed, view: RobotView, console: Console) -> None:
     """Show the mission until somebody types q, or a signal asks for the end.
 
     Raises:
@@ -54,69 +54,69 @@ def watch_on_screen(feed: Feed, known: Known, console: Console) -> None:
     page, shown_at = Page(console), (0, (0, 0), "")
     with stop_event(*END_SIGNALS) as stop, Screen(sys.stdout) as screen:
         while not stop.is_set():
-            came = take(feed, known, 0.0)
+            came = take(feed, view, 0.0)
             now = phrases.steady_now()
-            key = (int(now), screen.size(), known.trouble)
+            key = (int(now), screen.size(), view.trouble)
             if came or key != shown_at:
                 shown_at, size = key, key[1]
-                screen.show(page.lines(known, now, *size), size)
+                screen.show(page.lines(view, now, *size), size)
             if "q" in screen.keys(FRAME_S).lower():
                 return
 
 
-def watch_in_lines(feed: Feed, known: Known) -> None:
+def watch_in_lines(feed: Feed, view: RobotView) -> None:
     """Print what happens, and once a second how it stands, until a signal asks for the end."""
     # What is there already comes within the first second.
     told_entries, said, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
     with stop_event(*END_SIGNALS) as stop:
         while not stop.is_set():
-            take(feed, known, FRAME_S)
+            take(feed, view, FRAME_S)
             now = phrases.steady_now()
-            for entry in known.journal.since(told_entries):
+            for entry in view.events.since(told_entries):
                 _print_line(entry.at_s, entry.text)
-            told_entries = known.journal.count
+            told_entries = view.events.count
             if now >= next_line_at:
-                next_line_at, line = now + LINE_EVERY_S, status_line(known, now)
+                next_line_at, line = now + LINE_EVERY_S, status_line(view, now)
                 if line != said:
                     said = line
                     _print_line(now, line)
 
 
-def watch_as_json(feed: Feed, known: Known) -> None:
+def watch_as_json(feed: Feed, view: RobotView) -> None:
     """Print each status as a line of JSON, until a signal asks for the end."""
     with stop_event(*END_SIGNALS) as stop:
         while not stop.is_set():
-            for topic, item in take(feed, known, FRAME_S):
+            for topic, item in take(feed, view, FRAME_S):
                 if topic == "status" and isinstance(item, Sample):
                     print_json(item.payload)
 
 
-def look_once(feed: Feed, known: Known, timeout_s: float) -> bool:
+def look_once(feed: Feed, view: RobotView, timeout_s: float) -> bool:
     """Wait up to ``timeout_s`` [s] until enough is known for a picture; return whether it is."""
     deadline = time.monotonic() + timeout_s
     with stop_event(*END_SIGNALS) as stop:
-        while known.report is None or not known.is_here:
+        while view.report is None or not view.is_here:
             if stop.is_set() or time.monotonic() > deadline:
                 return False
-            take(feed, known, FRAME_S)
+            take(feed, view, FRAME_S)
         deadline = time.monotonic() + REST_S
-        while not (stop.is_set() or _is_whole(known)) and time.monotonic() < deadline:
-            take(feed, known, FRAME_S)
+        while not (stop.is_set() or _is_whole(view)) and time.monotonic() < deadline:
+            take(feed, view, FRAME_S)
     return True
 
 
-def status_line(known: Known, now: float) -> str:
+def status_line(view: RobotView, now: float) -> str:
     """Return how it stands, in a line."""
-    report = known.report
-    if known.trouble:
-        return f"waiting for the bus at {one_line(known.trouble)}"
-    if known.gone_since is not None:
+    report = view.report
+    if view.trouble:
+        return f"waiting for the bus at {one_line(view.trouble)}"
+    if view.gone_since is not None:
         return "waiting for the daemon to come back"
-    if not known.is_here:
-        return f"waiting for a daemon of robot {known.robot}"
+    if not view.is_here:
+        return f"waiting for a daemon of robot {view.robot}"
     if report is None:
         return "the daemon has said nothing yet"
-    if known.silent_s(now):
+    if view.silent_s(now):
         return "the daemon is silent"
     coverage, path = report.coverage, report.path
     line = phrases.figures(
@@ -136,8 +136,8 @@ def print_json(payload: bytes) -> None:
     print(json_line(decode_json(payload)), flush=True)
 
 
-def _is_whole(known: Known) -> bool:
-    return known.map is not None and known.coverage is not None and known.walk.revision > 0
+def _is_whole(view: RobotView) -> bool:
+    return view.map is not None and view.coverage is not None and view.walk.revision > 0
 
 
 def _print_line(at_s: float, text: str) -> None:

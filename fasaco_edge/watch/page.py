@@ -9,17 +9,16 @@ from rich.console import Console, RenderableType
 from rich.text import Text
 
 from fasaco_edge.text import one_line
-from fasaco_edge.watch import journal, picture
+from fasaco_edge.watch import picture
 from fasaco_edge.watch.figures import figures, state_colour
 from fasaco_edge.watch.ink import Ink
-from fasaco_edge.watch.journal import Entry
-from fasaco_edge.watch.known import Known
 from fasaco_edge.watch.phrases import age, clock, percent
 from fasaco_edge.watch.picture import Picturing
 from fasaco_edge.watch.report import Report
+from fasaco_edge.watch.robot_view import BAD, GOOD, ORDER, PLAIN, Event, RobotView
 
 FAINT = "bright_black"
-TONES = {journal.PLAIN: "", journal.GOOD: "green", journal.BAD: "red", journal.ORDER: "yellow"}
+TONES = {PLAIN: "", GOOD: "green", BAD: "red", ORDER: "yellow"}
 LEGEND = (
     (picture.COVERED, "covered"),
     (picture.RECOVERED, "twice"),
@@ -66,29 +65,29 @@ class Page:
         self._picturing = Picturing()
         self._kept: dict[str, tuple[object, list[str]]] = {}
 
-    def lines(self, known: Known, now: float, width: int, height: int) -> list[str]:
+    def lines(self, view: RobotView, now: float, width: int, height: int) -> list[str]:
         """Return ``height`` lines, each ``width`` characters wide.
 
         Args:
-            known: what to show.
+            view: what to show.
             now: time since the epoch [s].
             width, height: size of the screen, each at least 1 [characters].
         """
         plan = Plan.of(width, height)
-        page = self._block(headline(known, now), width, 1)
+        page = self._block(headline(view, now), width, 1)
         if plan.lines:
-            page += self._middle(known, plan)
+            page += self._middle(view, plan)
             whole = self._picturing.path_is_whole
             key: object = (width, whole)
             page += self._keep("legend", key, lambda: self._block(self._legend(whole), width, 1))
         if plan.entries:
-            key = (known.journal.count, self._picturing.pixel_m, width, plan)
-            page += self._keep("log", key, lambda: self._log(known, width, plan))
+            key = (view.events.count, self._picturing.pixel_m, width, plan)
+            page += self._keep("log", key, lambda: self._log(view, width, plan))
         page += [" " * width] * (height - len(page))
         return page[:height]
 
-    def _middle(self, known: Known, plan: Plan) -> list[str]:
-        drawn = self._picturing.kinds(known, plan.columns, plan.lines)
+    def _middle(self, view: RobotView, plan: Plan) -> list[str]:
+        drawn = self._picturing.kinds(view, plan.columns, plan.lines)
         if drawn is None:
             left = self._block(Text("no map, no coverage yet", FAINT), plan.columns, plan.lines)
         else:
@@ -96,8 +95,8 @@ class Page:
         if not plan.figures:
             return left
         # The status is a value: a new one is another object.
-        key = (known.report, plan)
-        right = self._keep("figures", key, lambda: self._figures(known.report, plan))
+        key = (view.report, plan)
+        right = self._keep("figures", key, lambda: self._figures(view.report, plan))
         return [f"{a} {b}" for a, b in zip(left, right, strict=True)]
 
     def _figures(self, report: Report | None, plan: Plan) -> list[str]:
@@ -112,13 +111,13 @@ class Page:
             legend.append_text(self._ink.sample(kind)).append(f" {told} ", FAINT)
         return _on_a_line(legend)
 
-    def _log(self, known: Known, width: int, plan: Plan) -> list[str]:
+    def _log(self, view: RobotView, width: int, plan: Plan) -> list[str]:
         rule, scale = "─" if self._ink.unicode else "-", ""
         if self._picturing.pixel_m is not None:
             scale = self._ink.scale(self._picturing.pixel_m, max(plan.columns // 4, 4))
         title = f" {scale}  lately " if scale else " lately "
         lines = self._block(_on_a_line(Text(f"{title}{rule * width}", FAINT)), width, 1)
-        for entry in list(known.journal.entries)[-plan.entries :]:
+        for entry in list(view.events.entries)[-plan.entries :]:
             lines += self._block(_entry(entry), width, 1)
         return lines
 
@@ -136,17 +135,17 @@ class Page:
         return kept[1]
 
 
-def headline(known: Known, now: float) -> Text:
+def headline(view: RobotView, now: float) -> Text:
     """Return the line that says how it stands."""
-    line = Text().append(f" {known.robot} ", "bold reverse").append("  ")
-    report, silent = known.report, known.silent_s(now)
-    if known.trouble:
-        line.append(f"waiting for the bus at {one_line(known.trouble)}", "red")
-    elif known.gone_since is not None:
-        gone = age(now - known.gone_since)
+    line = Text().append(f" {view.robot} ", "bold reverse").append("  ")
+    report, silent = view.report, view.silent_s(now)
+    if view.trouble:
+        line.append(f"waiting for the bus at {one_line(view.trouble)}", "red")
+    elif view.gone_since is not None:
+        gone = age(now - view.gone_since)
         line.append(f"the daemon is gone for {gone}; waiting for it to come back", "bold red")
-    elif not known.is_here:
-        others = ", ".join(sorted(known.robots - {known.robot}))
+    elif not view.is_here:
+        others = ", ".join(sorted(view.robots - {view.robot}))
         line.append("waiting for a daemon of that name", "yellow")
         line.append(f"; on this bus: {one_line(others)}" if others else "")
     elif report is None:
@@ -162,7 +161,7 @@ def headline(known: Known, now: float) -> Text:
     return _on_a_line(line.append(f"   {clock(now)}   q quits", FAINT))
 
 
-def _entry(entry: Entry) -> Text:
+def _entry(entry: Event) -> Text:
     return _on_a_line(
         Text().append(f"{clock(entry.at_s)} ", FAINT).append(entry.text, TONES[entry.tone])
     )

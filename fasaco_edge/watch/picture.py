@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.watch.known import Known
+from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire import coverage as covering
 
 LEAST_PIXEL_M = 0.01
@@ -237,29 +237,29 @@ class Picturing:
         self._frame: Frame | None = None
         self._ground: Kinds | None = None
 
-    def kinds(self, known: Known, columns: int, lines: int) -> Kinds | None:
+    def kinds(self, view: RobotView, columns: int, lines: int) -> Kinds | None:
         """Return a picture, uint8 (2 * lines, columns); None as long as nothing is to be seen."""
         # Grids are values: a new one is another object.
-        if (key := (known.map, known.coverage)) != self._key:
+        if (key := (view.map, view.coverage)) != self._key:
             self._key, self._frame = key, None
             grids = [grid for grid in key if grid is not None]
             self._bounds = joint_bounds([b for grid in grids if (b := known_bounds(grid))])
-        bounds = self._with_robot(known)
+        bounds = self._with_robot(view)
         if bounds is None:
             return None
         frame = Frame.over(bounds, columns, lines)
         if frame != self._frame or self._ground is None:
-            self._frame, self._ground = frame, ground(frame, known.map, known.coverage)
+            self._frame, self._ground = frame, ground(frame, view.map, view.coverage)
         kinds = self._ground.copy()
         self.pixel_m = frame.pixel_m
-        self.path_is_whole = draw_path(kinds, frame, known.path_ahead)
-        if known.pose is not None:
-            radius_m = known.report.config.robot.radius_m if known.report else 0.0
-            draw_robot(kinds, frame, known.pose, radius_m)
+        self.path_is_whole = draw_path(kinds, frame, view.path_ahead)
+        if view.pose is not None:
+            radius_m = view.report.config.robot.radius_m if view.report else 0.0
+            draw_robot(kinds, frame, view.pose, radius_m)
         return kinds
 
-    def _with_robot(self, known: Known) -> Bounds | None:
-        pose, parts = known.pose, [self._bounds] if self._bounds else []
+    def _with_robot(self, view: RobotView) -> Bounds | None:
+        pose, parts = view.pose, [self._bounds] if self._bounds else []
         # A robot alone is no picture.
         if pose is not None and parts:
             parts.append((pose.x, pose.y, pose.x, pose.y))

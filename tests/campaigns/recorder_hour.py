@@ -32,9 +32,9 @@ from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
 from fasaco_edge.recording.write.input_log import InputLog
-from fasaco_edge.recording.write.journal import Journal
-from fasaco_edge.recording.write.quota import Room
+from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.settings import RecorderReport, RecorderSettings
+from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.json_text import decode_json, encode_json
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path, encode_path
@@ -188,11 +188,11 @@ class Desk:
 
     def __init__(self, folder: Path) -> None:
         usual = RecorderSettings(folder)
-        room = Room(usual.part_bytes, usual.least_free_bytes, usual.part_s)
-        self.journal = Journal(folder, "run", room, build_blueprint(None))
-        self.journal.at(BEGAN_NS)
-        self._inputs = InputLog(self.journal, BEGAN_NS)
-        self._scene = Scene(self.journal, RunDescription("robot", "now"))
+        room = DiskBudget(usual.part_bytes, usual.least_free_bytes, usual.part_s)
+        self.writer = RecordingWriter(folder, "run", room, build_blueprint(None))
+        self.writer.at(BEGAN_NS)
+        self._inputs = InputLog(self.writer, BEGAN_NS)
+        self._scene = Scene(self.writer, RunDescription("robot", "now"))
         scene = self._scene
         self._readers = {
             "map": lambda sample: scene.add_map(decode_occupancy_grid(sample.payload)),
@@ -210,11 +210,11 @@ class Desk:
         arrival = Arrival(
             topic, Sample(f"robot/{topic}", payload, "", attachment), at_ns, BEGAN_NS + at_ns
         )
-        self.journal.message(arrival.wall_ns)
+        self.writer.message(arrival.wall_ns)
         self._inputs.add(arrival)
         self._readers[topic](arrival.sample)
         self._inputs.write_if_due(at_ns)
-        self.journal.sync(at_ns)
+        self.writer.sync(at_ns)
 
     def report(self) -> None:
         """Say how the recorder is, and draw what waits, as is done once a second."""
@@ -226,7 +226,7 @@ class Desk:
         """End the recording."""
         self._inputs.finish()
         self._scene.finish()
-        assert self.journal.close()
+        assert self.writer.close()
 
 
 def record_mission(folder: Path, seconds: int) -> Hour:

@@ -81,7 +81,7 @@ def test_a_fault_is_told_and_nothing_is_lost(fault):
 def test_one_recording_that_the_disk_does_not_give_keeps_no_recorder_from_recording(tmp_path):
     old = tmp_path / "old.rrd"
     old.write_bytes(b"RRF2 and so on")
-    script = "import sys; from pathlib import Path; from fasaco_edge.recording import repair; "
+    script = "import sys; from pathlib import Path; from fasaco_edge.recording.read import repair; "
     script += "print(*repair.repair_folder(Path(sys.argv[1])))"
     with Watch([tmp_path], Failure(Kind.READ, 1, "EIO")) as watch:
         command = [sys.executable, "-c", script, str(tmp_path)]

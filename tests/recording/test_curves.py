@@ -8,24 +8,24 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.curves import PERIOD_NS, Curves
-from fasaco_edge.recording.write.journal import Journal
-from fasaco_edge.recording.write.quota import Room
+from fasaco_edge.recording.write.quota import DiskBudget
+from fasaco_edge.recording.write.writer import RecordingWriter
 from tests.support.recording_reading import SCALAR, read_column
 
 SECOND_NS = 1_000_000_000
 
 
 def test_what_stays_the_same_is_drawn_seldom_and_what_changes_at_once(tmp_path):
-    journal = Journal(tmp_path, "run", Room(10**9, 0), build_blueprint(None))
-    curves = Curves(journal)
+    writer = RecordingWriter(tmp_path, "run", DiskBudget(10**9, 0), build_blueprint(None))
+    curves = Curves(writer)
     period_s = PERIOD_NS // SECOND_NS
     for second in range(2 * period_s + 10):
-        journal.at(second * SECOND_NS)
+        writer.at(second * SECOND_NS)
         curves.draw("steps", 1.0 if second < 5 else 2.0)
         curves.draw("trembles", 100.0 + second % 2, tremble=0.05)
         curves.draw("last", 100.0 + (second > 2 * period_s + 5), tremble=0.05)
     curves.finish()
-    assert journal.close()
+    assert writer.close()
     (part,) = tmp_path.glob("*.rrd")
     steps = read_column(part, "steps", SCALAR)
     assert (steps.wall_ns // SECOND_NS).tolist() == [0, 5, 5 + period_s, 5 + 2 * period_s]

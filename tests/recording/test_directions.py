@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fasaco_edge.recording.scene.paths import main_directions
+from fasaco_edge.recording.scene.drawings import main_directions
 
 
 def lanes(turned_by=0.0, lanes=10, steps=20):

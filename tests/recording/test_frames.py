@@ -24,7 +24,7 @@ from fasaco_edge.recording.read.repair import FRAME, HEADER_BYTES, scan_recordin
 from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.recording.sdk import RrdReader, rr
 from fasaco_edge.recording.write.part import Part
-from fasaco_edge.review.reading import read_review
+from fasaco_edge.review.review import read_review
 from fasaco_edge.samples.codec import _HEAD, WHOLE, SampleEncoder, _Lane
 from tests.samples.test_codec import arrival
 
@@ -212,7 +212,7 @@ def limited(file):
     """Read a recording in a process that may have 700 MB more than it has; return what it says."""
     code = (
         "import resource, sys, pathlib\n"
-        "from fasaco_edge.review.reading import read_review\n"
+        "from fasaco_edge.review.review import read_review\n"
         "from fasaco_edge.errors import FasacoError\n"
         "pages = int(open('/proc/self/statm').read().split()[0])\n"
         "resource.setrlimit(resource.RLIMIT_AS, (4096 * pages + 700_000_000,) * 2)\n"

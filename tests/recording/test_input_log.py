@@ -22,8 +22,8 @@ from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
 from fasaco_edge.recording.write import input_log
 from fasaco_edge.recording.write.input_log import InputLog
-from fasaco_edge.recording.write.journal import Journal, JournalState
-from fasaco_edge.recording.write.quota import Room
+from fasaco_edge.recording.write.quota import DiskBudget
+from fasaco_edge.recording.write.writer import RecordingWriter, WriterState
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
@@ -38,7 +38,7 @@ MOST_BYTES_H = 60e6
 
 @dataclass
 class Desk:
-    """A journal with an input log, and a clock that runs as fast as the test."""
+    """A writer with an input log, and a clock that runs as fast as the test."""
 
     folder: Path
     part_bytes: int = 10**9
@@ -46,26 +46,26 @@ class Desk:
     told: list[Arrival] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        room = Room(self.part_bytes, 0)
-        self.journal = Journal(self.folder, "run", room, build_blueprint(None))
-        self.inputs = InputLog(self.journal, BEGAN_NS)
+        room = DiskBudget(self.part_bytes, 0)
+        self.writer = RecordingWriter(self.folder, "run", room, build_blueprint(None))
+        self.inputs = InputLog(self.writer, BEGAN_NS)
 
     def hear(self, topic: str, payload: bytes, attachment: bytes = b"", after_s: float = 0.1):
         """Let a sample come."""
         self.now_ns += round(after_s * SECOND_NS)
         sample = Sample(f"robot/{topic}", payload, "some/msg/Type", attachment)
         arrival = Arrival(topic, sample, self.now_ns, BEGAN_NS + self.now_ns)
-        self.journal.message(arrival.wall_ns)
+        self.writer.message(arrival.wall_ns)
         self.inputs.add(arrival)
         self.inputs.write_if_due(self.now_ns)
-        self.journal.sync(self.now_ns)
+        self.writer.sync(self.now_ns)
         self.told.append(arrival)
         return arrival
 
     def close(self) -> list[Path]:
         """End the recording; return its parts."""
         self.inputs.finish()
-        assert self.journal.close()
+        assert self.writer.close()
         return parts(self.folder)
 
 
@@ -131,10 +131,10 @@ def test_a_map_with_too_many_updates_is_not_told_again(tmp_path, monkeypatch):
 def test_what_could_not_be_written_is_missed_and_the_rest_is_whole(tmp_path):
     desk = Desk(tmp_path)
     before = [desk.hear("map", noise(1)), desk.hear("pose", b"pose 1", after_s=1.0)]
-    desk.journal.state = JournalState.STALLED
+    desk.writer.state = WriterState.STALLED
     lost = [desk.hear("map", noise(2)), desk.hear("pose", b"pose 2")]
     desk.inputs.write()
-    desk.journal.state = JournalState.RECORDING
+    desk.writer.state = WriterState.RECORDING
     after = [desk.hear("map", noise(2)[:-1] + b"?"), desk.hear("pose", b"pose 3")]
     desk.inputs.note_lost(Counter(pose=3, status=7))
     last = desk.hear("pose", b"pose 4")
@@ -177,7 +177,7 @@ def test_a_part_that_had_just_begun_takes_nothing_from_the_others(tmp_path):
 def test_an_hour_takes_at_most_60_megabytes(tmp_path):
     """A map of 1,024 x 1,024 at 1 Hz, poses at 20 Hz, as a robot in a large building gives them."""
     desk = Desk(tmp_path)
-    scene = Scene(desk.journal, RunDescription("robot", "now"))
+    scene = Scene(desk.writer, RunDescription("robot", "now"))
     rng = np.random.default_rng(0)
     grown = {}
     for second in range(90):
@@ -190,10 +190,10 @@ def test_an_hour_takes_at_most_60_megabytes(tmp_path):
             pose = StampedPose(Pose2D(*place.tolist()), "map", desk.now_ns)
             payload = encode_pose_stamped(pose)
             desk.hear("pose", payload, after_s=0.05)
-            desk.journal.at(BEGAN_NS + desk.now_ns)
+            desk.writer.at(BEGAN_NS + desk.now_ns)
             scene.add_pose(decode_pose(payload, POSE_STAMPED))
             scene.catch_up()
-        grown[second] = desk.journal.size
+        grown[second] = desk.writer.size
     files = desk.close()
     # What a recording begins with is no growth.
     per_hour = (grown[89] - grown[40]) / 49 * 3600

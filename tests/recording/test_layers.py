@@ -15,8 +15,8 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.layers import BURST_S, RATES, Layers, size_in_file
-from fasaco_edge.recording.write.journal import Journal
-from fasaco_edge.recording.write.quota import Room
+from fasaco_edge.recording.write.quota import DiskBudget
+from fasaco_edge.recording.write.writer import RecordingWriter
 
 SECOND_NS = 1_000_000_000
 RATE = RATES[entities.MAP]
@@ -79,13 +79,13 @@ def test_the_size_is_about_what_the_file_grows_by(tmp_path, share):
     cells[::50] = 100
     cells[:, 400:] = -1
     grid = OccupancyGrid(GridGeometry(600, 600, 0.05, Pose2D(0.0, 0.0)), cells)
-    journal = Journal(tmp_path, "run", Room(10**9, 0), build_blueprint(None))
+    writer = RecordingWriter(tmp_path, "run", DiskBudget(10**9, 0), build_blueprint(None))
     sizes = []
     for second in range(10, 40, 10):
-        journal.log(entities.MAP, archetypes.map_archetype(grid))
-        journal.sync(second * SECOND_NS)
-        sizes.append(journal.size)
-    assert journal.close()
+        writer.log(entities.MAP, archetypes.map_archetype(grid))
+        writer.sync(second * SECOND_NS)
+        sizes.append(writer.size)
+    assert writer.close()
     grown = sizes[-1] - sizes[-2]
     print(f"{grown} bytes, taken for {size_in_file(cells)}")
     assert 0.5 * grown - 4000 < size_in_file(cells) < 2.5 * grown + 4000

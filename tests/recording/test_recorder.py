@@ -25,8 +25,8 @@ from fasaco_edge.errors import MissingExtra, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.recording.write.input_log import PERIOD_NS as INPUT_PERIOD_NS
-from fasaco_edge.recording.write.journal import FLUSH_PERIOD_NS
 from fasaco_edge.recording.write.part import Part
+from fasaco_edge.recording.write.writer import FLUSH_PERIOD_NS
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_occupancy_grid

@@ -14,7 +14,7 @@ from fasaco_edge.cli.record import ros_config
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.samples import RecordedSamples
-from fasaco_edge.review.reading import read_review
+from fasaco_edge.review.review import read_review
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, TF_MESSAGE
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
@@ -53,7 +53,7 @@ def test_maps_and_transforms_are_in_the_recording(domain, tmp_path):
     assert topics["tf_static", TF_MESSAGE] == 1
     assert topics["pose", TF_MESSAGE] == len(WAY)
     assert read_summary(parts[0]).rows[entities.ROBOT] >= len(WAY) - 1
-    story = read_review(parts).story
+    story = read_review(parts).data
     assert story.grid is not None
     assert np.allclose([pose[:2] for pose in story.poses], WAY)
     assert not story.undecodable

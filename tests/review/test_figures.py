@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.recording.read.run import RunRecord
-from fasaco_edge.review.curve import curve
+from fasaco_edge.review.charts import curve
 from fasaco_edge.review.drive import milestones, walk_figures
 from fasaco_edge.review.faults import faults_of
 from fasaco_edge.review.moments import (
@@ -18,7 +18,7 @@ from fasaco_edge.review.moments import (
     spans_of,
 )
 from fasaco_edge.review.rows import clock
-from fasaco_edge.review.story import PlanLog, Story
+from fasaco_edge.review.run_data import PlanLog, RunData
 from fasaco_edge.wire.turns import Beginning, Decided, PlanTaken, Turn, TurnBatch
 
 ALL = Span("under way", 0.0, 100.0)
@@ -156,4 +156,4 @@ def test_counts_by_code_go_on_after_a_restart():
         "metrics/latency/plan": np.array([(0, 9)], np.float64),
     }
     record = RunRecord("", (), 0, 0, plots, {}, {}, ())
-    assert faults_of(Story(), record).by_code == {"wrong_frame": 5}
+    assert faults_of(RunData(), record).by_code == {"wrong_frame": 5}

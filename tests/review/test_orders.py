@@ -12,22 +12,22 @@ from fasaco_edge.review.document import differences, side_by_side
 from fasaco_edge.review.moments import spans_of
 from fasaco_edge.review.orders import chapters
 from fasaco_edge.review.rows import compared_rows, setup_words, verdicts
-from fasaco_edge.review.story import HeardStatus, Story
+from fasaco_edge.review.run_data import HeardStatus, RunData
 
 ALL = read_order({})
 KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]], "passes": 1}]})
 
 
 def told(*rows, commands=()):
-    """Return the chapters of a story of (time, state, covered, coverable)."""
+    """Return the chapters of a data of (time, state, covered, coverable)."""
     statuses = [
         HeardStatus(at_s, state, "", {"covered": covered, "coverable": coverable}, (), 0, {}, {})
         for at_s, state, covered, coverable in rows
     ]
     states = spans_of([(at_s, state, "") for at_s, state, _, _ in rows], 100.0)
     fractions = np.array([(at_s, covered / coverable) for at_s, _, covered, coverable in rows])
-    story = Story(statuses=statuses, commands=list(commands))
-    return chapters(story, states, fractions, 100.0)
+    data = RunData(statuses=statuses, commands=list(commands))
+    return chapters(data, states, fractions, 100.0)
 
 
 def test_a_mission_without_commands_is_one_order():

@@ -23,8 +23,7 @@ from fasaco_edge.review.export import export
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.page import page_of
 from fasaco_edge.review.picture import SIZE, draw_review
-from fasaco_edge.review.reading import read_review
-from fasaco_edge.review.review import CoverageCounts, review_of
+from fasaco_edge.review.review import CoverageCounts, read_review, review_of
 from tests.review.test_parts import run_told
 from tests.support.commands import ENVIRONMENT, PROGRAM, fasaco_edge
 
@@ -120,10 +119,10 @@ def test_without_map_and_poses_there_are_still_charts(review):
     ],
 )
 def test_complete_is_done_and_nothing_left_over(review, state, covered, zones, complete):
-    last = replace(review.story.statuses[-1], zones=zones)
+    last = replace(review.data.statuses[-1], zones=zones)
     told = replace(
         review,
-        story=replace(review.story, statuses=[last]),
+        data=replace(review.data, statuses=[last]),
         # A daemon that is ended after the mission says nothing any more.
         states=(Span(state, 0, 1), Span("silent", 1, 2)) if state else (),
         counts=CoverageCounts(covered, 24, 0, 0, "status"),
@@ -132,10 +131,10 @@ def test_complete_is_done_and_nothing_left_over(review, state, covered, zones, c
 
 
 def test_what_was_covered_before_is_not_guessed_at(review):
-    story = replace(
-        review.story, statuses=[replace(s, restored_cells=7) for s in review.story.statuses]
+    data = replace(
+        review.data, statuses=[replace(s, restored_cells=7) for s in review.data.statuses]
     )
-    told = document(review_of(review.record, story, 0))
+    told = document(review_of(review.record, data, 0))
     assert told["covered_cells"] is told["reached_s"] is None
     assert told["steps"] == 5
     assert "7 cells were covered before" in told["not_recorded"]["reached_s"]

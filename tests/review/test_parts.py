@@ -14,7 +14,7 @@ from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.cli import main
 from fasaco_edge.errors import DifferentRuns, UnreadableRecording
 from fasaco_edge.review.document import document, side_by_side
-from fasaco_edge.review.reading import read_review
+from fasaco_edge.review.review import read_review
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys

@@ -13,7 +13,7 @@ pytest.importorskip("rerun")
 from fasaco_edge.review.charts import covered_share
 from fasaco_edge.review.document import document
 from fasaco_edge.review.drive import walk_figures
-from fasaco_edge.review.reading import read_review
+from fasaco_edge.review.review import read_review
 from tests.benchmarks.judge import check_walk
 from tests.review.naive import nearest_rank, passed_cells, quarter_turns
 from tests.support.commands import fasaco_edge
@@ -190,17 +190,17 @@ def test_moments_lie_within_the_mission(review):
     assert len(found) >= 4
     for moment in found.values():
         assert 0 <= moment.at_s <= review.duration_s
-    slowest = max(p.plan_ms for p in review.story.paths[1:] if p.plan_ms is not None)
+    slowest = max(p.plan_ms for p in review.data.paths[1:] if p.plan_ms is not None)
     assert found["slowest replan"].value == slowest
     # Brute force: each moment between two poses at which the robot had something to do.
-    ends = sorted({0.0, *review.story.pose_s, *(at for s in review.states for at in _ends(s))})
+    ends = sorted({0.0, *review.data.pose_s, *(at for s in review.states for at in _ends(s))})
     gaps, last = [], None
     for before, after in pairwise(ends):
         busy = any(
             s.begin_s <= before < s.end_s and s.name in ("planning", "covering", "paused")
             for s in review.states
         )
-        last = (before if last is None or before in review.story.pose_s else last) if busy else None
+        last = (before if last is None or before in review.data.pose_s else last) if busy else None
         gaps.append(after - last if last is not None else 0.0)
     assert found["longest time without a pose"].value == pytest.approx(max(gaps))
 
@@ -209,7 +209,7 @@ def test_the_longest_stand_is_one(review):
     (stand,) = (moment for moment in review.moments if moment.what == "longest stand")
     poses = [
         pose
-        for at, pose in zip(review.story.pose_s, review.story.poses, strict=True)
+        for at, pose in zip(review.data.pose_s, review.data.poses, strict=True)
         if stand.at_s <= at <= stand.at_s + stand.value
     ]
     xy = np.array(poses)[:, :2]

@@ -11,7 +11,7 @@ from rich.console import Console
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.watch.known import Known, Token
+from fasaco_edge.watch.robot_view import RobotView, Token
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import encode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
@@ -44,10 +44,10 @@ def plain(line: str) -> str:
     return ESCAPE.sub("", line)
 
 
-def tell(known: Known, topic: str, payload: bytes, attachment: bytes = b"") -> None:
+def tell(view: RobotView, topic: str, payload: bytes, attachment: bytes = b"") -> None:
     """Let a sample come."""
     schema = POSE_STAMPED if topic == "pose" else ""
-    known.take(topic, Sample(topic, payload, schema, attachment), NOW)
+    view.take(topic, Sample(topic, payload, schema, attachment), NOW)
 
 
 def status(**members: Any) -> bytes:
@@ -66,20 +66,20 @@ def status(**members: Any) -> bytes:
     return encode_json(document | members)
 
 
-def mid_mission() -> Known:
+def mid_mission() -> RobotView:
     """Return what is known of a robot in a room of 6 x 4 m: on its way east, then north."""
-    known = Known("robot")
-    known.take("token", Token("robot", here=True), NOW)
+    view = RobotView("robot")
+    view.take("token", Token("robot", here=True), NOW)
     room = np.zeros((40, 60), np.int8)
     room[[0, -1]] = room[:, [0, -1]] = 100
-    tell(known, "map", encode_occupancy_grid(grid_of(room.tolist(), 0.1)))
+    tell(view, "map", encode_occupancy_grid(grid_of(room.tolist(), 0.1)))
     covered = np.zeros((8, 12), np.int8)
     covered[:2] = 50
-    tell(known, "coverage", encode_occupancy_grid(grid_of(covered.tolist(), 0.5)))
-    tell(known, "status", status())
+    tell(view, "coverage", encode_occupancy_grid(grid_of(covered.tolist(), 0.5)))
+    tell(view, "status", status())
     east = [(0.75 + 0.5 * step, 1.25) for step in range(10)]
     xy = np.array([*east, (5.25, 1.75), (5.25, 2.25)])
     note = encode_json({"revision": 7, "reason": "map: 2 cells more", "steps": 11})
-    tell(known, "path", encode_path(xy, np.zeros(len(xy)), "map", 1), note)
-    tell(known, "pose", encode_pose_stamped(StampedPose(Pose2D(0.75, 1.25))))
-    return known
+    tell(view, "path", encode_path(xy, np.zeros(len(xy)), "map", 1), note)
+    tell(view, "pose", encode_pose_stamped(StampedPose(Pose2D(0.75, 1.25))))
+    return view

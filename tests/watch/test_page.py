@@ -10,17 +10,17 @@ from rich.cells import cell_len
 from rich.color import ColorSystem
 
 from fasaco_edge.watch.ink import Ink
-from fasaco_edge.watch.known import Known, Token
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
+from fasaco_edge.watch.robot_view import RobotView, Token
 from tests.watch.grids import NOW, console, mid_mission, plain, status, tell
 
 SIZES = [(80, 24), (120, 40), (200, 60), (64, 14), (63, 13), (30, 10), (12, 4), (1, 1), (400, 5)]
 
 
-def page_of(known: Known, width: int = 80, height: int = 24, colours: str | None = None) -> str:
+def page_of(view: RobotView, width: int = 80, height: int = 24, colours: str | None = None) -> str:
     """Return what is seen."""
-    lines = Page(console(width, colours=colours)).lines(known, NOW, width, height)
+    lines = Page(console(width, colours=colours)).lines(view, NOW, width, height)
     return "\n".join(plain(line) for line in lines)
 
 
@@ -95,15 +95,15 @@ def test_it_says_how_it_stands():
 
 
 def test_it_says_how_far_an_order_is():
-    known = mid_mission()
+    view = mid_mission()
     zones = [
         {"name": "kitchen", "passes": 2, "pass": 1, "cells": 60, "covered": 15},
         {"name": "hall", "passes": 1, "pass": 0},
     ]
     order = {"ordered": "command", "stage": "covering", "zone": "kitchen", "pass": 1, "passes": 2}
     more = {"zones": zones, "keep_out": 3, "return_home": True, "unreached": {"cells": 5}}
-    tell(known, "status", status(mission=order | more))
-    page = page_of(known, 120, 40)
+    tell(view, "status", status(mission=order | more))
+    page = page_of(view, 120, 40)
     for said in (
         "zone kitchen, pass 1 of 2",
         "kitchen   pass 1 of 2, 25.0 %: 15 of 60 cells",
@@ -115,10 +115,10 @@ def test_it_says_how_far_an_order_is():
 
 
 def test_a_path_without_points_is_a_stop():
-    known = mid_mission()
+    view = mid_mission()
     path = {"revision": 8, "reason": "paused by command"}
-    tell(known, "status", status(state="paused", reason="paused by command", path=path))
-    page = page_of(known, 120, 40)
+    tell(view, "status", status(state="paused", reason="paused by command", path=path))
+    page = page_of(view, 120, 40)
     assert "path 8    stop" in page
     assert "paused: paused by command" in page
 
@@ -131,38 +131,38 @@ def test_a_narrow_terminal_keeps_picture_and_state():
 
 
 def test_a_daemon_that_is_gone_or_silent_is_named_so():
-    known = mid_mission()
-    silent = "\n".join(Page(console(colours=None)).lines(known, NOW + 60.0, 80, 24))
+    view = mid_mission()
+    silent = "\n".join(Page(console(colours=None)).lines(view, NOW + 60.0, 80, 24))
     assert "silent for 60 s" in silent
-    known.take("token", Token("robot", here=False), NOW)
-    assert "gone for 0.0 s; waiting for it to come back" in page_of(known)
-    known.take("token", Token("robot", here=True), NOW)
-    assert "COVERING" in page_of(known)
-    assert "the daemon is back" in page_of(known)
+    view.take("token", Token("robot", here=False), NOW)
+    assert "gone for 0.0 s; waiting for it to come back" in page_of(view)
+    view.take("token", Token("robot", here=True), NOW)
+    assert "COVERING" in page_of(view)
+    assert "the daemon is back" in page_of(view)
 
 
 def test_before_anything_came_it_says_what_it_waits_for():
-    known = Known("robot")
-    known.take("token", Token("other", here=True), NOW)
-    page = page_of(known)
+    view = RobotView("robot")
+    view.take("token", Token("other", here=True), NOW)
+    page = page_of(view)
     assert "waiting for a daemon of that name; on this bus: other" in page
     assert "no map" in page
-    known.trouble = "refused"
-    assert "waiting for the bus at refused" in page_of(known)
+    view.trouble = "refused"
+    assert "waiting for the bus at refused" in page_of(view)
 
 
 def test_texts_off_the_bus_do_not_control_the_terminal():
-    known = mid_mission()
+    view = mid_mission()
     evil = "\x1b[2J\x07\n[red]gone[/red]\u202e"
     mission = {"stage": evil, "zones": [{"name": evil}]}
     errors = {"total": 1, "last": evil, "by_code": {evil: 1}}
-    tell(known, "status", status(state=evil, reason=evil, mission=mission, errors=errors))
+    tell(view, "status", status(state=evil, reason=evil, mission=mission, errors=errors))
     tell(
-        known,
+        view,
         "command",
         json.dumps({"command": evil, "order": {"zones": [{"name": evil}]}}).encode(),
     )
-    lines = Page(console(colours=None)).lines(known, NOW, 80, 24)
+    lines = Page(console(colours=None)).lines(view, NOW, 80, 24)
     assert len(lines) == 24
     for line in lines:
         assert line.isprintable(), line
@@ -170,7 +170,7 @@ def test_texts_off_the_bus_do_not_control_the_terminal():
 
 
 def test_a_page_that_did_not_change_is_not_drawn_anew():
-    page, known = Page(console()), mid_mission()
-    first, second = (page.lines(known, NOW, 80, 24) for _ in range(2))
+    page, view = Page(console()), mid_mission()
+    first, second = (page.lines(view, NOW, 80, 24) for _ in range(2))
     assert first == second
     assert all(a is b for a, b in zip(first[18:22], second[18:22], strict=True))

@@ -4,22 +4,16 @@ A chunk is an Arrow message, packed, in a Protobuf message, in a frame (``record
 says how much the next one holds; that is looked at before any room is made for it. Rerun's own
 reader makes the room, and ends the process where it cannot be had, or where a message is broken.
 The footer, a table of what stands where, is not needed to read from the beginning to the end.
-
-What is whole of a recording, also of one that a crash tore; the file is never touched.
 """
 
 from __future__ import annotations
 
-import shutil
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
-from fasaco_edge.recording.read.repair import FOOTER_KIND, FRAME, HEADER_BYTES, Scan, scan_recording
+from fasaco_edge.recording.read.repair import FOOTER_KIND, FRAME, HEADER_BYTES, Scan
 from fasaco_edge.recording.sdk import pa
 
 CHUNK_KIND = 2
@@ -198,27 +192,3 @@ def _varint(message: bytes, at: int) -> tuple[int, int]:
         if byte < 0x80:
             return value, at + place + 1
     raise ValueError("a number of more than ten bytes")
-
-
-@contextmanager
-def whole_part(path: Path) -> Iterator[tuple[Path, Scan]]:
-    """Yield ``path``, or where its end is torn a copy of what is whole; and what the file holds.
-
-    Raises:
-        ValueError: it is no recording.
-        OSError: it cannot be read, or there is no room for the copy.
-    """
-    with path.open("rb") as recording:
-        scan = scan_recording(recording)
-        if scan is None:
-            raise ValueError("this is no recording")
-        if scan.has_footer or not scan.torn_bytes:
-            yield path, scan
-            return
-        with TemporaryDirectory() as folder:
-            copy = Path(folder, path.name)
-            recording.seek(0)
-            with copy.open("wb") as target:
-                shutil.copyfileobj(recording, target)
-                target.truncate(scan.whole_bytes)
-            yield copy, scan

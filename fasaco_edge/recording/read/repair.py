@@ -1,4 +1,4 @@
-"""Recordings torn by a crash: found, and cut at their last whole frame.
+"""Recordings torn by a crash: found, cut at their last whole frame, shown up to it.
 
 A reader refuses a whole file for one torn frame at its end, which is what a
 power cut or a full disk leaves. The format: 12 bytes of header, then frames,
@@ -9,11 +9,20 @@ footer. Rerun never calls fsync, so more than the last frame may be missing.
 from __future__ import annotations
 
 import fcntl
+import importlib.util
 import os
+import shutil
 import struct
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import BinaryIO
+
+from fasaco_edge.errors import MissingExtra, ProcessEnded
+from fasaco_edge.host.processes import python_program
 
 MAGIC = b"RRF"
 HEADER_BYTES = 12
@@ -142,3 +151,50 @@ def repair_folder(folder: Path) -> list[Repair]:
         if repair is not None:
             repairs.append(repair)
     return repairs
+
+
+# Its server would be open to the whole network else, and refuse to start beside another viewer.
+VIEWER = python_program("rerun", "--bind", "127.0.0.1", "--port", "auto")
+
+
+def view(paths: Sequence[Path]) -> None:
+    """Show recordings until the viewer is closed; of torn ones what is whole.
+
+    Raises:
+        MissingExtra: rerun is not installed.
+        ProcessEnded: the viewer cannot be shown, for want of a screen, say.
+    """
+    if importlib.util.find_spec("rerun") is None:
+        raise MissingExtra("the viewer comes with rerun, which is not installed")
+    with ExitStack() as copies:
+        whole = [str(copies.enter_context(_whole_part(path))) for path in paths]
+        ended = subprocess.run([*VIEWER, *whole], check=False)
+    if ended.returncode:
+        raise ProcessEnded(
+            f"Rerun's viewer ended with {ended.returncode}",
+            hint="it needs a screen: run it where there is one, or write --png or --html",
+        )
+
+
+@contextmanager
+def _whole_part(path: Path) -> Iterator[Path]:
+    """Yield ``path``, or where its end is torn a copy of what is whole.
+
+    Raises:
+        ValueError: it is no recording.
+        OSError: it cannot be read, or there is no room for the copy.
+    """
+    with path.open("rb") as recording:
+        scan = scan_recording(recording)
+        if scan is None:
+            raise ValueError("this is no recording")
+        if scan.has_footer or not scan.torn_bytes:
+            yield path
+            return
+        with TemporaryDirectory() as folder:
+            copy = Path(folder, path.name)
+            recording.seek(0)
+            with copy.open("wb") as target:
+                shutil.copyfileobj(recording, target)
+                target.truncate(scan.whole_bytes)
+            yield copy

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fields import Json, number, section
 from fasaco_edge.recording.sdk import rr
-from fasaco_edge.recording.write.journal import Journal
+from fasaco_edge.recording.write.writer import RecordingWriter
 
 # A curve goes on as a step (``styles``); at the latest after so long it is drawn anyway, so
 # that a part, and what follows a gap, soon has all of them.
@@ -31,10 +31,10 @@ class _Curve:
 
 
 class Curves:
-    """Draws figures into a journal."""
+    """Draws figures into a writer."""
 
-    def __init__(self, journal: Journal) -> None:
-        self._journal = journal
+    def __init__(self, writer: RecordingWriter) -> None:
+        self._writer = writer
         self._curves: dict[str, _Curve] = {}
 
     def draw(self, entity: str, value: float, tremble: float = 0.0, spacing_ns: int = 0) -> None:
@@ -46,7 +46,7 @@ class Curves:
             tremble: the share of it by which it has to differ by more.
             spacing_ns: the least time from one drawn to the next [ns].
         """
-        now_ns = self._journal.wall_ns
+        now_ns = self._writer.wall_ns
         curve = self._curves.get(entity)
         if curve is None:
             curve = self._curves[entity] = _Curve(value, now_ns, value)
@@ -64,8 +64,8 @@ class Curves:
                 self._draw(entity, curve)
 
     def _draw(self, entity: str, curve: _Curve) -> None:
-        curve.drawn, curve.drawn_ns = curve.last, self._journal.wall_ns
-        self._journal.log(entity, rr.Scalars(curve.last))
+        curve.drawn, curve.drawn_ns = curve.last, self._writer.wall_ns
+        self._writer.log(entity, rr.Scalars(curve.last))
 
 
 # Counts that go on and on are drawn no more often than this.

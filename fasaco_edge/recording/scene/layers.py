@@ -131,7 +131,7 @@ class _Layer:
 
 
 class Layers:
-    """Decides when each layer is drawn; the journal's thread and clock."""
+    """Decides when each layer is drawn; the writer's thread and clock."""
 
     def __init__(self) -> None:
         self._layers = {name: _Layer(BURST_S * rate) for name, rate in RATES.items()}

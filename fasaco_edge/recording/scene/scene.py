@@ -14,8 +14,10 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.fields import Json, integer, number, section, text
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.anchor import Anchor
+from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.curves import TREMBLE, Curves, StatusFigures
+from fasaco_edge.recording.scene.drawings import DrivenPathDrawing, PathDrawing, PheromoneDrawing
 from fasaco_edge.recording.scene.layers import (
     Bounds,
     Layers,
@@ -24,13 +26,10 @@ from fasaco_edge.recording.scene.layers import (
     size_in_file,
     union,
 )
-from fasaco_edge.recording.scene.paths import PathDrawing, TrailDrawing
-from fasaco_edge.recording.scene.pheromone import PheromoneDrawing
 from fasaco_edge.recording.scene.runcard import RunDescription
-from fasaco_edge.recording.scene.styles import log_styles
 from fasaco_edge.recording.sdk import rr
-from fasaco_edge.recording.write.journal import Journal
 from fasaco_edge.recording.write.settings import RecorderReport
+from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
 
@@ -41,10 +40,10 @@ REFRAME_FRACTION = 0.15
 
 
 class Scene:
-    """Draws a mission into a journal, message by message; the caller sets the time."""
+    """Draws a mission into a writer, message by message; the caller sets the time."""
 
-    def __init__(self, journal: Journal, description: RunDescription) -> None:
-        self._journal = journal
+    def __init__(self, writer: RecordingWriter, description: RunDescription) -> None:
+        self._writer = writer
         self._run = description
         # Where 0 is drawn; known with the first place.
         self._anchor: Anchor | None = None
@@ -54,12 +53,12 @@ class Scene:
         self._errors = self._restored = 0
         self._states: dict[str, str] = {}
         self._layers = Layers()
-        self._curves = Curves(journal)
-        self._trail = TrailDrawing(journal)
+        self._curves = Curves(writer)
+        self._driven = DrivenPathDrawing(writer)
         self._figures = StatusFigures(self._curves)
-        self._paths = PathDrawing(journal, self._layers)
-        self._pheromone = PheromoneDrawing(journal, self._layers, self._curves)
-        log_styles(journal)
+        self._paths = PathDrawing(writer, self._layers)
+        self._pheromone = PheromoneDrawing(writer, self._layers, self._curves)
+        log_styles(writer)
         self._describe()
         self._draw_robot(DEFAULT_RADIUS_M)
 
@@ -74,10 +73,10 @@ class Scene:
                 return
             changed = changed_bounds(before, grid)
             if changed is not None:
-                self._journal.log(entities.MAP_CHANGE, draw.box_archetype(changed, draw.CHANGE))
+                self._writer.log(entities.MAP_CHANGE, draw.box_archetype(changed, draw.CHANGE))
 
         def draw_map() -> None:
-            self._journal.log(
+            self._writer.log(
                 entities.MAP, draw.map_archetype(grid), latched=True, size=grid.cells.size
             )
             self._frame(grid)
@@ -97,8 +96,8 @@ class Scene:
     def add_pose(self, stamped: StampedPose) -> None:
         """Move the robot, and draw its trail."""
         pose = self._anchored(stamped.pose).pose(stamped.pose)
-        self._journal.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
-        self._trail.add(pose.x, pose.y)
+        self._writer.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
+        self._driven.add(pose.x, pose.y)
 
     def add_command(self, command: Json) -> None:
         """Log a command that the mission has taken."""
@@ -118,7 +117,7 @@ class Scene:
         grid = self._anchored(grid.geometry.origin).grid(grid)
 
         def draw_coverage() -> None:
-            self._journal.log(
+            self._writer.log(
                 entities.COVERAGE,
                 draw.coverage_archetype(grid),
                 latched=True,
@@ -159,7 +158,7 @@ class Scene:
         if not state or self._states.get(entity) == state:
             return
         self._states[entity] = state
-        self._journal.log(entity, rr.StateChange(state=state), latched=True)
+        self._writer.log(entity, rr.StateChange(state=state), latched=True)
         if reason:
             recorder = entity == entities.RECORDER_STATE
             log = entities.RECORDER_LOG if recorder else entities.MISSION_LOG
@@ -171,19 +170,19 @@ class Scene:
 
     def catch_up(self) -> None:
         """Draw what had to wait; call it often."""
-        self._layers.catch_up(self._journal.wall_ns)
-        self._trail.catch_up()
+        self._layers.catch_up(self._writer.wall_ns)
+        self._driven.catch_up()
 
     def finish(self) -> None:
         """Draw what waits, and frame the map as it was at the end."""
         self._layers.finish()
-        self._trail.finish()
+        self._driven.finish()
         self._curves.finish()
         if self._known is not None and self._known != self._framed:
-            self._journal.show(build_blueprint(self._known))
+            self._writer.show(build_blueprint(self._known))
 
     def _draw(self, layer: str, size: int, draw_it: Callable[[], None]) -> None:
-        self._layers.draw(layer, size, draw_it, self._journal.wall_ns)
+        self._layers.draw(layer, size, draw_it, self._writer.wall_ns)
 
     def _anchored(self, place: Pose2D) -> Anchor:
         """Return where 0 is drawn; say so with the first place, where that is far away."""
@@ -191,7 +190,7 @@ class Scene:
             self._anchor = anchor = Anchor.near(place.x, place.y)
             if anchor:
                 where = rr.Transform3D(translation=[anchor.x, anchor.y, 0.0])
-                self._journal.log_static(entities.WORLD, where)
+                self._writer.log_static(entities.WORLD, where)
                 self._run = replace(self._run, anchor=(anchor.x, anchor.y))
                 self._describe()
         return self._anchor
@@ -203,7 +202,7 @@ class Scene:
         self._known = bounds = union(self._known, bounds)
         if self._framed is None or _is_far(self._framed, bounds):
             self._framed = bounds
-            self._journal.show(build_blueprint(bounds))
+            self._writer.show(build_blueprint(bounds))
 
     def _add_configuration(self, status: Json) -> None:
         version, config = text(status, "version"), dict(section(status, "config"))
@@ -220,13 +219,13 @@ class Scene:
 
     def _describe(self) -> None:
         card = rr.TextDocument(self._run.markdown(), media_type="text/markdown")
-        self._journal.log_static(entities.RUN_CARD, card)
-        self._journal.describe(self._run.name, self._run.properties())
+        self._writer.log_static(entities.RUN_CARD, card)
+        self._writer.describe(self._run.name, self._run.properties())
 
     def _draw_robot(self, radius_m: float) -> None:
         body, heading = draw.body_archetypes(radius_m)
-        self._journal.log_static(entities.ROBOT_BODY, body)
-        self._journal.log_static(entities.ROBOT_HEADING, heading)
+        self._writer.log_static(entities.ROBOT_BODY, body)
+        self._writer.log_static(entities.ROBOT_HEADING, heading)
 
     def _add_restored(self, ledger: Json) -> None:
         restored = integer(ledger, "restored_cells") or 0
@@ -245,7 +244,7 @@ class Scene:
         self._errors = total
 
     def _say(self, log: str, message: str, level: str = "INFO") -> None:
-        self._journal.log(log, rr.TextLog(message, level=level))
+        self._writer.log(log, rr.TextLog(message, level=level))
 
 
 def _is_far(framed: Bounds, bounds: Bounds) -> bool:

@@ -16,7 +16,7 @@ from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.recording.fields import section
-from fasaco_edge.recording.write.journal import Journal
+from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.samples.codec import Numbered, SampleEncoder
 from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.paths import decode_path
@@ -35,14 +35,14 @@ IN_FORCE_BYTES = 8_000_000
 
 
 class InputLog:
-    """Writes samples into a journal; for the journal's thread only.
+    """Writes samples into a writer; for the writer's thread only.
 
     Of paths only a digest is kept, of statuses those that tell something new, and one in
     ``STATUS_PERIOD_NS``: how far the mission is, is known so exactly whatever comes.
     """
 
-    def __init__(self, journal: Journal, run: int) -> None:
-        self._journal = journal
+    def __init__(self, writer: RecordingWriter, run: int) -> None:
+        self._writer = writer
         self._encoder = SampleEncoder(run)
         self._in_force = _InForce()
         self._part = 0
@@ -75,7 +75,7 @@ class InputLog:
 
     def finish(self) -> None:
         """Write what is left; a part begun just before the end gets a batch, too."""
-        part = self._journal.part_number
+        part = self._writer.part_number
         self._write(in_any_case=part > 1 and part != self._part)
 
     def write(self) -> None:
@@ -83,11 +83,11 @@ class InputLog:
         self._write(in_any_case=False)
 
     def _write(self, *, in_any_case: bool) -> None:
-        if self._part != self._journal.part_number:
-            self._part = self._journal.part_number
+        if self._part != self._writer.part_number:
+            self._part = self._writer.part_number
             self._encoder.restart(self._in_force.samples())
         batch = self._encoder.take(in_any_case=in_any_case)
-        if batch and not self._journal.write_blob(batch):
+        if batch and not self._writer.write_blob(batch):
             # What is not there, nothing can be told by.
             self._part = 0
 

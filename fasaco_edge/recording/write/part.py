@@ -31,7 +31,7 @@ from fasaco_edge.recording.read.repair import repair_recording, scan_recording
 from fasaco_edge.recording.sdk import rr, rrb
 
 
-class Standing:
+class LatchedState:
     """Static data, the newest of what is latched, name, properties, layout and times.
 
     Attributes:
@@ -89,7 +89,7 @@ class Standing:
 
 LOG = logging.getLogger(__name__)
 
-# Rows gather until the journal flushes, or at most this long [s].
+# Rows gather until the writer flushes, or at most this long [s].
 FLUSH_TICK_S = 10.0
 # How long the disk may take for the first message of a part.
 BEGIN_TIMEOUT_S = 10.0

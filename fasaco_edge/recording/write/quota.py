@@ -131,7 +131,7 @@ RESUME_BYTES = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Room:
+class DiskBudget:
     """How much a part may take, and how much the disk must keep free [bytes].
 
     A part older than ``part_s`` [s] is followed by the next, too, 0 for never; ``quota`` limits

@@ -26,10 +26,10 @@ from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
 from fasaco_edge.recording.write.inbox import Inbox, RunClock
 from fasaco_edge.recording.write.input_log import InputLog
-from fasaco_edge.recording.write.journal import Journal
 from fasaco_edge.recording.write.live import serve_live
-from fasaco_edge.recording.write.quota import Quota, Room, next_run
+from fasaco_edge.recording.write.quota import DiskBudget, Quota, next_run
 from fasaco_edge.recording.write.settings import RecorderReport, RecorderSettings
+from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.json_text import decode_json, encode_json, is_the_planners
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
@@ -72,7 +72,7 @@ def run_recorder(settings: RecorderSettings) -> int:
 
 
 class Recorder:
-    """Joins the bus to the journal: ``step`` takes what came, writes it, and reports."""
+    """Joins the bus to the writer: ``step`` takes what came, writes it, and reports."""
 
     def __init__(self, settings: RecorderSettings, bus: Bus) -> None:
         self._settings = settings
@@ -82,14 +82,14 @@ class Recorder:
         began = datetime.fromtimestamp(began_ns / 1e9, UTC)
         name = next_run(settings.out, settings.robot, began)
         quota = Quota(settings.robot, settings.quota_bytes)
-        room = Room(settings.part_bytes, settings.least_free_bytes, settings.part_s, quota)
-        self._journal = Journal(settings.out, name, room, build_blueprint(None))
-        self._journal.at(began_ns)
+        budget = DiskBudget(settings.part_bytes, settings.least_free_bytes, settings.part_s, quota)
+        self._writer = RecordingWriter(settings.out, name, budget, build_blueprint(None))
+        self._writer.at(began_ns)
         if settings.serve is not None:
-            self._journal.serve(serve_live(name, *settings.serve))
-        self._inputs = InputLog(self._journal, began_ns)
+            self._writer.serve(serve_live(name, *settings.serve))
+        self._inputs = InputLog(self._writer, began_ns)
         description = RunDescription(settings.robot, f"{began:%Y-%m-%d %H:%M:%S} UTC")
-        self._scene = Scene(self._journal, description)
+        self._scene = Scene(self._writer, description)
         self._inbox = Inbox(settings.queue_bytes, self._clock.arrival)
         self._readers: dict[str, Callable[[Sample], None]] = {
             "map": self._read_map,
@@ -135,11 +135,11 @@ class Recorder:
             self._write(arrivals.popleft())
             self._sync()
         self._inputs.note_lost(self._inbox.lost)
-        self._journal.at(self._clock.now_ns())
+        self._writer.at(self._clock.now_ns())
         self._sync()
         self._scene.catch_up()
         self._watch_planner()
-        self._tell(self._journal.state.value, self._journal.reason)
+        self._tell(self._writer.state.value, self._writer.reason)
 
     def end(self) -> bool:
         """Write the last words and the footer; False where the disk does not take them."""
@@ -147,16 +147,16 @@ class Recorder:
         for arrival in self._inbox.take(0.0):
             if time.monotonic_ns() < deadline_ns:
                 self._write(arrival)
-        self._journal.at(self._clock.now_ns())
+        self._writer.at(self._clock.now_ns())
         self._inputs.finish()
         self._tell("stopping", "asked to end")
         self._scene.finish()
-        return self._journal.close()
+        return self._writer.close()
 
     @property
     def hangs(self) -> bool:
         """Whether rerun would hang when the interpreter exits."""
-        return self._journal.hangs
+        return self._writer.hangs
 
     def note(self, line: str) -> None:
         """Log something that went wrong before the recording began."""
@@ -174,11 +174,11 @@ class Recorder:
     def _sync(self) -> None:
         now_ns = time.monotonic_ns()
         self._inputs.write_if_due(now_ns)
-        self._journal.sync(now_ns)
+        self._writer.sync(now_ns)
 
     def _write(self, arrival: Arrival) -> None:
         self._messages += 1
-        self._journal.message(arrival.wall_ns)
+        self._writer.message(arrival.wall_ns)
         if arrival.topic == "status" and not is_the_planners(arrival.sample.payload):
             line = "another daemon of this robot's name is there, and waits: it is not recorded"
             self._scene.complain(entities.BUS_LOG, line)
@@ -234,14 +234,14 @@ class Recorder:
         if last is not None and last.state == state and now_ns < self._next_report_ns:
             return
         self._next_report_ns = now_ns + REPORT_PERIOD_NS
-        path = self._journal.path
+        path = self._writer.path
         self._report = RecorderReport(
             state=state,
             reason=reason,
             file=str(path) if path else "",
-            bytes=self._journal.size,
+            bytes=self._writer.size,
             messages=self._messages,
-            lost=self._journal.lost + self._inbox.lost.total(),
+            lost=self._writer.lost + self._inbox.lost.total(),
             malformed=self._malformed,
             rss_mb=resident_mb(),
             pid=os.getpid(),

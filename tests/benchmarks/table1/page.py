@@ -14,11 +14,10 @@ from PIL import Image
 
 from fasaco_edge.bench.benchmark import Goal, Report, ResultTable
 from fasaco_edge.bench.grids import NamedGrid, read_grid
-from fasaco_edge.drawing.comparison import LabelledWalk, draw_walks
-from fasaco_edge.drawing.pheromone import draw_pheromone
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.planners.problem import CoverageProblem
+from tests.benchmarks.table1.pictures import LabelledWalk, draw_pheromone, draw_walks
 from tests.benchmarks.table1.runs import VARIANTS, grid_name, pose
 
 DRAWN = {

@@ -1,8 +1,7 @@
-"""Main directions: which way the lanes of a path run, region by region.
+"""Drawings of paths, of the driven path, and of the pheromone, as a recording shows them.
 
-Paths as a recording shows them: the newest, the one drawn before it, and why it came.
-
-The way the robot has driven, as a recording shows it.
+All cohorts walk on one pheromone field. What one has done is what the field is then otherwise than
+after the one before it: the timeline ``iter`` goes from cohort to cohort.
 """
 
 from __future__ import annotations
@@ -15,10 +14,12 @@ from numpy.typing import NDArray
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fields import Json, integer, number, section, text
 from fasaco_edge.recording.scene import archetypes as draw
-from fasaco_edge.recording.scene.layers import Layers
+from fasaco_edge.recording.scene.curves import Curves
+from fasaco_edge.recording.scene.layers import Layers, size_in_file
 from fasaco_edge.recording.sdk import rr
-from fasaco_edge.recording.write.journal import Journal
+from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.paths import PathMessage
+from fasaco_edge.wire.pheromone import PheromoneMessage
 
 # Edge of a region [steps], and at most about so many of them side by side.
 REGION_STEPS = 5
@@ -72,10 +73,10 @@ POINT_BYTES = 2 * 12
 
 
 class PathDrawing:
-    """Draws paths into a journal, each as soon as the allowance of its layer lets it."""
+    """Draws paths into a writer, each as soon as the allowance of its layer lets it."""
 
-    def __init__(self, journal: Journal, layers: Layers) -> None:
-        self._journal = journal
+    def __init__(self, writer: RecordingWriter, layers: Layers) -> None:
+        self._writer = writer
         self._layers = layers
         self._revision: int | None = None
         self._count = 0
@@ -88,9 +89,9 @@ class PathDrawing:
         """Draw a path; one that is published again is still the same."""
         revision = integer(note, "revision")
         if revision is not None:
-            self._journal.sequence(entities.REPLAN, revision)
+            self._writer.sequence(entities.REPLAN, revision)
         if not self._count or revision != self._revision:
-            self._journal.log(entities.PATH_LOG, rr.TextLog(_line(message, note), level="INFO"))
+            self._writer.log(entities.PATH_LOG, rr.TextLog(_path_line(message, note), level="INFO"))
             self._draw_window(section(note, "changed"), text(note, "reason"))
             self._count += 1
         self._revision, count, line = revision, self._count, draw.corners(message.xy)
@@ -104,14 +105,14 @@ class PathDrawing:
                 self._draw(entities.OLD_PATH, old, draw.OLD_PATH)
             self._draw(entities.PATH, line, draw.PATH)
 
-        self._layers.draw(entities.PATH, POINT_BYTES * len(line), draw_path, self._journal.wall_ns)
+        self._layers.draw(entities.PATH, POINT_BYTES * len(line), draw_path, self._writer.wall_ns)
 
     def _draw_directions(self, lines: NDArray[np.float64]) -> None:
         if np.array_equal(lines, self._directions):
             return
         self._directions = lines
         archetype = draw.lines_archetype(lines, draw.DIRECTION)
-        self._journal.log(entities.DIRECTIONS, archetype, latched=True, size=lines.nbytes)
+        self._writer.log(entities.DIRECTIONS, archetype, latched=True, size=lines.nbytes)
 
     def _draw_window(self, changed: Json, reason: str) -> None:
         """Draw which part of the map the path is because of; nothing where it is not of the map."""
@@ -127,15 +128,15 @@ class PathDrawing:
         else:
             return
         self._has_window = len(known) == len(edges)
-        self._journal.log(entities.REPLAN_WINDOW, box, latched=True)
-        self._journal.log(entities.REPLAN_REASON, label, latched=True)
+        self._writer.log(entities.REPLAN_WINDOW, box, latched=True)
+        self._writer.log(entities.REPLAN_REASON, label, latched=True)
 
     def _draw(self, entity: str, line: NDArray[np.float64], style: draw.LineStyle) -> None:
         archetype = draw.line_archetype(line, style)
-        self._journal.log(entity, archetype, latched=True, size=line.nbytes)
+        self._writer.log(entity, archetype, latched=True, size=line.nbytes)
 
 
-def _line(message: PathMessage, note: Json) -> str:
+def _path_line(message: PathMessage, note: Json) -> str:
     revision = integer(note, "revision")
     named = "path" if revision is None else f"path {revision}"
     facts = [f"{max(len(message.xy) - 1, 0)} steps"]
@@ -160,11 +161,11 @@ SPACING_M = 0.02
 PERIOD_NS = 2_000_000_000
 
 
-class TrailDrawing:
-    """Draws the trail piece by piece into a journal, each when it is there to be seen."""
+class DrivenPathDrawing:
+    """Draws the trail piece by piece into a writer, each when it is there to be seen."""
 
-    def __init__(self, journal: Journal) -> None:
-        self._journal = journal
+    def __init__(self, writer: RecordingWriter) -> None:
+        self._writer = writer
         self._piece: list[tuple[float, float]] = []
         self._drawn_ns = 0
 
@@ -177,15 +178,73 @@ class TrailDrawing:
 
     def catch_up(self) -> None:
         """Draw what has waited long enough; call it often."""
-        if self._journal.wall_ns - self._drawn_ns >= PERIOD_NS:
+        if self._writer.wall_ns - self._drawn_ns >= PERIOD_NS:
             self.finish()
 
     def finish(self) -> None:
         """Draw what waits."""
         if len(self._piece) < 2:
             return
-        self._drawn_ns = self._journal.wall_ns
+        self._drawn_ns = self._writer.wall_ns
         piece = draw.strip_archetype(np.array(self._piece), draw.TRAIL)
-        self._journal.log(entities.TRAIL, piece)
+        self._writer.log(entities.TRAIL, piece)
         # The next piece begins where this one ends.
         self._piece = self._piece[-1:]
+
+
+# How far above the field its label stands, as a share of the field's height.
+LABEL_ABOVE = 0.1
+# A range that grows by less than this is still told as it was.
+SLACK = 1.1
+
+
+class PheromoneDrawing:
+    """Draws pheromone into a writer as soon as the allowance of its layer lets it.
+
+    Attributes:
+        trail_range: least and greatest trail of all fields so far; None before the first.
+    """
+
+    def __init__(self, writer: RecordingWriter, layers: Layers, curves: Curves) -> None:
+        self._writer = writer
+        self._layers = layers
+        self._curves = curves
+        self._cohorts = 0
+        self.trail_range: tuple[float, float] | None = None
+
+    def add(self, message: PheromoneMessage) -> None:
+        """Draw the pheromone after a cohort, and plot the best walk so far."""
+        self._cohorts += 1
+        self._writer.sequence(entities.ITER, self._cohorts)
+
+        def draw_pheromone() -> None:
+            field = draw.pheromone_archetype(message)
+            label = draw.label_archetype(
+                message.geometry.bounds(), _cohort_line(message), LABEL_ABOVE
+            )
+            self._writer.log(entities.PHEROMONE, field, latched=True, size=message.levels.size)
+            self._writer.log(entities.COHORT, label, latched=True)
+
+        size = size_in_file(message.levels)
+        self._layers.draw(entities.PHEROMONE, size, draw_pheromone, self._writer.wall_ns)
+        self._curves.draw(entities.BEST_STEPS, message.best_steps)
+        # The levels' scale: with it they can be turned back into trails.
+        self._curves.draw(f"{entities.TRAIL_RANGE}/min", message.trail_min)
+        self._curves.draw(f"{entities.TRAIL_RANGE}/max", message.trail_max)
+        self._widen(message.trail_min, message.trail_max)
+
+    def _widen(self, least: float, most: float) -> None:
+        if most <= 0:
+            return  # no cell is coverable
+        low, high = self.trail_range or (least, most)
+        if self.trail_range is None or least * SLACK < low or most > high * SLACK:
+            self.trail_range = min(least, low), max(most, high)
+
+
+def _cohort_line(message: PheromoneMessage) -> str:
+    cells = "cell" if message.velocity == 1 else "cells"
+    ants = "ant" if message.ants == 1 else "ants"
+    return (
+        f"cohort {message.cohort + 1}, {message.velocity} {cells} a step\n"
+        f"{message.ants} {ants} in all, best walk {message.best_steps} steps"
+    )

@@ -141,7 +141,7 @@ class HeardStatus:
 
 
 @dataclass(slots=True)
-class Story:
+class RunData:
     """All that the samples tell; times are [s] since the recording began.
 
     Attributes:
@@ -183,19 +183,19 @@ class Story:
         return np.array(self.poses, np.float64).reshape(-1, 3)
 
 
-def gather(samples: Iterable[Arrival], began_ns: int) -> Story:
+def gather(samples: Iterable[Arrival], began_ns: int) -> RunData:
     """Return what ``samples``, in order, tell; one that cannot be read costs itself alone."""
-    listener = _Listener(Story(), began_ns)
+    listener = _Listener(RunData(), began_ns)
     for arrival in samples:
         listener.hear(arrival)
-    return listener.story
+    return listener.data
 
 
 class _Listener:
-    """Writes a story, sample by sample; holds one map at a time."""
+    """Writes a data, sample by sample; holds one map at a time."""
 
-    def __init__(self, story: Story, began_ns: int) -> None:
-        self.story = story
+    def __init__(self, data: RunData, began_ns: int) -> None:
+        self.data = data
         self._began_ns = began_ns
         self._now = 0.0
         self._poses = PoseDecoder(POSE_STAMPED)
@@ -213,25 +213,25 @@ class _Listener:
     def hear(self, arrival: Arrival) -> None:
         # A part begins with what was in force before it.
         self._now = max(1e-9 * (arrival.wall_ns - self._began_ns), 0.0)
-        self.story.last_s = max(self.story.last_s, self._now)
+        self.data.last_s = max(self.data.last_s, self._now)
         hear = self._hear.get(arrival.topic)
         if hear is None:
             return
         try:
             hear(arrival)
         except FasacoError:
-            self.story.undecodable[arrival.topic] += 1
+            self.data.undecodable[arrival.topic] += 1
 
     def _map(self, arrival: Arrival) -> None:
-        self.story.grid = decode_occupancy_grid(arrival.sample.payload)
-        self.story.map_s.append(self._now)
+        self.data.grid = decode_occupancy_grid(arrival.sample.payload)
+        self.data.map_s.append(self._now)
 
     def _map_update(self, arrival: Arrival) -> None:
         patch = decode_map_update(arrival.sample.payload)
-        if self.story.grid is None:
+        if self.data.grid is None:
             raise MalformedMessage("an update before any map")
-        self.story.grid = self.story.grid.patched(patch)
-        self.story.map_s.append(self._now)
+        self.data.grid = self.data.grid.patched(patch)
+        self.data.map_s.append(self._now)
 
     def _pose(self, arrival: Arrival) -> None:
         sample, is_static = arrival.sample, arrival.topic == "tf_static"
@@ -239,27 +239,27 @@ class _Listener:
         if stamped is None:
             return
         pose = stamped.pose
-        self.story.pose_s.append(self._now)
-        self.story.poses.append((pose.x, pose.y, pose.yaw))
+        self.data.pose_s.append(self._now)
+        self.data.poses.append((pose.x, pose.y, pose.yaw))
 
     def _command(self, arrival: Arrival) -> None:
         name, order = read_command(decode_json(arrival.sample.payload))
-        self.story.commands.append((self._now, name, order))
+        self.data.commands.append((self._now, name, order))
         if name == "start":
-            self.story.keep_out = order.keep_out
+            self.data.keep_out = order.keep_out
 
     def _status(self, arrival: Arrival) -> None:
-        status, story = decode_json(arrival.sample.payload), self.story
-        story.config = section(status, "config") or story.config
-        story.version = text(status, "version") or story.version
-        story.robot = text(status, "robot") or story.robot
-        self._poses.schema = text(section(story.config, "pose"), "schema") or self._poses.schema
-        frames = section(section(story.config, "ros2"), "frames")
+        status, data = decode_json(arrival.sample.payload), self.data
+        data.config = section(status, "config") or data.config
+        data.version = text(status, "version") or data.version
+        data.robot = text(status, "robot") or data.robot
+        self._poses.schema = text(section(data.config, "pose"), "schema") or self._poses.schema
+        frames = section(section(data.config, "ros2"), "frames")
         if frames:
             self._poses.follow((text(frames, "map"), text(frames, "robot")))
         zones = section(status, "mission").get("zones")
         by_code = section(section(status, "errors"), "by_code")
-        story.statuses.append(
+        data.statuses.append(
             HeardStatus(
                 at_s=self._now,
                 state=text(status, "state"),
@@ -273,12 +273,12 @@ class _Listener:
         )
 
     def _turns(self, arrival: Arrival) -> None:
-        self.story.made.take(decode_turns(arrival.sample.payload), self._now)
+        self.data.made.take(decode_turns(arrival.sample.payload), self._now)
 
     def _path(self, arrival: Arrival) -> None:
         note = _note(arrival)
         revision = integer(note, "revision") or 0
-        paths = self.story.paths
+        paths = self.data.paths
         # One that is published again is still the same.
         if paths and paths[-1].revision == revision:
             return

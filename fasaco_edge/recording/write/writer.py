@@ -1,6 +1,6 @@
 """A recording over its parts: what is logged survives rotation, and a full or stalled disk.
 
-The journal remembers static data and the newest value of what is latched. Each
+The writer remembers static data and the newest value of what is latched. Each
 part begins with them, so that each can be read alone; all share one recording
 id, so that a viewer shows them as one run.
 """
@@ -14,8 +14,8 @@ from pathlib import Path
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording.sdk import rr, rrb
-from fasaco_edge.recording.write.part import Flush, Part, Standing, send_blueprint, sweep
-from fasaco_edge.recording.write.quota import Room
+from fasaco_edge.recording.write.part import Flush, LatchedState, Part, send_blueprint, sweep
+from fasaco_edge.recording.write.quota import DiskBudget
 
 LOG = logging.getLogger(__name__)
 
@@ -34,7 +34,7 @@ PROBE_TIMEOUT_S = 0.05
 CLOSE_TIMEOUT_S = 1.2
 
 
-class JournalState(enum.Enum):
+class WriterState(enum.Enum):
     """Whether what is logged is being written."""
 
     RECORDING = "recording"
@@ -42,7 +42,7 @@ class JournalState(enum.Enum):
     STALLED = "stalled"
 
 
-class Journal:
+class RecordingWriter:
     """Writes to the parts ``<recording_id>-part<n>.rrd`` in ``folder``; for one thread only.
 
     Rerun keeps the time per thread, and logs as static what a thread without one logs.
@@ -52,12 +52,12 @@ class Journal:
     """
 
     def __init__(
-        self, folder: Path, recording_id: str, room: Room, blueprint: rrb.Blueprint
+        self, folder: Path, recording_id: str, budget: DiskBudget, blueprint: rrb.Blueprint
     ) -> None:
         self._folder = folder
         self._recording_id = recording_id
-        self._room = room
-        self._standing = Standing(recording_id, blueprint)
+        self._budget = budget
+        self._latched = LatchedState(recording_id, blueprint)
         self._part: Part | None = None
         self._parts = 0
         self._abandoned: list[Part] = []
@@ -68,7 +68,7 @@ class Journal:
         self._unflushed_bytes = 0
         self._lost_before = 0
         self.lost = 0
-        self.state = JournalState.RECORDING
+        self.state = WriterState.RECORDING
         self.reason = ""
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -76,7 +76,7 @@ class Journal:
         except OSError as error:
             if not self._abandoned:
                 raise BadConfiguration(f"cannot record into {folder}: {error}") from error
-            self._enter(JournalState.STALLED, f"no part: {error}")
+            self._enter(WriterState.STALLED, f"no part: {error}")
 
     @property
     def path(self) -> Path | None:
@@ -86,12 +86,12 @@ class Journal:
     @property
     def hangs(self) -> bool:
         """Whether rerun would hang when the interpreter exits."""
-        return bool(self._abandoned) or self.state is JournalState.STALLED
+        return bool(self._abandoned) or self.state is WriterState.STALLED
 
     @property
     def wall_ns(self) -> int:
         """The time of what is logged next [ns]."""
-        return self._standing.wall_ns
+        return self._latched.wall_ns
 
     @property
     def part_number(self) -> int:
@@ -110,22 +110,22 @@ class Journal:
         lost with a broken part, too.
         """
         self.at(wall_ns)
-        if self.state is JournalState.RECORDING:
+        if self.state is WriterState.RECORDING:
             self._unflushed_messages += 1
         else:
             self.lost += 1
 
     def at(self, wall_ns: int) -> None:
         """Set the time [ns] of what is logged next."""
-        self._standing.wall_ns = wall_ns
+        self._latched.wall_ns = wall_ns
         for stream in self._streams():
-            self._standing.set_times(stream)
+            self._latched.set_times(stream)
 
     def sequence(self, timeline: str, number: int) -> None:
         """Set the place on another timeline of all that is logged from now on."""
-        self._standing.sequences[timeline] = number
+        self._latched.sequences[timeline] = number
         for stream in self._streams():
-            self._standing.set_times(stream)
+            self._latched.set_times(stream)
 
     def log(
         self, entity: str, archetype: rr.AsComponents, *, latched: bool = False, size: int = 0
@@ -138,15 +138,15 @@ class Journal:
             size: how much it is, where that is much [bytes].
         """
         if latched:
-            missed = self._part is None or self.state is not JournalState.RECORDING
-            self._standing.latch(entity, archetype, missed=missed)
+            missed = self._part is None or self.state is not WriterState.RECORDING
+            self._latched.latch(entity, archetype, missed=missed)
         for stream in self._streams():
             stream.log(entity, archetype)
         self._unflushed_bytes += size
 
     def write_blob(self, blob: bytes) -> bool:
         """Write bytes at the time set, without waiting for a flush; False where it cannot be."""
-        if self._part is None or self.state is not JournalState.RECORDING:
+        if self._part is None or self.state is not WriterState.RECORDING:
             return False
         self._part.write_blob(blob, self.wall_ns)
         self._unflushed_bytes += len(blob)
@@ -154,26 +154,26 @@ class Journal:
 
     def log_static(self, entity: str, *archetypes: rr.AsComponents) -> None:
         """Log what holds for the whole run; takes the place of what held before."""
-        self._standing.static[entity] = archetypes
+        self._latched.static[entity] = archetypes
         for stream in self._streams():
             stream.log(entity, *archetypes, static=True)
 
     def describe(self, name: str, properties: dict[str, str]) -> None:
         """Name the recording, and set its properties."""
-        self._standing.name, self._standing.properties = name, properties
+        self._latched.name, self._latched.properties = name, properties
         for stream in self._streams():
-            self._standing.send_description(stream)
+            self._latched.send_description(stream)
 
     def show(self, blueprint: rrb.Blueprint) -> None:
         """Make ``blueprint`` the one that opens; a file's last one counts."""
-        self._standing.blueprint = blueprint
+        self._latched.blueprint = blueprint
         for stream in self._streams():
             send_blueprint(stream, blueprint)
 
     def serve(self, live: rr.RecordingStream) -> None:
         """Let all that is logged go to ``live``, too, whatever becomes of the disk."""
         self._live = live
-        self._standing.begin(live)
+        self._latched.begin(live)
 
     def sync(self, now_ns: int) -> None:
         """Find out whether all is written, and act on it; call it often.
@@ -189,7 +189,7 @@ class Journal:
             self._try_again()
         elif self._is_flushed(self._part):
             self._keep_room(self._part, now_ns)
-        recording = self.state is JournalState.RECORDING
+        recording = self.state is WriterState.RECORDING
         retry_ns = RETRY_PERIOD_NS << min(len(self._abandoned), MOST_DOUBLINGS)
         self._next_flush_ns = now_ns + (FLUSH_PERIOD_NS if recording else retry_ns)
 
@@ -201,7 +201,7 @@ class Journal:
             return True
         outcome = self._part.flush(CLOSE_TIMEOUT_S)
         if outcome is Flush.STALLED:
-            self._enter(JournalState.STALLED, f"{self._part.path.name} waits for the disk")
+            self._enter(WriterState.STALLED, f"{self._part.path.name} waits for the disk")
             return False
         if outcome is Flush.BROKEN:
             self._give_up(self._part)
@@ -211,43 +211,43 @@ class Journal:
         return True
 
     def _streams(self) -> Iterator[rr.RecordingStream]:
-        if self._part is not None and self.state is JournalState.RECORDING:
+        if self._part is not None and self.state is WriterState.RECORDING:
             yield self._part.stream
         if self._live is not None:
             yield self._live
 
     def _is_flushed(self, part: Part) -> bool:
-        stalled = self.state is JournalState.STALLED
+        stalled = self.state is WriterState.STALLED
         outcome = part.flush(PROBE_TIMEOUT_S if stalled else FLUSH_TIMEOUT_S)
         if outcome is Flush.STALLED:
-            self._enter(JournalState.STALLED, f"{part.path.name} waits for the disk")
+            self._enter(WriterState.STALLED, f"{part.path.name} waits for the disk")
             return False
         if outcome is Flush.BROKEN:
             self._give_up(part)
             return False
         self._unflushed_messages = self._unflushed_bytes = 0
         if stalled:
-            self._enter(JournalState.RECORDING, "the disk writes again")
-            self._standing.send_latched(part.stream)
+            self._enter(WriterState.RECORDING, "the disk writes again")
+            self._latched.send_latched(part.stream)
         return True
 
     def _keep_room(self, part: Part, now_ns: int) -> None:
         if self._part_until_ns is None:
             # Parts grow slowly: to look once in each is enough, once before there is any other.
-            self._room.keep_quota(self._folder)
-            self._part_until_ns = now_ns + round(1e9 * self._room.part_s)
-        is_old = self._room.part_s > 0 and now_ns >= self._part_until_ns
-        if self._room.is_full(self._folder):
+            self._budget.keep_quota(self._folder)
+            self._part_until_ns = now_ns + round(1e9 * self._budget.part_s)
+        is_old = self._budget.part_s > 0 and now_ns >= self._part_until_ns
+        if self._budget.is_full(self._folder):
             part.close()
             self._part = None
-            floor_mb = self._room.least_free_bytes / 1e6
-            self._enter(JournalState.DISK_FULL, f"less than {floor_mb:.0f} MB are free")
-        elif is_old or part.size >= self._room.part_bytes:
+            floor_mb = self._budget.least_free_bytes / 1e6
+            self._enter(WriterState.DISK_FULL, f"less than {floor_mb:.0f} MB are free")
+        elif is_old or part.size >= self._budget.part_bytes:
             try:
                 self._begin_part()
             except OSError as error:
                 self._part = None
-                self._enter(JournalState.DISK_FULL, f"no new part: {error}")
+                self._enter(WriterState.DISK_FULL, f"no new part: {error}")
             part.close()
             del part
             if not self._abandoned:
@@ -260,20 +260,20 @@ class Journal:
         self.lost += self._unflushed_messages
         self._unflushed_messages = self._unflushed_bytes = 0
         reason = f"{part.path.name} can no longer be written"
-        if self._room.may_begin(self._folder):
-            self._enter(JournalState.STALLED, reason)
+        if self._budget.may_begin(self._folder):
+            self._enter(WriterState.STALLED, reason)
         else:
-            self._enter(JournalState.DISK_FULL, f"{reason}: no space left")
+            self._enter(WriterState.DISK_FULL, f"{reason}: no space left")
 
     def _try_again(self) -> None:
-        if not self._room.may_begin(self._folder):
+        if not self._budget.may_begin(self._folder):
             return
         try:
             self._begin_part()
         except OSError as error:
             self._enter(self.state, f"no new part: {error}")
         else:
-            self._enter(JournalState.RECORDING, "there is room again")
+            self._enter(WriterState.RECORDING, "there is room again")
 
     def _begin_part(self) -> None:
         number = self._parts + 1
@@ -285,13 +285,13 @@ class Journal:
             self._abandoned.append(part)
             raise OSError(f"{path.name}: {part.refused}")
         self._part, self._part_until_ns = part, None
-        self._standing.begin(part.stream)
+        self._latched.begin(part.stream)
 
-    def _enter(self, state: JournalState, reason: str) -> None:
-        if state is JournalState.RECORDING:
+    def _enter(self, state: WriterState, reason: str) -> None:
+        if state is WriterState.RECORDING:
             reason = f"{reason}; {self.lost - self._lost_before} samples were lost"
             self._lost_before = self.lost
         if state is not self.state:
-            level = logging.INFO if state is JournalState.RECORDING else logging.WARNING
+            level = logging.INFO if state is WriterState.RECORDING else logging.WARNING
             LOG.log(level, "%s: %s", state.value, reason)
         self.state, self.reason = state, reason

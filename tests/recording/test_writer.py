@@ -16,8 +16,8 @@ from fasaco_edge.errors import BadConfiguration, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.sdk import rr
-from fasaco_edge.recording.write.journal import FLUSH_PERIOD_NS, Journal, JournalState
-from fasaco_edge.recording.write.quota import Quota, Room
+from fasaco_edge.recording.write.quota import DiskBudget, Quota
+from fasaco_edge.recording.write.writer import FLUSH_PERIOD_NS, RecordingWriter, WriterState
 from tests.support.recording_reading import read_column, read_summary
 
 RUN = "run-1"
@@ -45,22 +45,24 @@ def noise(seed: int, size: int = 100_000) -> rr.GridMap:
     )
 
 
-def journal_in(folder, part_bytes: int = 10**9, least_free_bytes: int = 0) -> Journal:
-    return Journal(folder, RUN, Room(part_bytes, least_free_bytes), build_blueprint(None))
+def writer_in(folder, part_bytes: int = 10**9, least_free_bytes: int = 0) -> RecordingWriter:
+    return RecordingWriter(
+        folder, RUN, DiskBudget(part_bytes, least_free_bytes), build_blueprint(None)
+    )
 
 
 def test_parts_rotate_and_each_begins_with_what_is_in_force(tmp_path):
     clock = Clock()
-    journal = journal_in(tmp_path, part_bytes=250_000)
-    journal.describe("a run", {"planner": "fasaco"})
-    journal.log_static(entities.RUN_CARD, rr.TextDocument("card"))
-    journal.message(clock.now_ns)
-    journal.log(entities.PATH, rr.LineStrips3D([[[0, 0, 0], [1, 2, 0]]]), latched=True)
+    writer = writer_in(tmp_path, part_bytes=250_000)
+    writer.describe("a run", {"planner": "fasaco"})
+    writer.log_static(entities.RUN_CARD, rr.TextDocument("card"))
+    writer.message(clock.now_ns)
+    writer.log(entities.PATH, rr.LineStrips3D([[[0, 0, 0], [1, 2, 0]]]), latched=True)
     for seed in range(7):
-        journal.message(clock.now_ns)
-        journal.log("noise", noise(seed))
-        journal.sync(clock.tick())
-    assert journal.close()
+        writer.message(clock.now_ns)
+        writer.log("noise", noise(seed))
+        writer.sync(clock.tick())
+    assert writer.close()
     parts = sorted(tmp_path.glob("*.rrd"))
     assert len(parts) == 4
     for part in parts:
@@ -69,22 +71,22 @@ def test_parts_rotate_and_each_begins_with_what_is_in_force(tmp_path):
         assert summary.rows[entities.PATH] == 1
         assert list(read_cards(part)) == ["card"]
     assert sum(read_summary(part).rows.get("noise", 0) for part in parts) == 7
-    assert journal.lost == 0
+    assert writer.lost == 0
 
 
 def test_parts_leave_no_threads_behind(tmp_path):
     clock, threads = Clock(), []
-    journal = journal_in(tmp_path, part_bytes=1)
+    writer = writer_in(tmp_path, part_bytes=1)
     for _ in range(6):
-        journal.message(clock.now_ns)
-        journal.log("metrics/a", rr.Scalars(1.0))
-        journal.sync(clock.tick())
-        journal.show(build_blueprint(None))
+        writer.message(clock.now_ns)
+        writer.log("metrics/a", rr.Scalars(1.0))
+        writer.sync(clock.tick())
+        writer.show(build_blueprint(None))
         time.sleep(0.1)  # they end a moment after they were told to
         threads.append(len(os.listdir("/proc/self/task")))
-    assert journal.part_number == 7
+    assert writer.part_number == 7
     assert threads[-1] <= threads[1]
-    assert journal.close()
+    assert writer.close()
 
 
 def test_an_old_part_gives_way_and_the_oldest_go_by_the_quota(tmp_path):
@@ -93,18 +95,18 @@ def test_an_old_part_gives_way_and_the_oldest_go_by_the_quota(tmp_path):
     for path in (*others, *before):
         path.write_bytes(bytes(400_000))
     clock = Clock()
-    room = Room(300_000, 0, part_s=3 * FLUSH_PERIOD_NS / 1e9, quota=Quota("robot", 1_000_000))
+    room = DiskBudget(300_000, 0, part_s=3 * FLUSH_PERIOD_NS / 1e9, quota=Quota("robot", 1_000_000))
     name = "20260101T000000Z-robot"
-    journal = Journal(tmp_path, name, room, build_blueprint(None))
-    journal.sync(clock.tick())
+    writer = RecordingWriter(tmp_path, name, room, build_blueprint(None))
+    writer.sync(clock.tick())
     # With the part that is coming, one of the two that there were is too much.
     assert not before[0].exists()
     assert before[1].exists()
     for seed in range(20):
-        journal.log("noise", noise(seed, 20_000))
-        journal.sync(clock.tick())
-    last = journal.path
-    assert journal.close()
+        writer.log("noise", noise(seed, 20_000))
+        writer.sync(clock.tick())
+    last = writer.path
+    assert writer.close()
     assert all(path.exists() for path in others)
     assert not before[1].exists()
     parts = list(tmp_path.glob(f"{name}-part*.rrd"))
@@ -115,26 +117,26 @@ def test_an_old_part_gives_way_and_the_oldest_go_by_the_quota(tmp_path):
 
 
 def test_a_part_that_is_written_is_not_deleted_for_the_quota(tmp_path):
-    room = Room(10**6, 0)
-    journal = Journal(tmp_path, "20200101T000000Z-robot", room, build_blueprint(None))
+    room = DiskBudget(10**6, 0)
+    writer = RecordingWriter(tmp_path, "20200101T000000Z-robot", room, build_blueprint(None))
     assert not Quota("robot", 1).keep(tmp_path)
-    assert journal.close()
+    assert writer.close()
     assert Quota("robot", 1).keep(tmp_path)
 
 
 def test_no_part_is_written_below_the_floor(tmp_path):
     clock = Clock()
     # One more than there is: no room, though the disk is far from full.
-    journal = journal_in(tmp_path, least_free_bytes=shutil.disk_usage(tmp_path).total)
-    journal.message(clock.now_ns)
-    journal.sync(clock.tick())
-    assert journal.state is JournalState.DISK_FULL
-    assert journal.path is None
-    journal.message(clock.now_ns)
-    assert journal.lost == 1
+    writer = writer_in(tmp_path, least_free_bytes=shutil.disk_usage(tmp_path).total)
+    writer.message(clock.now_ns)
+    writer.sync(clock.tick())
+    assert writer.state is WriterState.DISK_FULL
+    assert writer.path is None
+    writer.message(clock.now_ns)
+    assert writer.lost == 1
     (part,) = tmp_path.glob("*.rrd")
     assert read_summary(part).complete
-    assert journal.close()
+    assert writer.close()
 
 
 def test_a_stalled_disk_is_told_and_taken_up_again(tmp_path):
@@ -142,22 +144,22 @@ def test_a_stalled_disk_is_told_and_taken_up_again(tmp_path):
     pipe = tmp_path / f"{RUN}-part1.rrd"
     os.mkfifo(pipe)
     clock = Clock()
-    journal = journal_in(tmp_path)
-    journal.message(clock.now_ns)
-    journal.log(entities.PATH, rr.LineStrips3D([[[0, 0, 0], [1, 2, 0]]]), latched=True)
-    journal.log("noise", noise(1, 400_000))
-    journal.sync(clock.tick())
-    assert journal.state is JournalState.STALLED
-    journal.message(clock.now_ns)
-    assert journal.lost == 1
-    assert not journal.close()
+    writer = writer_in(tmp_path)
+    writer.message(clock.now_ns)
+    writer.log(entities.PATH, rr.LineStrips3D([[[0, 0, 0], [1, 2, 0]]]), latched=True)
+    writer.log("noise", noise(1, 400_000))
+    writer.sync(clock.tick())
+    assert writer.state is WriterState.STALLED
+    writer.message(clock.now_ns)
+    assert writer.lost == 1
+    assert not writer.close()
     drained = threading.Thread(target=drain, args=(pipe, tmp_path / "copy.rrd"))
     drained.start()
     deadline = time.monotonic() + 60
-    while journal.state is JournalState.STALLED and time.monotonic() < deadline:
-        journal.sync(clock.tick())
-    assert journal.state is JournalState.RECORDING
-    assert journal.close()
+    while writer.state is WriterState.STALLED and time.monotonic() < deadline:
+        writer.sync(clock.tick())
+    assert writer.state is WriterState.RECORDING
+    assert writer.close()
     drained.join()
     # What is in force was logged again after the gap.
     values = read_column(tmp_path / "copy.rrd", entities.PATH, "LineStrips3D:strips").values
@@ -167,7 +169,7 @@ def test_a_stalled_disk_is_told_and_taken_up_again(tmp_path):
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(BadConfiguration, match="cannot record into"):
-        journal_in(tmp_path / "file" / "runs")
+        writer_in(tmp_path / "file" / "runs")
 
 
 def test_what_is_no_recording_is_said_to_be_none(tmp_path):

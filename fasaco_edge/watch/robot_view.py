@@ -1,10 +1,8 @@
-"""All that is known of a robot by now, put together from samples as they come.
-
-How far a robot is on its path.
-"""
+"""The newest state of a robot as its samples tell it, and the latest events."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -15,7 +13,7 @@ from fasaco_edge.bus.session import Sample
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.watch.journal import BAD, GOOD, ORDER, Journal, differences
+from fasaco_edge.text import one_line
 from fasaco_edge.watch.report import PathNote, Report, read
 from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.limits import MAX_COORDINATE_M
@@ -23,6 +21,60 @@ from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.poses import decode_pose
 from fasaco_edge.wire.schemas import POSE_STAMPED
+
+KEPT = 200
+# How an entry is to be taken.
+PLAIN, GOOD, BAD, ORDER = "plain", "good", "bad", "order"
+TROUBLED = ("blocked", "degraded")
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened: when, since the epoch [s], what, and its tone."""
+
+    at_s: float
+    text: str
+    tone: str = PLAIN
+
+
+class EventLog:
+    """The newest entries, and how many there ever were."""
+
+    def __init__(self) -> None:
+        self.entries: deque[Event] = deque(maxlen=KEPT)
+        self.count = 0
+
+    def add(self, at_s: float, text: str, tone: str = PLAIN) -> None:
+        """Note what happened at ``at_s``, since the epoch [s]."""
+        self.entries.append(Event(at_s, one_line(text), tone))
+        self.count += 1
+
+    def since(self, count: int) -> list[Event]:
+        """Return what was noted after the first ``count`` entries, as far as it is kept."""
+        new = min(self.count - count, len(self.entries))
+        return list(self.entries)[len(self.entries) - new :]
+
+
+def differences(before: Report | None, after: Report) -> list[tuple[str, str]]:
+    """Return what a status says that the one before did not, as (text, tone)."""
+    found: list[tuple[str, str]] = []
+    if before is None or before.state != after.state:
+        tone = BAD if after.state in TROUBLED else GOOD if after.state == "done" else PLAIN
+        found.append((f"{after.state}: {after.reason}", tone))
+    elif after.state in TROUBLED and before.reason != after.reason:
+        found.append((f"{after.state}: {after.reason}", BAD))
+    known = before.errors.by_code if before is not None else {}
+    for code, count in after.errors.by_code.items():
+        if more := count - known.get(code, 0):
+            found.append((f"refused: {more} x {code}, {after.errors.last}", BAD))
+    if after.ledger.fault and (before is None or before.ledger.fault != after.ledger.fault):
+        found.append((f"ledger: {after.ledger.fault}", BAD))
+    recorder = before.recorder.state if before is not None and before.recorder else ""
+    if after.recorder and after.recorder.state != recorder:
+        tone = PLAIN if after.recorder.state in ("recording", "starting") else BAD
+        found.append((f"recorder {after.recorder.state}: {after.recorder.reason}", tone))
+    return found
+
 
 # The daemon speaks once a second.
 SILENCE_S = 3.5
@@ -38,7 +90,7 @@ class Token:
     here: bool
 
 
-class Known:
+class RobotView:
     """The newest map, coverage, path, pose and status of one robot, and what happened lately.
 
     Attributes:
@@ -55,7 +107,7 @@ class Known:
 
     def __init__(self, robot: str) -> None:
         self.robot = robot
-        self.journal = Journal()
+        self.events = EventLog()
         self.map: OccupancyGrid | None = None
         self.coverage: OccupancyGrid | None = None
         self.pose: Pose2D | None = None
@@ -107,19 +159,19 @@ class Known:
                 # A publisher gone wrong is so at every message: note the 1st, 2nd, 4th, 8th ...
                 if self._malformed & (self._malformed - 1) == 0:
                     text = f"{topic} cannot be read ({self._malformed} so far): {error}"
-                    self.journal.add(now, text, BAD)
+                    self.events.add(now, text, BAD)
 
     def _note_token(self, token: Token, now: float) -> None:
         was_here = self.is_here
         (self.robots.add if token.here else self.robots.discard)(token.robot)
         if was_here and not self.is_here:
             self.gone_since = now
-            self.journal.add(now, "the daemon is gone; waiting for it to come back", BAD)
+            self.events.add(now, "the daemon is gone; waiting for it to come back", BAD)
         elif self.is_here and not was_here:
             back = self.gone_since is not None
             # It has not had the time to speak.
             self.gone_since, self._reported_at = None, now
-            self.journal.add(now, f"the daemon is {'back' if back else 'there'}", GOOD)
+            self.events.add(now, f"the daemon is {'back' if back else 'there'}", GOOD)
 
     def _read_map(self, sample: Sample, _: float) -> None:
         self.map = decode_occupancy_grid(sample.payload)
@@ -140,7 +192,7 @@ class Known:
         note = read(decode_json(sample.attachment), PathNote) if sample.attachment else PathNote()
         self.walk = Walk(decode_path(sample.payload).xy, note.revision)
         steps = f"{note.steps} steps" if len(self.walk.xy) else "stop"
-        self.journal.add(now, f"path {note.revision}, {steps}: {note.reason}")
+        self.events.add(now, f"path {note.revision}, {steps}: {note.reason}")
 
     def _read_coverage(self, sample: Sample, _: float) -> None:
         self.coverage = decode_occupancy_grid(sample.payload)
@@ -150,10 +202,10 @@ class Known:
         if report.claim.stand != "plans":
             # It may be a second daemon of this name: what that is like is not how the robot is.
             if report.claim.stand != "looks":
-                self.journal.add(now, f"a second daemon is {report.state}: {report.reason}", BAD)
+                self.events.add(now, f"a second daemon is {report.state}: {report.reason}", BAD)
             return
         for text, tone in differences(self.report, report):
-            self.journal.add(now, text, tone)
+            self.events.add(now, text, tone)
         self.report, self.document, self._reported_at = report, sample.payload, now
         if report.path is None:
             # A daemon that was started anew has none of the old paths.
@@ -169,7 +221,7 @@ class Known:
         order = document.get("order")
         names = [str(zone["name"]) for zone in _zones(order)]
         about = f" with {', '.join(names)}" if names else ""
-        self.journal.add(now, f"command {document.get('command')}{about}", ORDER)
+        self.events.add(now, f"command {document.get('command')}{about}", ORDER)
 
     def _move(self, pose: Pose2D) -> None:
         if abs(pose.x) <= MAX_COORDINATE_M and abs(pose.y) <= MAX_COORDINATE_M:

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.comparison import LabelledWalk, draw_walks
-from fasaco_edge.drawing.pheromone import draw_pheromone
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.planner import ColonySnapshot
+from tests.benchmarks.table1.pictures import LabelledWalk, draw_pheromone, draw_walks
 
 LINES = ["a caption"]
 

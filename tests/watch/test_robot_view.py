@@ -1,0 +1,167 @@
+"""What is made of samples as they come."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
+from fasaco_edge.grid.occupancy import MapPatch
+from fasaco_edge.watch.robot_view import KEPT, EventLog, RobotView, Walk
+from fasaco_edge.wire.maps import encode_map_update
+from fasaco_edge.wire.poses import encode_pose_stamped
+from tests.watch.grids import NOW, mid_mission, status, tell
+
+
+def texts(view: RobotView) -> list[str]:
+    return [entry.text for entry in view.events.entries]
+
+
+def at(x: float, y: float) -> bytes:
+    return encode_pose_stamped(StampedPose(Pose2D(x, y)))
+
+
+def test_the_path_ahead_begins_at_the_robot():
+    view = mid_mission()
+    assert len(view.path_ahead) == 12
+    tell(view, "pose", at(2.3, 1.2))
+    assert view.path_ahead[0].tolist() == [2.3, 1.2]
+    assert view.path_ahead[1].tolist() == [2.75, 1.25]
+
+
+def test_a_path_that_passes_a_place_again_is_not_cut_there():
+    out = [(float(step), 0.0) for step in range(20)]
+    walk = Walk(np.array(out + out[::-1]))
+    for x, _ in out[:6]:
+        walk.passed(Pose2D(x, 0.1))
+    assert walk.at == 5
+
+
+def test_the_daemon_knows_how_much_is_left():
+    view = mid_mission()
+    view.pose = None
+    path = {"revision": 7, "remaining_steps": 2, "steps": 11}
+    tell(view, "status", status(path=path))
+    assert view.path_ahead.tolist() == [[5.25, 1.25], [5.25, 1.75], [5.25, 2.25]]
+    tell(view, "status", status(path=path | {"revision": 8, "remaining_steps": 0}))
+    assert len(view.path_ahead) == 3
+
+
+@pytest.mark.parametrize("steps", [-5, 10**9])
+def test_nonsense_about_the_path_breaks_nothing(steps):
+    view = mid_mission()
+    tell(view, "status", status(path={"revision": 7, "remaining_steps": steps}))
+    tell(view, "pose", at(1.0, 1.0))
+    assert len(view.path_ahead) in (0, 12)
+
+
+def test_a_new_daemon_has_none_of_the_old_paths():
+    view = mid_mission()
+    tell(view, "status", status(path=None))
+    assert len(view.path_ahead) == 0
+
+
+def test_a_second_daemon_is_noted_and_changes_nothing():
+    view = mid_mission()
+    before = view.report
+    for stand, reason in (("looks", "no map yet"), ("waits", "another daemon plans: 2f")):
+        claim = {"id": "1f", "stand": stand}
+        tell(view, "status", status(state="blocked", reason=reason, path=None, claim=claim))
+    assert view.report is before
+    assert len(view.path_ahead) == 12
+    assert view.events.entries[-1].text == ("a second daemon is blocked: another daemon plans: 2f")
+    tell(view, "status", status(state="paused", claim={"id": "2f", "stand": "plans"}))
+    assert view.report.state == "paused"
+
+
+def test_updates_are_laid_over_the_map():
+    view = mid_mission()
+    patch = MapPatch(Window(10, 20, 12, 22), np.full((2, 2), 100, np.int8))
+    tell(view, "map_update", encode_map_update(patch))
+    assert view.map is not None
+    assert (view.map.cells == 100).sum() == 2 * 60 + 2 * 38 + 4
+    tell(RobotView("robot"), "map_update", encode_map_update(patch))
+
+
+def test_without_poses_of_its_own_the_status_tells_where_the_robot_is():
+    view = RobotView("robot")
+    tell(view, "status", status(pose={"x": 1.0, "y": 2.0, "yaw": 0.5}))
+    assert view.pose == Pose2D(1.0, 2.0, 0.5)
+    tell(view, "pose", at(3.0, 3.0))
+    tell(view, "status", status(pose={"x": 1.0, "y": 2.0}))
+    assert view.pose == Pose2D(3.0, 3.0)
+    tell(view, "status", status(pose={"x": 1e300, "y": 2.0}))
+    assert view.pose == Pose2D(3.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("topic", "payload"),
+    [
+        ("map", b"no map"),
+        ("map_update", b""),
+        ("pose", b"\x00\x01"),
+        ("path", b"no path"),
+        ("coverage", b"\xff" * 99),
+        ("status", b"[]"),
+        ("status", b"{}"),
+        ("status", json.dumps({"state": 5}).encode()),
+        ("status", json.dumps({"state": "done", "coverage": {"covered": "all"}}).encode()),
+        ("command", b"\xff"),
+    ],
+)
+def test_what_cannot_be_read_costs_only_itself(topic, payload):
+    view = mid_mission()
+    before = view.map, view.coverage, view.pose, view.report
+    for _ in range(9):
+        tell(view, topic, payload)
+    assert (view.map, view.coverage, view.pose, view.report) == before
+    assert [text for text in texts(view) if "cannot be read" in text][-1].startswith(
+        f"{topic} cannot be read (8 so far): "
+    )
+    tell(view, "status", status(state="done"))
+    assert view.report is not None
+    assert view.report.state == "done"
+
+
+def test_members_nobody_knows_yet_are_passed_over():
+    view = RobotView("robot")
+    tell(view, "status", status(weather={"rain": True}))
+    assert view.report is not None
+
+
+def test_what_happened_is_told_once():
+    view = mid_mission()
+    tell(view, "status", status())
+    assert texts(view) == [
+        "the daemon is there",
+        "covering: path 7",
+        "path 7, 11 steps: map: 2 cells more",
+    ]
+    errors = {"total": 3, "last": "no map", "by_code": {"malformed_message": 3}}
+    for _ in range(2):
+        blocked = status(state="blocked", reason="in an occupied cell", errors=errors)
+        tell(view, "status", blocked)
+    order = {"zones": [{"name": "kitchen"}, {"name": "hall"}]}
+    tell(view, "command", json.dumps({"command": "start", "order": order}).encode())
+    recorder = {"state": "disk full", "reason": "no room"}
+    tell(view, "status", status(errors=errors, recorder=recorder, ledger={"fault": "torn"}))
+    assert texts(view)[3:] == [
+        "blocked: in an occupied cell",
+        "refused: 3 x malformed_message, no map",
+        "command start with kitchen, hall",
+        "covering: path 7",
+        "ledger: torn",
+        "recorder disk full: no room",
+    ]
+
+
+def test_a_journal_keeps_the_newest():
+    events = EventLog()
+    for number in range(KEPT + 5):
+        events.add(NOW, str(number))
+    assert events.entries[0].text == "5"
+    assert [entry.text for entry in events.since(KEPT + 3)] == [str(KEPT + 3), str(KEPT + 4)]
+    assert len(events.since(0)) == KEPT
+    assert events.since(events.count) == []
