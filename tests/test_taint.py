@@ -39,9 +39,8 @@ from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import RPC_NAMES
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
-from tests.support.commands import ENVIRONMENT, PROGRAM, TIMEOUT_S
 from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process, free_endpoint
+from tests.support.processes import COMMAND_S, ENVIRONMENT, PROGRAM, daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.test_text import HIDDEN
 from tests.wire.schemas import NAMES, schema
@@ -98,7 +97,7 @@ def run(*words: object, env: dict[str, str] | None = None) -> tuple[int, str]:
     """Run a command as a user does; judge and return what it says."""
     command = [*PROGRAM, *(os.fsencode(str(word)) for word in words)]
     ended = subprocess.run(
-        command, check=False, capture_output=True, timeout=TIMEOUT_S, env=ENVIRONMENT | (env or {})
+        command, check=False, capture_output=True, timeout=COMMAND_S, env=ENVIRONMENT | (env or {})
     )
     said = (ended.stdout + ended.stderr).decode()
     judge(said)

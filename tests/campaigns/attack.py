@@ -19,11 +19,10 @@ from typing import Any
 import zenoh
 
 from tests.campaigns.attacks import AT, GOOD_MAP, attacks, pour
-from tests.support.certificates import authority
 from tests.support.outsider import Outsider, open_client
 from tests.support.processes import Daemon, daemon_process, resident_mb
 from tests.support.rooms import pose_bytes
-from tests.support.secured import House, secured_daemon, transport
+from tests.support.secured import House, authority, secured_daemon, transport
 
 # Before each attack the daemon's share of a core is looked at for so long [s].
 QUIET_S = 2.0

@@ -13,10 +13,9 @@ from typing import Any
 
 import zenoh
 
-from tests.support.certificates import Authority
 from tests.support.outsider import open_client
 from tests.support.rooms import map_bytes, pose_bytes, room, update_bytes
-from tests.support.secured import House, transport
+from tests.support.secured import Authority, House, transport
 
 # A map of a megabyte, and the mission's: to hear it once more changes nothing.
 HALL = room(50.0, 50.0)

@@ -34,12 +34,11 @@ import zenoh
 from fasaco_edge.bench.processes import warm_kernels
 from fasaco_edge.recording.write.quota import oldest_first
 from tests.campaigns.shifted_clock import ShiftedClock
-from tests.support.certificates import Authority, authority
 from tests.support.outsider import Outsider
 from tests.support.processes import ENVIRONMENT, PROGRAM, Daemon, daemon_process, free_endpoint
-from tests.support.recording_reading import read_summary
+from tests.support.recordings import read_summary
 from tests.support.rooms import map_bytes, pose_bytes
-from tests.support.secured import transport
+from tests.support.secured import Authority, authority, transport
 
 YEAR_S = 365 * 86_400.0
 BOOT_1970_S = 12.0

@@ -28,12 +28,11 @@ from fasaco_edge.wire.keys import Keys
 from tests.campaigns.kill_recorder import driving
 from tests.campaigns.services import START_S, Service, service
 from tests.daemon.test_commands import command
-from tests.support.hall import begin, drive, lanes
 from tests.support.ledgers import CELL_M, Cell, contents, lane, visits_of
 from tests.support.outsider import Outsider
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
-from tests.support.recorders import bus_on_free_port
-from tests.support.recording_reading import read_summary
+from tests.support.recordings import bus_on_free_port, read_summary
+from tests.support.rooms import begin, drive, lanes
 
 DRIVEN, MESSAGES = 6, 60
 # To compile all kernels takes a minute; on a busy computer, many.

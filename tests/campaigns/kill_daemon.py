@@ -20,10 +20,10 @@ from typing import Any
 
 from fasaco_edge.bench.processes import warm_kernels
 from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger
+from tests.campaigns.roaming import Robot, Trail, entries, roaming_robot
 from tests.support.ledgers import CELL_M, Cell, visits_of
 from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process
-from tests.support.roaming import Robot, Trail, entries, roaming_robot
 
 # At so small a distance from the border of "under the tool", rounding may decide.
 DOUBT_M = 0.01

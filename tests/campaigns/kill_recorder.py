@@ -24,9 +24,8 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.recording.read.samples import RecordedSamples
-from tests.support.recorded_mission import Mission
-from tests.support.recorders import bus_on_free_port, recorder_process
-from tests.support.recording_reading import read_column
+from tests.support.recordings import bus_on_free_port, read_column, recorder_process
+from tests.support.scripted_mission import Mission
 
 GOAL_LOST_S = 1.0
 POSES_HZ, FRAMES = 50, 400

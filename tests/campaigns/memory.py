@@ -32,10 +32,10 @@ from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.host.processes import peak_mb
 from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
 from tests.support import processes
-from tests.support.limited import Group, memory_group, unit_limit, why_not
 from tests.support.outsider import Outsider, open_client
 from tests.support.processes import Daemon, daemon_process
 from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.service_manager import Group, memory_group, unit_limit, why_not
 
 SIDES = (1000, 2000, 4000, 5000, 8000)
 RESOLUTIONS = (0.0001, 0.02, 0.05)

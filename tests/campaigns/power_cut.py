@@ -36,13 +36,13 @@ from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording.read.repair import repair_folder, scan_recording
 from tests.campaigns.file_calls import Call, Kind, Watch, why_not
 from tests.campaigns.power_states import Cut, Disk, Spread, cuts_of
+from tests.campaigns.roaming import entries, roaming_robot
 from tests.campaigns.services import START_S, service, show
 from tests.daemon.test_commands import command
 from tests.support.ledgers import CELL_M, Cell, contents
 from tests.support.outsider import Outsider
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
-from tests.support.recording_reading import read_summary
-from tests.support.roaming import entries, roaming_robot
+from tests.support.recordings import read_summary
 
 # At so small a distance from the border of "under the tool", rounding may decide.
 DOUBT_M = 0.01

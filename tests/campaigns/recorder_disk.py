@@ -23,8 +23,7 @@ from pathlib import Path
 
 from fasaco_edge.recording import entities
 from tests.campaigns.kill_recorder import driving
-from tests.support.recorders import bus_on_free_port, recorder_process
-from tests.support.recording_reading import read_column, read_summary
+from tests.support.recordings import bus_on_free_port, read_column, read_summary, recorder_process
 
 DISK = "size=24m"
 # So little is left of the room when the disk is filled [bytes].

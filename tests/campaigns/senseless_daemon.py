@@ -32,9 +32,9 @@ from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from tests.campaigns import raw_messages
 from tests.campaigns.senseless import SILENT, Event, pixels_of
-from tests.support.managing import Manager
 from tests.support.processes import Daemon, daemon_process, free_endpoint
 from tests.support.router import router_process
+from tests.support.service_manager import Manager
 from tests.wire.schemas import check
 
 PREFIX = "fasaco/@v1/robot"

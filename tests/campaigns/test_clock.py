@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("rerun")
 
 from tests.campaigns import clock, shifted_clock
-from tests.support.certificates import needs_openssl
+from tests.support.secured import needs_openssl
 
 
 @needs_openssl

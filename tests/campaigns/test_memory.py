@@ -10,10 +10,10 @@ import pytest
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.memory import needed_bytes
 from tests.campaigns.memory import Flood, pour, run_flood, run_floods
-from tests.support.limited import UNIT, memory_group, unit_limit, why_not
 from tests.support.outsider import Outsider
 from tests.support.processes import ENVIRONMENT, daemon_process
 from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.service_manager import UNIT, memory_group, unit_limit, why_not
 
 SMALL = {"map": {"max_pixels": 4_000_000, "max_lattice_cells": 60_000}}
 limited = pytest.mark.skipif(bool(why_not()), reason=why_not())

@@ -7,9 +7,8 @@ import json
 import pytest
 
 from fasaco_edge.wire.keys import RPC_NAMES
-from tests.support.commands import fasaco_edge
 from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
+from tests.support.processes import daemon_process, fasaco_edge
 from tests.support.rooms import map_bytes, pose_bytes, room
 
 SAID = {

@@ -11,7 +11,7 @@ import yaml
 from fasaco_edge.cli import main
 from fasaco_edge.config.config import load_config
 from fasaco_edge.errors import BadConfiguration
-from tests.support.commands import fasaco_edge
+from tests.support.processes import fasaco_edge
 
 EXAMPLE = Path(__file__).parents[2] / "deploy" / "fasaco-edge.yaml"
 WRONG = """\

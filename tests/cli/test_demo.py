@@ -12,8 +12,7 @@ import pytest
 from PIL import Image
 
 from fasaco_edge.grid.map_files import find_map, read_map
-from tests.support.commands import fasaco_edge
-from tests.support.processes import is_running
+from tests.support.processes import fasaco_edge, is_running
 
 CELL_M, RADIUS_M = 0.3, 0.18
 

@@ -12,8 +12,8 @@ from fasaco_edge.cli import main
 from fasaco_edge.doctor.finding import Check, Finding, Level
 from fasaco_edge.doctor.report import CHECKS, findings
 from fasaco_edge.errors import BadConfiguration
-from tests.support.certificates import authority, needs_openssl
-from tests.support.commands import fasaco_edge
+from tests.support.processes import fasaco_edge
+from tests.support.secured import authority, needs_openssl
 
 OF_CONFIG = [check.name for check in CHECKS if not check.of_machine]
 ROLES = {"mapper": ["slam"], "operator": ["boss"]}

@@ -12,8 +12,7 @@ import pytest
 
 from fasaco_edge.bench import machine as placement
 from fasaco_edge.cli import main
-from tests.support.commands import ENVIRONMENT, PROGRAM, fasaco_edge
-from tests.support.processes import free_endpoint
+from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge, free_endpoint
 
 NOBODY = "tcp/127.0.0.1:1"
 

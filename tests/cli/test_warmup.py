@@ -10,7 +10,7 @@ import sys
 from fasaco_edge.kernels.cache import code_digest
 from tests.kernels.harm import zeroed
 from tests.kernels.installations import fill_with
-from tests.support.commands import ENVIRONMENT, fasaco_edge
+from tests.support.processes import ENVIRONMENT, fasaco_edge
 
 COUNT = """
 import importlib

@@ -10,11 +10,9 @@ from typing import Any
 import pytest
 
 from tests.daemon.test_mission import about, planned
-from tests.support.commands import fasaco_edge
-from tests.support.hall import begin, drive, lanes
 from tests.support.outsider import Outsider
-from tests.support.processes import Daemon, daemon_process
-from tests.support.rooms import TOOL_M, cells_of, map_bytes, pose_bytes, room
+from tests.support.processes import Daemon, daemon_process, fasaco_edge
+from tests.support.rooms import TOOL_M, begin, cells_of, drive, lanes, map_bytes, pose_bytes, room
 
 # Lanes 3 and 4 of the hall, columns 1 to 4.
 KITCHEN = {"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5], [0.3, 1.5]]}

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 import time
 
-from tests.support.hall import HALL, begin, drive, lanes
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
-from tests.support.rooms import map_bytes, pose_bytes
+from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes
 
 
 def command(client, name):

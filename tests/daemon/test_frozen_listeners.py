@@ -41,7 +41,7 @@ def plan_times(outsider, count, first_revision):
 def test_a_frozen_subscriber_does_not_hold_the_planner(daemon, outsider):
     plan_times(outsider, 1, 0)  # brings the kernels along
     free = plan_times(outsider, 5, 1)
-    command = [sys.executable, "-m", "tests.support.frozen", daemon.endpoint]
+    command = [sys.executable, "-m", "tests.support.outsider", daemon.endpoint]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as listener:
         try:
             assert listener.stdout.readline() == b"listening\n"

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge.daemon.ledger.writer import RETRY_S
-from tests.support.hall import begin, drive, lanes, wait_written
 from tests.support.outsider import Outsider
 from tests.support.processes import STOP_S, Daemon, daemon_process
+from tests.support.rooms import begin, drive, lanes, wait_written
 
 
 @pytest.fixture

@@ -27,7 +27,7 @@ from fasaco_edge.daemon.memory import (
 )
 from fasaco_edge.grid.lattice import MOST_REACH_PX
 from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_POSE_BYTES
-from tests.support.limited import unit_limit
+from tests.support.service_manager import unit_limit
 
 ROOT = Path(__file__).parents[2]
 DEFAULT = DaemonConfig()

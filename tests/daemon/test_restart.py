@@ -14,11 +14,20 @@ import pytest
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.writer import PERIOD_S
 from tests.campaigns.kill_daemon import MOST_LOST_S, run_campaign
-from tests.support.hall import HALL, begin, drive, lanes, pillars, wait_written
 from tests.support.ledgers import CELL_M
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
-from tests.support.rooms import FREE, map_bytes, pose_bytes
+from tests.support.rooms import (
+    FREE,
+    HALL,
+    begin,
+    drive,
+    lanes,
+    map_bytes,
+    pillars,
+    pose_bytes,
+    wait_written,
+)
 
 # The full campaign, two hundred, is a command: see kill_campaign.py.
 KILLS = 3

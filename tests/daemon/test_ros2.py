@@ -13,7 +13,6 @@ from tests.daemon.test_idle import IDLE_MB
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint, resident_mb
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, two_rooms, update_bytes
-from tests.support.ros_checks import check_attachment, check_path, is_walk
 from tests.support.ros_robot import (
     GRID,
     PATH,
@@ -22,6 +21,9 @@ from tests.support.ros_robot import (
     UPDATE,
     Naming,
     RosRobot,
+    check_attachment,
+    check_path,
+    is_walk,
     ros_node,
     ros_robot,
     ros_router,

@@ -10,11 +10,10 @@ import zenoh
 
 from fasaco_edge.host.resources import folder
 from tests.daemon.test_security import PAUSE, SILENCE_S
-from tests.support.certificates import authority, needs_openssl
 from tests.support.outsider import Outsider, open_client
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes
-from tests.support.secured import transport
+from tests.support.secured import authority, needs_openssl, transport
 
 pytestmark = needs_openssl
 FLEET = ("r1", "r2")

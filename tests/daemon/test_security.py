@@ -12,11 +12,10 @@ import zenoh
 import zenoh.ext
 
 from fasaco_edge.daemon.loop.inbox import MAP_SPACING_S
-from tests.support.certificates import authority, needs_openssl
 from tests.support.outsider import Ear, Outsider, open_client
 from tests.support.processes import PROGRAM, daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, room
-from tests.support.secured import NAMES, secured_daemon, transport
+from tests.support.secured import NAMES, authority, needs_openssl, secured_daemon, transport
 
 pytestmark = needs_openssl
 START = json.dumps({"command": "start"}).encode()

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.support.managing import Manager
 from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process
 from tests.support.rooms import fill, map_bytes, pillared_room, pose_bytes, two_rooms
+from tests.support.service_manager import Manager
 
 WATCHDOG_S = 1.0
 # Neither free nor occupied by the default thresholds.

@@ -8,8 +8,8 @@ import time
 import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from tests.daemon.breaking import MISSION_M, PHEROMONE_M, PLANNER_M
 from tests.support import processes
-from tests.support.breaking import MISSION_M, PHEROMONE_M, PLANNER_M
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import map_bytes, pose_bytes, room
@@ -40,7 +40,7 @@ def stand(client, holds, x=0.75, y=0.75):
 
 @pytest.fixture
 def breaking(tmp_path, monkeypatch):
-    program = (sys.executable, "-m", "tests.support.breaking")
+    program = (sys.executable, "-m", "tests.daemon.breaking")
     monkeypatch.setattr(processes, "PROGRAM", program)
     # Pheromone is of full plans by the colony alone.
     with (

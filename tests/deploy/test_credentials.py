@@ -8,7 +8,7 @@ import pytest
 
 from tests.deploy.recordings import recordings
 from tests.deploy.service import UNITS, Service, wait_for
-from tests.support.certificates import authority, needs_openssl
+from tests.support.secured import authority, needs_openssl
 
 LENT = {
     "root_ca": "$CREDENTIALS_DIRECTORY/ca.pem",

@@ -13,7 +13,7 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from tests.support.maps import (
+from tests.support.grids import (
     cropped,
     displaced,
     footprints,

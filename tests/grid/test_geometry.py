@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import RASTER_STEPS, GridGeometry, Pose2D, Window
-from tests.support.maps import on_raster
+from tests.support.grids import on_raster
 
 METRES = st.floats(-1e3, 1e3)
 SIDES = st.integers(-20, 20)

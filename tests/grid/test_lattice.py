@@ -13,7 +13,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from tests import naive
-from tests.support.maps import cropped, footprints, grid, occupancy_grids, on_raster
+from tests.support.grids import cropped, footprints, grid, occupancy_grids, on_raster
 
 
 def cells_and_centres(window, cell_m):

@@ -6,7 +6,7 @@ import pytest
 from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from tests.support.maps import grid
+from tests.support.grids import grid
 
 
 def patch(window, value=100, frame="map"):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
 from tests import naive
-from tests.support.maps import footprints, grid, occupancy_grids, on_raster
+from tests.support.grids import footprints, grid, occupancy_grids, on_raster
 
 
 def assert_agrees(occupancy, footprint):

@@ -6,7 +6,7 @@ from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.orders.order import OrderError
 from fasaco_edge.mission.orders.order_state import CommandError, OrderState
-from tests.support.mission_world import (
+from tests.mission.world import (
     CONFIG,
     Drive,
     answer,

@@ -11,7 +11,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived, State
 from tests import naive
-from tests.support.mission_world import FOOTPRINT, PIXELS, Drive, placed, pose_at, reachable_cells
+from tests.mission.world import FOOTPRINT, PIXELS, Drive, placed, pose_at, reachable_cells
 
 
 class Reveal:

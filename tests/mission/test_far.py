@@ -8,7 +8,7 @@ from fasaco_edge.grid.geometry import FARTHEST_M, GridGeometry, Pose2D, StampedP
 from fasaco_edge.grid.lattice import MOST_INDEX, CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
-from tests.support.mission_world import CELL, CONFIG, Drive, building
+from tests.mission.world import CELL, CONFIG, Drive, building
 
 # Easting and northing of a place in Germany, and the largest northing there is [m].
 UTM = [(500_000.0, 5_500_000.0), (833_000.25, 9_999_990.5), (-19_999_000.0, 19_999_000.0)]

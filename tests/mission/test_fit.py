@@ -12,7 +12,7 @@ from fasaco_edge.mission.core.events import Decision, MapReceived, State
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerMismatchError
 from fasaco_edge.mission.coverage.ledger_keeper import Fit, Verdict
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
-from tests.support.mission_world import CELL, Drive, building, patch, placed, pose_at, started
+from tests.mission.world import CELL, Drive, building, patch, placed, pose_at, started
 
 MAPS = ("office", "flat", "basement", "walled_grid", "warehouse")
 ROBOT = Footprint(0.3, 0.18)

@@ -8,7 +8,7 @@ from fasaco_edge.errors import WrongFrame
 from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.coverage.ledger import LedgerMismatchError
 from fasaco_edge.mission.map.inputs import PATIENCE_S
-from tests.support.mission_world import CONFIG, Drive, building, patch, pose_at, started
+from tests.mission.world import CONFIG, Drive, building, patch, pose_at, started
 
 HALL = ("########", *("#......#",) * 4, "########")
 MAP, ODOM = MapReceived(building(*HALL)), MapReceived(building(*HALL, frame="odom"))

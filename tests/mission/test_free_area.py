@@ -11,8 +11,8 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.map.reachable_area import FreeArea
-from tests.support.maps import occupancy_grids
-from tests.support.mission_world import CELL, building, started
+from tests.mission.world import CELL, building, started
+from tests.support.grids import occupancy_grids
 
 FOOTPRINT = Footprint(cell_m=0.3, robot_radius_m=0.12)
 

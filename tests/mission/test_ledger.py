@@ -16,7 +16,7 @@ from fasaco_edge.mission.coverage.ledger import (
     TILE,
     CoverageLedger,
 )
-from tests.support.mission_world import Drive, building, pose_at
+from tests.mission.world import Drive, building, pose_at
 
 CELL = 0.25
 

@@ -7,7 +7,7 @@ import pytest
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.orders.order_state import CommandError, OrderState
-from tests.support.mission_world import Drive, building, pose_at, started
+from tests.mission.world import Drive, building, pose_at, started
 
 ROOM = ("........",) * 6
 

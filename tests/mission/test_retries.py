@@ -7,7 +7,7 @@ import numpy as np
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.coverage.unreached import viewpoints
-from tests.support.mission_world import (
+from tests.mission.world import (
     CELL,
     CONFIG,
     Drive,

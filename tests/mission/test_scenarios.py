@@ -20,7 +20,7 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.executive import PATIENCE_S
 from fasaco_edge.planners.path import CoveragePath
-from tests.support.mission_world import (
+from tests.mission.world import (
     Drive,
     answer,
     building,

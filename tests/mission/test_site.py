@@ -13,7 +13,7 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.zones import kept_out, without
-from tests.support.maps import displaced, grid, occupancy_grids, part_of, repainted
+from tests.support.grids import displaced, grid, occupancy_grids, part_of, repainted
 
 FOOTPRINT = Footprint(cell_m=0.2, robot_radius_m=0.08)
 ZONE = ((0.3, 0.3), (0.9, 0.3), (0.9, 0.8), (0.3, 0.8))

@@ -14,7 +14,7 @@ from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.repair import HELD_CELLS
 from fasaco_edge.planners.stopping import SearchWork, WorkLimit, never
 from tests.benchmarks.judge import check_walk
-from tests.support.mission_world import CONFIG, Drive, building, patch, pose_at
+from tests.mission.world import CONFIG, Drive, building, patch, pose_at
 
 HALL = ["." * 12 for _ in range(12)]
 SHARE = 0.1

@@ -13,7 +13,7 @@ from fasaco_edge.mission.core.executive import PATIENCE_S
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.orders.order_state import OrderState
-from tests.support.mission_world import (
+from tests.mission.world import (
     CONFIG,
     Drive,
     answer,

@@ -17,8 +17,8 @@ from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 from tests import naive
 from tests.kernels.test_bound import drawn_task, shortest_walks
+from tests.planners.searches import TURNS, Watched, after, hall, plan
 from tests.support.grids import ROOMS, lattice, placed
-from tests.support.searches import TURNS, Watched, after, hall, plan
 
 ROOT = Path(__file__).parents[2]
 

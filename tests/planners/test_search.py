@@ -17,8 +17,7 @@ from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.stopping import AnyOf, GapReached, Interrupt, WorkLimit, never
 from tests.benchmarks.buildings import building
-from tests.support.grids import ENDS, ROOMS, end_of, problems
-from tests.support.searches import (
+from tests.planners.searches import (
     FEW_ANTS,
     TURNS,
     Watched,
@@ -29,6 +28,7 @@ from tests.support.searches import (
     plan,
     take_apart,
 )
+from tests.support.grids import ENDS, ROOMS, end_of, problems
 
 
 @settings(max_examples=100, deadline=None)

@@ -18,9 +18,8 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.recording.scene.anchor import NEAR_M, Anchor
 from fasaco_edge.wire.maps import decode_occupancy_grid
-from tests.support import recorded_mission as made_up
-from tests.support.recorders import bus_on_free_port, recorder_process
-from tests.support.recording_reading import read_column
+from tests.support import scripted_mission as made_up
+from tests.support.recordings import bus_on_free_port, read_column, recorder_process
 
 UTM = (500_012.0, 5_500_034.0)
 DRAWN_FROM = (500_000.0, 5_500_000.0)

@@ -14,8 +14,8 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.recording.scene import archetypes
 from tests.support import viewer
-from tests.support.recorded_mission import Mission
-from tests.support.recorders import bus_on_free_port, recorder_process
+from tests.support.recordings import bus_on_free_port, recorder_process
+from tests.support.scripted_mission import Mission
 
 pytestmark = pytest.mark.skipif(not viewer.drivers(), reason="no software renderer")
 

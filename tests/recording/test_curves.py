@@ -10,7 +10,7 @@ from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.curves import PERIOD_NS, Curves
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter
-from tests.support.recording_reading import SCALAR, read_column
+from tests.support.recordings import SCALAR, read_column
 
 SECOND_NS = 1_000_000_000
 

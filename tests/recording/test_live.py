@@ -13,8 +13,8 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording.write.live import serve_live
-from tests.support.recorded_mission import Mission
-from tests.support.recorders import bus_on_free_port, recorder_process
+from tests.support.recordings import bus_on_free_port, recorder_process
+from tests.support.scripted_mission import Mission
 
 
 def free_port() -> int:

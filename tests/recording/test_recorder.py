@@ -31,9 +31,15 @@ from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID
-from tests.support.recorded_mission import CELL_M, COLS, ORIGIN, ROWS, Mission, building
-from tests.support.recorders import bus_on_free_port, recorder_process
-from tests.support.recording_reading import SCALAR, RecordingSummary, read_column, read_summary
+from tests.support.recordings import (
+    SCALAR,
+    RecordingSummary,
+    bus_on_free_port,
+    read_column,
+    read_summary,
+    recorder_process,
+)
+from tests.support.scripted_mission import CELL_M, COLS, ORIGIN, ROWS, Mission, building
 
 ERRORS = {"total": 2, "last": "", "by_code": {"malformed_message": 2, "no code": 3}}
 FRAMES = 40

@@ -18,7 +18,7 @@ from fasaco_edge.review.review import read_review
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, TF_MESSAGE
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
-from tests.support.recording_reading import read_summary
+from tests.support.recordings import read_summary
 from tests.support.rooms import map_bytes, pillared_room
 from tests.support.ros_robot import GRID, Naming, ros_robot
 

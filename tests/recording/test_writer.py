@@ -18,7 +18,7 @@ from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.quota import DiskBudget, Quota
 from fasaco_edge.recording.write.writer import FLUSH_PERIOD_NS, RecordingWriter, WriterState
-from tests.support.recording_reading import read_column, read_summary
+from tests.support.recordings import read_column, read_summary
 
 RUN = "run-1"
 

@@ -17,10 +17,10 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.replay.replay import Replay
 from fasaco_edge.replay.stand_ins import read_run
-from tests.support import scenarios
-from tests.support.commands import fasaco_edge
-from tests.support.recorded import record_mission
-from tests.support.scenarios import driven_m, left, places, played
+from tests.replay import scenarios
+from tests.replay.scenarios import driven_m, left, places, played
+from tests.support.processes import fasaco_edge
+from tests.support.recorded_mission import record_mission
 
 
 @pytest.fixture(scope="module")

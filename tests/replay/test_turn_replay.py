@@ -16,8 +16,8 @@ from fasaco_edge.replay.stand_ins import read_run
 from fasaco_edge.replay.turn_record import TURNS, read_turns
 from fasaco_edge.replay.turn_replay import TurnReplay
 from fasaco_edge.wire.turns import decode_turns, encode_turns
-from tests.support.recorded import record_mission
-from tests.support.scenarios import changed, places, without
+from tests.replay.scenarios import changed, places, without
+from tests.support.recorded_mission import record_mission
 from tests.wire.schemas import check
 
 # What stands before the pixels of a map update is shorter.

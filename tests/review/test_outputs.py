@@ -25,7 +25,7 @@ from fasaco_edge.review.page import page_of
 from fasaco_edge.review.picture import SIZE, draw_review
 from fasaco_edge.review.review import CoverageCounts, read_review, review_of
 from tests.review.test_parts import run_told
-from tests.support.commands import ENVIRONMENT, PROGRAM, fasaco_edge
+from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge
 
 VOID = ("meta", "img")
 

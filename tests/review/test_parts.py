@@ -19,7 +19,7 @@ from fasaco_edge.wire import schemas
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.paths import encode_path
-from tests.support.recorders import bus_on_free_port, recorder_process
+from tests.support.recordings import bus_on_free_port, recorder_process
 from tests.support.rooms import map_bytes, pose_bytes, room
 
 CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "mission": {"lost_pose_s": 3.0}}

@@ -16,8 +16,8 @@ from fasaco_edge.review.drive import walk_figures
 from fasaco_edge.review.review import read_review
 from tests.benchmarks.judge import check_walk
 from tests.review.naive import nearest_rank, passed_cells, quarter_turns
-from tests.support.commands import fasaco_edge
-from tests.support.recorded import record_mission
+from tests.support.processes import fasaco_edge
+from tests.support.recorded_mission import record_mission
 from tests.support.rooms import TOOL_M
 
 BROKEN_POSES = 3

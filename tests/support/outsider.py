@@ -1,8 +1,12 @@
-"""A program of somebody else on the bus: plain Zenoh, payloads by rosbags, no code of ours."""
+"""A program of somebody else on the bus: plain Zenoh, payloads by rosbags, no code of ours.
+
+``python -m tests.support.outsider ENDPOINT`` subscribes to all that is published, to be frozen.
+"""
 
 from __future__ import annotations
 
 import json
+import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -163,3 +167,18 @@ def _heard(sample: zenoh.Sample) -> Heard:
         str(sample.encoding),
         None if attachment is None else attachment.to_bytes(),
     )
+
+
+def main() -> None:
+    """Listen until killed; say "listening" on standard output once a status came."""
+    with Outsider(sys.argv[1]) as outsider:
+        for name in ("path", "coverage", "pheromone", "status"):
+            outsider.listen(name, late=name != "pheromone")
+        outsider.ask_status()
+        print("listening", flush=True)
+        while True:
+            time.sleep(1.0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,4 +1,4 @@
-"""Daemon processes: started as a service manager would, ended, and watched for what they leave."""
+"""Daemons and commands as processes of their own, started as a user or a service manager does."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from typing import Any
 
 import yaml
 
-import fasaco_edge
+import fasaco_edge as package
 
 # What a daemon may take from SIGTERM to its end on a machine that is busy with much else [s]; on
 # a quiet one it is two seconds at most.
 STOP_S = 30.0
 PROGRAM = (sys.executable, "-m", "fasaco_edge")
 # Found from any folder, installed or not.
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(fasaco_edge.__file__).parents[1])}
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(package.__file__).parents[1])}
 
 
 def free_endpoint() -> str:
@@ -124,3 +124,25 @@ def is_running(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
+
+
+COMMAND_S = 400.0
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended, and what it said."""
+
+    code: int
+    out: str
+    err: str
+
+
+def fasaco_edge(*words: object) -> Ended:
+    """Run a command to its end; a traceback is never right."""
+    command = [*PROGRAM, *(str(word) for word in words)]
+    ended = subprocess.run(
+        command, check=False, capture_output=True, text=True, timeout=COMMAND_S, env=ENVIRONMENT
+    )
+    assert "Traceback" not in ended.stderr, ended.stderr
+    return Ended(ended.returncode, ended.stdout, ended.stderr)

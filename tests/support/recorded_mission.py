@@ -1,242 +1,207 @@
-"""A made-up mission, as the daemon and a robot would publish it: asymmetric, so that a
-mirrored picture shows.
+"""A short mission of a real daemon with a real recorder: a robot in a room it does not know.
 
-A building of 8 m x 6 m whose corner (0, 0) lies at (-1, -2) m: one wall inside, from
-the bottom, and a box at the lower right. The robot sees ever more of it, from the left.
+Its mapper sends whole maps while they grow, and else updates. For a while it believes in a
+crate that is not there. Once the robot is told to pause, and to go on.
 """
 
 from __future__ import annotations
 
-import json
-import math
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
+from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.publisher import QOS
-from fasaco_edge.bus.session import Bus
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
-from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.planners.planner import ColonySnapshot
-from fasaco_edge.wire.coverage import BLOCKED, COVERED, RECOVERED, TO_COVER, UNKNOWN
-from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.errors import BusUnavailable
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.planners.warmup import warm_up
+from fasaco_edge.simulation.config import SimulationConfig
+from fasaco_edge.simulation.world import World
+from fasaco_edge.wire import schemas
+from fasaco_edge.wire.json_text import decode_json, encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import encode_occupancy_grid
-from fasaco_edge.wire.paths import encode_path
-from fasaco_edge.wire.pheromone import encode_pheromone
+from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
+from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.poses import encode_pose_stamped
-from fasaco_edge.wire.schemas import OCCUPANCY_GRID, PATH, PHEROMONE_GRID, POSE_STAMPED
+from tests.support.processes import daemon_process
+from tests.support.rooms import RESOLUTION_M, WALL, fill, room
 
-RESOLUTION_M = 0.05
-CELL_M = 0.25
-ORIGIN = (-1.0, -2.0)
-ROWS, COLS = 120, 160
-# The box that turns up half-way, where the map said free: rows and columns of pixels.
-SURPRISE = (slice(80, 92), slice(40, 52))
+SIZE_M = (3.6, 2.7)
+START = Pose2D(0.75, 0.75)
+# Where the crate is said to stand [m], and from when to when [simulated s].
+CRATE = (2.4, 1.2, 2.7, 1.5)
+CRATE_S = (8.0, 25.0)
+# What is commanded when [simulated s].
+COMMANDS = ((14.0, "pause"), (16.0, "resume"), (19.0, "replan"))
+# From the first path to the first command, at least [s]: when the daemon took what a recording
+# tells no more exactly than that.
+DRIVES_S = 0.5
+# Simulated seconds per second.
+SPEED = 16.0
+TIMEOUT_S = 250.0
+SIMULATION = SimulationConfig(
+    robot_radius_m=0.18, range_m=1.2, map_chunk_m=1.5, map_hz=1.0, pose_hz=4.0
+)
 
 
-@dataclass
-class Mission:
-    """Publishes a mission on ``bus``: ``frames()`` yields after each tenth of a second of it."""
+@dataclass(frozen=True)
+class Recording:
+    """The parts, what the daemon said, and where the robot was in truth.
 
-    bus: Bus
-    keys: Keys = field(default_factory=Keys)
+    ``statuses`` and ``notes``, those of all paths, come with the seconds they came at.
+    """
 
-    def __post_init__(self) -> None:
-        bus, keys = self.bus, self.keys
-        self._map = bus.publisher(keys.map, OCCUPANCY_GRID, QOS["map"])
-        self._pose = bus.publisher(keys.pose, POSE_STAMPED, QOS["pose"])
-        self._path = bus.publisher(keys.path, PATH, QOS["path"])
-        self._coverage = bus.publisher(keys.coverage, OCCUPANCY_GRID, QOS["coverage"])
-        self._pheromone = bus.publisher(keys.pheromone, PHEROMONE_GRID)
-        self._status = bus.publisher(keys.status, qos=QOS["status"])
-        self.walk = _walk()
-        self.rest = self.walk
-        self.seen_cells = 0
-        self.revision = 0
-        self.best_steps = 0
-        self.covered = self.recovered = 0.0
-        self.visits = np.zeros((ROWS // 5, COLS // 5), np.int64)
+    paths: list[Path]
+    status: dict
+    statuses: list[tuple[float, dict]]
+    notes: list[tuple[float, dict]]
+    trail: np.ndarray
 
-    def frames(self, count: int) -> Iterator[float]:
-        """Publish ``count`` steps of the mission; yield how far it is, from 0 to 1."""
-        for frame in range(count):
-            done = frame / max(count - 1, 1)
-            if frame % max(count // 16, 1) == 0:
-                self.publish_map(done)
-                self.replan(done, "first map" if frame == 0 else "the map grew")
-            self.drive(done)
-            if frame % 4 == 0:
-                self.publish_coverage(done)
-            yield done
 
-    def publish_map(self, done: float) -> None:
-        """Publish what is known of the building by then: it grows to the right."""
-        self.seen_cells = known_columns(done) // 5
-        truth = building(done)[:, : known_columns(done)]
-        self._map.put(encode_occupancy_grid(occupancy(truth)))
+def is_done(status: dict) -> bool:
+    """Tell whether all is covered."""
+    return status.get("state") == "done"
 
-    def replan(self, done: float, reason: str) -> None:
-        """Publish three cohorts and the walk they led to."""
-        self.revision += 1
-        self.publish_status("planning", done, planning=True)
-        for cohort in range(3):
-            self.publish_cohort(cohort, done)
-        self.rest = self.walk[round(done * (len(self.walk) - 1)) :]
-        seen = cells(self.rest)[1] < self.seen_cells - 1
-        rest = self.rest = self.rest[: np.argmin(seen) if not seen.all() else None]
-        note = {
-            "revision": self.revision,
-            "map_stamp_ns": 0,
-            "reason": reason,
-            "planner": "fasaco",
-            "seed": 7,
-            "steps": len(rest) - 1,
-            "plan_ms": 40.0 + 10.0 * math.sin(self.revision),
-            "ants": 60,
-            "planned_steps": len(rest) - 1,
-            "lower_bound_steps": len(rest) - 4,
-            "planned_cost_s": 1.2 * len(rest),
-            "gap": 3 / (len(rest) - 4),
-            "changed": self.changed(done) if reason == "the map grew" else None,
-        }
-        yaw = np.zeros(len(rest))
-        self._path.put(encode_path(rest, yaw, "map", _stamp()), json.dumps(note).encode())
-        self.publish_status("covering", done, planning=False)
 
-    def changed(self, done: float) -> dict[str, float]:
-        """Return where the map has just grown."""
-        x, y = ORIGIN[0] + RESOLUTION_M * known_columns(done), ORIGIN[1]
-        return {"x_min": x - 0.75, "y_min": y + 0.5, "x_max": x - 0.25, "y_max": y + 5.0}
+def record_mission(
+    folder: Path, name: str = "runs", ends=is_done, *, broken_poses: int = 0
+) -> Recording:
+    """Record a mission from its first map until a status ends it; some poses may be none."""
+    runs = folder / name
+    warm_up()  # so that the daemon need not compile while the robot waits
+    with daemon_process(folder, "--record", str(runs), planner={"budget_s": 0.05}) as daemon:
+        deadline = time.monotonic() + TIMEOUT_S
+        while (bus := _joined(daemon.endpoint)) is None:
+            assert time.monotonic() < deadline, daemon.log_text()
+            time.sleep(0.05)
+        with bus:
+            robot = MappingRobot(bus, broken_poses)
+            robot.wait(lambda status: (status["recorder"] or {}).get("state") == "recording")
+            robot.drive(ends)
+        # With the recorder's last words it may take a while on a busy machine.
+        daemon.process.terminate()
+        daemon.process.wait(TIMEOUT_S)
+    return Recording(
+        sorted(runs.glob("*.rrd")), robot.status, robot.statuses, robot.notes, robot.trail
+    )
 
-    def publish_cohort(self, cohort: int, done: float) -> None:
-        """Publish pheromone that gathers along the walk."""
-        trail = np.full(self.visits.shape, 0.1, np.float32)
-        rows, cols = cells(self.walk)
-        along = np.arange(len(rows)) / len(rows)
-        np.add.at(trail, (rows, cols), 5.0 * (cohort + 1) * (0.2 + along).astype(np.float32))
-        trail[blocked_cells(done)] = 0.0
-        trail = trail[:, : self.seen_cells]
-        self.best_steps = round(len(rows) * (1.3 - 0.1 * cohort) - 40 * done)
-        col, row = (round(at / CELL_M) for at in ORIGIN)
-        window = Window(0, 0, *trail.shape).moved(row, col)
-        snapshot = ColonySnapshot(
-            window, CELL_M, trail, cohort, 1, 20 * (cohort + 1), self.best_steps
+
+def _joined(endpoint: str) -> Bus | None:
+    try:
+        return open_bus(BusSettings("client", (endpoint,)))
+    except BusUnavailable:
+        return None
+
+
+class MappingRobot:
+    """A robot on the bus, and the newest status of the daemon."""
+
+    def __init__(self, bus: Bus, broken_poses: int = 0) -> None:
+        self._bus, self._keys = bus, Keys()
+        self._broken_poses = broken_poses
+        keys = self._keys
+        self._commands = list(COMMANDS)
+        pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
+        geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0))
+        self._world = World(OccupancyGrid(geometry, pixels), START, SIMULATION)
+        self._maps = bus.publisher(keys.map, schemas.OCCUPANCY_GRID, QOS["map"])
+        self._updates = bus.publisher(keys.map_update, schemas.OCCUPANCY_GRID_UPDATE)
+        self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED, QOS["pose"])
+        self._newest_path = LatestSlot[Sample]()
+        self.status: dict = {}
+        self.statuses: list[tuple[float, dict]] = []
+        self.notes: list[tuple[float, dict]] = []
+        self._sent: OccupancyGrid | None = None
+        bus.subscribe(keys.path, self._take_path, latched=True)
+        bus.subscribe(keys.status, self._hear, latched=True)
+
+    def wait(self, holds) -> None:
+        """Wait for a status."""
+        deadline = time.monotonic() + TIMEOUT_S
+        while not (self.status and holds(self.status)):
+            assert time.monotonic() < deadline, f"never came; the last was {self.status}"
+            time.sleep(0.02)
+
+    def drive(self, ends=is_done) -> None:
+        """Drive until the daemon says that all is covered, or what else ends it."""
+        deadline = time.monotonic() + TIMEOUT_S
+        tick_s = SIMULATION.tick_s / SPEED
+        due = time.monotonic()
+        while not ends(self.status):
+            assert time.monotonic() < deadline, f"never done; the last was {self.status}"
+            if (sample := self._newest_path.take(0.0)) is not None:
+                self._world.follow(decode_path(sample.payload).xy)
+            self._publish()
+            if self._is_time():
+                self._command(self._commands.pop(0)[1])
+                due = time.monotonic()
+            due += tick_s
+            time.sleep(max(due - time.monotonic(), 0.0))
+        # The last path, which tells the robot to stop, is to be recorded too, and its turn.
+        time.sleep(0.8)
+
+    def _is_time(self) -> bool:
+        """Tell whether the next command is due; one that waits for its first path gets none."""
+        if not self._commands or 1e-9 * self._world.stamp_ns < self._commands[0][0]:
+            return False
+        if not self.notes or time.monotonic() - self.notes[0][0] < DRIVES_S:
+            return False
+        return self._commands[0][1] == "resume" or self.status.get("state") == "covering"
+
+    def _publish(self) -> None:
+        emission = self._world.tick()
+        if emission.map is not None:
+            self._publish_map(self._believed(emission.map))
+        if emission.pose is not None:
+            pose = encode_pose_stamped(emission.pose)
+            self._poses.put(pose)
+            if self._broken_poses:
+                self._broken_poses -= 1
+                self._poses.put(pose[:-5])
+
+    def _command(self, name: str) -> None:
+        payload = encode_json({"command": name})
+        (reply,) = self._bus.get(self._keys.rpc("mission"), timeout_s=TIMEOUT_S, payload=payload)
+        assert not reply.is_error, reply.payload
+
+    def _believed(self, grid: OccupancyGrid) -> OccupancyGrid:
+        if not CRATE_S[0] <= 1e-9 * self._world.stamp_ns < CRATE_S[1]:
+            return grid
+        (col0, row0), (col1, row1) = (
+            (round(place) for place in grid.geometry.to_pixels(x, y))
+            for x, y in (CRATE[:2], CRATE[2:])
         )
-        self._pheromone.put(encode_pheromone(snapshot, "map", _stamp()))
+        cells = grid.cells.copy()
+        cells[max(row0, 0) : max(row1, 0), max(col0, 0) : max(col1, 0)] = WALL
+        return replace(grid, cells=cells)
 
-    def drive(self, done: float) -> None:
-        """Publish the robot's pose, and remember which cell it is in."""
-        place = done * (len(self.walk) - 1)
-        index = min(int(place), len(self.walk) - 2)
-        step = self.walk[index + 1] - self.walk[index]
-        x, y = self.walk[index] + (place - index) * step
-        passed = cells(self.walk[: index + 1])
-        self.visits[:] = 0
-        np.add.at(self.visits, passed, 1)
-        pose = Pose2D(float(x), float(y), math.atan2(step[1], step[0]))
-        self._pose.put(encode_pose_stamped(StampedPose(pose, "map", _stamp())))
+    def _publish_map(self, grid: OccupancyGrid) -> None:
+        before, self._sent = self._sent, grid
+        if before is None or before.geometry != grid.geometry:
+            self._maps.put(encode_occupancy_grid(grid))
+            return
+        changed = before.cells != grid.cells
+        if not changed.any():
+            return
+        rows, cols = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
+        window = Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
+        cells = grid.cells[window.row0 : window.row1, window.col0 : window.col1].copy()
+        patch = MapPatch(window, cells, grid.frame, grid.stamp_ns)
+        self._updates.put(encode_map_update(patch))
 
-    def publish_coverage(self, done: float) -> None:
-        """Publish how often the robot was where, as far as the building is known."""
-        grid = coverage(self.visits, blocked_cells(done))
-        values = grid.cells.copy()
-        values[:, self.seen_cells :] = UNKNOWN
-        recovered, covered = np.count_nonzero(values == RECOVERED), np.count_nonzero(values > 0)
-        covered -= np.count_nonzero(values == BLOCKED)
-        coverable = covered + np.count_nonzero(values == TO_COVER)
-        self.covered, self.recovered = covered / coverable, recovered / coverable
-        self._coverage.put(
-            encode_occupancy_grid(OccupancyGrid(grid.geometry, values, "map", _stamp()))
-        )
+    @property
+    def trail(self) -> np.ndarray:
+        """Where the robot was in truth: points (x, y) [m], float64 (n, 2)."""
+        return self._world.trail
 
-    def publish_status(self, state: str, done: float, planning: bool, **more: Any) -> None:
-        """Publish a status as the daemon would."""
-        status = {
-            "robot": self.keys.robot,
-            "version": "1.0.0",
-            "state": state,
-            "reason": "",
-            "uptime_s": 40.0 * self.revision,
-            "cpu_s": 8.0 * self.revision,
-            "threads": 9,
-            "coverage": {"coverable": 500, "covered": round(500 * done), "recovered": 3},
-            "plan": {"plans": self.revision, "unchanged": 2, "outdated": 1, "planning": planning},
-            "latency_ms": {"ingest": 4.0 + done, "plan": 45.0, "map_to_path": 60.0 + 20 * done},
-            "errors": {"total": 0, "last": "", "by_code": {}},
-            "rss_mb": 120.0,
-            "config": {"planner": "fasaco", "cell_m": CELL_M, "robot_radius_m": 0.2, "seed": 7},
-        }
-        self._status.put(encode_json(status | more))
+    def _take_path(self, sample: Sample) -> None:
+        self.notes.append((time.monotonic(), decode_json(sample.attachment)))
+        self._newest_path.put(sample)
 
-
-def known_columns(done: float) -> int:
-    """Return how many columns of pixels the robot has seen."""
-    return min(COLS, 5 * round(10 + done * 32))
-
-
-def building(done: float = 0.0) -> np.ndarray:
-    """Return the building, int8 (ROWS, COLS)."""
-    grid = np.zeros((ROWS, COLS), np.int8)
-    grid[:2] = grid[-2:] = grid[:, :2] = grid[:, -2:] = 100
-    grid[:80, 58:62] = 100
-    grid[:25, 120:140] = 100
-    grid[90:, 135:] = -1
-    if done >= 0.5:
-        grid[SURPRISE] = 100
-    return grid
-
-
-def occupancy(pixels: np.ndarray) -> OccupancyGrid:
-    """Return pixels of the building, from its corner on, as a map."""
-    rows, cols = pixels.shape
-    geometry = GridGeometry(rows, cols, RESOLUTION_M, Pose2D(*ORIGIN))
-    return OccupancyGrid(geometry, pixels.copy(), "map", _stamp())
-
-
-def blocked_cells(done: float = 0.0) -> np.ndarray:
-    """Return which lattice cells hold an obstacle or something unknown, bool."""
-    pixels = building(done) != 0
-    return pixels.reshape(ROWS // 5, 5, COLS // 5, 5).any(axis=(1, 3))
-
-
-def coverage(visits: np.ndarray, blocked: np.ndarray) -> OccupancyGrid:
-    """Return the coverage for numbers of visits, and what is blocked, per lattice cell."""
-    values = np.full(visits.shape, TO_COVER, np.int8)
-    values[visits == 1] = COVERED
-    values[visits > 1] = RECOVERED
-    values[blocked] = BLOCKED
-    values[18:, 27:] = UNKNOWN
-    geometry = GridGeometry(*visits.shape, CELL_M, Pose2D(*ORIGIN))
-    return OccupancyGrid(geometry, values, "map", _stamp())
-
-
-def cells(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows and columns of the lattice cells that points [m] lie in."""
-    row_col = np.floor((xy[:, ::-1] - np.array(ORIGIN[::-1])) / CELL_M).astype(np.int64)
-    return row_col[:, 0], row_col[:, 1]
-
-
-def _walk() -> np.ndarray:
-    """Return points [m], float64 (n, 2): up and down the columns of cells, left to right."""
-    places: list[tuple[int, int]] = []
-    for col in range(1, 31):
-        low, high = (17 if col in (11, 12) else 6 if 24 <= col <= 28 else 1), 22
-        high = 17 if col >= 27 else high
-        rows = range(low, high + 1)
-        near_top = bool(places) and abs(rows[-1] - places[-1][0]) < abs(rows[0] - places[-1][0])
-        column = [(row, col) for row in (reversed(rows) if near_top else rows)]
-        if places:
-            towards = 1 if column[0][0] > places[-1][0] else -1
-            back = range(places[-1][0] + towards, column[0][0] + towards, towards)
-            places += [(row, places[-1][1]) for row in back if column[0][0] != places[-1][0]]
-        places += column
-    corner = np.array(ORIGIN)
-    return np.array([corner + CELL_M * (np.array([col, row]) + 0.5) for row, col in places])
-
-
-def _stamp() -> int:
-    return time.time_ns()
+    def _hear(self, sample: Sample) -> None:
+        self.status = decode_json(sample.payload)
+        self.statuses.append((time.monotonic(), self.status))

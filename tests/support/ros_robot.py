@@ -7,17 +7,19 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import zenoh
 import zenoh.ext
 
 from fasaco_edge.grid.geometry import Pose2D
-from tests.support.outsider import TIMEOUT_S, Ear
+from tests.support.outsider import TIMEOUT_S, Ear, Heard
 from tests.wire import oracle
 
 GRID, PATH, POSE = (
@@ -163,3 +165,32 @@ def _open(**document: Any) -> zenoh.Session:
     document["timestamping"] = {"enabled": True}
     document["transport"] = {"shared_memory": {"enabled": False}} | document.get("transport", {})
     return zenoh.open(zenoh.Config.from_json5(json.dumps(document)))
+
+
+def is_walk(heard: Heard) -> bool:
+    return len(heard.payload) > 200
+
+
+def check_path(heard: Heard, near: tuple[float, float]) -> None:
+    """Check what a robot that follows the path needs."""
+    path = oracle.from_bytes(PATH, heard.payload)
+    assert path.header.frame_id == "map"
+    assert path.header.stamp.nanosec == 1  # the map's
+    xy = np.array([[pose.pose.position.x, pose.pose.position.y] for pose in path.poses])
+    assert len(xy) > 50
+    assert np.hypot(*(xy[0] - near)) < 0.5
+    for pose, step in zip(path.poses, np.diff(xy, axis=0), strict=False):
+        assert pose.header.frame_id == "map"
+        turn = pose.pose.orientation
+        ahead = [turn.w**2 - turn.z**2, 2 * turn.w * turn.z]
+        np.testing.assert_allclose(ahead, step / np.hypot(*step), atol=1e-6)
+
+
+def check_attachment(heard: Heard) -> int:
+    """Check what rmw_zenoh takes apart; return the sequence number."""
+    assert heard.attachment is not None
+    assert len(heard.attachment) == 33
+    sequence, time_ns, size = struct.unpack_from("<qqB", heard.attachment)
+    assert size == 16
+    assert abs(time_ns - time.time_ns()) < 60e9
+    return sequence

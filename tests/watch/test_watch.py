@@ -12,18 +12,19 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.support.commands import ENVIRONMENT, PROGRAM, fasaco_edge
-from tests.support.hall import HALL, begin, lanes
 from tests.support.outsider import Outsider
 from tests.support.processes import (
+    ENVIRONMENT,
+    PROGRAM,
     Daemon,
     daemon_process,
+    fasaco_edge,
     free_endpoint,
     mapped_files,
     resident_mb,
 )
-from tests.support.rooms import map_bytes, pose_bytes
-from tests.support.terminal import Terminal
+from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes
+from tests.watch.terminal import Terminal
 
 # What it may be resident with [MB].
 WATCH_MB = 75.0

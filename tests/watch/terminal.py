@@ -17,7 +17,7 @@ from collections.abc import Callable
 from typing import Any, Self
 
 from fasaco_edge.watch.live import END_PAGE
-from tests.support.commands import ENVIRONMENT, PROGRAM
+from tests.support.processes import ENVIRONMENT, PROGRAM
 from tests.watch.grids import plain
 
 # Nothing takes so long but on a machine that is busy with much else [s].

@@ -1,4 +1,4 @@
-"""The daemon with faults built in: ``python -m tests.support.breaking run ...`` as ``fasaco-edge``.
+"""The daemon with faults built in: ``python -m tests.daemon.breaking run ...`` as ``fasaco-edge``.
 
 What breaks is chosen by the width of the map.
 """

@@ -1,0 +1,242 @@
+"""A made-up mission, as the daemon and a robot would publish it: asymmetric, so that a
+mirrored picture shows.
+
+A building of 8 m x 6 m whose corner (0, 0) lies at (-1, -2) m: one wall inside, from
+the bottom, and a box at the lower right. The robot sees ever more of it, from the left.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fasaco_edge.bus.publisher import QOS
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.planners.planner import ColonySnapshot
+from fasaco_edge.wire.coverage import BLOCKED, COVERED, RECOVERED, TO_COVER, UNKNOWN
+from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.maps import encode_occupancy_grid
+from fasaco_edge.wire.paths import encode_path
+from fasaco_edge.wire.pheromone import encode_pheromone
+from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.schemas import OCCUPANCY_GRID, PATH, PHEROMONE_GRID, POSE_STAMPED
+
+RESOLUTION_M = 0.05
+CELL_M = 0.25
+ORIGIN = (-1.0, -2.0)
+ROWS, COLS = 120, 160
+# The box that turns up half-way, where the map said free: rows and columns of pixels.
+SURPRISE = (slice(80, 92), slice(40, 52))
+
+
+@dataclass
+class Mission:
+    """Publishes a mission on ``bus``: ``frames()`` yields after each tenth of a second of it."""
+
+    bus: Bus
+    keys: Keys = field(default_factory=Keys)
+
+    def __post_init__(self) -> None:
+        bus, keys = self.bus, self.keys
+        self._map = bus.publisher(keys.map, OCCUPANCY_GRID, QOS["map"])
+        self._pose = bus.publisher(keys.pose, POSE_STAMPED, QOS["pose"])
+        self._path = bus.publisher(keys.path, PATH, QOS["path"])
+        self._coverage = bus.publisher(keys.coverage, OCCUPANCY_GRID, QOS["coverage"])
+        self._pheromone = bus.publisher(keys.pheromone, PHEROMONE_GRID)
+        self._status = bus.publisher(keys.status, qos=QOS["status"])
+        self.walk = _walk()
+        self.rest = self.walk
+        self.seen_cells = 0
+        self.revision = 0
+        self.best_steps = 0
+        self.covered = self.recovered = 0.0
+        self.visits = np.zeros((ROWS // 5, COLS // 5), np.int64)
+
+    def frames(self, count: int) -> Iterator[float]:
+        """Publish ``count`` steps of the mission; yield how far it is, from 0 to 1."""
+        for frame in range(count):
+            done = frame / max(count - 1, 1)
+            if frame % max(count // 16, 1) == 0:
+                self.publish_map(done)
+                self.replan(done, "first map" if frame == 0 else "the map grew")
+            self.drive(done)
+            if frame % 4 == 0:
+                self.publish_coverage(done)
+            yield done
+
+    def publish_map(self, done: float) -> None:
+        """Publish what is known of the building by then: it grows to the right."""
+        self.seen_cells = known_columns(done) // 5
+        truth = building(done)[:, : known_columns(done)]
+        self._map.put(encode_occupancy_grid(occupancy(truth)))
+
+    def replan(self, done: float, reason: str) -> None:
+        """Publish three cohorts and the walk they led to."""
+        self.revision += 1
+        self.publish_status("planning", done, planning=True)
+        for cohort in range(3):
+            self.publish_cohort(cohort, done)
+        self.rest = self.walk[round(done * (len(self.walk) - 1)) :]
+        seen = cells(self.rest)[1] < self.seen_cells - 1
+        rest = self.rest = self.rest[: np.argmin(seen) if not seen.all() else None]
+        note = {
+            "revision": self.revision,
+            "map_stamp_ns": 0,
+            "reason": reason,
+            "planner": "fasaco",
+            "seed": 7,
+            "steps": len(rest) - 1,
+            "plan_ms": 40.0 + 10.0 * math.sin(self.revision),
+            "ants": 60,
+            "planned_steps": len(rest) - 1,
+            "lower_bound_steps": len(rest) - 4,
+            "planned_cost_s": 1.2 * len(rest),
+            "gap": 3 / (len(rest) - 4),
+            "changed": self.changed(done) if reason == "the map grew" else None,
+        }
+        yaw = np.zeros(len(rest))
+        self._path.put(encode_path(rest, yaw, "map", _stamp()), json.dumps(note).encode())
+        self.publish_status("covering", done, planning=False)
+
+    def changed(self, done: float) -> dict[str, float]:
+        """Return where the map has just grown."""
+        x, y = ORIGIN[0] + RESOLUTION_M * known_columns(done), ORIGIN[1]
+        return {"x_min": x - 0.75, "y_min": y + 0.5, "x_max": x - 0.25, "y_max": y + 5.0}
+
+    def publish_cohort(self, cohort: int, done: float) -> None:
+        """Publish pheromone that gathers along the walk."""
+        trail = np.full(self.visits.shape, 0.1, np.float32)
+        rows, cols = cells(self.walk)
+        along = np.arange(len(rows)) / len(rows)
+        np.add.at(trail, (rows, cols), 5.0 * (cohort + 1) * (0.2 + along).astype(np.float32))
+        trail[blocked_cells(done)] = 0.0
+        trail = trail[:, : self.seen_cells]
+        self.best_steps = round(len(rows) * (1.3 - 0.1 * cohort) - 40 * done)
+        col, row = (round(at / CELL_M) for at in ORIGIN)
+        window = Window(0, 0, *trail.shape).moved(row, col)
+        snapshot = ColonySnapshot(
+            window, CELL_M, trail, cohort, 1, 20 * (cohort + 1), self.best_steps
+        )
+        self._pheromone.put(encode_pheromone(snapshot, "map", _stamp()))
+
+    def drive(self, done: float) -> None:
+        """Publish the robot's pose, and remember which cell it is in."""
+        place = done * (len(self.walk) - 1)
+        index = min(int(place), len(self.walk) - 2)
+        step = self.walk[index + 1] - self.walk[index]
+        x, y = self.walk[index] + (place - index) * step
+        passed = cells(self.walk[: index + 1])
+        self.visits[:] = 0
+        np.add.at(self.visits, passed, 1)
+        pose = Pose2D(float(x), float(y), math.atan2(step[1], step[0]))
+        self._pose.put(encode_pose_stamped(StampedPose(pose, "map", _stamp())))
+
+    def publish_coverage(self, done: float) -> None:
+        """Publish how often the robot was where, as far as the building is known."""
+        grid = coverage(self.visits, blocked_cells(done))
+        values = grid.cells.copy()
+        values[:, self.seen_cells :] = UNKNOWN
+        recovered, covered = np.count_nonzero(values == RECOVERED), np.count_nonzero(values > 0)
+        covered -= np.count_nonzero(values == BLOCKED)
+        coverable = covered + np.count_nonzero(values == TO_COVER)
+        self.covered, self.recovered = covered / coverable, recovered / coverable
+        self._coverage.put(
+            encode_occupancy_grid(OccupancyGrid(grid.geometry, values, "map", _stamp()))
+        )
+
+    def publish_status(self, state: str, done: float, planning: bool, **more: Any) -> None:
+        """Publish a status as the daemon would."""
+        status = {
+            "robot": self.keys.robot,
+            "version": "1.0.0",
+            "state": state,
+            "reason": "",
+            "uptime_s": 40.0 * self.revision,
+            "cpu_s": 8.0 * self.revision,
+            "threads": 9,
+            "coverage": {"coverable": 500, "covered": round(500 * done), "recovered": 3},
+            "plan": {"plans": self.revision, "unchanged": 2, "outdated": 1, "planning": planning},
+            "latency_ms": {"ingest": 4.0 + done, "plan": 45.0, "map_to_path": 60.0 + 20 * done},
+            "errors": {"total": 0, "last": "", "by_code": {}},
+            "rss_mb": 120.0,
+            "config": {"planner": "fasaco", "cell_m": CELL_M, "robot_radius_m": 0.2, "seed": 7},
+        }
+        self._status.put(encode_json(status | more))
+
+
+def known_columns(done: float) -> int:
+    """Return how many columns of pixels the robot has seen."""
+    return min(COLS, 5 * round(10 + done * 32))
+
+
+def building(done: float = 0.0) -> np.ndarray:
+    """Return the building, int8 (ROWS, COLS)."""
+    grid = np.zeros((ROWS, COLS), np.int8)
+    grid[:2] = grid[-2:] = grid[:, :2] = grid[:, -2:] = 100
+    grid[:80, 58:62] = 100
+    grid[:25, 120:140] = 100
+    grid[90:, 135:] = -1
+    if done >= 0.5:
+        grid[SURPRISE] = 100
+    return grid
+
+
+def occupancy(pixels: np.ndarray) -> OccupancyGrid:
+    """Return pixels of the building, from its corner on, as a map."""
+    rows, cols = pixels.shape
+    geometry = GridGeometry(rows, cols, RESOLUTION_M, Pose2D(*ORIGIN))
+    return OccupancyGrid(geometry, pixels.copy(), "map", _stamp())
+
+
+def blocked_cells(done: float = 0.0) -> np.ndarray:
+    """Return which lattice cells hold an obstacle or something unknown, bool."""
+    pixels = building(done) != 0
+    return pixels.reshape(ROWS // 5, 5, COLS // 5, 5).any(axis=(1, 3))
+
+
+def coverage(visits: np.ndarray, blocked: np.ndarray) -> OccupancyGrid:
+    """Return the coverage for numbers of visits, and what is blocked, per lattice cell."""
+    values = np.full(visits.shape, TO_COVER, np.int8)
+    values[visits == 1] = COVERED
+    values[visits > 1] = RECOVERED
+    values[blocked] = BLOCKED
+    values[18:, 27:] = UNKNOWN
+    geometry = GridGeometry(*visits.shape, CELL_M, Pose2D(*ORIGIN))
+    return OccupancyGrid(geometry, values, "map", _stamp())
+
+
+def cells(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return rows and columns of the lattice cells that points [m] lie in."""
+    row_col = np.floor((xy[:, ::-1] - np.array(ORIGIN[::-1])) / CELL_M).astype(np.int64)
+    return row_col[:, 0], row_col[:, 1]
+
+
+def _walk() -> np.ndarray:
+    """Return points [m], float64 (n, 2): up and down the columns of cells, left to right."""
+    places: list[tuple[int, int]] = []
+    for col in range(1, 31):
+        low, high = (17 if col in (11, 12) else 6 if 24 <= col <= 28 else 1), 22
+        high = 17 if col >= 27 else high
+        rows = range(low, high + 1)
+        near_top = bool(places) and abs(rows[-1] - places[-1][0]) < abs(rows[0] - places[-1][0])
+        column = [(row, col) for row in (reversed(rows) if near_top else rows)]
+        if places:
+            towards = 1 if column[0][0] > places[-1][0] else -1
+            back = range(places[-1][0] + towards, column[0][0] + towards, towards)
+            places += [(row, places[-1][1]) for row in back if column[0][0] != places[-1][0]]
+        places += column
+    corner = np.array(ORIGIN)
+    return np.array([corner + CELL_M * (np.array([col, row]) + 0.5) for row, col in places])
+
+
+def _stamp() -> int:
+    return time.time_ns()
