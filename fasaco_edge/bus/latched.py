@@ -91,8 +91,10 @@ class LatchedSubscription(Subscription):
         self._there: dict[str, _Publisher] = {}
         # By publisher, the number or time of what was heard of it last.
         self._last = OrderedDict[str, int]()
-        # Likewise by clock, of those that may keep nothing: what a cache answers with is compared
-        # with it, and nothing that is published, for no token tells when such a clock is set back.
+        # When that was published, by the publisher's clock; 0 where it does not tell.
+        self._stamps = OrderedDict[str, int]()
+        # As ``_last``, of those that may keep nothing: only what a cache answers is compared with
+        # it, for no token tells when such a clock is set back.
         self._unlisted = OrderedDict[str, int]()
         # Where several samples count, they wait for those before them, which were asked for.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
@@ -211,18 +213,18 @@ class LatchedSubscription(Subscription):
         name, mark = _origin(sample)
         with self._lock:
             waits = self._depth > 1 and bool(self._open or self._wants_all)
-            if not name:
-                self._receive(sample)
-                return
             is_listed = sample.source_info or name in self._last or name in self._there
-            if not is_listed and not waits:
+            if not name or not (is_listed or waits):
                 # Of a publisher that keeps nothing, or of one that is not yet found.
-                _remember(self._unlisted, name, mark)
+                if name:
+                    _remember(self._unlisted, name, mark)
                 self._receive(sample)
                 return
-            if sample.source_info and not mark and self._last.get(name):
-                del self._last[name]  # it was started anew under the same name
             last = self._last.get(name)
+            if last and not mark and _ticks(sample) >= self._stamps.get(name, 0):
+                # It was started anew under the same name: what an answer has overtaken is older.
+                del self._last[name]
+                last = None
             is_gap = name in self._there and _leaves_gap(name, mark, last)
             if waits or (self._depth > 1 and is_gap):
                 self._hold(name, mark, sample)
@@ -259,6 +261,7 @@ class LatchedSubscription(Subscription):
     def _deliver(self, name: str, mark: int, sample: zenoh.Sample) -> None:
         self._unlisted.pop(name, None)
         _remember(self._last, name, mark)
+        _remember(self._stamps, name, _ticks(sample))
         self._receive(sample)
 
 
@@ -326,9 +329,13 @@ def _origin(sample: zenoh.Sample) -> tuple[str, int]:
     if info is not None:
         return f"{info.source_id.zid}/{info.source_id.eid}", int(info.source_sn)
     if stamp is not None:
-        ticks, _, clock = str(stamp).partition("/")
-        return f"{clock}/uhlc", int(ticks)
+        return f"{str(stamp).partition('/')[2]}/uhlc", _ticks(sample)
     return "", 0
+
+
+def _ticks(sample: zenoh.Sample) -> int:
+    """Return when a sample was published, by the clock of its session; 0 where it does not tell."""
+    return int(str(sample.timestamp).partition("/")[0]) if sample.timestamp is not None else 0
 
 
 def _is_newer(mark: int, last: int | None) -> bool:
