@@ -36,9 +36,9 @@ from fasaco_edge.recording.write.part import Part
 from fasaco_edge.samples.codec import SampleEncoder
 from fasaco_edge.text import json_line
 from fasaco_edge.wire import schemas
-from fasaco_edge.wire.keys import RPC_NAMES
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
+from fasaco_edge.wire.topics import RPC_NAMES
 from tests.support.outsider import Outsider
 from tests.support.processes import COMMAND_S, ENVIRONMENT, PROGRAM, daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pose_bytes, room

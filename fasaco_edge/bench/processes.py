@@ -22,13 +22,13 @@ from typing import Any, Self
 
 import yaml
 
-from fasaco_edge.bus.publisher import QOS, Publisher
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BusUnavailable, NotYet, ProcessEnded
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import python_program
-from fasaco_edge.wire import schemas
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import encode_occupancy_grid
@@ -125,7 +125,7 @@ class DaemonProcess:
 
     def wait_alive(self, bus: Bus) -> float:
         """Wait for its liveliness token; return the time since its start [s]."""
-        while not bus.alive(self.keys.alive):
+        while not bus.alive(self.keys.of(topics.ALIVE)):
             self._wait("say that it is alive")
         return time.monotonic() - self._started
 
@@ -163,10 +163,12 @@ class MapSource:
     def __init__(self, daemon: DaemonProcess, bus: Bus) -> None:
         keys = daemon.keys
         self._daemon = daemon
-        self._maps = bus.publisher(keys.map, schemas.OCCUPANCY_GRID, QOS["map"])
-        self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED, QOS["pose"])
+        self._maps = bus.advertise(keys, topics.MAP)
+        self._poses = bus.advertise(keys, topics.POSE)
         self._arrivals = queue.SimpleQueue[tuple[float, Sample]]()
-        bus.subscribe(keys.path, lambda sample: self._arrivals.put((time.monotonic(), sample)))
+        bus.subscribe(
+            keys.of(topics.PATH), lambda sample: self._arrivals.put((time.monotonic(), sample))
+        )
         for publisher in (self._maps, self._poses):
             self._await_listener(publisher)
 
@@ -261,7 +263,7 @@ def _wait_alive(
     process: subprocess.Popen[bytes], daemon: DaemonProcess, bus: Bus, log: Path
 ) -> None:
     deadline = time.monotonic() + START_TIMEOUT_S
-    while not bus.alive(f"{daemon.keys.recorder}/alive"):
+    while not bus.alive(daemon.keys.of(topics.RECORDER_ALIVE)):
         if process.poll() is not None or time.monotonic() > deadline:
             said = log.read_text(errors="replace").splitlines()[-5:]
             raise ProcessEnded("the recorder does not listen:\n  " + "\n  ".join(said))

@@ -18,6 +18,7 @@ from fasaco_edge.bench.processes import DaemonProcess, MapSource
 from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.paths import decode_path
 
 RESOLUTION_M = 0.05
@@ -118,7 +119,7 @@ def robot_beside(daemon: DaemonProcess, bus: Bus) -> Iterator[CoveringRobot]:
     """Let a robot drive for the block, from the moment it has its first path."""
     source = MapSource(daemon, bus)
     robot = CoveringRobot(source)
-    bus.subscribe(daemon.keys.path, robot.take_path)
+    bus.subscribe(daemon.keys.of(topics.PATH), robot.take_path)
     stamp_ns = time.time_ns()
     source.put_pose(robot_pose(stamp_ns))
     source.put_map(with_crate(building(), 0, stamp_ns))

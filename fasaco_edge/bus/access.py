@@ -18,40 +18,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from fasaco_edge.wire.topics import QUERIES, RPC_NAMES, TOPICS, Query, Topic
+
 SPEAK = ("put", "reply", "declare_queryable", "liveliness_token")
 LISTEN = ("declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query")
 
-MAPS = ("map", "map_update")
-# By these the daemons of one name see each other.
-CLAIMS = "claim/*/*"
-VIEWS = ("path", "status", "coverage", "pheromone", "alive", CLAIMS)
-VIEW_QUERIES = (
-    "@rpc/path",
-    "@rpc/status",
-    "@rpc/coverage",
-    "@rpc/pheromone",
-    "@rpc/config",
-    "@rpc/version",
-)
-# To ask these is to command.
-COMMANDS = ("@rpc/mission", "@rpc/replan")
-TOKENS = ("alive", CLAIMS, "recorder/alive")
-RECORDER = ("recorder", "recorder/alive")
-SAID_BY_ROBOT = (*VIEWS, "command", "turns", *VIEW_QUERIES, *COMMANDS)
-HEARD_BY_ROBOT = (*MAPS, "pose", *RECORDER)
-EVERYTHING = (*HEARD_BY_ROBOT, *SAID_BY_ROBOT)
-LARGE = (
-    *MAPS,
-    "path",
-    "coverage",
-    "pheromone",
-    "@rpc/path",
-    "@rpc/coverage",
-    "@rpc/pheromone",
-)
-NOT_JSON = (*LARGE, "pose", *TOKENS)
-# Topics that answer queries with their last sample.
-ANSWERED = ("path", "status", "coverage", "pheromone")
+Entry = Topic | Query
+ENTRIES: tuple[Entry, ...] = (*TOPICS, *QUERIES)
+TOKENS = tuple(entry.suffix for entry in ENTRIES if entry.size_class == "token")
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,26 +45,28 @@ class Role:
     includes: str = ""
 
 
+def _role(name: str, told: str, includes: str = "") -> Role:
+    return Role(
+        told,
+        speaks=tuple(entry.suffix for entry in ENTRIES if entry.speaker == name),
+        listens=tuple(entry.suffix for entry in ENTRIES if name in entry.listeners),
+        includes=includes,
+    )
+
+
+EVERYTHING = tuple(entry.suffix for entry in ENTRIES)
+
 ROLES: Mapping[str, Role] = {
-    "mapper": Role("gives maps, map updates and poses", speaks=(*MAPS, "pose")),
-    "viewer": Role("sees path, status, coverage and pheromone", listens=(*VIEWS, *VIEW_QUERIES)),
-    "operator": Role(
-        "commands the mission, and views", listens=("command", *COMMANDS), includes="viewer"
-    ),
-    "recorder": Role(
-        "hears everything, and says how it is itself",
-        speaks=RECORDER,
-        listens=(*HEARD_BY_ROBOT, "command", "turns"),
-        includes="viewer",
-    ),
+    "mapper": _role("mapper", "gives maps, map updates and poses"),
+    "viewer": _role("viewer", "sees path, status, coverage and pheromone"),
+    "operator": _role("operator", "commands the mission, and views", includes="viewer"),
+    "recorder": _role("recorder", "hears everything, and says how it is itself", includes="viewer"),
     # Topics that the configuration names: see ``ros_rights``.
     "ros": Role("gives maps, updates and poses on ROS 2 topics, sees path and coverage there"),
-    # Whom a daemon connects to: what others may do there, the router itself has to restrict.
+    # A daemon connects to it: what others may do there, the router itself has to restrict.
     "router": Role("passes everything on, both ways", speaks=EVERYTHING, listens=EVERYTHING),
     # The daemon itself, as a router sees it.
-    "robot": Role(
-        "plans: hears maps, says paths", speaks=SAID_BY_ROBOT, listens=(*HEARD_BY_ROBOT, CLAIMS)
-    ),
+    "robot": _role("robot", "plans: hears maps, says paths"),
 }
 
 
@@ -164,20 +140,21 @@ def access_control(grants: Sequence[Grant], attribute: str) -> dict[str, Any]:
 def limits(prefix: str, most: Limits) -> dict[str, Any]:
     """Return Zenoh's ``low_pass_filter`` and ``downsampling`` for what comes in."""
     published = ["put", "reply"]
+    classes: dict[str, list[str]] = {}
+    for entry in ENTRIES:
+        classes.setdefault(entry.size_class, []).append(entry.suffix)
+    # These answer queries with their last sample, as a storage would.
+    answered = [topic.suffix for topic in TOPICS if topic.name in RPC_NAMES]
     sizes = (
-        ("grids and paths", published, LARGE, most.map_bytes),
-        ("poses", published, ("pose",), most.pose_bytes),
-        (
-            "JSON",
-            published,
-            [topic for topic in EVERYTHING if topic not in NOT_JSON],
-            most.json_bytes,
-        ),
+        ("grids and paths", published, classes["large"], most.map_bytes),
+        ("poses", published, classes["pose"], most.pose_bytes),
+        ("JSON", published, classes["json"], most.json_bytes),
         ("queries", ["query"], EVERYTHING, most.json_bytes),
     )
+    queries = (*answered, *(query.suffix for query in QUERIES))
     rates = (
         ("maps and poses", "put", {"map": most.maps_hz, "pose": most.poses_hz}),
-        ("queries", "query", dict.fromkeys((*ANSWERED, *VIEW_QUERIES, *COMMANDS), most.queries_hz)),
+        ("queries", "query", dict.fromkeys(queries, most.queries_hz)),
     )
     return {
         "low_pass_filter": [

@@ -21,7 +21,7 @@ from typing import Any, Self
 import zenoh
 
 from fasaco_edge.bus.latched import Asker, LatchedSubscription, Subscription
-from fasaco_edge.bus.publisher import JSON, VOLATILE, Publisher, Qos, schema_of
+from fasaco_edge.bus.publisher import JSON, Publisher, schema_of
 from fasaco_edge.bus.queries import (
     Question,
     Reply,
@@ -35,6 +35,8 @@ from fasaco_edge.bus.queries import (
 )
 from fasaco_edge.bus.session_config import session_config
 from fasaco_edge.errors import BusUnavailable
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.topics import VOLATILE, Qos, Topic
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 ZENOH_VERSION = metadata.version("eclipse-zenoh")
@@ -163,6 +165,14 @@ class Bus:
         publisher = Publisher(self._session, key, schema, qos)
         self._lent.append(publisher)
         return publisher
+
+    def advertise(self, keys: Keys, topic: Topic) -> Publisher:
+        """Declare the publisher of a topic of the contract."""
+        return self.publisher(keys.of(topic), topic.schema, topic.qos or VOLATILE)
+
+    def listen(self, keys: Keys, topic: Topic, callback: Callable[[Sample], None]) -> Subscription:
+        """Subscribe to a topic of the contract, see ``subscribe``."""
+        return self.subscribe(keys.of(topic), callback, topic.is_latched)
 
     def subscribe(
         self,

@@ -8,7 +8,8 @@ from typing import Any
 
 import zenoh
 
-MAX_MESSAGE_BYTES = 64 * 1024 * 1024
+from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
+
 # How long who connects may take to say who it is, and how many may do so at a time.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
 # A map or a path is many packets of 64 kB. Where two of them fill the queue, as by default, a

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console import asking, exits
 from fasaco_edge.cli.console.arguments import add_command
-from fasaco_edge.wire.keys import RPC_NAMES
+from fasaco_edge.wire.topics import RPC_NAMES
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.console.arguments import Subparsers

@@ -24,6 +24,7 @@ from fasaco_edge.errors import BusUnavailable, ProcessEnded
 from fasaco_edge.grid.map_files import find_map
 from fasaco_edge.host.processes import python_program
 from fasaco_edge.watch import phrases
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.keys import Keys
 
@@ -165,7 +166,7 @@ class DemoMission:
         state = ["--state", str(self._out / "state"), "--fresh"]
         self._spawn("daemon", ["run", "--config", str(config), *recording, *state])
         self._bus = self._join()
-        self._bus.subscribe(self._keys.status, self._newest.put, latched=True)
+        self._bus.listen(self._keys, topics.STATUS, self._newest.put)
         robot = ["--speed", str(self._args.speed), "--robot-radius", str(self._args.robot_radius)]
         trail = ["--trail-out", str(self._out / "trail.csv")]
         self._spawn(

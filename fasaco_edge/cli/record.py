@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console.arguments import add_command, add_robot_on_bus, client_settings
-from fasaco_edge.wire.poses import POSE_SCHEMAS
 from fasaco_edge.wire.schemas import POSE_STAMPED
+from fasaco_edge.wire.topics import POSE_SCHEMAS
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.session import BusSettings
@@ -201,8 +201,7 @@ def recorder_settings(
 def _ros_inputs(config: RosConfig) -> tuple[RosInput, ...]:
     from fasaco_edge.recording.write.settings import RosInput
 
-    topics = {"map": config.map, "map_update": config.map_updates, **config.poses}
     return tuple(
         RosInput(name, config.input_key(topic), topic.schema, topic.latched, topic.depth)
-        for name, topic in topics.items()
+        for name, topic in config.inputs.items()
     )

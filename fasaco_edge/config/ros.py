@@ -11,9 +11,9 @@ from msgspec import Meta
 from fasaco_edge.bus.access import Role, ros_rights
 from fasaco_edge.config.sections import Section
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.wire import schemas
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
 from fasaco_edge.wire.ros_keys import RosTopic, graph_key
+from fasaco_edge.wire.topics import ROS_TOPICS
 
 # ROS 2 design, "Topic and Service name mapping": letters, digits, _; no digit first.
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
@@ -22,9 +22,6 @@ _NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _MAX_TOPIC_LENGTH = 247
 
 DEFAULT_NODE = "fasaco_edge"
-# As tf2's listeners have it. A bridge keeps all nodes' static transforms in one history.
-TF_DEPTH = POSE_DEPTH = 100
-UPDATES_DEPTH = 256
 
 
 class RosTopicNames(Section, frozen=True):
@@ -68,37 +65,22 @@ class RosConfig(Section, frozen=True):
     frames: RosFrames = RosFrames()
 
     @property
-    def map(self) -> RosTopic:
-        """In: the map."""
-        return RosTopic(self._name(self.topics.map), schemas.OCCUPANCY_GRID, latched=True)
+    def inputs(self) -> dict[str, RosTopic]:
+        """What the daemon subscribes to, by the topic's name in the daemon."""
+        poses = ("tf_static", "tf") if self.pose == "tf" else ("pose",)
+        names = ("map", "map_updates", *poses)
+        return {ROS_TOPICS[name].topic: self._topic(name) for name in names}
 
     @property
-    def map_updates(self) -> RosTopic:
-        """In: new values for a window of the map."""
-        name = self._name(self.topics.map_updates)
-        return RosTopic(name, schemas.OCCUPANCY_GRID_UPDATE, depth=UPDATES_DEPTH)
+    def outputs(self) -> dict[str, RosTopic]:
+        """What the daemon publishes, by the native topic that is like it."""
+        names = ("coverage_path", "coverage_grid")
+        return {ROS_TOPICS[name].topic: self._topic(name) for name in names}
 
-    @property
-    def poses(self) -> dict[str, RosTopic]:
-        """In: what tells where the robot is, by the mailbox's kind."""
-        if self.pose != "tf":
-            return {"pose": RosTopic(self._name(self.topics.pose), self.pose, depth=POSE_DEPTH)}
-        tf, static = self._name(self.topics.tf), self._name(self.topics.tf_static)
-        return {
-            "tf_static": RosTopic(static, schemas.TF_MESSAGE, latched=True, depth=TF_DEPTH),
-            "pose": RosTopic(tf, schemas.TF_MESSAGE, depth=TF_DEPTH),
-        }
-
-    @property
-    def coverage_path(self) -> RosTopic:
-        """Out: the walk still to be driven."""
-        return RosTopic(self._name(self.topics.coverage_path), schemas.PATH, latched=True)
-
-    @property
-    def coverage_grid(self) -> RosTopic:
-        """Out: what is covered."""
-        name = self._name(self.topics.coverage_grid)
-        return RosTopic(name, schemas.OCCUPANCY_GRID, latched=True)
+    def _topic(self, name: str) -> RosTopic:
+        row = ROS_TOPICS[name]
+        schema = self.pose if name == "pose" else row.schemas[0]
+        return RosTopic(self._name(getattr(self.topics, name)), schema, row.latched, row.depth)
 
     def input_key(self, topic: RosTopic) -> str:
         """Return the key to subscribe to for a topic, whatever hash rmw_zenoh puts behind it."""
@@ -112,8 +94,7 @@ class RosConfig(Section, frozen=True):
 
     def rights(self) -> Role:
         """Return what those may do that have the role ``ros``."""
-        heard = [self.map, self.map_updates, *self.poses.values()]
-        said = [self.coverage_path, self.coverage_grid]
+        heard, said = self.inputs.values(), self.outputs.values()
         graph = [] if self.kind == "bridge" else [graph_key(self.domain)]
         return ros_rights([*map(self.input_key, heard)], [*map(self.output_key, said)], graph)
 

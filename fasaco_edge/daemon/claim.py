@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 
 from fasaco_edge.bus.session import Bus
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 
 LOG = logging.getLogger(__name__)
@@ -134,7 +135,7 @@ class NameClaim:
         self._bus = bus
         self._keys = keys
         self._claim = Claim(bus.id)
-        self._roll = bus.roll(keys.claims)
+        self._roll = bus.roll(keys.of(topics.CLAIM))
         self._token = bus.token(keys.claim(bus.id, ClaimState.WAITS))
         self._others: dict[str, ClaimState] = {}
         self._version = 0

@@ -35,6 +35,7 @@ from fasaco_edge.bus.mailbox import Queue
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.security import HEADER_BYTES
 from fasaco_edge.wire.limits import MAX_POSE_BYTES
+from fasaco_edge.wire.topics import QUEUE_LENGTHS
 
 MB = 1_000_000
 MIB = 1 << 20
@@ -48,9 +49,6 @@ SPARE = 1.1
 # What is tried under any limit: a small flat.
 LEAST_PIXELS, LEAST_CELLS = 250_000, 10_000
 
-# Samples that wait for the loop, as ``protocol/limits.yaml`` has it; one more, and the oldest is
-# lost.
-QUEUES = {"map": 4, "map_update": 256, "tf_static": 256, "pose": 1024, "command": 16}
 # Of these kinds no more than so much waits, either.
 QUEUED_BYTES = 8 * MAX_POSE_BYTES
 
@@ -68,7 +66,9 @@ def most_bytes(kind: str, max_pixels: int) -> int:
 def queues(max_pixels: int) -> dict[str, Queue]:
     """Return what may wait of each kind."""
     sizes = dict.fromkeys(("map", "map_update"), map_bytes(max_pixels))
-    rooms = {kind: Queue(length, sizes.get(kind, QUEUED_BYTES)) for kind, length in QUEUES.items()}
+    rooms = {
+        kind: Queue(length, sizes.get(kind, QUEUED_BYTES)) for kind, length in QUEUE_LENGTHS.items()
+    }
     return {**rooms, "snapshot": Queue(8)}
 
 

@@ -12,12 +12,14 @@ from typing import Literal
 
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.bus.publisher import QOS, Publisher
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.queries import Shared
 from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.daemon.loop.inbox import poster
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, attachment, gid_of
+from fasaco_edge.wire.topics import VOLATILE, Topic
 
 
 class RosBridge:
@@ -39,12 +41,12 @@ class RosBridge:
         self._endpoints = 0
         if config.kind == "rmw_zenoh":
             bus.token(self._node.token)
-        self.map = self._subscribe("map", config.map)
-        self._subscribe("map_update", config.map_updates)
-        for kind, topic in config.poses.items():
-            self._subscribe(kind, topic)
-        self.path = self._publisher(config.coverage_path, "path")
-        self.coverage = self._publisher(config.coverage_grid, "coverage")
+        inputs = {name: self._subscribe(name, topic) for name, topic in config.inputs.items()}
+        self.map = inputs["map"]
+        self.path, self.coverage = (
+            self._publisher(config.outputs[like.name], like)
+            for like in (topics.PATH, topics.COVERAGE)
+        )
 
     def _subscribe(self, kind: str, topic: RosTopic) -> Subscription:
         take = poster(self._mailbox, kind, self._max_pixels)
@@ -57,9 +59,10 @@ class RosBridge:
         self._announce("MS", topic)
         return subscription
 
-    def _publisher(self, topic: RosTopic, like: str) -> RosPublisher:
+    def _publisher(self, topic: RosTopic, like: Topic) -> RosPublisher:
         """Publish ``topic`` with the quality of service of the native key ``like``."""
-        publisher = self._bus.publisher(self._config.output_key(topic), topic.schema, QOS[like])
+        key = self._config.output_key(topic)
+        publisher = self._bus.publisher(key, topic.schema, like.qos or VOLATILE)
         token = self._announce("MP", topic)
         return RosPublisher(publisher, gid_of(token) if token else b"")
 

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
@@ -29,6 +28,7 @@ from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.host.processes import return_soon
 from fasaco_edge.host.signals import call_on
+from fasaco_edge.wire import topics
 
 LOG = logging.getLogger(__name__)
 
@@ -128,7 +128,7 @@ def _serve(
     inbox = Inbox(bus, keys, mailbox, config.poses(), max_pixels, [ros.map] if ros else [])
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
     commands = Commands(bus, keys, mailbox)
-    turns = TurnLog(bus.publisher(keys.turns, qos=QOS["turns"]), config, ledger.restored)
+    turns = TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored)
     vitals = Watchdog(manager)
     claim = NameClaim(bus, keys)
     loop = Loop(
@@ -137,7 +137,7 @@ def _serve(
     serve_about(bus, keys, lambda: loop.config)
     try:
         loop.announce()
-        bus.token(keys.alive)
+        bus.token(keys.of(topics.ALIVE))
         seconds = time.monotonic() - started
         LOG.info("ready after %.2f s on %s", seconds, keys.prefix, extra={"event": "ready"})
         if not stop.is_set():

@@ -16,6 +16,7 @@ from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.host.processes import python_program
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_json
 
 LOG = logging.getLogger(__name__)
@@ -43,7 +44,7 @@ class RecorderSupervisor:
         self._pause_s = FIRST_PAUSE_S
         self._start_at: float | None = None
         self._death = ""
-        bus.subscribe(config.keys().recorder, self._word.put, latched=True)
+        bus.listen(config.keys(), topics.RECORDER, self._word.put)
         self._process: subprocess.Popen[bytes] | None = None
         self._launch()
 

@@ -20,6 +20,7 @@ from fasaco_edge.config.endpoints import from_here, host_of, protocol_of
 from fasaco_edge.daemon.claim import claims_in
 from fasaco_edge.doctor.finding import CheckContext, Finding, Level
 from fasaco_edge.errors import BadConfiguration, BusUnavailable, MalformedMessage
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.keys import VERSION
 
@@ -154,20 +155,21 @@ def peers(patient: CheckContext) -> Finding:
 
 def _seen(patient: CheckContext, bus: Bus) -> Finding:
     keys, ros = patient.config.keys(), patient.config.ros2
-    wanted = {"map": [keys.map], "pose": [keys.pose]}
+    wanted = {"map": [keys.of(topics.MAP)], "pose": [keys.of(topics.POSE)]}
     if ros:
-        wanted["map"].append(ros.input_key(ros.map))
-        wanted["pose"] += [ros.input_key(topic) for topic in ros.poses.values()]
+        poses = [topic for name, topic in ros.inputs.items() if name in ("pose", "tf_static")]
+        wanted["map"].append(ros.input_key(ros.inputs["map"]))
+        wanted["pose"] += map(ros.input_key, poses)
     heard = _listen(bus, wanted)
     alive = bus.alive(f"{keys.base}/{VERSION}/*/alive", ASK_S)
-    others = sorted(key.split("/")[-2] for key in alive if key != keys.alive)
+    others = sorted(key.split("/")[-2] for key in alive if key != keys.of(topics.ALIVE))
     details = [f"other robots: {', '.join(others)}"] if others else []
-    claims = claims_in(bus.alive(keys.claims, ASK_S))
+    claims = claims_in(bus.alive(keys.of(topics.CLAIM), ASK_S))
     details += [f"daemon {own} {stand}" for own, stand in sorted(claims.items())]
-    status = _status(bus, keys.rpc("status")) if keys.alive in alive else None
+    status = _status(bus, keys.rpc("status")) if keys.of(topics.ALIVE) in alive else None
     for kind, count in heard.items():
         details.append(f"{kind}: {f'{count} in {LISTEN_S:g} s' if count else 'nothing heard'}")
-    if keys.alive not in alive:
+    if keys.of(topics.ALIVE) not in alive:
         found = f"no daemon of robot {keys.robot!r}; {_in_words(heard)}"
         return Finding(Level.OK, found, details=tuple(details))
     if status is None:
@@ -181,9 +183,9 @@ def _seen(patient: CheckContext, bus: Bus) -> Finding:
         return Finding(Level.WARN, found, to_do, tuple(details))
     if status["map"] is None or status["pose"] is None:
         lacking = " and ".join(kind for kind in ("map", "pose") if status[kind] is None)
-        topics = ", ".join(key for kind in wanted if status[kind] is None for key in wanted[kind])
+        lack = ", ".join(key for kind in wanted if status[kind] is None for key in wanted[kind])
         return Finding(
-            Level.WARN, f"{found}; it has no {lacking}", f"publish on {topics}", tuple(details)
+            Level.WARN, f"{found}; it has no {lacking}", f"publish on {lack}", tuple(details)
         )
     return Finding(Level.OK, found, details=tuple(details))
 

@@ -22,9 +22,9 @@ import msgspec
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
-from fasaco_edge.bus.session_config import MAX_MESSAGE_BYTES
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.samples.residuals import Residual, payloads_of, residual_of
+from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 
 FORMAT = 1
 # Format, run, number of the first sample not told before.

@@ -11,18 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.host.signals import stop_event
 from fasaco_edge.simulation.pace import Pace
 from fasaco_edge.simulation.world import Activity, Emission, World
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import encode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.poses import encode_pose_stamped
-from fasaco_edge.wire.schemas import OCCUPANCY_GRID, POSE_STAMPED
 
 log = logging.getLogger(__name__)
 
@@ -126,10 +125,10 @@ class _RobotOnBus:
     def __init__(self, world: World, keys: Keys, bus: Bus) -> None:
         self.world = world
         self.refused_paths = 0
-        self._map = bus.publisher(keys.map, OCCUPANCY_GRID, QOS["map"])
-        self._pose = bus.publisher(keys.pose, POSE_STAMPED, QOS["pose"])
+        self._map = bus.advertise(keys, topics.MAP)
+        self._pose = bus.advertise(keys, topics.POSE)
         self._newest_path: LatestSlot[Sample] = LatestSlot()
-        bus.subscribe(keys.path, self._newest_path.put, latched=True)
+        bus.listen(keys, topics.PATH, self._newest_path.put)
 
     def publish(self, emission: Emission) -> None:
         # The map first: where the robot stands is on it.

@@ -12,16 +12,14 @@ from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.watch.robot_view import Token
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
+from fasaco_edge.wire.topics import NEWEST, TOPICS
 
-# Each counts: states and revisions are noted, updates lie on each other.
-QUEUED = {
-    "token": Queue(256),
-    "status": Queue(64),
-    "path": Queue(64, MAX_MESSAGE_BYTES),
-    "map_update": Queue(256, MAX_MESSAGE_BYTES),
-    "command": Queue(16),
+SUBSCRIBED = [topic for topic in TOPICS if topic.queues.watch is not None]
+QUEUED = {"token": Queue(256)} | {
+    topic.name: Queue(topic.queues.watch, MAX_MESSAGE_BYTES)
+    for topic in SUBSCRIBED
+    if topic.queues.watch is not None and topic.queues.watch > NEWEST
 }
-LATCHED = ("map", "path", "coverage", "status")
 RETRY_S = 0.5
 # So long the end may wait for a host that does not answer.
 END_S = 0.5
@@ -85,9 +83,8 @@ class Feed:
     def _listen(self, bus: Bus) -> None:
         prefix = f"{self._keys.base}/{VERSION}"
         bus.watch_tokens(f"{prefix}/*/alive", self._note_token)
-        for topic in ("map", "map_update", "pose", "path", "coverage", "status", "command"):
-            key = f"{self._keys.prefix}/{topic}"
-            bus.subscribe(key, partial(self._post, topic), latched=topic in LATCHED)
+        for topic in SUBSCRIBED:
+            bus.listen(self._keys, topic, partial(self._post, topic.name))
 
     def _note_token(self, key: str, here: bool) -> None:
         self._mailbox.post("token", Token(key.split("/")[-2], here))

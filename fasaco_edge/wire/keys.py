@@ -1,4 +1,4 @@
-"""Keys of the native contract; ``protocol/keys.yaml`` is the same table as data."""
+"""Keys of one robot; ``wire.topics`` has their table."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ import re
 from dataclasses import dataclass
 
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.wire.topics import CLAIM, Topic
 
 VERSION = "@v1"
-
-RPC_NAMES = ("path", "status", "coverage", "pheromone", "config", "version", "mission", "replan")
-"""What can be asked, each as ``@rpc/<name>``."""
 
 _CHUNK = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -40,74 +38,13 @@ class Keys:
         """What all keys of this robot begin with."""
         return f"{self.base}/{VERSION}/{self.robot}"
 
-    @property
-    def map(self) -> str:
-        """In: the map."""
-        return f"{self.prefix}/map"
-
-    @property
-    def map_update(self) -> str:
-        """In: new values for a window of the map."""
-        return f"{self.prefix}/map_update"
-
-    @property
-    def pose(self) -> str:
-        """In: the robot's pose."""
-        return f"{self.prefix}/pose"
-
-    @property
-    def path(self) -> str:
-        """Out: the walk still to be driven."""
-        return f"{self.prefix}/path"
-
-    @property
-    def coverage(self) -> str:
-        """Out: what is covered."""
-        return f"{self.prefix}/coverage"
-
-    @property
-    def pheromone(self) -> str:
-        """Out: the pheromone field."""
-        return f"{self.prefix}/pheromone"
-
-    @property
-    def status(self) -> str:
-        """Out: what the planner is doing."""
-        return f"{self.prefix}/status"
-
-    @property
-    def command(self) -> str:
-        """Out: each command the mission has taken."""
-        return f"{self.prefix}/command"
-
-    @property
-    def turns(self) -> str:
-        """Out: what each turn of the loop took in and decided."""
-        return f"{self.prefix}/turns"
-
-    @property
-    def alive(self) -> str:
-        """Liveliness token of the planner."""
-        return f"{self.prefix}/alive"
-
-    @property
-    def claims(self) -> str:
-        """What matches the claims of all daemons of this name."""
-        return self.claim("*", "*")
+    def of(self, topic: Topic) -> str:
+        """Return the key of a topic; a key expression where its row has a ``*``."""
+        return f"{self.prefix}/{topic.suffix}"
 
     def claim(self, own: str, stand: str) -> str:
-        """Liveliness token of the daemon with the Zenoh id ``own``, which "plans" or "waits"."""
-        return f"{self.prefix}/claim/{own}/{stand}"
-
-    @property
-    def recorder(self) -> str:
-        """Out, by the recorder: what it is doing."""
-        return f"{self.prefix}/recorder"
-
-    @property
-    def recorder_alive(self) -> str:
-        """Liveliness token of the recorder."""
-        return f"{self.prefix}/recorder/alive"
+        """Return the token of the daemon with the Zenoh id ``own``, which "plans" or "waits"."""
+        return self.of(CLAIM).replace("*/*", f"{own}/{stand}")
 
     def rpc(self, name: str) -> str:
         """Return the key of the queryable ``name``.

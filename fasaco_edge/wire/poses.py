@@ -18,7 +18,7 @@ TWIST_FLOATS = 6
 
 
 def decode_pose(payload: bytes, schema: str) -> StampedPose:
-    """Return the robot's pose in a message of type ``schema``, one of ``POSE_SCHEMAS``.
+    """Return the robot's pose in a message of type ``schema``, one of ``topics.POSE_SCHEMAS``.
 
     Covariance and twist are stepped over, not looked at: publishers write NaN there for
     what they do not know.
@@ -28,7 +28,7 @@ def decode_pose(payload: bytes, schema: str) -> StampedPose:
     """
     decode = _DECODERS.get(schema)
     if decode is None:
-        known = ", ".join(POSE_SCHEMAS)
+        known = ", ".join(_DECODERS)
         raise MalformedMessage(f"a pose must come as one of {known}, got {schema!r}")
     return decode(payload)
 
@@ -124,9 +124,6 @@ _DECODERS: dict[str, Callable[[bytes], StampedPose]] = {
     POSE_WITH_COVARIANCE_STAMPED: _decode_pose_with_covariance_stamped,
     ODOMETRY: _decode_odometry,
 }
-
-POSE_SCHEMAS = tuple(_DECODERS)
-"""The message types a pose may come as."""
 
 
 def _begin(schema: str, stamped: StampedPose) -> CdrWriter:

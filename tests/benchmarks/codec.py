@@ -33,13 +33,13 @@ from fasaco_edge.wire.maps import (
 )
 from fasaco_edge.wire.paths import decode_path, encode_path
 from fasaco_edge.wire.poses import (
-    POSE_SCHEMAS,
     decode_pose,
     encode_odometry,
     encode_pose_stamped,
     encode_pose_with_covariance_stamped,
 )
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID_UPDATE, PHEROMONE_GRID
+from fasaco_edge.wire.topics import POSE_SCHEMAS
 
 
 class RosbagsCodec:

@@ -14,10 +14,10 @@ import zenoh
 import zenoh.ext
 
 from fasaco_edge.bus import queries as roll_module
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import BusSettings, Sample, open_bus
 from fasaco_edge.errors import BusUnavailable
+from fasaco_edge.wire.topics import QOS
 from tests.support.outsider import Ear, open_client
 from tests.support.processes import free_endpoint
 
@@ -288,7 +288,7 @@ def _numbered(number):
 def test_a_process_that_closes_its_session_ends(endpoint):
     """Without close() a process with a subscription may hang at its exit."""
     code = f"""
-from fasaco_edge.bus.publisher import QOS
+from fasaco_edge.wire.topics import QOS
 from fasaco_edge.bus.session import BusSettings, open_bus
 with open_bus(BusSettings("peer", (), ({endpoint!r},))) as bus:
     bus.subscribe({KEY!r}, lambda sample: None, latched=True)

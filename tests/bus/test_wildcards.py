@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 import zenoh
 
-from fasaco_edge.wire.keys import RPC_NAMES, Keys
-from tests.wire.readme_tables import WILDCARDS, load
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.topics import RPC_NAMES
+from tests.wire.contract_files import WILDCARDS, load
 
 TOPICS = {
     entry["name"]: entry["key"].removeprefix("{base}/@v1/{robot}/").replace("*/*", "1f/plans")

@@ -24,6 +24,7 @@ from fasaco_edge.daemon.ledger.codec import LedgerFileError, decode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording.read.repair import repair_folder
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from tests.campaigns.kill_recorder import driving
 from tests.campaigns.services import START_S, Service, service
@@ -179,7 +180,7 @@ def _record(folder: Path, environment: dict[str, str]) -> tuple[int | None, str]
     with bus_on_free_port() as (bus, endpoint), driving(bus):
         words = ["record", "--out", str(folder / RECORDINGS), "--connect", endpoint]
         enough = threading.Event()
-        bus.subscribe(Keys().recorder, lambda sample: _hear(sample, enough), latched=True)
+        bus.listen(Keys(), topics.RECORDER, lambda sample: _hear(sample, enough))
         with service(folder, words, environment) as recorder:
             deadline = time.monotonic() + START_S
             while recorder.process.poll() is None and not enough.wait(0.05):

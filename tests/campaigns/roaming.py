@@ -10,14 +10,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
 from fasaco_edge.simulation.config import SimulationConfig
 from fasaco_edge.simulation.pace import Pace
 from fasaco_edge.simulation.world import Emission, World
-from fasaco_edge.wire import schemas
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import encode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
@@ -59,9 +58,9 @@ class Robot:
         self._world = world
         self._newest_path = LatestSlot[Sample]()
         keys = Keys()
-        self._maps = bus.publisher(keys.map, schemas.OCCUPANCY_GRID, QOS["map"])
-        self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED, QOS["pose"])
-        bus.subscribe(keys.path, self._newest_path.put, latched=True)
+        self._maps = bus.advertise(keys, topics.MAP)
+        self._poses = bus.advertise(keys, topics.POSE)
+        bus.listen(keys, topics.PATH, self._newest_path.put)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._drive, name="robot")
 

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from fasaco_edge.wire.keys import RPC_NAMES
+from fasaco_edge.wire.topics import RPC_NAMES
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, fasaco_edge
 from tests.support.rooms import map_bytes, pose_bytes, room

@@ -291,12 +291,14 @@ def test_the_command_ends_with_ex_config(tmp_path, text, said):
 def test_ros_is_left_out_unless_it_stands_there(load):
     assert not load("").ros2
     config = load("ros2: {kind: bridge, namespace: /robot1, pose: nav_msgs/msg/Odometry}")
-    assert config.ros2.map.name == "/robot1/map"
-    assert config.ros2.map.latched
-    assert {kind: topic.name for kind, topic in config.ros2.poses.items()} == {
-        "pose": "/robot1/pose"
+    assert config.ros2.inputs["map"].name == "/robot1/map"
+    assert config.ros2.inputs["map"].latched
+    assert {kind: topic.name for kind, topic in config.ros2.inputs.items()} == {
+        "map": "/robot1/map",
+        "map_update": "/robot1/map_updates",
+        "pose": "/robot1/pose",
     }
-    assert list(load("ros2: {kind: rmw_zenoh}").ros2.poses) == ["tf_static", "pose"]
+    assert list(load("ros2: {kind: rmw_zenoh}").ros2.inputs)[2:] == ["tf_static", "pose"]
 
 
 @pytest.mark.parametrize(

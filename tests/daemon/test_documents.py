@@ -11,7 +11,7 @@ import pytest
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import cells_of, coverable_cells, map_bytes, pose_bytes, room
-from tests.wire.readme_tables import PROTOCOL, load
+from tests.wire.contract_files import PROTOCOL, load
 from tests.wire.schemas import check
 
 ORDER = {"zones": [{"name": "west", "polygon": [[0, 0], [1.5, 0], [1.5, 3], [0, 3]], "passes": 2}]}

@@ -8,10 +8,10 @@ import time
 
 import pytest
 
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.daemon.loop.inbox import ASK_FOR_MAP_S
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.wire.topics import QOS
 from tests.campaigns.fuzz_daemon import KINDS, run_campaign
 from tests.support.map_mutations import GOOD, REFUSES, mutant
 from tests.support.outsider import Outsider

@@ -17,7 +17,6 @@ from fasaco_edge.daemon.memory import (
     LEAST_PIXELS,
     MAPS,
     MIB,
-    QUEUES,
     afforded,
     limits_mib,
     memory_limit,
@@ -27,6 +26,7 @@ from fasaco_edge.daemon.memory import (
 )
 from fasaco_edge.grid.lattice import MOST_REACH_PX
 from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_POSE_BYTES
+from fasaco_edge.wire.topics import QUEUE_LENGTHS
 from tests.support.service_manager import unit_limit
 
 ROOT = Path(__file__).parents[2]
@@ -58,7 +58,7 @@ def test_the_guides_say_the_formula():
 @given(st.integers(1, MAX_GRID_CELLS))
 def test_what_waits_for_the_loop_is_part_of_it(max_pixels):
     rooms = queues(max_pixels)
-    waiting = sum(max(rooms[kind].size, most_bytes(kind, max_pixels)) for kind in QUEUES)
+    waiting = sum(max(rooms[kind].size, most_bytes(kind, max_pixels)) for kind in QUEUE_LENGTHS)
     # The other shares of a pixel are for the turn and for Zenoh.
     assert waiting <= BASE_BYTES / 4 + 2 * max_pixels
     assert most_bytes("pose", max_pixels) == MAX_POSE_BYTES

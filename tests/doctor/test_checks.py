@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.config.config import BusConfig, DaemonConfig, MissionSettings, RobotConfig
 from fasaco_edge.doctor import files as folders
@@ -20,6 +19,7 @@ from fasaco_edge.doctor import machine, report, session
 from fasaco_edge.doctor import machine as memory
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
 from fasaco_edge.kernels.sealed import write_sealed
+from fasaco_edge.wire.topics import QOS
 from tests.kernels.harm import HARMS
 from tests.kernels.installations import fill_with
 from tests.support.outsider import Outsider

@@ -20,13 +20,13 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.bus.arrival import PATH_DIGEST
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.errors import MissingExtra, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.recording.write.input_log import PERIOD_NS as INPUT_PERIOD_NS
 from fasaco_edge.recording.write.part import Part
 from fasaco_edge.recording.write.writer import FLUSH_PERIOD_NS
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_occupancy_grid
@@ -68,13 +68,13 @@ def recorded(tmp_path_factory):
     with bus_on_free_port() as (bus, endpoint), recorder_process(bus, endpoint, out) as recorder:
         mission = Mission(bus)
         play(mission)
-        bus.publisher(Keys().coverage, OCCUPANCY_GRID).put(b"\x00\x01\x00\x00not a map")
+        bus.advertise(Keys(), topics.COVERAGE).put(b"\x00\x01\x00\x00not a map")
         # A second daemon of the name, which waits: it is not this robot's state.
         waits = {"state": "blocked", "claim": {"id": "1f", "stand": "waits"}}
-        bus.publisher(Keys().status, qos=QOS["status"]).put(encode_json(waits))
+        bus.advertise(Keys(), topics.STATUS).put(encode_json(waits))
         mission.publish_status("done", 1.0, planning=False, latency_ms="none", errors=ERRORS)
         report = recorder.wait_until(lambda report: report["malformed"] > 0)
-        assert bus.alive(f"{Keys().recorder}/alive")
+        assert bus.alive(Keys().of(topics.RECORDER_ALIVE))
         recorder.process.send_signal(signal.SIGTERM)
         exit_code = recorder.process.wait(60)
     path = Path(report["file"])
@@ -95,13 +95,13 @@ def test_everything_on_the_bus_becomes_an_entity(recorded):
 
 def test_what_the_mission_hears_is_there_byte_for_byte(recorded):
     samples = list(RecordedSamples([recorded.path]))
-    topics = Counter(sample.topic for sample in samples)
-    assert topics["pose"] == FRAMES
-    assert topics[PATH_DIGEST] == recorded.mission.revision
-    assert topics["status"] >= 2
+    counts = Counter(sample.topic for sample in samples)
+    assert counts["pose"] == FRAMES
+    assert counts[PATH_DIGEST] == recorded.mission.revision
+    assert counts["status"] >= 2
     maps = [sample for sample in samples if sample.topic == "map"]
     assert maps[-1].sample.schema == OCCUPANCY_GRID
-    assert maps[-1].sample.key == Keys().map
+    assert maps[-1].sample.key == Keys().of(topics.MAP)
     assert np.array_equal(decode_occupancy_grid(maps[-1].sample.payload).cells, building(1.0))
     assert [sample.at_ns for sample in samples] == sorted(sample.at_ns for sample in samples)
     assert len({sample.wall_ns - sample.at_ns for sample in samples}) == 1
@@ -200,7 +200,7 @@ def test_a_malformed_sample_costs_that_sample(recorded):
     assert recorded.report["lost"] == 0
     lines = read_column(recorded.path, entities.BUS_LOG, "TextLog:text").values
     # The other daemon's status may overtake it: statuses go first on the bus.
-    assert sum(Keys().coverage in line for (line,) in lines) == 1
+    assert sum(Keys().of(topics.COVERAGE) in line for (line,) in lines) == 1
 
 
 def test_the_report_tells_what_is_going_on(recorded):

@@ -10,12 +10,11 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.cli import main
 from fasaco_edge.errors import DifferentRuns, UnreadableRecording
 from fasaco_edge.review.document import document, side_by_side
 from fasaco_edge.review.review import read_review
-from fasaco_edge.wire import schemas
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.paths import encode_path
@@ -39,11 +38,11 @@ def run_told(folder, *, faults, silent=0, killed=False):
     folder.mkdir()
     keys = Keys()
     with bus_on_free_port() as (bus, endpoint):
-        topics = {
-            "map": bus.publisher(keys.map, schemas.OCCUPANCY_GRID, QOS["map"]),
-            "pose": bus.publisher(keys.pose, schemas.POSE_STAMPED),
-            "path": bus.publisher(keys.path, schemas.PATH, QOS["path"]),
-            "status": bus.publisher(keys.status, qos=QOS["status"]),
+        publishers = {
+            "map": bus.advertise(keys, topics.MAP),
+            "pose": bus.advertise(keys, topics.POSE),
+            "path": bus.advertise(keys, topics.PATH),
+            "status": bus.advertise(keys, topics.STATUS),
         }
         with recorder_process(bus, endpoint, folder, part_bytes=1) as recorder:
             sent = 0
@@ -51,7 +50,7 @@ def run_told(folder, *, faults, silent=0, killed=False):
             def put(topic, payload, note=None):
                 nonlocal sent
                 sent += 1
-                topics[topic].put(payload, encode_json(note) if note else b"")
+                publishers[topic].put(payload, encode_json(note) if note else b"")
                 # Each is to come at a time of its own, and in this order.
                 time.sleep(0.03)
 

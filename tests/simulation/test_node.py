@@ -13,18 +13,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.errors import BadConfiguration, BusUnavailable
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.simulation.config import SimulationConfig
 from fasaco_edge.simulation.node import run_simulation
 from fasaco_edge.simulation.world import Activity, World
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.poses import decode_pose
-from fasaco_edge.wire.schemas import PATH
 from tests.simulation.rooms import building, centres, distances_to, serpentine
 
 ROBOT = """
@@ -54,9 +53,9 @@ class Planner:
         self.keys = Keys(robot)
         self.maps, self.poses = [], []
         self.bus = open_bus(BusSettings(mode="router", connect=(), listen=(self.endpoint,)))
-        self.bus.subscribe(self.keys.map, self.maps.append, latched=True)
-        self.bus.subscribe(self.keys.pose, self.poses.append)
-        self._path = self.bus.publisher(self.keys.path, PATH, QOS["path"])
+        self.bus.listen(self.keys, topics.MAP, self.maps.append)
+        self.bus.listen(self.keys, topics.POSE, self.poses.append)
+        self._path = self.bus.advertise(self.keys, topics.PATH)
 
     @property
     def settings(self):

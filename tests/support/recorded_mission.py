@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
@@ -21,7 +20,7 @@ from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.planners.warmup import warm_up
 from fasaco_edge.simulation.config import SimulationConfig
 from fasaco_edge.simulation.world import World
-from fasaco_edge.wire import schemas
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_json, encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
@@ -108,16 +107,16 @@ class MappingRobot:
         pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
         geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0))
         self._world = World(OccupancyGrid(geometry, pixels), START, SIMULATION)
-        self._maps = bus.publisher(keys.map, schemas.OCCUPANCY_GRID, QOS["map"])
-        self._updates = bus.publisher(keys.map_update, schemas.OCCUPANCY_GRID_UPDATE)
-        self._poses = bus.publisher(keys.pose, schemas.POSE_STAMPED, QOS["pose"])
+        self._maps = bus.advertise(keys, topics.MAP)
+        self._updates = bus.advertise(keys, topics.MAP_UPDATE)
+        self._poses = bus.advertise(keys, topics.POSE)
         self._newest_path = LatestSlot[Sample]()
         self.status: dict = {}
         self.statuses: list[tuple[float, dict]] = []
         self.notes: list[tuple[float, dict]] = []
         self._sent: OccupancyGrid | None = None
-        bus.subscribe(keys.path, self._take_path, latched=True)
-        bus.subscribe(keys.status, self._hear, latched=True)
+        bus.listen(keys, topics.PATH, self._take_path)
+        bus.listen(keys, topics.STATUS, self._hear)
 
     def wait(self, holds) -> None:
         """Wait for a status."""

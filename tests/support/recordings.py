@@ -23,6 +23,7 @@ from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import scan_recording
 from fasaco_edge.recording.sdk import RrdReader
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 
 RUN = """
@@ -82,7 +83,7 @@ def recorder_process(bus: Bus, endpoint: str, out: Path, **settings: Any) -> Ite
     process = subprocess.Popen([sys.executable, "-c", RUN, told], stderr=subprocess.PIPE, text=True)
     recorder = Recorder(process)
     try:
-        bus.subscribe(Keys().recorder, recorder.hear, latched=True)
+        bus.listen(Keys(), topics.RECORDER, recorder.hear)
         recorder.wait_until(lambda report: report["pid"] == process.pid)
         yield recorder
     finally:

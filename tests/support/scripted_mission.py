@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.planner import ColonySnapshot
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.coverage import BLOCKED, COVERED, RECOVERED, TO_COVER, UNKNOWN
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
@@ -28,7 +28,6 @@ from fasaco_edge.wire.maps import encode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
 from fasaco_edge.wire.poses import encode_pose_stamped
-from fasaco_edge.wire.schemas import OCCUPANCY_GRID, PATH, PHEROMONE_GRID, POSE_STAMPED
 
 RESOLUTION_M = 0.05
 CELL_M = 0.25
@@ -47,12 +46,12 @@ class Mission:
 
     def __post_init__(self) -> None:
         bus, keys = self.bus, self.keys
-        self._map = bus.publisher(keys.map, OCCUPANCY_GRID, QOS["map"])
-        self._pose = bus.publisher(keys.pose, POSE_STAMPED, QOS["pose"])
-        self._path = bus.publisher(keys.path, PATH, QOS["path"])
-        self._coverage = bus.publisher(keys.coverage, OCCUPANCY_GRID, QOS["coverage"])
-        self._pheromone = bus.publisher(keys.pheromone, PHEROMONE_GRID)
-        self._status = bus.publisher(keys.status, qos=QOS["status"])
+        self._map = bus.advertise(keys, topics.MAP)
+        self._pose = bus.advertise(keys, topics.POSE)
+        self._path = bus.advertise(keys, topics.PATH)
+        self._coverage = bus.advertise(keys, topics.COVERAGE)
+        self._pheromone = bus.advertise(keys, topics.PHEROMONE)
+        self._status = bus.advertise(keys, topics.STATUS)
         self.walk = _walk()
         self.rest = self.walk
         self.seen_cells = 0

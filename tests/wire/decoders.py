@@ -9,7 +9,8 @@ from fasaco_edge.wire import schemas
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
-from fasaco_edge.wire.poses import POSE_SCHEMAS, decode_pose
+from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.topics import POSE_SCHEMAS
 from fasaco_edge.wire.transforms import Transform, decode_transforms
 
 

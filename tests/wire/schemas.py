@@ -10,7 +10,7 @@ from jsonschema import Draft202012Validator
 from referencing import Registry
 from referencing.jsonschema import DRAFT202012
 
-from tests.wire.readme_tables import PROTOCOL
+from tests.wire.contract_files import PROTOCOL
 
 NAMES = sorted(path.name for path in (PROTOCOL / "schema").glob("*.json"))
 # What may stand in a section of the configuration is not the contract's.

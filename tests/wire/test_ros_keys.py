@@ -11,7 +11,7 @@ import zenoh.ext
 
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.host.resources import folder
-from fasaco_edge.wire import schemas
+from fasaco_edge.wire import schemas, topics
 from fasaco_edge.wire.ros_keys import (
     GID_BYTES,
     TYPE_HASHES,
@@ -42,9 +42,9 @@ def test_topics_are_those_of_the_table() -> None:
     config = RosConfig(kind="rmw_zenoh")
     by_pose = RosConfig(kind="rmw_zenoh", pose=schemas.ODOMETRY)
     ours = [
-        *(config.map, config.map_updates, by_pose.poses["pose"]),
-        *(config.poses["pose"], config.poses["tf_static"]),
-        *(config.coverage_path, config.coverage_grid),
+        *by_pose.inputs.values(),
+        *(config.inputs["pose"], config.inputs["tf_static"]),
+        *config.outputs.values(),
     ]
     shown = re.findall(r"^\| `(/\w+)` \| (in|out).* \| (.*) \| (.*) \|$", README, re.MULTILINE)
     for topic, entry, row in zip(ours, TABLE["topics"], shown, strict=True):
@@ -101,3 +101,12 @@ def test_each_publisher_has_a_gid_of_its_own() -> None:
     tokens = [NODE.endpoint_token(number, "MP", PATH) for number in range(1, 5)]
     assert len({gid_of(token) for token in tokens}) == 4
     assert {len(gid_of(token)) for token in tokens} == {GID_BYTES}
+
+
+def test_rows_are_those_of_the_table() -> None:
+    rows = [
+        (row.name, row.direction, list(row.schemas), row.latched, row.depth)
+        for row in topics.ROS_TOPICS.values()
+    ]
+    columns = ("name", "direction", "schema", "latched", "depth")
+    assert rows == [tuple(entry[name] for name in columns) for entry in TABLE["topics"]]

@@ -10,7 +10,7 @@ from jsonschema import Draft202012Validator, ValidationError
 
 from fasaco_edge.errors import NotYet
 from fasaco_edge.wire.json_text import encode_error
-from tests.wire.readme_tables import PROTOCOL, load
+from tests.wire.contract_files import PROTOCOL, load
 from tests.wire.schemas import NAMES, check, schema
 
 README = (PROTOCOL / "README.md").read_text()

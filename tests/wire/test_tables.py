@@ -9,17 +9,15 @@ import re
 import pytest
 
 import fasaco_edge
-from fasaco_edge.bus import session_config
-from fasaco_edge.bus.publisher import QOS, VOLATILE, Qos
 from fasaco_edge.daemon.loop.commands import REPLAN_PERIOD_S
-from fasaco_edge.daemon.memory import QUEUES
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.coverage.ledger import MOST_TILES
 from fasaco_edge.mission.orders import order
 from fasaco_edge.wire import limits
-from fasaco_edge.wire.keys import RPC_NAMES, Keys
-from tests.wire import readme_tables
-from tests.wire.readme_tables import PROTOCOL, load
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.topics import QOS, QUERIES, QUEUE_LENGTHS, TOPICS, VOLATILE
+from tests.wire import contract_files
+from tests.wire.contract_files import PROTOCOL, load
 
 README = (PROTOCOL / "README.md").read_text()
 PRIORITIES = (
@@ -30,8 +28,8 @@ PRIORITIES = (
 
 @pytest.mark.parametrize("table", ["key", "qos", "query", "wildcard", "error"])
 def test_a_table_of_the_readme_is_that_of_the_data(table):
-    """To write it anew: python -m tests.wire.readme_tables."""
-    rows = getattr(readme_tables, f"{table}_rows")()
+    """To write it: python -m tests.wire.contract_files."""
+    rows = getattr(contract_files, f"{table}_rows")()
     assert "\n|---" in README
     assert "\n".join(rows) in README
 
@@ -53,28 +51,33 @@ def test_what_the_readme_names_is_there():
         assert (PROTOCOL / name).exists(), name
 
 
-def test_queries_are_those_of_the_code():
-    queries = load("keys.yaml")["queries"]
-    assert tuple(query["name"] for query in queries) == RPC_NAMES
+def test_keys_queries_and_quality_of_service_are_those_of_the_table_of_topics():
+    keys = load("keys.yaml")
+    assert keys["keys"] == [contract_files.key_entry(topic) for topic in TOPICS]
+    assert keys["queries"] == [contract_files.query_entry(query) for query in QUERIES]
+    table = {topic.name: contract_files.qos_entry(topic) for topic in TOPICS if topic.qos}
+    assert load("qos.yaml")["qos"] == table
+    names = Keys("mower-2", "site/hall_1")
+    for entry, topic in zip(keys["keys"], TOPICS, strict=True):
+        assert entry["key"].format(base=names.base, robot=names.robot) == names.of(topic)
+    for entry in keys["queries"]:
+        assert entry["key"].format(base=names.base, robot=names.robot) == names.rpc(entry["name"])
+
+
+def test_queries_make_sense():
     codes = {error["code"] for error in load("errors.yaml")["errors"] if "query" in error["from"]}
-    keys = Keys("mower-2", "site/hall_1")
-    for query in queries:
-        assert query["key"].format(base=keys.base, robot=keys.robot) == keys.rpc(query["name"])
-        assert set(query["errors"]) <= codes
-        assert 0 < query["timeout_s"] <= 5
-    assert len({frozenset(query) for query in queries}) == 1
+    for query in QUERIES:
+        assert set(query.errors) <= codes
+        assert 0 < query.timeout_s <= 5
 
 
-def test_publishers_get_the_quality_of_service_of_the_table():
-    table = load("qos.yaml")["qos"]
-    for row in table.values():
-        row.pop("blocks")
-    assert {name: Qos(**row) for name, row in table.items()} == QOS
-    keys = {entry["name"]: entry for entry in load("keys.yaml")["keys"]}
-    assert {entry["qos"] for entry in keys.values()} == {*QOS, None}
-    for name, qos in QOS.items():
-        assert keys[name]["qos"] == name
-        assert keys[name]["latched"] == qos.latched
+@pytest.mark.parametrize("name", contract_files.template_grants())
+def test_a_session_template_has_the_keys_of_the_table_of_topics(name):
+    text = (PROTOCOL / "config" / f"{name}.json5").read_text()
+    assert contract_files.with_keys(text, contract_files.template_grants()[name]) == text
+    # And would get them.
+    broken = text.replace("/map_update", "/other")
+    assert contract_files.with_keys(broken, contract_files.template_grants()[name]) == text
 
 
 def test_priorities_make_sense():
@@ -86,18 +89,16 @@ def test_priorities_make_sense():
     assert rank("pheromone") == max(map(rank, QOS))
     # An update must not overtake the map it belongs to.
     assert rank("map") == rank("map_update")
-    entries = load("keys.yaml")["keys"]
-    sent = {entry["name"] for entry in entries if entry["direction"].startswith("out")}
+    sent = {topic.name for topic in TOPICS if topic.direction.startswith("out")}
     assert {QOS[name].congestion for name in sent} == {"drop"}, "nobody holds up a daemon"
 
 
-def test_every_publisher_says_how():
-    """One that says nothing is as Zenoh's are: no key of the contract is."""
+def test_every_publisher_has_the_quality_of_service_of_a_row():
+    """What is published on no key of the contract travels as Zenoh's default does."""
     assert VOLATILE not in QOS.values()
-    said = re.compile(r"\.publisher\([^)]*QOS\[")
     for path in PROTOCOL.parent.glob("fasaco_edge/**/*.py"):
         for call in re.findall(r"bus\.publisher\([^)]*\)", path.read_text()):
-            assert said.search(call), f"{path}: {call}"
+            assert ".qos or" in call, f"{path}: {call}"
 
 
 def test_limits_are_those_of_the_code():
@@ -107,11 +108,10 @@ def test_limits_are_those_of_the_code():
     assert load("limits.yaml") == {
         **upper(limits),
         **{name: value for name, value in upper(order).items() if isinstance(value, int | float)},
-        **{f"queue_{name}": length for name, length in QUEUES.items()},
+        **{f"queue_{name}": length for name, length in QUEUE_LENGTHS.items()},
         "replan_period_s": REPLAN_PERIOD_S,
         "most_ledger_tiles": MOST_TILES,
     }
-    assert session_config.MAX_MESSAGE_BYTES == limits.MAX_MESSAGE_BYTES
     named = {name for entry in load("keys.yaml")["keys"] for name in entry["limits"]}
     assert named <= load("limits.yaml").keys()
 

@@ -18,8 +18,9 @@ from fasaco_edge.bus.queries import Reply, Request, Shared, matches
 from fasaco_edge.bus.session import ZENOH_VERSION, Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadQuery, FasacoError, NotYet, UnknownQuery
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import encode_error, encode_json
-from fasaco_edge.wire.keys import RPC_NAMES, VERSION, Keys
+from fasaco_edge.wire.keys import VERSION, Keys
 
 NEWEST = "newest"
 Said = Reply | Shared
@@ -69,11 +70,11 @@ class LastSamples:
         # Of the newest full plan: by cohort, and the newest; and the number of its request.
         self._trails: dict[str, Said] = {}
         self._plan = 0
-        for name in ("path", "status", "coverage"):
-            answer = answering(partial(self._answer, name))
-            for key in (keys.rpc(name), getattr(keys, name)):
+        for topic in (topics.PATH, topics.STATUS, topics.COVERAGE):
+            answer = answering(partial(self._answer, topic.name))
+            for key in (keys.rpc(topic.name), keys.of(topic)):
                 bus.serve(key, answer)
-        for key in (keys.rpc("pheromone"), keys.pheromone):
+        for key in (keys.rpc("pheromone"), keys.of(topics.PHEROMONE)):
             bus.serve(key, answering(self._trail))
 
     def keep(self, topic: str, reply: Said) -> None:
@@ -163,9 +164,9 @@ def _tell(document: Callable[[], dict[str, Any]], request: Request) -> Reply:
 
 def _unknown(keys: Keys, request: Request) -> Reply | None:
     """Answer what no other queryable does: this one hears every query."""
-    if any(matches(request.key, keys.rpc(name)) for name in RPC_NAMES):
+    if any(matches(request.key, keys.rpc(name)) for name in topics.RPC_NAMES):
         return None
     name = request.key.rpartition("/")[2]
     return error_reply(
-        UnknownQuery(f"there is no query {name!r}; there are {', '.join(RPC_NAMES)}")
+        UnknownQuery(f"there is no query {name!r}; there are {', '.join(topics.RPC_NAMES)}")
     )

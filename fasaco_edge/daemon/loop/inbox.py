@@ -19,6 +19,7 @@ from fasaco_edge.mission.core.events import (
     PatchReceived,
     PoseReceived,
 )
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.pose_decoding import PoseDecoder
@@ -101,11 +102,11 @@ class Inbox:
         self._max_pixels = max_pixels
         self._asked_for_map_at = float("-inf")
         self._maps = [
-            bus.subscribe(keys.map, poster(mailbox, "map", max_pixels), latched=True),
+            bus.listen(keys, topics.MAP, poster(mailbox, "map", max_pixels)),
             *maps,
         ]
-        for kind, key in (("map_update", keys.map_update), ("pose", keys.pose)):
-            bus.subscribe(key, poster(mailbox, kind, max_pixels))
+        for topic in (topics.MAP_UPDATE, topics.POSE):
+            bus.listen(keys, topic, poster(mailbox, topic.name, max_pixels))
 
     def ask_for_map(self, now: float) -> None:
         """Ask whoever publishes the map, and keeps the newest for late joiners, for it."""

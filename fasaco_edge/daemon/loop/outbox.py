@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bus.publisher import QOS
 from fasaco_edge.bus.queries import Reply, Shared
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.faults import PublishGuard
@@ -22,7 +21,7 @@ from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import command_document
-from fasaco_edge.wire import schemas
+from fasaco_edge.wire import schemas, topics
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import encode_occupancy_grid
@@ -52,11 +51,11 @@ class Outbox:
         self.gate = PublishGuard()
         self._ros = ros
         self._last = LastSamples(bus, keys)
-        self._path = bus.publisher(keys.path, schemas.PATH, QOS["path"])
-        self._coverage = bus.publisher(keys.coverage, schemas.OCCUPANCY_GRID, QOS["coverage"])
-        self._pheromone = bus.publisher(keys.pheromone, schemas.PHEROMONE_GRID, QOS["pheromone"])
-        self._status = bus.publisher(keys.status, qos=QOS["status"])
-        self._command = bus.publisher(keys.command, qos=QOS["command"])
+        self._path = bus.advertise(keys, topics.PATH)
+        self._coverage = bus.advertise(keys, topics.COVERAGE)
+        self._pheromone = bus.advertise(keys, topics.PHEROMONE)
+        self._status = bus.advertise(keys, topics.STATUS)
+        self._command = bus.advertise(keys, topics.COMMAND)
 
     def path(
         self,

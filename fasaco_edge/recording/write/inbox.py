@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
+from fasaco_edge.wire.topics import NEWEST, TOPICS
 
 
 class RunClock:
@@ -33,15 +34,12 @@ class RunClock:
 # So many samples waiting mean that the writer is behind: some ten seconds of poses.
 BEHIND_SAMPLES = 1024
 
-# What a sample makes worthless when the writer is behind. Paths are missing: they are
-# small, and each revision counts. A full map also clears the patches of the one before it.
-SUPERSEDED: dict[str, frozenset[str]] = {
-    "map": frozenset({"map", "map_update"}),
-    "pose": frozenset({"pose"}),
-    "coverage": frozenset({"coverage"}),
-    "pheromone": frozenset({"pheromone"}),
-    "status": frozenset({"status"}),
+# What a sample makes worthless when the writer is behind. A full map also clears the updates of
+# the one before it.
+SUPERSEDED = {
+    topic.name: frozenset({topic.name}) for topic in TOPICS if topic.queues.recorder == NEWEST
 }
+SUPERSEDED["map"] |= {"map_update"}
 
 
 class Inbox:

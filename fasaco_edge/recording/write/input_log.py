@@ -20,10 +20,9 @@ from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.samples.codec import Numbered, SampleEncoder
 from fasaco_edge.wire.json_text import decode_json
 from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.topics import RECORDED_INPUTS
 
-INPUTS: Final = ("map", "map_update", "pose", "tf_static", "command", "turns")
-"""Topics that are logged as they come: all that a mission hears, and when it took it."""
-# What is in force for no longer than it takes to hear it.
+# These hold for the moment they come alone; all other inputs stay in force.
 PASSING: Final = ("pose", "command", "turns")
 PERIOD_NS = 900_000_000
 STATUS_PERIOD_NS = 15_000_000_000
@@ -55,7 +54,7 @@ class InputLog:
         """Take a sample, if it is one that matters."""
         if arrival.topic == "path":
             arrival = _path_digest(arrival)
-        elif arrival.topic not in INPUTS and not self._is_news(arrival):
+        elif arrival.topic not in RECORDED_INPUTS and not self._is_news(arrival):
             return
         self._in_force.note(self._encoder.add(arrival))
         if self._encoder.waiting_bytes > WAITING_BYTES:
@@ -63,7 +62,7 @@ class InputLog:
 
     def note_lost(self, lost: Counter[str]) -> None:
         """Note how many samples of each topic never came here, in all."""
-        count = sum(lost[topic] for topic in INPUTS)
+        count = sum(lost[topic] for topic in RECORDED_INPUTS)
         self._encoder.skip(count - self._lost)
         self._lost = count
 

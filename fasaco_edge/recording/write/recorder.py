@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from fasaco_edge.bus.arrival import Arrival
-from fasaco_edge.bus.publisher import QOS, Publisher
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, FasacoError
 from fasaco_edge.host.processes import resident_mb, return_soon
@@ -30,6 +30,7 @@ from fasaco_edge.recording.write.live import serve_live
 from fasaco_edge.recording.write.quota import DiskBudget, Quota, next_run
 from fasaco_edge.recording.write.settings import RecorderReport, RecorderSettings
 from fasaco_edge.recording.write.writer import RecordingWriter
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_json, encode_json, is_the_planners
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
@@ -109,24 +110,17 @@ class Recorder:
         self._last_status_ns: int | None = None
         self._report: RecorderReport | None = None
         self._next_report_ns = 0
-        self._reporter: Publisher = bus.publisher(settings.keys.recorder, qos=QOS["recorder"])
+        self._reporter: Publisher = bus.advertise(settings.keys, topics.RECORDER)
 
     def listen(self) -> None:
         """Subscribe to everything there is to record, and say that the recorder is there."""
         settings, keys = self._settings, self._settings.keys
-        self._subscribe("map", keys.map, latched=True)
-        self._subscribe("map_update", keys.map_update)
-        self._subscribe("pose", keys.pose)
         for ros in settings.ros:
             self._subscribe(ros.topic, ros.key, ros.latched, ros.depth, ros.schema)
-        self._subscribe("command", keys.command)
-        self._subscribe("path", keys.path, latched=True)
-        self._subscribe("coverage", keys.coverage, latched=True)
-        self._subscribe("pheromone", keys.pheromone)
-        self._subscribe("status", keys.status, latched=True)
-        # Last: once the daemon sees that this is listened to, everything else is, too.
-        self._subscribe("turns", keys.turns)
-        self._bus.token(keys.recorder_alive)
+        for topic in topics.TOPICS:
+            if topic.queues.recorder is not None:
+                self._subscribe(topic.name, keys.of(topic), topic.is_latched)
+        self._bus.token(keys.of(topics.RECORDER_ALIVE))
 
     def step(self, timeout_s: float) -> None:
         """Write what came within ``timeout_s`` [s], find out whether it is written, report."""

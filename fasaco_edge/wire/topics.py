@@ -1,0 +1,414 @@
+"""Table of topics: one row for each key, query and ROS 2 topic of the contract.
+
+Publishers, subscribers, queues, the recorder's inputs and access rules are made from these rows;
+``protocol/keys.yaml``, ``protocol/qos.yaml``, the tables of ``protocol/README.md`` and the session
+templates are written from them (``python -m tests.wire.contract_files``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from fasaco_edge.wire import schemas
+
+Role = Literal["mapper", "viewer", "operator", "recorder", "robot"]
+Direction = Literal["in", "out", "out, by the recorder", "liveliness token"]
+SizeClass = Literal["large", "pose", "json", "token"]
+Priority = Literal[
+    "real_time",
+    "interactive_high",
+    "interactive_low",
+    "data_high",
+    "data",
+    "data_low",
+    "background",
+]
+
+NEWEST = 1
+EVERY = 0
+POSE_SCHEMAS = (schemas.POSE_STAMPED, schemas.POSE_WITH_COVARIANCE_STAMPED, schemas.ODOMETRY)
+
+
+@dataclass(frozen=True, slots=True)
+class Qos:
+    """Quality of service of a publisher.
+
+    Attributes:
+        priority: what goes first where a link is busy.
+        reliability: whether a link that may lose what it carries sends it again.
+        congestion: ``drop``: a receiver too slow loses the sample; ``block``: the sender waits
+            for it.
+        express: whether it is sent at once, never gathered with others into one packet.
+        cache: how many samples are kept for those who join late; 0 for none.
+        why: reason of what is unusual about it.
+    """
+
+    priority: Priority = "data"
+    reliability: Literal["reliable", "best_effort"] = "reliable"
+    congestion: Literal["drop", "block"] = "drop"
+    express: bool = False
+    cache: int = 0
+    why: str = ""
+
+    @property
+    def latched(self) -> bool:
+        """Whether late joiners get the newest sample."""
+        return self.cache > 0
+
+
+VOLATILE = Qos()
+
+
+class Queues(NamedTuple):
+    """How many samples of a topic may wait at each receiver of this package.
+
+    NEWEST: a newer sample replaces the one before. EVERY: as many as the receiver's memory holds;
+    the recorder keeps all until it is behind, then the newest where it says NEWEST. None: that
+    receiver does not subscribe.
+    """
+
+    daemon: int | None = None
+    recorder: int | None = None
+    watch: int | None = None
+
+
+NO_QUEUES = Queues()
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A key below the prefix of a robot, ``<base>/@v1/<robot>/``.
+
+    Attributes:
+        name: name of the row, and of the topic in recordings.
+        direction: as seen by the planner.
+        when: what makes a sample.
+        speaker: the role that publishes it.
+        listeners: roles that may subscribe to it; ``bus.access`` says which include others.
+        key: what follows the prefix; "" for the name. A ``*`` is a chunk that a session fills in.
+        schemas: message types; none for JSON and tokens.
+        json, attachment: JSON Schema of the payload, and of what comes with it; "" for none.
+        qos: how it is published; None for tokens.
+        rate_hz: how often at least; 0 where that is not promised.
+        queues: what waits at the receivers.
+        is_input: whether a recording holds it byte for byte, for a replay.
+        limits: what bounds it, in ``protocol/limits.yaml``.
+    """
+
+    name: str
+    direction: Direction
+    when: str
+    speaker: Role
+    listeners: tuple[Role, ...]
+    key: str = ""
+    schemas: tuple[str, ...] = ()
+    json: str = ""
+    attachment: str = ""
+    qos: Qos | None = None
+    rate_hz: float = 0.0
+    queues: Queues = NO_QUEUES
+    is_input: bool = False
+    limits: tuple[str, ...] = ()
+
+    @property
+    def suffix(self) -> str:
+        """What its keys end with."""
+        return self.key or self.name
+
+    @property
+    def schema(self) -> str:
+        """The message type its publishers in this package use; "" for JSON."""
+        return self.schemas[0] if self.schemas else ""
+
+    @property
+    def is_latched(self) -> bool:
+        """Whether late joiners get the newest sample."""
+        return self.qos is not None and self.qos.latched
+
+    @property
+    def size_class(self) -> SizeClass:
+        """Which limit of size holds for it, see ``bus.access.Limits``."""
+        if self.qos is None:
+            return "token"
+        if not self.schemas:
+            return "json"
+        return "pose" if self.schemas == POSE_SCHEMAS else "large"
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """What can be asked of a daemon, as ``@rpc/<name>``.
+
+    Attributes:
+        name: name of the query.
+        listeners: roles that may ask it.
+        schema: message type of the answer; "" for JSON.
+        json: JSON Schema of the answer; "" for none.
+        payload: JSON Schema of what comes with the question; "" for none.
+        parameters: what may stand behind ``?``.
+        answered: ``at once`` with the newest sample; by the ``loop`` once it has decided.
+        timeout_s: how long to wait for an answer [s].
+        errors: codes of errors beside ``bad_query``.
+    """
+
+    name: str
+    listeners: tuple[Role, ...]
+    schema: str = ""
+    json: str = ""
+    payload: str = ""
+    parameters: tuple[str, ...] = ()
+    answered: Literal["at once", "loop"] = "at once"
+    timeout_s: float = 1.0
+    errors: tuple[str, ...] = ()
+    speaker: Role = "robot"
+
+    @property
+    def suffix(self) -> str:
+        """What its keys end with."""
+        return f"@rpc/{self.name}"
+
+    @property
+    def size_class(self) -> SizeClass:
+        """Which limit of size holds for its answer."""
+        return "large" if self.schema else "json"
+
+
+class RosRow(NamedTuple):
+    """A ROS 2 topic.
+
+    Attributes:
+        name: its key under ``ros2.topics`` of the configuration.
+        topic: name it has in the daemon and in recordings.
+        direction: as seen by the planner.
+        schemas: message types it may have.
+        latched: transient local.
+        depth: how many samples are kept.
+    """
+
+    name: str
+    topic: str
+    direction: Literal["in", "out"]
+    schemas: tuple[str, ...]
+    latched: bool
+    depth: int
+
+
+MAP = Topic(
+    name="map",
+    direction="in",
+    when="the map is new, or has grown or moved",
+    speaker="mapper",
+    listeners=("robot", "recorder"),
+    schemas=(schemas.OCCUPANCY_GRID,),
+    qos=Qos("data_high", cache=1),
+    queues=Queues(daemon=4, recorder=NEWEST, watch=NEWEST),
+    is_input=True,
+    limits=("max_grid_cells", "min_resolution_m", "max_resolution_m", "max_grid_tilt", "queue_map"),
+)
+MAP_UPDATE = Topic(
+    name="map_update",
+    direction="in",
+    when="a window of the last map has changed",
+    speaker="mapper",
+    listeners=("robot", "recorder"),
+    schemas=(schemas.OCCUPANCY_GRID_UPDATE,),
+    qos=Qos(
+        "data_high",
+        congestion="block",
+        why="a lost update leaves the map wrong; with the map's priority both stay in order",
+    ),
+    queues=Queues(daemon=256, recorder=EVERY, watch=256),
+    is_input=True,
+    limits=("max_grid_cells", "queue_map_update"),
+)
+POSE = Topic(
+    name="pose",
+    direction="in",
+    when="the robot has a new pose in the frame of the map",
+    speaker="mapper",
+    listeners=("robot", "recorder"),
+    schemas=POSE_SCHEMAS,
+    qos=Qos("interactive_low", express=True, why="the next pose is better than one sent again"),
+    queues=Queues(daemon=1024, recorder=NEWEST, watch=NEWEST),
+    is_input=True,
+    limits=("max_coordinate_m", "quaternion_tolerance", "queue_pose"),
+)
+PATH = Topic(
+    name="path",
+    direction="out",
+    when="the walk still to be driven has changed",
+    speaker="robot",
+    listeners=("viewer",),
+    schemas=(schemas.PATH,),
+    attachment="path_attachment.json",
+    qos=Qos(
+        "interactive_high", express=True, cache=1, why="a frozen receiver never holds the planner"
+    ),
+    queues=Queues(recorder=EVERY, watch=64),
+    limits=("max_path_poses", "max_coordinate_m"),
+)
+COVERAGE = Topic(
+    name="coverage",
+    direction="out",
+    when="what is covered has changed, twice a second at most",
+    speaker="robot",
+    listeners=("viewer",),
+    schemas=(schemas.OCCUPANCY_GRID,),
+    qos=Qos("data_low", cache=1),
+    queues=Queues(recorder=NEWEST, watch=NEWEST),
+    limits=("max_grid_cells",),
+)
+PHEROMONE = Topic(
+    name="pheromone",
+    direction="out",
+    when="a cohort has walked, and only while someone listens",
+    speaker="robot",
+    listeners=("viewer",),
+    schemas=(schemas.PHEROMONE_GRID,),
+    qos=Qos("background", "best_effort", why="for display: never before a path"),
+    queues=Queues(recorder=NEWEST),
+    limits=("max_grid_cells",),
+)
+STATUS = Topic(
+    name="status",
+    direction="out",
+    when="the status has changed",
+    speaker="robot",
+    listeners=("viewer",),
+    json="status.json",
+    qos=Qos("interactive_low", cache=1),
+    rate_hz=1.0,
+    queues=Queues(recorder=NEWEST, watch=64),
+    limits=("max_json_bytes",),
+)
+COMMAND = Topic(
+    name="command",
+    direction="out",
+    when="the mission has taken a command",
+    speaker="robot",
+    listeners=("operator", "recorder"),
+    json="mission.json",
+    qos=Qos("interactive_low"),
+    queues=Queues(recorder=EVERY, watch=16),
+    is_input=True,
+    limits=("max_json_bytes",),
+)
+TURNS = Topic(
+    name="turns",
+    direction="out",
+    when=(
+        "turns were made, twice a second at most, and only while someone listens from the beginning"
+    ),
+    speaker="robot",
+    listeners=("recorder",),
+    json="turns.json",
+    qos=Qos("data_low"),
+    queues=Queues(recorder=EVERY),
+    is_input=True,
+    limits=("max_json_bytes",),
+)
+ALIVE = Topic(
+    name="alive",
+    direction="liveliness token",
+    when="stands while the planner is able to plan",
+    speaker="robot",
+    listeners=("viewer",),
+)
+CLAIM = Topic(
+    name="claim",
+    direction="liveliness token",
+    when="each daemon of this name has one, which tells whether it plans or waits",
+    speaker="robot",
+    # By these the daemons of one name see each other.
+    listeners=("viewer", "robot"),
+    key="claim/*/*",
+)
+RECORDER = Topic(
+    name="recorder",
+    direction="out, by the recorder",
+    when="the recorder's status has changed",
+    speaker="recorder",
+    listeners=("robot", "recorder"),
+    json="recorder.json",
+    qos=Qos("data", cache=1),
+    rate_hz=1.0,
+    queues=Queues(daemon=NEWEST),
+    limits=("max_json_bytes",),
+)
+RECORDER_ALIVE = Topic(
+    name="recorder_alive",
+    direction="liveliness token",
+    when="stands while a recorder listens",
+    speaker="recorder",
+    listeners=("robot", "recorder"),
+    key="recorder/alive",
+)
+
+# A recorder subscribes in this order, to the turn log last: once the daemon sees a subscriber
+# there, that subscriber receives everything else, too.
+TOPICS = (
+    *(MAP, MAP_UPDATE, POSE),
+    *(PATH, COVERAGE, PHEROMONE, STATUS, COMMAND, TURNS, ALIVE, CLAIM),
+    *(RECORDER, RECORDER_ALIVE),
+)
+QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}
+
+QUERIES = (
+    Query("path", ("viewer",), schema=schemas.PATH, errors=("not_yet",)),
+    Query("status", ("viewer",), json="status.json"),
+    Query("coverage", ("viewer",), schema=schemas.OCCUPANCY_GRID, errors=("not_yet",)),
+    Query(
+        "pheromone",
+        ("viewer",),
+        schema=schemas.PHEROMONE_GRID,
+        parameters=("cohort",),
+        errors=("not_yet",),
+    ),
+    Query("config", ("viewer",), json="config.json"),
+    Query("version", ("viewer",), json="version.json"),
+    # To ask these is to command.
+    Query(
+        "mission",
+        ("operator",),
+        json="reply.json",
+        payload="mission.json",
+        answered="loop",
+        timeout_s=5.0,
+        errors=("bad_order", "not_now", "malformed_message"),
+    ),
+    Query(
+        "replan",
+        ("operator",),
+        json="replan.json",
+        answered="loop",
+        timeout_s=5.0,
+        errors=("not_now",),
+    ),
+)
+RPC_NAMES = tuple(query.name for query in QUERIES)
+
+TF_STATIC = "tf_static"
+# As tf2's listeners have it. A bridge keeps all nodes' static transforms in one history.
+TF_DEPTH = POSE_DEPTH = 100
+TF = (schemas.TF_MESSAGE,)
+_ROS_ROWS = (
+    RosRow("map", "map", "in", MAP.schemas, latched=True, depth=1),
+    RosRow("map_updates", "map_update", "in", MAP_UPDATE.schemas, latched=False, depth=256),
+    RosRow("pose", "pose", "in", POSE.schemas, latched=False, depth=POSE_DEPTH),
+    RosRow("tf", "pose", "in", TF, latched=False, depth=TF_DEPTH),
+    RosRow("tf_static", TF_STATIC, "in", TF, latched=True, depth=TF_DEPTH),
+    RosRow("coverage_path", "path", "out", PATH.schemas, latched=True, depth=1),
+    RosRow("coverage_grid", "coverage", "out", COVERAGE.schemas, latched=True, depth=1),
+)
+ROS_TOPICS = {row.name: row for row in _ROS_ROWS}
+"""By their key under ``ros2.topics`` of the configuration."""
+
+# How many samples wait for the daemon's loop where it queues them; static transforms come by
+# ROS 2 alone, and commands as queries.
+QUEUE_LENGTHS = {TF_STATIC: 256, "command": 16} | {
+    topic.name: length
+    for topic in TOPICS
+    if (length := topic.queues.daemon) is not None and length > NEWEST
+}
+RECORDED_INPUTS = (*(topic.name for topic in TOPICS if topic.is_input), TF_STATIC)
