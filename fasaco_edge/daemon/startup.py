@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
-from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, fitting
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, without_base
 from fasaco_edge.mission.core.events import (
     Answer,
     CommandReceived,
@@ -105,17 +105,15 @@ class Startup:
         """Lay updates over the maps held; return why some cannot be."""
         maps = self._maps()
         if not maps or self._has_lost:
-            why = "updates before it were lost" if maps else "there is no map yet"
-            return [PatchWithoutBase(f"map update refused: {why}") for _ in patches]
+            return without_base(patches, updates_lost=bool(maps))
         faults: list[FasacoError] = []
         newest = next(reversed(maps))
         for frame, place in maps.items():
             # One of neither frame misfits the newest map.
             theirs = [p for p in patches if (p.frame if p.frame in maps else newest) == frame]
-            grid = self._grid_at(place)
-            fit, misfits = fitting(grid, theirs)
-            self.held[place] = MapReceived(grid.patched(*fit))
-            faults += misfits
+            updated = self._grid_at(place).with_updates(theirs)
+            self.held[place] = MapReceived(updated.grid)
+            faults += updated.faults
         return faults
 
     def _grid_at(self, place: int) -> OccupancyGrid:

@@ -45,52 +45,66 @@ class OccupancyGrid:
             object.__setattr__(self, "cells", view)
 
     def patched(self, *patches: MapPatch) -> OccupancyGrid:
-        """Return this map with ``patches`` laid over it, one after the other; at one copy of it.
+        """Return this map with ``patches`` laid over it, one after the other.
 
         Raises:
             PatchWithoutBase: one does not lie inside this map, or is in another frame.
         """
+        result = self.with_updates(patches)
+        for fault in result.faults:
+            raise fault
+        return result.grid
+
+    def with_updates(self, patches: Iterable[MapPatch]) -> UpdatedGrid:
+        """Lay those patches over this map that fit, one after the other, at one copy of it."""
+        fit: list[MapPatch] = []
+        faults: list[FasacoError] = []
         for patch in patches:
-            self.check_patch(patch)
-        if not patches:
-            return self
+            if why := self._misfit(patch):
+                faults.append(PatchWithoutBase(why))
+            else:
+                fit.append(patch)
+        if not fit:
+            return UpdatedGrid(self, (), faults)
         cells = self.cells.copy()
-        for patch in patches:
+        for patch in fit:
             window = patch.window
             cells[window.row0 : window.row1, window.col0 : window.col1] = patch.cells
-        return OccupancyGrid(self.geometry, cells, self.frame, patches[-1].stamp_ns)
+        grid = OccupancyGrid(self.geometry, cells, self.frame, fit[-1].stamp_ns)
+        return UpdatedGrid(grid, tuple(patch.window for patch in fit), faults)
 
-    def check_patch(self, patch: MapPatch) -> None:
-        """Check that a patch can be laid over this map.
-
-        Raises:
-            PatchWithoutBase: it does not lie inside this map, or is in another frame.
-        """
-        window = patch.window
-        rows, cols = self.cells.shape
+    def _misfit(self, patch: MapPatch) -> str:
+        """Return why a patch cannot be laid over this map; "" where it can."""
+        window, (rows, cols) = patch.window, self.cells.shape
         if window.intersection(Window(0, 0, rows, cols)) != window:
-            raise PatchWithoutBase(
+            return (
                 f"update of rows {window.row0}..{window.row1}, columns {window.col0}.."
                 f"{window.col1} does not lie inside the map of {rows} x {cols} cells"
             )
         if patch.frame != self.frame:
-            raise PatchWithoutBase(f"update in frame {patch.frame!r}, map in {self.frame!r}")
+            return f"update in frame {patch.frame!r}, map in {self.frame!r}"
+        return ""
 
 
-def fitting(
-    grid: OccupancyGrid, patches: Iterable[MapPatch]
-) -> tuple[list[MapPatch], list[FasacoError]]:
-    """Return which of some patches can be laid over a map, and why the others cannot."""
-    fit: list[MapPatch] = []
-    misfits: list[FasacoError] = []
-    for patch in patches:
-        try:
-            grid.check_patch(patch)
-        except PatchWithoutBase as error:
-            misfits.append(error.with_traceback(None))
-        else:
-            fit.append(patch)
-    return fit, misfits
+@dataclass(frozen=True, slots=True)
+class UpdatedGrid:
+    """A map with updates laid over it.
+
+    Attributes:
+        grid: the map; the one before where no update fits.
+        windows: what the updates that fit span, in order.
+        faults: why the others do not fit.
+    """
+
+    grid: OccupancyGrid
+    windows: tuple[Window, ...]
+    faults: list[FasacoError]
+
+
+def without_base(patches: Iterable[MapPatch], *, updates_lost: bool) -> list[FasacoError]:
+    """Return a fault for each update that no map is there for, or whose predecessors were lost."""
+    why = "updates before it were lost" if updates_lost else "there is no map yet"
+    return [PatchWithoutBase(f"map update refused: {why}") for _ in patches]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

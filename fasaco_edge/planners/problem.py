@@ -65,6 +65,7 @@ class CoverageProblem:
         cost: CoverageCost = STEPS_ALONE,
         before: NDArray[np.int32] | None = None,
         attempt: int = 0,
+        reachable: NDArray[np.bool_] | None = None,
     ) -> CoverageProblem:
         """Pose the problem of covering what is reachable and not yet ``covered``.
 
@@ -76,6 +77,8 @@ class CoverageProblem:
             cost: of steps and turns; by default of steps alone.
             before: int32 (n, 2), the walk that was still to be driven; None for none.
             attempt: see above.
+            reachable: bool (rows, cols), the cells that can be reached from the start, where
+                they are known; None to search for them.
 
         Raises:
             StartOutsideMap, EndOutsideMap: the lattice does not span the start, or the end.
@@ -84,7 +87,8 @@ class CoverageProblem:
             NothingToCover: no cell is left to cover.
         """
         _check_cell(lattice, start, "start", StartOutsideMap, StartBlocked)
-        reachable = reachable_from(lattice.steps, *lattice.local(start)).astype(bool)
+        if reachable is None:
+            reachable = reachable_from(lattice.steps, *lattice.local(start)).astype(bool)
         if end is not None:
             _check_cell(lattice, end, "end", EndOutsideMap, EndBlocked)
             if not reachable[lattice.local(end)]:

@@ -80,7 +80,7 @@ def drive_over(
         if not lattice.contains(lattice.cell_at(x, y)):
             continue
         if 0 < lost_pose_s < now - before:
-            ledger.lift()
+            ledger.break_track()
         entered = sorted(ledger.record(Pose2D(x, y)), key=_distance_from(last, lattice.cell_m))
         walk += entered
         times += [now] * len(entered)

@@ -10,7 +10,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
-from fasaco_edge.mission.map.loop_closure import Motion, doubtful, has_moved
+from fasaco_edge.mission.map.loop_closure import Motion, has_moved, uncertain_cells
 
 FOOTPRINT = Footprint(0.3, 0.15)
 HOME = Pose2D(0.0, 0.0)
@@ -79,8 +79,8 @@ def test_nothing_counts_that_the_tool_did_not_pass_over(seed):
     motion, before = Motion(start, end), ledger.snapshot()
     window = Window(-5, -5, 40, 40)
     was = before.visits(window) > 0
-    ledger.part()
-    ledger.forget(doubtful(before, motion))
+    ledger.lift_tool()
+    ledger.forget(uncertain_cells(before, motion))
     left = np.argwhere(ledger.visits(window) > 0) + np.array((window.row0, window.col0))
     assert (ledger.visits(window)[~was] == 0).all()
     x, y = motion.back(1.0, (left[:, 1] + 0.5) * 0.3, (left[:, 0] + 0.5) * 0.3)
@@ -94,10 +94,10 @@ def test_the_corner_of_four_cells_was_not_under_a_round_tool(shift, counts):
     ledger = CoverageLedger(0.3)
     for row in range(10):
         for col in range(10):
-            ledger.lift()
+            ledger.break_track()
             ledger.record(Pose2D(0.3 * (col + 0.5), 0.3 * (row + 0.5)))
     motion = Motion(Pose2D(1.5, 1.5), Pose2D(1.5 + shift[0], 1.5 + shift[1]))
-    doubt = doubtful(ledger.snapshot(), motion)(Window(3, 3, 7, 7))
+    doubt = uncertain_cells(ledger.snapshot(), motion)(Window(3, 3, 7, 7))
     assert doubt.all() != counts
     assert doubt.any() != counts
 
@@ -107,5 +107,5 @@ def test_who_stood_still_forgets_nothing():
     for step in range(40):
         ledger.record(Pose2D(0.1 * step, 0.15))
     before = ledger.snapshot()
-    ledger.forget(doubtful(before, Motion(HOME, HOME)))
+    ledger.forget(uncertain_cells(before, Motion(HOME, HOME)))
     assert ledger.snapshot().cells == before.cells > 5

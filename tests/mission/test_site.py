@@ -60,12 +60,12 @@ def test_from_map_to_map_a_site_is_what_its_last_map_says(data, whole):
         share = data.draw(st.sampled_from([0.2, 0.5, 0.8]))
         place = Pose2D(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
         site.take_pose(StampedPose(place))
-        site.survey()
-        cell = site.cell()
-        assert (site.ground is None) == (cell is None)
+        site.update_area()
+        cell = site.robot_cell()
+        assert (site.area is None) == (cell is None)
         if cell is not None:
             reachable = ReachableArea.around(driven, cell).reachable
-            assert np.array_equal(site.ground.reachable, reachable)
+            assert np.array_equal(site.area.reachable, reachable)
 
 
 def test_a_map_that_says_nothing_new_changes_nothing():
@@ -75,11 +75,11 @@ def test_a_map_that_says_nothing_new_changes_nothing():
     first = grid(cells)
     site.take_map(first)
     site.take_pose(StampedPose(Pose2D(1.0, 1.0)))
-    site.survey()
-    lattice, ground = site.lattice, site.ground
+    site.update_area()
+    lattice, ground = site.lattice, site.area
     site.take_map(grid(cells))
-    site.survey()
+    site.update_area()
     assert site.map_revision == 2
     assert site.grid is not first
     assert site.lattice is lattice
-    assert site.ground is ground
+    assert site.area is ground

@@ -58,7 +58,7 @@ def mission_in(grid, order=None):
 
 def report(mission):
     """Return a report as of something having changed."""
-    mission._parts.log.ledger.total += 1
+    mission._ledger.current.total += 1
     return mission_report(mission, mission.order_state)
 
 

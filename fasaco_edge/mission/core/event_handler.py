@@ -1,8 +1,9 @@
-"""Events in: what a mission hears, and what that changes before anything is decided."""
+"""Event handler: what each event changes in the mission's state, before anything is decided."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import StampedPose
@@ -18,194 +19,224 @@ from fasaco_edge.mission.core.events import (
     PlanBroken,
     PlanReady,
     PoseReceived,
+    in_runs,
 )
-from fasaco_edge.mission.core.parts import Parts
+from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.coverage.ledger import LedgerMismatchError
-from fasaco_edge.mission.orders.order_state import CommandError
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.map.inputs import InputMonitor
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.orders.order_state import CommandError, OrderState
+from fasaco_edge.mission.orders.sequencer import Sequencer
 
 
-class EventHandler:
-    """Takes events in, one after the other.
+@dataclass(slots=True)
+class Effects:
+    """What the events of a step lead to at once.
 
     Attributes:
-        answers: to the commands taken so far.
+        path: the newest path published; None for none.
+        faults: what went wrong, also with events that took effect all the same.
+        answers: to the commands among the events.
         forgotten: whether one of them was to forget what is covered.
-        stopped: an empty path that is due unless a later one follows; None for none.
-        faults: what went wrong, also with events that were taken all the same.
     """
 
-    def __init__(self, parts: Parts) -> None:
-        self.answers: list[Answer] = []
-        self.forgotten = False
-        self.stopped: PathUpdate | None = None
-        self.faults: list[FasacoError] = []
-        self._parts = parts
+    path: PathUpdate | None = None
+    faults: list[FasacoError] = field(default_factory=list)
+    answers: list[Answer] = field(default_factory=list)
+    forgotten: bool = False
 
-    def take(self, event: Event | PatchRun) -> PathUpdate | None:
-        """Take one event; return a path that is due at once.
 
-        Raises:
-            FasacoError: it cannot be used, and changes nothing.
-        """
+@dataclass(slots=True, eq=False)
+class EventHandler:
+    """Applies events, one after the other, to map, ledger, monitor, orders and route."""
+
+    map: MapState
+    ledger: MissionLedger
+    monitor: InputMonitor
+    orders: Sequencer
+    route: Route
+    _effects: Effects = field(default_factory=Effects, init=False)
+    _now: float = field(default=0.0, init=False)
+
+    def handle(self, events: Iterable[Event], now: float) -> Effects:
+        """Apply events at ``now`` [s]; one that cannot be used is a fault and changes nothing."""
+        self._effects, self._now = Effects(), now
+        for event in in_runs(events):
+            try:
+                self._apply(event)
+            except FasacoError as error:
+                # Its traceback would hold the map until garbage is collected.
+                self._effects.faults.append(error.with_traceback(None))
+        return self._effects
+
+    def begin_order(self, order: OrderState) -> None:
+        """Begin with another order, or with none; ``update_area`` has to follow."""
+        self.route.abandon()
+        self.map.keep_out(order.order.keep_out if order.order else ())
+        self.orders.start(order)
+
+    def update_area(self) -> None:
+        """Find out what can be reached now; want a new plan if that changed."""
+        before, route = self.map.area, self.route
+        self.map.update_area()
+        area = self.map.area
+        if area is None:
+            return
+        self.orders.note_area()
+        if before is None:
+            again = "robot is on coverable ground again"
+            route.want(again if route.revision else self.ledger.first_plan_reason)
+        elif change := area.change_since(before):
+            route.want(str(change), change.window)
+
+    def _apply(self, event: Event | PatchRun) -> None:
         match event:
             case MapReceived(grid):
-                if self._parts.site.take_map(grid):
-                    self._begin_in(grid.frame)
-                self._look_at_map()
+                if self.map.take_map(grid):
+                    self._enter_frame(grid.frame)
+                self._map_changed()
             case PatchRun(patches):
                 self._take_patches(patches)
             case PatchesLost(count):
-                self._parts.site.lose_patches(count)
+                self.map.lose_patches(count)
             case PoseReceived(pose):
                 self._take_pose(pose)
             case PlanReady():
-                return self._take_plan(event)
+                self._take_plan(event)
             case PlanBroken():
-                self._parts.route.give_up(event)
-                self._parts.spare.rest(self._parts.now)
+                self.route.fail(event, self._now)
                 raise event.why
             case CommandReceived():
                 self._obey(event)
-        return None
 
     def _take_patches(self, patches: Sequence[MapPatch]) -> None:
-        is_other, faults = self._parts.site.take_patches(patches)
-        self.faults += faults
-        if is_other:
-            self._look_at_map()
+        has_changed, faults = self.map.take_patches(patches)
+        self._effects.faults += faults
+        if has_changed:
+            self._map_changed()
 
-    def _look_at_map(self) -> None:
-        """See what a new map changed; raise LedgerMismatchError where it is another building's."""
-        parts, site = self._parts, self._parts.site
-        assert site.free is not None
-        assert site.grid is not None
-        parts.watch.map_came(parts.now)
-        parts.route.mend()
-        if site.map_moved and site.pose is not None:
-            parts.log.part(site.pose.pose)
+    def _map_changed(self) -> None:
+        """Follow a new map; raise LedgerMismatchError where it shows another building."""
+        assert self.map.free is not None
+        assert self.map.grid is not None
+        self.monitor.note_map(self._now)
+        self.route.forget_failure()
+        if self.map.has_moved and self.map.pose is not None:
+            self.ledger.note_map_motion(self.map.pose.pose)
         else:
             self._record()  # the pose may have come before the map
-        self._go_on_after(parts.log.check(site.free, site.grid.frame))
+        self._go_on(self.ledger.check(self.map.free, self.map.grid.frame))
 
-    def _go_on_after(self, misfit: LedgerMismatchError | None) -> None:
-        """Find out what can be reached; begin anew where the ledger is of another place."""
-        parts = self._parts
+    def _go_on(self, misfit: LedgerMismatchError | None) -> None:
+        """Update what can be reached; begin anew where the ledger is of another place."""
         if misfit is not None:
-            parts.take_order(parts.agenda.assignment.in_other_building(str(misfit)))
-        parts.survey()
+            self.begin_order(self.orders.state.in_other_building(str(misfit)))
+        self.update_area()
         if misfit is not None:
-            parts.route.want(parts.log.opening)
+            self.route.want(self.ledger.first_plan_reason)
             raise misfit
 
-    def _begin_in(self, frame: str) -> None:
-        """Let a frame count; raise LedgerMismatchError where there is progress in another."""
-        parts = self._parts
-        is_other_map = parts.site.turn()
-        before = parts.log.ledger.frame
-        misfit = parts.log.move_to(frame)
+    def _enter_frame(self, frame: str) -> None:
+        """Make a frame the active one; raise LedgerMismatchError for progress in another."""
+        is_other_map = self.map.switch_frame()
+        before = self.ledger.current.frame
+        misfit = self.ledger.move_to(frame)
         if misfit is None and before not in ("", frame):
             why = f"map and poses are in frame {frame!r} now, no more in {before!r}"
-            parts.take_order(parts.agenda.assignment.in_other_frame(why))
-        if is_other_map or misfit is not None:
-            self._leave(f"map and poses are in frame {frame!r} now")
-            parts.watch.map_came(parts.now)
+            self.begin_order(self.orders.state.in_other_frame(why))
+        if not is_other_map and misfit is None:
+            return
+        self._leave_map(f"map and poses are in frame {frame!r} now")
+        self.monitor.note_map(self._now)
         if misfit is not None:
             self._record()
-        if is_other_map or misfit is not None:
-            self._go_on_after(misfit)
+        self._go_on(misfit)
 
-    def _leave(self, why: str) -> None:
+    def _leave_map(self, why: str) -> None:
         """Stop the robot: its path leads through another map."""
-        self.stopped = self._parts.route.stop(why) or self.stopped
-        self._parts.route.disown()
-        self._parts.route.mend()
-        self._parts.watch.forget_pose()
+        self._effects.path = self.route.stop(why, self._now) or self._effects.path
+        self.route.abandon()
+        self.monitor.forget_pose()
 
     def _take_pose(self, stamped: StampedPose) -> None:
-        parts, site, route = self._parts, self._parts.site, self._parts.route
-        if site.frames.hear_pose(stamped, parts.now):
-            self._begin_in(stamped.frame)
-        site.take_pose(stamped)
-        astray = parts.watch.pose_came(stamped.pose, parts.now)
-        if astray:
-            parts.log.lift()
-        again = parts.log.follow(stamped.pose)
+        if self.map.frames.note_pose(stamped, self._now):
+            self._enter_frame(stamped.frame)
+        self.map.take_pose(stamped)
+        has_jumped = self.monitor.note_pose(stamped.pose, self._now)
+        if has_jumped:
+            self.ledger.break_track()
+        uncertain = self.ledger.forget_uncertain(stamped.pose)
         self._record()
-        cell = site.cell()
+        cell = self.map.robot_cell()
         if cell is None:
             return
-        if astray or site.ground is None or not site.ground.contains(cell):
-            parts.survey()
-        if again:
-            route.want(f"map and pose moved: {again} cells to be covered again")
-        parts.agenda.pass_by(cell)
-        route.path = route.path.driven_to(cell, parts.log.ledger.has_visited)
+        if has_jumped or self.map.area is None or not self.map.area.contains(cell):
+            self.update_area()
+        if uncertain:
+            self.route.want(f"map and pose moved: {uncertain} cells to be covered again")
+        self.orders.note_cell(cell)
+        self.route.follow(cell, self.ledger.current.has_visited)
 
     def _record(self) -> None:
-        """Count what lies under the tool; a pose kilometres astray is no drive."""
-        lattice, stamped = self._parts.site.lattice, self._parts.site.pose
+        """Count what lies under the tool; a pose far outside the map is no drive."""
+        lattice, stamped = self.map.lattice, self.map.pose
         if lattice is None or stamped is None:
             return
         pose = stamped.pose
         if lattice.contains(lattice.cell_at(pose.x, pose.y)):
-            full = self._parts.log.record(pose)
+            full = self.ledger.record(pose)
             if full is not None:
-                self.faults.append(full)
+                self._effects.faults.append(full)
 
-    def _take_plan(self, event: PlanReady) -> PathUpdate | None:
-        route, watch = self._parts.route, self._parts.watch
-        asked = route.asked
-        if route.is_improving:
-            self._parts.spare.spend(event.seconds, self._parts.now, route.revision)
-        update = route.take_plan(event)
-        if asked is not None and route.asked is None and not route.wanted:
-            watch.plan_made(asked.number)
-        return update
+    def _take_plan(self, event: PlanReady) -> None:
+        request = self.route.pending
+        self._effects.path = self.route.accept(event, self._now) or self._effects.path
+        if request is not None and self.route.pending is None and not self.route.wanted:
+            self.monitor.note_plan(request.number)
 
     def _obey(self, event: CommandReceived) -> None:
-        """Take a command; what is wrong with it goes to whoever gave it."""
-        parts, before = self._parts, self._parts.agenda.assignment
+        """Carry out a command; what is wrong with it is its answer."""
+        before = self.orders.state
         try:
             if event.command == "start":
-                parts.site.check_zones(event.order)
+                self.map.check_zones(event.order)
             after = before.commanded(event.command, event.order)
             plan = self._replan() if event.command == "replan" else None
         except FasacoError as error:
-            self.answers.append(Answer(event.number, error))
+            self._effects.answers.append(Answer(event.number, error))
             return
-        self.answers.append(Answer(event.number, plan=plan))
+        self._effects.answers.append(Answer(event.number, plan=plan))
         if event.command == "reset":
             self._reset()
         if after.order is not before.order:
-            parts.take_order(after)
-            parts.survey()
+            self.begin_order(after)
+            self.update_area()
         elif after.paused and not before.paused:
-            parts.route.disown()
+            self.route.abandon()
         elif before.paused and not after.paused:
-            parts.route.want("resumed")
-        parts.agenda.assignment = after
+            self.route.want("resumed")
+        self.orders.set_state(after)
 
     def _reset(self) -> None:
-        """Forget what is covered but where the tool is now, and which frame counts."""
-        parts, site = self._parts, self._parts.site
-        self.forgotten = True
-        site.frames.forget()
-        if site.turn():
-            self._leave("reset")
-            parts.watch.map_came(parts.now)
-        parts.log.begin_anew(site.frames.counts)
-        parts.route.mend()
+        """Forget what is covered but where the tool is now, and which frame is active."""
+        self._effects.forgotten = True
+        self.map.frames.reset()
+        if self.map.switch_frame():
+            self._leave_map("reset")
+            self.monitor.note_map(self._now)
+        self.ledger.reset(self.map.frames.active)
+        self.route.forget_failure()
         self._record()
 
     def _replan(self) -> int:
         """Want a full new plan, and return its number; CommandError where there is none to make."""
-        site = self._parts.site
-        if site.lattice is None:
+        if self.map.lattice is None:
             raise CommandError("nothing to plan: there is no map yet")
-        if site.pose is None:
+        if self.map.pose is None:
             raise CommandError("nothing to plan: there is no pose yet")
-        if site.ground is None or site.cell() is None:
-            raise CommandError(f"nothing to plan: {site.misplaced()}")
-        if not self._parts.agenda.can_plan:
+        if self.map.area is None or self.map.robot_cell() is None:
+            raise CommandError(f"nothing to plan: {self.map.why_misplaced()}")
+        if not self.orders.can_plan:
             raise CommandError("nothing to plan: no reachable cell is left to cover")
-        return self._parts.route.want_anew("asked for")
+        return self.route.want_from_scratch("asked for")

@@ -1,10 +1,8 @@
-"""Spare time: while the robot drives, what lies further on of its path is made better.
-
-The route: the path the robot was given, and the plan under way for the next one.
-"""
+"""Route: the path the robot was given, the plan under way, and better paths in spare time."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,52 +20,53 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.repair import HELD_CELLS
 
-# A path is worth another only if that saves so many steps, and such a share of what is left.
+# A path is replaced by a better one only if that saves this many steps, and this share of
+# what is left.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
-# The share of time is halved so often at most.
+# The share of time is halved at most this often.
 MOST_VAIN = 4
-# Where there is nothing to attempt it is asked again so late [s]: to find that out takes a look
-# at the whole lattice, and the answer rarely changes from one pose to the next.
+# Where there is nothing to improve, the next look is this much later [s]: it takes a search of
+# the whole lattice, and the answer rarely changes from one pose to the next.
 SKIPPED_S = 1.0
-# After a plan that broke [s].
+# After a plan that failed [s].
 BROKEN_S = 30.0
 
 
 class SpareTime:
-    """Keeps attempts to a share of a processor core; a share of 0 is none at all.
+    """Limits attempts at better paths to a share of a processor core; a share of 0 is none.
 
-    Of a path that attempt after attempt makes no better, ever fewer are made.
+    While attempts at one path come to nothing, fewer and fewer are made.
     """
 
     def __init__(self, share: float) -> None:
         self._share = share
         self._resting_until = 0.0
-        # The path of the last attempt, and how many came to nothing since it is there.
+        # The path of the last attempt, and how many attempts at it came to nothing.
         self._revision = self._vain = 0
 
-    def is_there(self, now: float) -> bool:
+    def is_available(self, now: float) -> bool:
         """Tell whether another attempt may begin at ``now`` [s]."""
         return self._share > 0.0 and now >= self._resting_until
 
     def spend(self, seconds: float, now: float, revision: int) -> None:
-        """Note that an attempt at path ``revision`` took so many seconds, and ended at ``now``."""
+        """Note that an attempt at path ``revision`` took ``seconds`` and ended at ``now`` [s]."""
         self._vain = min(self._vain + 1, MOST_VAIN) if revision == self._revision else 0
         self._revision = revision
         share = self._share / 2**self._vain
         self._resting_until = now + seconds * (1.0 / share - 1.0)
 
-    def rest(self, now: float) -> None:
-        """Note that a plan broke at ``now`` [s]."""
+    def rest_after_failure(self, now: float) -> None:
+        """Note that a plan failed at ``now`` [s]."""
         self._resting_until = max(self._resting_until, now + BROKEN_S)
 
     def skip(self, now: float) -> None:
-        """Note that there was nothing to attempt at ``now`` [s]."""
+        """Note that there was nothing to improve at ``now`` [s]."""
         self._resting_until = now + SKIPPED_S
 
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """An attempt to make a path better from one of its cells on.
+    """An attempt at a better path from one of its cells on.
 
     Attributes:
         revision: of the path.
@@ -82,21 +81,21 @@ class Attempt:
     problem: CoverageProblem
 
     @classmethod
-    def at(cls, path: DrivenPath, revision: int, agenda: Sequencer, number: int) -> Attempt | None:
-        """Return attempt ``number``, on a path; None where too little of it is left."""
-        # What the robot is about to drive holds still; less than twice that is not worth a thought.
+    def at(cls, path: DrivenPath, revision: int, orders: Sequencer, number: int) -> Attempt | None:
+        """Return attempt ``number`` at a path; None where too little of it is left."""
+        # The next cells ahead of the robot stay as they are; a shorter rest is not worth a search.
         joint = path.index + HELD_CELLS
         if joint + HELD_CELLS > len(path.cells):
             return None
         row, col = path.cells[path.index].tolist()
         try:
-            problem = agenda.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
+            problem = orders.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
         except FasacoError:
             return None  # the map has changed: a repair is due
         return cls(revision, path.index, joint, problem)
 
     def joined(self, path: DrivenPath, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
-        """Return what is ahead of a better path, int32 (n, 2); None if it is not worth it."""
+        """Return the cells ahead on a better path, int32 (n, 2); None if it saves too little."""
         if path.index > self.joint:
             return None
         ahead = better[path.index - self.index :]
@@ -104,98 +103,57 @@ class Attempt:
 
 
 def _is_worth_it(cost: CoverageCost, before: NDArray[np.int32], after: NDArray[np.int32]) -> bool:
-    costs_s = cost.of_walk(before)
-    least_s = max(LEAST_STEPS * cost.step_s, LEAST_SHARE * costs_s)
-    return costs_s - cost.of_walk(after) >= least_s
+    cost_s = cost.of_walk(before)
+    least_s = max(LEAST_STEPS * cost.step_s, LEAST_SHARE * cost_s)
+    return cost_s - cost.of_walk(after) >= least_s
 
 
 class Route:
-    """Asks for plans, one at a time, and makes paths of them.
+    """Requests plans, one at a time, and publishes paths from them. All times ``now`` are [s].
 
     Attributes:
         path: the published path, and how far the robot is on it.
         revision: counts the published paths.
         plans, attempts: count the plans that came back, and the attempts at better paths.
         unchanged, outdated: count those of the plans that led to no path, because they found
-            the one there is, or because they did not hold any more.
+            the same path again, or because they no longer held.
         wanted: why a new plan is wanted; "" where none is.
-        asked: the plan under way.
-        now: time of the step [s].
-        published_at: when a path was last published, or found to be still right [s].
+        pending: the plan under way.
+        published_at: when a path was last published, or confirmed by a plan.
     """
 
-    def __init__(self, site: MapState, agenda: Sequencer) -> None:
+    def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
         self.path = DrivenPath.none()
         self.revision = 0
         self.plans = self.attempts = 0
         self.unchanged = self.outdated = 0
         self.wanted = ""
-        self.asked: PlanRequest | None = None
-        self.now = 0.0
+        self.pending: PlanRequest | None = None
         self.published_at = 0.0
-        self._site = site
-        self._agenda = agenda
-        self._disowned = False
+        self._map = map_state
+        self._orders = orders
+        self._spare = SpareTime(spare_share)
+        self._attempt: Attempt | None = None
+        # Whether the plan under way is for an order that no longer counts.
+        self._is_abandoned = False
         # Why a plan is wanted that keeps nothing of the path; "" where none is.
         self._anew = ""
-        # What has changed since the last plan was asked for, and whether that is why one is wanted.
+        # What has changed since the last request, and whether that is why a plan is wanted.
         self._changed: Window | None = None
         self._is_by_map = False
         self._checked_on: ReachableArea | None = None
-        self._attempt: Attempt | None = None
-        # How the last plan broke, and when [s]; "" where it did not.
-        self._broken = "", 0.0
+        # How the last plan failed, and when; "" where it did not.
+        self._failure = "", 0.0
 
     @property
     def is_improving(self) -> bool:
-        """Whether the plan under way is only to make the path better."""
-        return self.asked is not None and self._attempt is not None
+        """Whether the plan under way is only to improve the path."""
+        return self.pending is not None and self._attempt is not None
 
     @property
-    def _number(self) -> int:
-        return self.plans + self.attempts + 1
-
-    def ask(self, problem: CoverageProblem) -> PlanRequest:
-        """Ask for the plan that is wanted."""
-        reason = self._anew or self.wanted
-        changed = self._changed if self._is_by_map and not self._anew else None
-        self.asked = PlanRequest(self._number, problem, reason, changed)
-        self.want_none()
-        return self.asked
-
-    def ask_for_better(self) -> PlanRequest | None:
-        """Ask for a better path; None where too little is left of it."""
-        self._attempt = Attempt.at(self.path, self.revision, self._agenda, self.attempts + 1)
-        if self._attempt is None:
-            return None
-        self.asked = PlanRequest(self._number, self._attempt.problem, "spare time")
-        return self.asked
-
-    def give_up(self, event: PlanBroken) -> None:
-        """Take note that the plan under way broke: the same problem would break it again."""
-        asked = self.asked
-        if asked is None or asked.number != event.number:
-            return
-        is_improving, disowned = self.is_improving, self._disowned
-        self.asked = self._attempt = None
-        self._disowned = False
-        self.plans += not is_improving
-        self.attempts += is_improving
-        if not is_improving and not disowned:
-            self.outdated += 1
-            self.want(self.wanted or asked.reason, asked.changed)
-            self._broken = str(event.why), self.now
-
-    def broken_for(self, now: float) -> str:
-        """Return why no plan is asked for as yet; "" where one may be."""
-        why, since = self._broken
-        if why and now - since < BROKEN_S:
-            return f"{why}; tried again with the next map, or after {BROKEN_S:g} s"
-        return ""
-
-    def mend(self) -> None:
-        """Let a plan be asked for although the last one broke: the problem is another."""
-        self._broken = "", 0.0
+    def path_to_keep(self) -> NDArray[np.int32]:
+        """What of the path the next plan is to keep where it can, int32 (n, 2)."""
+        return self.path.ahead[:0] if self._anew else self.path.ahead
 
     def want(self, reason: str, changed: Window | None = None) -> None:
         """Want a plan: because the cells in a window have changed, or for another reason."""
@@ -203,120 +161,171 @@ class Route:
         self._changed = Window.around(self._changed, changed)
         self._is_by_map = changed is not None
 
-    def want_none(self) -> None:
+    def want_from_scratch(self, reason: str) -> int:
+        """Want a plan that keeps nothing of the path; return its number among the plans."""
+        self.wanted = self._anew = reason
+        self.forget_failure()
+        return self.plans + (1 if self.pending is None or self.is_improving else 2)
+
+    def drop(self) -> None:
         """Want no plan any more."""
         self.wanted = self._anew = ""
         self._changed = None
 
-    def want_anew(self, reason: str) -> int:
-        """Want a plan that keeps nothing of the path; return which of the plans it will be."""
-        self.wanted = self._anew = reason
-        self.mend()
-        return self.plans + (1 if self.asked is None or self.is_improving else 2)
+    def abandon(self) -> None:
+        """Want no plan any more, and discard the one under way: it is for another order."""
+        self.drop()
+        self.forget_failure()
+        self._is_abandoned = self.pending is not None
 
-    @property
-    def kept(self) -> NDArray[np.int32]:
-        """What of the path the next plan is to keep where it can, int32 (n, 2)."""
-        return self.path.ahead[:0] if self._anew else self.path.ahead
+    def request_plan(self, problem: CoverageProblem) -> PlanRequest:
+        """Request the plan that is wanted."""
+        changed = self._changed if self._is_by_map and not self._anew else None
+        request = self._request(problem, self._anew or self.wanted, changed)
+        self.drop()
+        return request
 
-    def disown(self) -> None:
-        """Want no plan any more; what comes back of the one under way is for another order."""
-        self.want_none()
-        self.mend()
-        self._disowned = self.asked is not None
-
-    def take_plan(self, event: PlanReady) -> PathUpdate | None:
-        """Publish a plan that was asked for, unless it does not hold any more."""
-        asked, ground = self.asked, self._site.ground
-        if asked is None or asked.number != event.number:
+    def request_improvement(self, now: float) -> PlanRequest | None:
+        """Request a better path; None without spare time, or where too little of it is left."""
+        if not self._spare.is_available(now):
             return None
-        self.asked = None
-        disowned, self._disowned = self._disowned, False
-        attempt, self._attempt = self._attempt, None
-        self.plans += attempt is None
-        self.attempts += attempt is not None
-        cell = self._site.cell()
-        if disowned or cell is None or ground is None:
+        self._attempt = Attempt.at(self.path, self.revision, self._orders, self.attempts + 1)
+        if self._attempt is None:
+            self._spare.skip(now)
+            return None
+        return self._request(self._attempt.problem, "spare time")
+
+    def _request(
+        self, problem: CoverageProblem, reason: str, changed: Window | None = None
+    ) -> PlanRequest:
+        self.pending = PlanRequest(self.plans + self.attempts + 1, problem, reason, changed)
+        return self.pending
+
+    def fail(self, event: PlanBroken, now: float) -> None:
+        """Note that the plan under way failed: the same problem would make it fail again."""
+        self._spare.rest_after_failure(now)
+        request, is_improving = self.pending, self.is_improving
+        if request is None or request.number != event.number:
+            return
+        if not self._close_request() and not is_improving:
+            self.outdated += 1
+            self.want(self.wanted or request.reason, request.changed)
+            self._failure = str(event.why), now
+
+    def why_not_yet(self, now: float) -> str:
+        """Return why no plan may be requested yet; "" where one may be."""
+        why, since = self._failure
+        if why and now - since < BROKEN_S:
+            return f"{why}; tried again with the next map, or after {BROKEN_S:g} s"
+        return ""
+
+    def forget_failure(self) -> None:
+        """Allow a request although the last plan failed: the problem is another."""
+        self._failure = "", 0.0
+
+    def accept(self, event: PlanReady, now: float) -> PathUpdate | None:
+        """Publish a plan that was requested, unless it no longer holds."""
+        if self.is_improving:
+            self._spare.spend(event.seconds, now, self.revision)
+        request, attempt, area = self.pending, self._attempt, self._map.area
+        if request is None or request.number != event.number:
+            return None
+        is_abandoned = self._close_request()
+        cell = self._map.robot_cell()
+        if is_abandoned or cell is None or area is None:
             self.outdated += attempt is None
             return None
         if attempt is not None:
-            return self._take_better(attempt, event, ground)
-        cells = self._from_here(event.path.cells, cell, ground)
-        if not len(cells) or ground.drivable_prefix(cells) < len(cells):
+            return self._accept_better(attempt, event, area, now)
+        cells = self._from_here(event.path.cells, cell, area)
+        if not len(cells) or area.drivable_prefix(cells) < len(cells):
             self.outdated += 1
-            self._changed = Window.around(self._changed, asked.changed)
+            self._changed = Window.around(self._changed, request.changed)
             if not self.wanted:
-                self.want("the map changed while planning", asked.changed)
+                self.want("the map changed while planning", request.changed)
             return None
         if np.array_equal(cells, self.path.ahead):
-            # Nothing to change: whoever drives it need not hear of it again.
+            # The follower has this path already.
             self.unchanged += 1
-            self.published_at = self.now
+            self.published_at = now
             return None
-        return self.publish(cells, asked.reason, event, asked.changed)
+        return self.publish(cells, request.reason, now, event, request.changed)
 
-    def _take_better(
-        self, attempt: Attempt, event: PlanReady, ground: ReachableArea
+    def _close_request(self) -> bool:
+        """Count the plan under way as come back; return whether it was abandoned."""
+        self.plans += self._attempt is None
+        self.attempts += self._attempt is not None
+        self.pending = self._attempt = None
+        is_abandoned, self._is_abandoned = self._is_abandoned, False
+        return is_abandoned
+
+    def _accept_better(
+        self, attempt: Attempt, event: PlanReady, area: ReachableArea, now: float
     ) -> PathUpdate | None:
-        """Publish the path with a better rest; None where that is not worth it."""
+        """Publish the path with a better rest; None where that saves too little."""
         if attempt.revision != self.revision:
             return None
         cells = attempt.joined(self.path, event.path.cells)
-        if cells is None or ground.drivable_prefix(cells) < len(cells):
+        if cells is None or area.drivable_prefix(cells) < len(cells):
             return None
-        return self.publish(cells, "better further on", event)
+        return self.publish(cells, "better further on", now, event)
 
     def _from_here(
-        self, cells: NDArray[np.int32], here: Cell, ground: ReachableArea
+        self, cells: NDArray[np.int32], here: Cell, area: ReachableArea
     ) -> NDArray[np.int32]:
-        """Return a fresh plan without what was covered while it was made.
+        """Return a new plan without what was covered while it was made.
 
-        The robot went on meanwhile: it joins the plan at the first cell that still
-        needs a visit. Empty where it cannot come there: it was carried elsewhere.
+        The robot drove on meanwhile: it joins the plan at the first cell that still needs a
+        visit. Empty where no path leads there: the robot was carried elsewhere.
         """
-        window = ground.lattice.window
-        open_cells = self._agenda.open_cells(window)
+        window = area.lattice.window
+        open_cells = self._orders.open_cells(window)
         rows, cols = cells[:, 0] - window.row0, cells[:, 1] - window.col0
         inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
         still_open = np.ones(len(cells), bool)
         still_open[inside] = open_cells[rows[inside], cols[inside]]
         first = int(np.argmax(still_open)) if still_open.any() else len(cells) - 1
-        lead = ground.shortest_path(here, (int(cells[first, 0]), int(cells[first, 1])))
+        lead = area.shortest_path(here, (int(cells[first, 0]), int(cells[first, 1])))
         return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead
 
     def publish(
         self,
         cells: NDArray[np.int32],
         reason: str,
+        now: float,
         ready: PlanReady | None = None,
         changed: Window | None = None,
     ) -> PathUpdate:
         """Publish a path in place of the one before."""
         self.revision += 1
-        self.published_at = self.now
+        self.published_at = now
         self.path = DrivenPath(cells)
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
         return PathUpdate(self.revision, cells, reason, plan, seconds, changed)
 
-    def stop(self, reason: str) -> PathUpdate | None:
+    def follow(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> None:
+        """Note that the robot is in ``cell``, see ``DrivenPath.driven_to``."""
+        self.path = self.path.driven_to(cell, has_visited)
+
+    def stop(self, reason: str, now: float) -> PathUpdate | None:
         """Publish an empty path; None where the robot has none to drive."""
         if not len(self.path.cells):
             return None
-        return self.publish(np.empty((0, 2), np.int32), reason)
+        return self.publish(np.empty((0, 2), np.int32), reason, now)
 
-    def cut_off(self) -> PathUpdate | None:
-        """Shorten a path that a new map blocks, at once; a new plan follows.
+    def truncate(self, now: float) -> PathUpdate | None:
+        """Cut a path that a new map blocks before the block, at once; a new plan follows.
 
-        Nothing is left of it where the robot's own cell on it is blocked, or is no more.
+        Nothing is left of it where the robot's own cell is blocked or no longer on the map.
         """
-        ground = self._site.ground
-        if ground is None or ground is self._checked_on:
+        area = self._map.area
+        if area is None or area is self._checked_on:
             return None
-        self._checked_on = ground
+        self._checked_on = area
         ahead = self.path.ahead
-        holding = ground.drivable_prefix(ahead)
-        if holding == len(ahead):
+        drivable = area.drivable_prefix(ahead)
+        if drivable == len(ahead):
             return None
-        row, col = ahead[holding]
+        row, col = ahead[drivable]
         self.want(f"path blocked at cell ({row}, {col})", self._changed)
-        return self.publish(ahead[:holding], self.wanted, changed=self._changed)
+        return self.publish(ahead[:drivable], self.wanted, now, changed=self._changed)

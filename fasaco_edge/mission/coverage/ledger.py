@@ -1,4 +1,4 @@
-"""Which cells the tool has passed over, cell by cell and never by path index."""
+"""Coverage ledger: which cells the tool has passed over, by cell and never by path index."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Pose2D, Window
 
 if TYPE_CHECKING:
-    # Only named here: a daemon reads its ledger before it has loaded what plans.
+    # For types only: a daemon reads its ledger before it has loaded the kernels.
     from fasaco_edge.grid.lattice import Cell
 
-# Two poses further apart than this many cells are a jump, not a drive: nobody
-# knows what lay under the tool in between.
+# Two poses further apart than this many cells are a jump, not a drive: what lay under the tool in
+# between is unknown.
 JUMP_CELLS = 2.0
 
 TILE = 64
 
-# So many tiles a ledger holds at most, 8 million cells, more than any path: each takes 8 kB, and
-# as much again as it was when it was last written. ``protocol/limits.yaml`` has the same number.
+# The most tiles a ledger holds, 8 million cells, more than any path: each takes 8 kB, and as much
+# again in the copy that was written last. ``protocol/limits.yaml`` has the same number.
 MOST_TILES = 2048
-# Where there would be more the farthest go, this many at once.
+# Beyond that the farthest are dropped, this many at once.
 DROPPED_TILES = MOST_TILES // 16
 
 Tiles = Mapping["Cell", NDArray[np.uint16]]
 
 
 class LedgerFullError(FasacoError):
-    """A ledger holds as much as it may: what lay farthest from the robot is to be covered again."""
+    """A ledger is full: what lay farthest from the robot is to be covered again."""
 
     code = "ledger_full"
     hint = "look for poses or maps that jump; begin anew (`mission reset`) in another building"
@@ -58,8 +58,7 @@ class LedgerSnapshot:
         tiles: the visits, uint16 (TILE, TILE), read-only; tile (i, j) has the cells from
             (TILE * i, TILE * j) on.
         under_tool: the cells that lay under the tool: still there, it does not visit them anew.
-        note: what is kept with it, as JSON: the order and how far it is, see
-            ``mission.assignment``; "" for none.
+        note: the order and how far it is, as JSON, see ``orders.order_state``; "" for none.
     """
 
     cell_m: float
@@ -85,7 +84,7 @@ class CoverageLedger:
     A cell is visited when the tool, a disc as wide as a cell, passes over its
     centre. Coming back after having left counts as another visit; ``total`` counts
     all of them. ``frame`` names the frame of the poses, "" as long as none is known.
-    ``dropped`` counts the tiles that had to go so that no more than ``MOST_TILES`` are held: those
+    ``dropped`` counts the tiles that were dropped to hold no more than ``MOST_TILES``: those
     farthest from the robot at that moment.
     """
 
@@ -104,10 +103,7 @@ class CoverageLedger:
 
     @classmethod
     def restored(cls, snapshot: LedgerSnapshot) -> Self:
-        """Return the ledger as it was.
-
-        It does not know the last pose: what the robot did since, nobody saw.
-        """
+        """Return the ledger as it was, without the last pose: the way from it is unknown."""
         ledger = cls(snapshot.cell_m, snapshot.frame)
         ledger.total = snapshot.total
         ledger._tiles = {place: tile.copy() for place, tile in snapshot.tiles.items()}
@@ -138,13 +134,13 @@ class CoverageLedger:
         self._last = pose
         return entered
 
-    def lift(self) -> None:
-        """Note that nobody knows how the robot gets to its next pose."""
+    def break_track(self) -> None:
+        """Note that the way of the robot to its next pose is unknown."""
         self._last = None
 
-    def part(self) -> None:
-        """Note that the map moved under the robot: nobody knows any more what the tool is on."""
-        self.lift()
+    def lift_tool(self) -> None:
+        """Note that the map moved under the robot: what lies under the tool is unknown, too."""
+        self.break_track()
         self._under_tool = frozenset()
 
     def forget(self, inside: Callable[[Window], NDArray[np.bool_]]) -> None:
@@ -179,12 +175,12 @@ class CoverageLedger:
         place = (row // TILE, col // TILE)
         tile = self._tiles.get(place)
         if tile is None:
-            self._make_room(place)
+            self._limit_tiles(place)
             tile = self._tiles[place] = np.zeros((TILE, TILE), np.uint16)
         self._changed.add(place)
         tile[row % TILE, col % TILE] = min(int(tile[row % TILE, col % TILE]) + 1, 65535)
 
-    def _make_room(self, place: Cell) -> None:
+    def _limit_tiles(self, place: Cell) -> None:
         """Drop the tiles farthest from ``place`` where there is no room for another."""
         if len(self._tiles) < MOST_TILES:
             return

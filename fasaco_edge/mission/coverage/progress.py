@@ -1,7 +1,4 @@
-"""How far a mission is: its state, its coverage, its place on the path.
-
-How far each zone of an order is.
-"""
+"""Progress: of the robot on its path, of the coverage, and of each zone of an order."""
 
 from __future__ import annotations
 
@@ -12,7 +9,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.grid.lattice import Cell, CoverageLattice, pixels_of, placement_on
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.lattice.pixels import count_free_beside
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
@@ -22,10 +21,6 @@ from fasaco_edge.mission.orders.zones import counts_in
 # path may come back to the same cell for another reason.
 LOOK_AHEAD = 16
 FAR_CELLS = 4
-
-# A robot that stops short of its path's end, out of the tool's reach of the last
-# cell, is sent there so often and no more.
-MOST_TRIES = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +85,47 @@ class Coverage:
         return self.covered / self.coverable if self.coverable else 0.0
 
 
+class FreeArea:
+    """Measures the free area out of reach, again only where map or reach have changed."""
+
+    def __init__(self, free_at_most: int) -> None:
+        self._free_at_most = free_at_most
+        # The revision, not the map itself, which would then be kept in memory.
+        self._counted: tuple[int, NDArray[np.bool_] | None] = (-1, None)
+        self._area_m2 = 0.0
+
+    def out_of_reach_m2(
+        self,
+        grid: OccupancyGrid,
+        revision: int,
+        lattice: CoverageLattice,
+        reachable: NDArray[np.bool_] | None,
+    ) -> float:
+        """Return the area [m2] of free pixels whose centre lies in no reachable cell.
+
+        Args:
+            grid: the map.
+            revision: which map it is.
+            lattice: the lattice over it.
+            reachable: bool (rows, cols) on the lattice; None where the robot has no place yet.
+        """
+        counted, known = self._counted
+        if revision != counted or reachable is not known:
+            nowhere = np.zeros(lattice.states.shape, bool)
+            raster, _ = grid.geometry.on_raster()
+            pixels = count_free_beside(
+                pixels_of(grid),
+                self._free_at_most,
+                placement_on(raster, lattice.cell_m),
+                nowhere if reachable is None else reachable,
+                lattice.window.row0,
+                lattice.window.col0,
+            )
+            self._area_m2 = pixels * grid.geometry.resolution**2
+            self._counted = revision, reachable
+        return self._area_m2
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class DrivenPath:
     """The published path and how far the robot has come on it.
@@ -139,28 +175,6 @@ class DrivenPath:
             return False
         row, col = self.cells[self.index]
         return bool(abs(int(row) - cell[0]) + abs(int(col) - cell[1]) > FAR_CELLS)
-
-
-@dataclass(frozen=True, slots=True)
-class LeftOver:
-    """How often a path came to its end and left as many cells over as the one before.
-
-    Attributes:
-        cells: left over by the last one.
-        tries: paths that have left over so many.
-    """
-
-    cells: int = -1
-    tries: int = 0
-
-    def after(self, cells: int) -> LeftOver:
-        """Return it after another path that left ``cells`` over."""
-        return LeftOver(cells, self.tries + 1 if cells == self.cells else 1)
-
-    @property
-    def given_up(self) -> bool:
-        """Whether there is no point in trying again at once."""
-        return self.cells > 0 and self.tries > MOST_TRIES
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,4 @@
-"""What of an order stays uncovered, area by area, and why; and where to look at it again.
-
-What of an order is left uncovered on the map as it is: found out anew when something changed.
-"""
+"""Unreached areas: what of an order stays uncovered, why, and where to look at it again."""
 
 from __future__ import annotations
 
@@ -11,19 +8,19 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
-from fasaco_edge.mission.coverage.ledger_keeper import LedgerKeeper
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.zones import in_zones
 
-# So many areas are named, the largest first; the others are counted.
+# This many areas are listed, the largest first; the others are counted.
 MOST_AREAS = 20
-# A robot drives by so many in the end, and no more.
+# A robot drives to this many at most when it tries again.
 MOST_VIEWPOINTS = 256
 
 
@@ -78,109 +75,77 @@ class Unreached:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sighted:
-    """Which cells the robot could come to at some time, bool (rows, cols) of ``window``."""
-
-    window: Window
-    mask: NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, ground: ReachableArea) -> Sighted:
-        """Return what can be reached now."""
-        return cls(ground.lattice.window, ground.reachable)
-
-    def on(self, window: Window) -> NDArray[np.bool_]:
-        """Return the mask on another window, bool (rows, cols)."""
-        if window == self.window:
-            return self.mask
-        mask = np.zeros((window.rows, window.cols), bool)
-        if common := window.intersection(self.window):
-            mask[common.slices_in(window)] = self.mask[common.slices_in(self.window)]
-        return mask
-
-    def and_now(self, ground: ReachableArea) -> Sighted:
-        """Return what could be reached before, or can be now."""
-        window = ground.lattice.window
-        return Sighted(window, self.on(window) | ground.reachable)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Situation:
     """All that decides what stays uncovered; arrays are bool (rows, cols) on one window.
 
     Attributes:
         free: the lattice without any keep-out zone.
-        ground: the lattice with them, and what can be reached on it.
+        area: the lattice with them, and what can be reached on it.
         uncovered: cells that were to be covered, and are not.
-        sighted: cells that could be reached at some time.
-        zoned: whether the order names zones; else unknown cells are nobody's.
+        once_reachable: cells that could be reached at some time.
+        has_zones: whether the order names zones; else unknown cells are not to be covered.
         given_up: whether reachable cells will not be tried again; else they are still to come.
         tries: how often they were tried.
     """
 
     free: CoverageLattice
-    ground: ReachableArea
+    area: ReachableArea
     uncovered: NDArray[np.bool_]
-    sighted: NDArray[np.bool_]
-    zoned: bool
+    once_reachable: NDArray[np.bool_]
+    has_zones: bool
     given_up: bool
     tries: int
 
     def unreached(self) -> Unreached:
         """Return what stays uncovered."""
-        window = self.ground.lattice.window
+        window = self.area.lattice.window
         areas = find_areas(self._causes())
         largest = np.argsort(-areas.cells, kind="stable")[:MOST_AREAS]
-        named = []
-        for area in largest.tolist():
-            row, col = areas.inner[area].tolist()
-            cause = Cause(int(areas.kinds[area]))
+        listed = []
+        for index in largest.tolist():
+            row, col = areas.inner[index].tolist()
+            cause = Cause(int(areas.kinds[index]))
             reason = REASONS.get(cause, f"left over after {self.tries} tries")
             cell = row + window.row0, col + window.col0
-            named.append(UnreachedArea(int(areas.cells[area]), cell, reason))
+            listed.append(UnreachedArea(int(areas.cells[index]), cell, reason))
         cells = int(areas.cells.sum(dtype=np.int64))
-        return Unreached(tuple(named), cells, len(areas.cells) - len(named))
+        return Unreached(tuple(listed), cells, len(areas.cells) - len(listed))
 
     def closed(self) -> NDArray[np.bool_]:
         """Return the uncovered cells that could be reached once, bool (rows, cols)."""
-        kept_out = self.free.coverable & ~self.ground.lattice.coverable
-        return self.uncovered & self.sighted & ~self.ground.reachable & ~kept_out
+        kept_out = self.free.coverable & ~self.area.lattice.coverable
+        return self.uncovered & self.once_reachable & ~self.area.reachable & ~kept_out
 
     def _causes(self) -> NDArray[np.uint8]:
-        states, reachable = self.ground.lattice.states, self.ground.reachable
-        coverable = self.ground.lattice.coverable
-        causes = np.zeros(states.shape, np.uint8)
-        if self.zoned:
-            causes[states == UNKNOWN] = Cause.UNKNOWN
-        causes[self.sighted & ~coverable] = Cause.CLOSED
+        lattice, reachable = self.area.lattice, self.area.reachable
+        coverable = lattice.coverable
+        causes = np.zeros(lattice.states.shape, np.uint8)
+        if self.has_zones:
+            causes[lattice.states == UNKNOWN] = Cause.UNKNOWN
+        causes[self.once_reachable & ~coverable] = Cause.CLOSED
         causes[coverable & ~reachable] = Cause.BEHIND_OBSTACLES
-        if self.free is not self.ground.lattice:
-            self._blame_keep_out(causes)
+        if self.free is not lattice:
+            self._mark_keep_out(causes)
         if self.given_up:
             causes[reachable] = Cause.LEFT_OVER
         causes[~self.uncovered] = 0
         return causes
 
-    def _blame_keep_out(self, causes: NDArray[np.uint8]) -> None:
-        lattice, reachable = self.ground.lattice, self.ground.reachable
+    def _mark_keep_out(self, causes: NDArray[np.uint8]) -> None:
+        lattice, reachable = self.area.lattice, self.area.reachable
         causes[self.free.coverable & (lattice.states == BLOCKED)] = Cause.KEPT_OUT
         if reachable.any():
             row, col = divmod(int(np.argmax(reachable)), reachable.shape[1])
-            somewhere = row + lattice.window.row0, col + lattice.window.col0
-            behind = (
-                ReachableArea.around(self.free, somewhere).reachable
-                & lattice.coverable
-                & ~reachable
-            )
-            causes[behind] = Cause.BEHIND_KEEP_OUT
+            cell = row + lattice.window.row0, col + lattice.window.col0
+            without_zones = ReachableArea.around(self.free, cell).reachable
+            causes[without_zones & lattice.coverable & ~reachable] = Cause.BEHIND_KEEP_OUT
 
 
 def viewpoints(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -> list[Cell]:
     """Return a cell beside each closed area to look at it from; indices of the arrays.
 
     An area without a square of two by two cells is left out: rows of cells along the walls
-    come and go with a map's noise, and nobody wants a robot to drive along all of them again.
-    Of very many the largest are looked at.
+    come and go with a map's noise. Of very many the largest are taken.
     """
     areas = find_areas(closed.view(np.uint8))
     beside = cells_beside(areas, reachable)
@@ -189,64 +154,69 @@ def viewpoints(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -> list[
     return [(row, col) for row, col in beside[largest].tolist()]
 
 
-class Leftovers:
-    """Remembers what could be reached since an order began.
+class ReachHistory:
+    """Remembers what could be reached since an order began, and tells what of it is not covered."""
 
-    Attributes:
-        failures: paths after which cells were left over.
-    """
-
-    def __init__(self, site: MapState, log: LedgerKeeper) -> None:
-        self.failures = 0
-        self._site = site
-        self._log = log
-        self._sighted: Sighted | None = None
+    def __init__(self, map_state: MapState, ledger: MissionLedger) -> None:
+        self._map = map_state
+        self._ledger = ledger
+        # Paths after which cells were left over.
+        self._failures = 0
+        # The newest area seen, and which cells of its lattice could be reached at some time.
         self._seen: ReachableArea | None = None
+        self._once_reachable: NDArray[np.bool_] | None = None
         self._found: tuple[object, Unreached] = (None, Unreached())
 
-    def begin_anew(self) -> None:
+    def restart(self) -> None:
         """Begin with another order."""
-        self.failures, self._sighted, self._seen = 0, None, None
-        self.see()
+        self._failures, self._seen, self._once_reachable = 0, None, None
+        self.update()
 
-    def see(self) -> None:
+    def update(self) -> None:
         """Remember what can be reached now."""
-        ground, before = self._site.ground, self._sighted
-        if ground is not None and ground is not self._seen:
-            self._sighted = before.and_now(ground) if before else Sighted.of(ground)
-            self._seen = ground
+        area = self._map.area
+        if area is not None and area is not self._seen:
+            self._once_reachable = self._before(area) | area.reachable
+            self._seen = area
 
-    def unreached(self, assignment: OrderState) -> Unreached:
-        """Return what is not reached.
+    def note_failure(self) -> None:
+        """Note that a path left cells over."""
+        self._failures += 1
 
-        While the robot stands where it cannot be, what was so before is all there is to say.
-        """
-        ground = self._site.ground
-        if assignment.order is None:
+    def unreached(self, state: OrderState) -> Unreached:
+        """Return what is not reached; the last answer while the robot is on no coverable cell."""
+        area = self._map.area
+        if state.order is None:
             return Unreached()
-        key = (ground, self._log.ledger.total, assignment)
-        if ground is not None and key != self._found[0]:
-            given_up = assignment.stage is not Stage.COVERING
-            self._found = key, self._situation(assignment.order, ground, given_up).unreached()
+        key = (area, self._ledger.current.total, state)
+        if area is not None and key != self._found[0]:
+            given_up = state.stage is not Stage.COVERING
+            self._found = key, self._situation(state.order, area, given_up).unreached()
         return self._found[1]
 
-    def viewpoints(self, order: MissionOrder, ground: ReachableArea) -> set[Cell]:
+    def viewpoints(self, order: MissionOrder, area: ReachableArea) -> set[Cell]:
         """Return the cells (row, col) to look at areas from that were closed."""
-        window = ground.lattice.window
-        situation = self._situation(order, ground, given_up=True)
-        found = viewpoints(situation.closed(), ground.reachable)
+        window = area.lattice.window
+        situation = self._situation(order, area, given_up=True)
+        found = viewpoints(situation.closed(), area.reachable)
         return {(row + window.row0, col + window.col0) for row, col in found}
 
-    def _situation(self, order: MissionOrder, ground: ReachableArea, given_up: bool) -> Situation:
-        window = ground.lattice.window
-        assert self._site.free is not None
-        uncovered = in_zones(order.zones, window, ground.lattice.cell_m)
+    def _before(self, area: ReachableArea) -> NDArray[np.bool_]:
+        """Return what could be reached before, on the lattice of ``area``, bool (rows, cols)."""
+        if self._seen is None or self._once_reachable is None:
+            return np.zeros_like(area.reachable)
+        return carried(self._once_reachable, self._seen.lattice.window, area.lattice.window)
+
+    def _situation(self, order: MissionOrder, area: ReachableArea, given_up: bool) -> Situation:
+        window = area.lattice.window
+        assert self._map.free is not None
+        uncovered = in_zones(order.zones, window, area.lattice.cell_m)
         return Situation(
-            free=self._site.free,
-            ground=ground,
-            uncovered=uncovered & (self._log.ledger.visits(window) == 0),
-            sighted=self._sighted.on(window) if self._sighted else ground.reachable,
-            zoned=order.zones[0].polygon is not None,
+            free=self._map.free,
+            area=area,
+            uncovered=uncovered & (self._ledger.current.visits(window) == 0),
+            once_reachable=area.reachable if self._seen is None else self._before(area),
+            has_zones=order.zones[0].polygon is not None,
             given_up=given_up,
-            tries=self.failures,
+            tries=self._failures,
         )

@@ -1,8 +1,8 @@
-"""Loop closures: the mapper finds that all lies elsewhere, and moves map and pose at once.
+"""Loop closures: the mapper corrects the whole map, and moves map and pose at once.
 
-The ledger's cells are places in the map's frame: after such a jump nobody knows which of them
+The ledger's cells are places in the map's frame: after such a jump it is unknown which of them
 the tool passed over, only that the map was somewhere between its old place and the new one, as
-far as it moved at all. What counts still is what was covered wherever in between it lay.
+far as it moved at all. What still counts is what was covered wherever in between it lay.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 
-# So many cells turn from free to blocked or back in one map, and such a share of those that were
+# This many cells change between free and blocked in one map, and this share of those that were
 # known: no door and no passer-by does that.
 LEAST_CELLS, LEAST_SHARE = 20, 0.1
-# Whoever moved less than this stayed where it was: [m], [rad].
+# A motion smaller than this is none: [m], [rad].
 STILL_M, STILL_RAD = 0.02, math.radians(0.2)
 # How far a cell's centre may lie from the middle of four [cells] to be one with the nearest.
 NEAR = 0.1
-# Where the map may have lain, as shares of the way.
+# Where the map may have lain, as shares of its motion.
 BETWEEN = (0.25, 0.5, 0.75, 1.0)
 
 
@@ -35,9 +35,9 @@ def has_moved(change: LatticeChange) -> bool:
     if change.before is None or len(change.cells) < LEAST_CELLS:
         return False
     then, now = _states(change.before, change.cells), _states(change.after, change.cells)
-    turned = int(np.count_nonzero((then != UNKNOWN) & (now != UNKNOWN) & (then != now)))
-    # The whole lattice is looked at only where that may matter: this is asked at every map.
-    return turned >= LEAST_CELLS and turned >= LEAST_SHARE * int(
+    changed = int(np.count_nonzero((then != UNKNOWN) & (now != UNKNOWN) & (then != now)))
+    # The whole lattice is counted only where that may matter: this runs at every map.
+    return changed >= LEAST_CELLS and changed >= LEAST_SHARE * int(
         np.count_nonzero(change.before.states != UNKNOWN)
     )
 
@@ -54,14 +54,14 @@ def _states(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.ui
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """How a rigid map moved, as the robot's pose tells: it stood in ``start``, now in ``end``."""
+    """How a rigid map moved, by the robot's pose before (``start``) and after (``end``)."""
 
     start: Pose2D
     end: Pose2D
 
     @property
     def is_still(self) -> bool:
-        """Whether it did not."""
+        """Whether it did not move."""
         start, end = self.start, self.end
         distance = math.hypot(end.x - start.x, end.y - start.y)
         turn = math.remainder(end.yaw - start.yaw, math.tau)
@@ -79,8 +79,10 @@ class Motion:
         return cos * dx - sin * dy + start.x, sin * dx + cos * dy + start.y
 
 
-def doubtful(before: LedgerSnapshot, motion: Motion) -> Callable[[Window], NDArray[np.bool_]]:
-    """Return what tells which cells of a window, bool (rows, cols), may not have been covered."""
+def uncertain_cells(
+    before: LedgerSnapshot, motion: Motion
+) -> Callable[[Window], NDArray[np.bool_]]:
+    """Return a function of a window: which cells, bool (rows, cols), may not have been covered."""
 
     def inside(window: Window) -> NDArray[np.bool_]:
         rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1]
@@ -113,10 +115,7 @@ def _covered(
 def _between_cells(
     cell_m: float, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Tell which points [m] a round tool may have missed that was in the middle of each cell.
-
-    A map most often moves as a whole, to where it is now: only there is looked at it.
-    """
+    """Tell which points [m] a round tool may have missed that was in the middle of each cell."""
     row, col = y / cell_m - 0.5, x / cell_m - 0.5
     away: NDArray[np.bool_] = np.hypot(row - np.rint(row), col - np.rint(col)) >= 0.5
     return away

@@ -1,7 +1,4 @@
-"""What a map knows to be free and the robot's cells leave out: beside walls, behind doors.
-
-The part of the lattice the robot can come to, and what a new map changed of it.
-"""
+"""Reachable area: the part of the lattice the robot can reach, updated at the cost of a change."""
 
 from __future__ import annotations
 
@@ -14,56 +11,12 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange, carried
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice, pixels_of, placement_on
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
 from fasaco_edge.kernels.cells import COL_STEP, ROW_STEP
-from fasaco_edge.kernels.lattice.pixels import count_free_beside
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, update_reach
 
-
-class FreeArea:
-    """Counts free pixels, anew where the map or what can be reached has changed."""
-
-    def __init__(self, free_at_most: int) -> None:
-        self._free_at_most = free_at_most
-        # Of which map and reach the count is, not the map itself: that would outlive its time.
-        self._counted: tuple[int, NDArray[np.bool_] | None] = (-1, None)
-        self._area_m2 = 0.0
-
-    def out_of_reach_m2(
-        self,
-        grid: OccupancyGrid,
-        revision: int,
-        lattice: CoverageLattice,
-        reachable: NDArray[np.bool_] | None,
-    ) -> float:
-        """Return the area [m2] of free pixels whose centre lies in no reachable cell.
-
-        Args:
-            grid: the map.
-            revision: which map it is.
-            lattice: the lattice over it.
-            reachable: bool (rows, cols) on the lattice; None where the robot has no place yet.
-        """
-        counted, known = self._counted
-        if revision != counted or reachable is not known:
-            nowhere = np.zeros(lattice.states.shape, bool)
-            raster, _ = grid.geometry.on_raster()
-            pixels = count_free_beside(
-                pixels_of(grid),
-                self._free_at_most,
-                placement_on(raster, lattice.cell_m),
-                nowhere if reachable is None else reachable,
-                lattice.window.row0,
-                lattice.window.col0,
-            )
-            self._area_m2 = pixels * grid.geometry.resolution**2
-            self._counted = revision, reachable
-        return self._area_m2
-
-
-# A robot that stands a little off, or whose cell was just closed by a noisy
-# scan, goes on from the nearest coverable cell this close.
+# A robot a little off, or whose cell was just closed by a noisy scan, goes on from the nearest
+# coverable cell this close.
 ANCHOR_CELLS = 1.5
 
 # Where more of the lattice has changed, to search all of it is as fast.
@@ -74,7 +27,7 @@ LOCAL_SHARE = 0.01
 class AreaChange:
     """How many reachable cells came, went, or have other steps than before.
 
-    ``window`` is the smallest around all of them; None where nobody has looked.
+    ``window`` is the smallest around all of them; None where there are none.
     """
 
     gained: int
@@ -105,12 +58,12 @@ class ReachableArea:
 
     @classmethod
     def around(cls, lattice: CoverageLattice, cell: Cell) -> Self:
-        """Return the ground that can be reached from a coverable ``cell``."""
+        """Return the area that can be reached from a coverable ``cell``."""
         reachable = reachable_from(lattice.steps, *lattice.local(cell)).astype(bool)
         return cls(lattice, reachable)
 
     def updated(self, change: LatticeChange, cell: Cell) -> ReachableArea:
-        """Return the ground that can be reached from ``cell`` after the lattice has changed.
+        """Return the area that can be reached from ``cell`` after the lattice has changed.
 
         The same as ``around`` finds, at the cost of what changed where that is possible.
         """
@@ -131,11 +84,11 @@ class ReachableArea:
         return ReachableArea.around(lattice, cell)
 
     def contains(self, cell: Cell) -> bool:
-        """Tell whether a coverable ``cell`` is reachable."""
-        return bool(self.reachable[self.lattice.local(cell)])
+        """Tell whether ``cell`` is reachable."""
+        return self.lattice.contains(cell) and bool(self.reachable[self.lattice.local(cell)])
 
     def change_since(self, before: ReachableArea) -> AreaChange:
-        """Compare with the ground before; cells outside an array are not reachable."""
+        """Compare with the area before; cells outside an array are not reachable."""
         mine, theirs = self.lattice.window, before.lattice.window
         common = mine.intersection(theirs)
         total, total_before = np.count_nonzero(self.reachable), np.count_nonzero(before.reachable)
@@ -162,9 +115,9 @@ class ReachableArea:
         return replace(change, window=window)
 
     def drivable_prefix(self, cells: NDArray[np.int32]) -> int:
-        """Return how many leading cells of a walk, int32 (n, 2), can be driven here.
+        """Return how many leading cells of a path, int32 (n, 2), can be driven.
 
-        None where the first one is not coverable: nobody may be sent there.
+        0 where the first one is not coverable.
         """
         if not len(cells):
             return 0
@@ -185,7 +138,7 @@ class ReachableArea:
         return 1 + int(np.argmin(legal)) if not legal.all() else len(cells)
 
     def shortest_path(self, start: Cell, goal: Cell) -> NDArray[np.int32]:
-        """Return a shortest walk, int32 (n, 2); empty where there is none."""
+        """Return a shortest path, int32 (n, 2); empty where there is none."""
         lattice = self.lattice
         if not (lattice.contains(start) and lattice.contains(goal)):
             return np.empty((0, 2), np.int32)

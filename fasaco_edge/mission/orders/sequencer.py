@@ -1,9 +1,4 @@
-"""The frontier: cells the robot can come to, beside what the map does not know yet.
-
-Where the robot is sent only to look: for a way to a zone, or into what is closed off.
-
-The agenda: what of the order is still to be done, on the map as it is now.
-"""
+"""Sequencer: goes through an order: zones pass by pass, what was left over again, the way home."""
 
 from __future__ import annotations
 
@@ -16,9 +11,8 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Polygon, Window
 from fasaco_edge.grid.lattice import UNKNOWN, Cell
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.coverage.ledger_keeper import LedgerKeeper
-from fasaco_edge.mission.coverage.progress import MOST_TRIES, LeftOver
-from fasaco_edge.mission.coverage.unreached import Leftovers, Unreached
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.coverage.unreached import ReachHistory, Unreached
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Zone
@@ -29,20 +23,26 @@ from fasaco_edge.planners.problem import CoverageProblem
 # Around a cell from which nothing new was seen, others show nothing new either [cells].
 SEEN_AROUND = 1
 
+# After this many paths that left the same number of cells over, they wait for the next try: the
+# robot may stop short of its path's end, out of the tool's reach of the last cell.
+MOST_TRIES = 3
 
-def next_frontier(ground: ReachableArea, polygon: Polygon, looked: Iterable[Cell]) -> Cell | None:
+
+def next_frontier(area: ReachableArea, polygon: Polygon, looked: Iterable[Cell]) -> Cell | None:
     """Return the frontier cell (row, col) nearest to a polygon's corners [m], in a straight line.
 
+    A frontier cell is reachable and beside cells that are unknown to the map.
+
     Args:
-        ground: what the robot can come to.
-        polygon: where it wants to get.
-        looked: cells it has looked from already; what is close to them is left out.
+        area: what the robot can reach.
+        polygon: where it has to get.
+        looked: cells it was sent to already; what is close to them is left out.
     """
-    lattice, window = ground.lattice, ground.lattice.window
+    lattice, window = area.lattice, area.lattice.window
     # Beyond the lattice nothing is known.
     unknown = np.pad(lattice.states == UNKNOWN, 1, constant_values=True)
     beside = unknown[:-2, 1:-1] | unknown[2:, 1:-1] | unknown[1:-1, :-2] | unknown[1:-1, 2:]
-    rows, cols = np.nonzero(ground.reachable & beside)
+    rows, cols = np.nonzero(area.reachable & beside)
     rows, cols = rows + window.row0, cols + window.col0
     for row, col in looked:
         away = np.maximum(abs(rows - row), abs(cols - col)) > SEEN_AROUND
@@ -57,38 +57,38 @@ def next_frontier(ground: ReachableArea, polygon: Polygon, looked: Iterable[Cell
 
 @dataclass(slots=True)
 class Exploration:
-    """Cells to look from.
+    """Cells the robot is sent to only to look: for a way to a zone, or into closed areas.
 
     Attributes:
-        viewpoints: cells (row, col) to look from, and not yet driven to.
+        viewpoints: cells (row, col) to look from, and not yet reached.
         looked: cells from which a way to the zone was looked for.
     """
 
     viewpoints: set[Cell] = field(default_factory=set)
     looked: set[Cell] = field(default_factory=set)
 
-    def seek(self, zone: Zone | None, ground: ReachableArea | None, cell: Cell) -> str:
-        """Look for a way to a zone the robot cannot come to; return why a plan is wanted, or "".
+    def seek(self, zone: Zone | None, area: ReachableArea | None, cell: Cell) -> str:
+        """Look for a way to a zone out of reach; return why a plan is wanted, or "".
 
-        At the border of the known, cell by cell, until the zone is in reach or all was looked at.
+        Along the frontier, cell by cell, until the zone is in reach or all was looked at.
         """
-        if zone is None or zone.polygon is None or ground is None or is_in_reach(zone, ground):
+        if zone is None or zone.polygon is None or area is None or is_in_reach(zone, area):
             return ""
         self.looked |= {cell}
-        goal = next_frontier(ground, zone.polygon, self.looked)
+        goal = next_frontier(area, zone.polygon, self.looked)
         if goal is None:
             return ""
         self.looked.add(goal)
         self.viewpoints = {goal}
         return f"looking for a way to zone {zone.name!r}"
 
-    def note(self, zone: Zone | None, ground: ReachableArea) -> None:
+    def end_if_reached(self, zone: Zone | None, area: ReachableArea) -> None:
         """Look no more for a zone that can be reached now."""
-        if zone is not None and self.viewpoints and is_in_reach(zone, ground):
+        if zone is not None and self.viewpoints and is_in_reach(zone, area):
             self.viewpoints.clear()
 
-    def gives_up(self) -> bool:
-        """Note that a viewpoint was not come to; tell whether the zone may be seen from others."""
+    def skip_viewpoint(self) -> bool:
+        """Note that a viewpoint was not reached; tell whether others may show the zone."""
         another = bool(self.looked and self.viewpoints)
         if another:
             self.viewpoints.clear()
@@ -101,100 +101,103 @@ class Exploration:
                 cells[row - window.row0, col - window.col0] = True
 
 
-def is_in_reach(zone: Zone, ground: ReachableArea) -> bool:
-    """Tell whether the robot can come to any cell of a zone."""
-    inside = in_zones((zone,), ground.lattice.window, ground.lattice.cell_m)
-    return bool((inside & ground.reachable).any())
+def is_in_reach(zone: Zone, area: ReachableArea) -> bool:
+    """Tell whether the robot can reach any cell of a zone."""
+    inside = in_zones((zone,), area.lattice.window, area.lattice.cell_m)
+    return bool((inside & area.reachable).any())
 
 
 @dataclass(slots=True)
-class _Memory:
-    """What is only known as long as the daemon lives.
+class _Run:
+    """What is known of an order only as long as the daemon runs.
 
     Attributes:
-        lookout: where to look from.
-        left_over: whether paths still get anything done.
-        retry_at: when what is blocked or left over is tried again [s]; None if nobody waits.
+        exploration: where to look from.
+        left_over: how many cells the last path left over; -1 before the first.
+        same_again: how many paths in a row left over that many.
+        retry_at: when what is blocked or left over is tried again [s]; None if nothing waits.
         ending: how the order came to its end.
     """
 
-    lookout: Exploration = field(default_factory=Exploration)
-    left_over: LeftOver = field(default_factory=LeftOver)
+    exploration: Exploration = field(default_factory=Exploration)
+    left_over: int = -1
+    same_again: int = 0
     retry_at: float | None = None
     ending: str = "the order was carried out"
 
 
 class Sequencer:
-    """Goes through an order: zones pass by pass, what was left over once more, the way home.
+    """Knows what of an order is to be done next, on the map as it is now. Times are [s].
 
     Attributes:
-        assignment: the order, and how far it is.
+        state: the order, and how far it is.
     """
 
-    def __init__(self, config: MissionConfig, site: MapState, log: LedgerKeeper) -> None:
-        self.assignment = OrderState.idle(NO_ORDER)
+    def __init__(self, config: MissionConfig, map_state: MapState, ledger: MissionLedger) -> None:
+        self.state = OrderState.idle(NO_ORDER)
         self._config = config
-        self._site = site
-        self._log = log
-        self._memory = _Memory()
-        self._leftovers = Leftovers(site, log)
-        # Whether anything is worth trying again, and as of when.
-        self._counted: tuple[object, bool] = (None, False)
+        self._map = map_state
+        self._ledger = ledger
+        self._run = _Run()
+        self._history = ReachHistory(map_state, ledger)
+        # Whether anything is worth trying again, and as of which map and ledger.
+        self._retry_check: tuple[object, bool] = (None, False)
 
     @property
-    def waiting(self) -> bool:
-        """Whether the robot stands until it is time to try again."""
-        return self._memory.retry_at is not None
+    def is_waiting(self) -> bool:
+        """Whether the robot waits for the time to try again."""
+        return self._run.retry_at is not None
 
     @property
     def can_plan(self) -> bool:
         """Whether a plan would have anything to cover."""
-        return self.assignment.stage is not Stage.RETURNING and self._left() > 0
+        return self.state.stage is not Stage.RETURNING and self._left() > 0
 
     @property
     def ending(self) -> str:
         """How the order came to its end."""
-        return self._memory.ending
+        return self._run.ending
 
-    def take(self, assignment: OrderState) -> None:
+    def start(self, state: OrderState) -> None:
         """Begin with another order, or with none."""
-        self.assignment, self._memory = assignment, _Memory()
-        self._counted = (None, False)
-        self._leftovers.begin_anew()
+        self.state, self._run = state, _Run()
+        self._retry_check = (None, False)
+        self._history.restart()
 
-    def see(self) -> None:
+    def set_state(self, state: OrderState) -> None:
+        """Go on with the same order in another state, as a command has left it."""
+        self.state = state
+
+    def note_area(self) -> None:
         """Remember what can be reached now."""
-        self._leftovers.see()
+        self._history.update()
 
-    def pass_by(self, cell: Cell) -> None:
-        """Note that the robot has come to ``cell``."""
-        self._memory.lookout.viewpoints.discard(cell)
+    def note_cell(self, cell: Cell) -> None:
+        """Note that the robot is in ``cell``."""
+        self._run.exploration.viewpoints.discard(cell)
 
     def begin(self, cell: Cell, now: float) -> str:
         """Begin what is due, the robot being in ``cell``; return why a plan is wanted, or ""."""
-        if self._memory.retry_at is not None and not self._worth_trying():
-            self.go_on(now)
-        if self._memory.retry_at is not None:
-            return self._begin_try(cell) if now >= self._memory.retry_at else ""
-        assignment = self.assignment
-        if assignment.begun or assignment.order is None or assignment.stage is Stage.OVER:
+        run = self._run
+        if run.retry_at is not None and not self._is_worth_trying():
+            self.advance(now)
+        if run.retry_at is not None:
+            return self._begin_try(cell) if now >= run.retry_at else ""
+        state = self.state
+        if state.begun or state.order is None or state.stage is Stage.OVER:
             return ""
-        zone = assignment.current_zone
-        if zone is not None and not (assignment.order.keep_covered and assignment.pass_number == 1):
+        zone = state.current_zone
+        if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
             cell_m = self._config.footprint.cell_m
-            self._log.forget(lambda window: in_zones((zone,), window, cell_m))
-        self.assignment = replace(assignment, begun=True, home=assignment.home or cell)
-        self._memory.left_over = LeftOver()
-        if assignment.pass_number == 1:
-            self._memory.lookout.looked.clear()
-        return "" if assignment.automatic else assignment.title
+            self._ledger.forget(lambda window: in_zones((zone,), window, cell_m))
+        self.state = replace(state, begun=True, home=state.home or cell)
+        run.left_over, run.same_again = -1, 0
+        if state.pass_number == 1:
+            run.exploration.looked.clear()
+        return "" if state.automatic else state.title
 
     def problem(
-        self,
-        cell: Cell,
-        before: NDArray[np.int32],
-        *,
-        attempt: int = 0,
+        self, cell: Cell, before: NDArray[np.int32], *, attempt: int = 0
     ) -> CoverageProblem:
         """Return the problem of what is still to be covered now.
 
@@ -206,124 +209,120 @@ class Sequencer:
         Raises:
             NothingToCover: nothing is.
         """
-        ground, assignment = self._site.ground, self.assignment
-        assert ground is not None
-        lattice, home = ground.lattice, assignment.home
-        self._memory.lookout.note(assignment.current_zone, ground)
-        ends_home = (
-            home is not None
-            and assignment.returns_home_next
-            and lattice.contains(home)
-            and ground.contains(home)
-        )
-        covered = ~self.open_cells(lattice.window)
+        area, state = self._map.area, self.state
+        assert area is not None
+        lattice, home = area.lattice, state.home
+        self._run.exploration.end_if_reached(state.current_zone, area)
+        ends_home = home is not None and state.returns_home_next and area.contains(home)
         return CoverageProblem.of(
             lattice,
             cell,
-            covered=covered,
+            covered=~self.open_cells(lattice.window),
             end=home if ends_home else None,
             cost=self._config.cost,
             before=before,
             attempt=attempt,
+            # An attempt begins on the path, which the robot may have left for another area.
+            reachable=area.reachable if area.contains(cell) else None,
         )
 
-    def seek(self, cell: Cell) -> str:
+    def explore(self, cell: Cell) -> str:
         """Look for a way to a zone out of reach; return why a plan is wanted, or ""."""
-        return self._memory.lookout.seek(self.assignment.current_zone, self._site.ground, cell)
+        return self._run.exploration.seek(self.state.current_zone, self._map.area, cell)
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
-        order = self.assignment.order
+        order, zone = self.state.order, self.state.current_zone
         if order is None:
             return np.zeros((window.rows, window.cols), bool)
-        zone = self.assignment.current_zone
         zones = order.zones if zone is None else (zone,)
         wanted = in_zones(zones, window, self._config.footprint.cell_m)
-        open_cells: NDArray[np.bool_] = wanted & (self._log.ledger.visits(window) == 0)
-        self._memory.lookout.mark(open_cells, window)
+        open_cells: NDArray[np.bool_] = wanted & (self._ledger.current.visits(window) == 0)
+        self._run.exploration.mark(open_cells, window)
         return open_cells
 
-    def gives_up(self) -> bool:
+    def note_path_end(self) -> bool:
         """Note that a path came to its end; return whether what it left over has to wait."""
-        memory, cells = self._memory, self._left()
-        self._leftovers.failures += cells > 0
-        memory.left_over = memory.left_over.after(cells)
-        return memory.left_over.given_up and not memory.lookout.gives_up()
+        run, cells = self._run, self._left()
+        if cells > 0:
+            self._history.note_failure()
+        run.same_again = run.same_again + 1 if cells == run.left_over else 1
+        run.left_over = cells
+        is_given_up = cells > 0 and run.same_again > MOST_TRIES
+        return is_given_up and not run.exploration.skip_viewpoint()
 
-    def go_on(self, now: float) -> None:
+    def advance(self, now: float) -> None:
         """Go on to what comes next: all that could be done now is done."""
-        assignment, memory = self.assignment, self._memory
-        memory.lookout.viewpoints.clear()
-        following = assignment.next_pass()
-        if following is not assignment:
-            self.assignment = following
+        state, run = self.state, self._run
+        run.exploration.viewpoints.clear()
+        following = state.next_pass()
+        if following is not state:
+            self.state = following
             return
-        if assignment.stage is Stage.RETRYING and not self.waiting:
-            assignment = replace(assignment, tries=assignment.tries + 1)
-        if assignment.stage is Stage.RETURNING:
+        if state.stage is Stage.RETRYING and not self.is_waiting:
+            state = replace(state, tries=state.tries + 1)
+        if state.stage is Stage.RETURNING:
             self._end()
             return
         # What is left is counted over all zones from here on.
-        self.assignment = replace(assignment, stage=Stage.RETRYING)
-        if assignment.tries < self._config.retries and self._worth_trying():
-            if memory.retry_at is None:
-                memory.retry_at = now + self._config.retry_s
-        elif assignment.returns_home_next:
-            memory.retry_at = None
-            self.assignment = replace(assignment, stage=Stage.RETURNING, begun=False)
+        self.state = replace(state, stage=Stage.RETRYING)
+        if state.tries < self._config.retries and self._is_worth_trying():
+            if run.retry_at is None:
+                run.retry_at = now + self._config.retry_s
+        elif state.returns_home_next:
+            run.retry_at = None
+            self.state = replace(state, stage=Stage.RETURNING, begun=False)
         else:
             self._end()
 
     def reopen(self) -> None:
-        """Let an order that stands go on: the map has changed since it was over."""
-        if self.assignment.automatic and self.assignment.stage is Stage.OVER:
-            self.assignment = replace(self.assignment, stage=Stage.COVERING)
+        """Let an automatic order go on: the map has changed since it was over."""
+        if self.state.automatic and self.state.stage is Stage.OVER:
+            self.state = replace(self.state, stage=Stage.COVERING)
 
-    def waits_for(self) -> str:
+    def waiting_reason(self) -> str:
         """Return in words what the robot waits for before it tries again."""
         cells, config = self.unreached().cells, self._config
         return (
             f"{cells} {'cell' if cells == 1 else 'cells'} not reached: tried again after "
-            f"{config.retry_s:g} s ({self.assignment.tries + 1} of {config.retries})"
+            f"{config.retry_s:g} s ({self.state.tries + 1} of {config.retries})"
         )
 
     def unreached(self) -> Unreached:
         """Return what of the order stays uncovered as things are."""
-        return self._leftovers.unreached(self.assignment)
+        return self._history.unreached(self.state)
 
     def _begin_try(self, cell: Cell) -> str:
-        memory = self._memory
-        memory.retry_at, memory.lookout.viewpoints = None, self._closed_off() - {cell}
+        run = self._run
+        run.retry_at, run.exploration.viewpoints = None, self._viewpoints() - {cell}
         # One path that changes nothing is enough this time.
-        memory.left_over = LeftOver(self._left(), MOST_TRIES)
-        return f"tried again, {self.assignment.tries + 1} of {self._config.retries}"
+        run.left_over, run.same_again = self._left(), MOST_TRIES
+        return f"tried again, {self.state.tries + 1} of {self._config.retries}"
 
     def _end(self) -> None:
-        left, order = self._left(), self.assignment.order
-        self._memory.retry_at = None
-        self.assignment = replace(self.assignment, stage=Stage.OVER)
+        left, order = self._left(), self.state.order
+        self._run.retry_at = None
+        self.state = replace(self.state, stage=Stage.OVER)
         every = order is None or order.zones[0].polygon is None
-        self._memory.ending = f"every reachable cell{'' if every else ' of the zones'} is covered"
+        self._run.ending = f"every reachable cell{'' if every else ' of the zones'} is covered"
         if left:
-            self._memory.ending += f" but {left} left over"
+            self._run.ending += f" but {left} left over"
 
-    def _worth_trying(self) -> bool:
-        """Tell whether there is anything to be tried again; counted anew if anything changed."""
-        key = (self._site.ground, self._log.ledger.total)
-        if key != self._counted[0]:
-            self._counted = key, bool(self._left() or self._closed_off())
-        return self._counted[1]
+    def _is_worth_trying(self) -> bool:
+        """Tell whether there is anything to try again; searched anew if anything changed."""
+        key = (self._map.area, self._ledger.current.total)
+        if key != self._retry_check[0]:
+            self._retry_check = key, bool(self._left() or self._viewpoints())
+        return self._retry_check[1]
 
     def _left(self) -> int:
         """Return how many reachable cells still need a visit."""
-        ground = self._site.ground
-        if ground is None:
+        area = self._map.area
+        if area is None:
             return 0
-        return int(np.count_nonzero(self.open_cells(ground.lattice.window) & ground.reachable))
+        return int(np.count_nonzero(self.open_cells(area.lattice.window) & area.reachable))
 
-    def _closed_off(self) -> set[Cell]:
+    def _viewpoints(self) -> set[Cell]:
         """Return the cells to look at closed areas from."""
-        order, ground = self.assignment.order, self._site.ground
-        if order is None or ground is None:
-            return set()
-        return self._leftovers.viewpoints(order, ground)
+        order, area = self.state.order, self._map.area
+        return set() if order is None or area is None else self._history.viewpoints(order, area)

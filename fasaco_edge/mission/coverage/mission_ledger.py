@@ -1,0 +1,236 @@
+"""Mission ledger: the coverage ledger of a mission, as long as no map contradicts it.
+
+A ledger from before a restart may be of another building than the map now shows. A map of
+another building knows nothing of the ledger: its obstacles lie on covered cells as often as
+anywhere around them. In the same building they hardly ever do. So of the covered cells that the
+map knows, those blocked are counted, and compared with how many would be by chance: by the share
+of blocked cells among the others that the map knows around them. The ledger is of another
+building if there are more than OTHER_FROM times as many, and not so few that some new furniture
+explains them; or if MANY_BLOCKED of the known ones are blocked, whatever is around.
+
+Unknown is no contradiction, nor is what lies outside of the map: a mapper that was restarted has
+seen next to nothing. Until a map knows enough to decide, the ledger holds, and the next map is
+compared; a map that knows half of the covered cells and does not contradict has confirmed them
+for good.
+
+Measured on 13 buildings, 10 to 100 % of them covered, all robots starting at the same place of
+the frame. Taken for another building: of the complete maps of another one 66 % (of the rest
+most overlap too little), of single scans there of 3.5 m and 8 m 32 % and 47 % at once, more
+as the map grows. Of the same building none, also with the map moved by 0.1 m; moved by
+0.22 m and a degree 2 %; with obstacles on 3 and 10 % of what is covered none and 8 %. Moved by
+more than a cell, the ledger is as wrong as in another building, and may be judged so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
+from fasaco_edge.mission.coverage.ledger import (
+    DROPPED_TILES,
+    MOST_TILES,
+    TILE,
+    CoverageLedger,
+    LedgerFullError,
+    LedgerMismatchError,
+    LedgerSnapshot,
+)
+from fasaco_edge.mission.map.loop_closure import Motion, uncertain_cells
+
+# Unless this many covered cells are blocked, or would be by chance, nothing is decided.
+LEAST_CELLS = 10
+# Times as often as by chance: up to the first the ledger is of this building, beyond the
+# second it is of another; in between the next map may tell.
+SAME_UP_TO, OTHER_FROM = 0.3, 0.6
+# Share of the known covered cells: with fewer blocked it may be this building still, with
+# more it cannot be.
+LEAST_BLOCKED, MANY_BLOCKED = 0.05, 1 / 3
+# How far around the covered cells the map is compared [cells]: to the walls beside them.
+AROUND_CELLS = 2
+
+
+class Verdict(Enum):
+    """What a map says about a ledger."""
+
+    SAME = auto()
+    OTHER = auto()
+    OPEN = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """How the covered cells lie on a map.
+
+    Attributes:
+        covered: covered cells in all.
+        known: those that the map knows, blocked or coverable.
+        blocked: those of them that are blocked.
+        chance: share of blocked cells among those not covered that it knows around them.
+    """
+
+    covered: int
+    known: int
+    blocked: int
+    chance: float
+
+    @classmethod
+    def of(cls, snapshot: LedgerSnapshot, lattice: CoverageLattice) -> Fit:
+        """Compare a ledger with a map."""
+        states = lattice.states
+        covered = (snapshot.visits(lattice.window) > 0) & (states != UNKNOWN)
+        rows, cols = np.nonzero(covered)
+        if not len(rows):
+            return cls(snapshot.cells, 0, 0, 0.0)
+        near = _near(rows), _near(cols)
+        others = states[near][~covered[near]]
+        known_others = int(np.count_nonzero(others != UNKNOWN))
+        return cls(
+            covered=snapshot.cells,
+            known=len(rows),
+            blocked=int(np.count_nonzero(states[covered] == BLOCKED)),
+            chance=int(np.count_nonzero(others == BLOCKED)) / max(known_others, 1),
+        )
+
+    @property
+    def verdict(self) -> Verdict:
+        """What follows from it."""
+        expected = self.chance * self.known
+        if self.blocked >= max(LEAST_CELLS, MANY_BLOCKED * self.known):
+            return Verdict.OTHER
+        if expected < LEAST_CELLS:
+            return Verdict.OPEN
+        if self.blocked > max(OTHER_FROM * expected, LEAST_BLOCKED * self.known):
+            return Verdict.OTHER
+        confirmed = self.blocked <= SAME_UP_TO * expected and 2 * self.known >= self.covered
+        return Verdict.SAME if confirmed else Verdict.OPEN
+
+
+def _near(indices: NDArray[np.intp]) -> slice:
+    return slice(max(int(indices.min()) - AROUND_CELLS, 0), int(indices.max()) + 1 + AROUND_CELLS)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Resumed:
+    """A ledger from before a restart that no map has confirmed yet.
+
+    Attributes:
+        before: the ledger as it was.
+        since: what was covered since: that is true in any building.
+    """
+
+    before: LedgerSnapshot
+    since: CoverageLedger
+
+
+class MissionLedger:
+    """Keeps the ledger; one from before a restart only as long as no map contradicts it.
+
+    Attributes:
+        current: what is covered.
+        first_plan_reason: why the first plan is wanted.
+    """
+
+    def __init__(self, cell_m: float) -> None:
+        self._cell_m = cell_m
+        self.current = CoverageLedger(cell_m)
+        self.first_plan_reason = "first plan"
+        self._resumed: _Resumed | None = None
+        # The robot's last pose on a map that has moved since.
+        self._pose_before_motion: Pose2D | None = None
+
+    @property
+    def _all(self) -> tuple[CoverageLedger, ...]:
+        return (self.current,) if self._resumed is None else (self.current, self._resumed.since)
+
+    def resume(self, before: LedgerSnapshot) -> None:
+        """Go on with the ledger from before a restart."""
+        self._resumed = _Resumed(before, CoverageLedger(before.cell_m))
+        self.current = CoverageLedger.restored(before)
+        self.first_plan_reason = f"first plan, {before.cells} cells were covered before"
+
+    def record(self, pose: Pose2D) -> LedgerFullError | None:
+        """Note that the robot drove on to ``pose``; return a fault where tiles were dropped."""
+        before = self.current.dropped
+        for ledger in self._all:
+            ledger.record(pose)
+        if self.current.dropped == before:
+            return None
+        return LedgerFullError(
+            f"the ledger holds {MOST_TILES} tiles of {TILE} x {TILE} cells at most: the "
+            f"{DROPPED_TILES} farthest from the robot were dropped"
+        )
+
+    def break_track(self) -> None:
+        """Note that the way of the robot to its next pose is unknown."""
+        for ledger in self._all:
+            ledger.break_track()
+
+    def note_map_motion(self, pose: Pose2D) -> None:
+        """Note that the map has moved under a robot at ``pose``; the next pose tells where to."""
+        self._pose_before_motion = pose
+        for ledger in self._all:
+            ledger.lift_tool()
+
+    def forget_uncertain(self, pose: Pose2D) -> int:
+        """Forget what is uncertain after a motion of the map; return how many cells that are."""
+        start, self._pose_before_motion = self._pose_before_motion, None
+        if start is None or (motion := Motion(start, pose)).is_still:
+            return 0
+        before = self.current.snapshot()
+        self.forget(uncertain_cells(before, motion))
+        return before.cells - self.current.snapshot().cells
+
+    def forget(self, inside: Callable[[Window], NDArray[np.bool_]]) -> None:
+        """Forget all visits to cells ``inside``, see ``CoverageLedger.forget``."""
+        for ledger in self._all:
+            ledger.forget(inside)
+
+    def move_to(self, frame: str) -> LedgerMismatchError | None:
+        """Lie in ``frame`` from now on; begin anew, and say so, if another holds covered cells."""
+        was = self.current.frame
+        if was in ("", frame):
+            self.current.frame = frame
+            return None
+        cells = self.current.snapshot().cells
+        self._replace(CoverageLedger(self._cell_m, frame))
+        if not cells:
+            return None
+        return self._begun_anew(
+            f"the ledger of {cells} covered cells lies in frame {was!r}, the map in {frame!r}"
+        )
+
+    def reset(self, frame: str) -> None:
+        """Forget everything; ``frame`` is that of the poses, "" where none is active."""
+        self._replace(CoverageLedger(self._cell_m, frame))
+        self.first_plan_reason = "first plan"
+
+    def check(self, lattice: CoverageLattice, frame: str) -> LedgerMismatchError | None:
+        """Begin anew, and say so, where a map shows the ledger to be of another building."""
+        resumed = self._resumed
+        if resumed is None:
+            return None
+        verdict = Fit.of(resumed.before, lattice).verdict
+        if verdict is Verdict.OPEN:
+            return None
+        self._resumed = None
+        if verdict is Verdict.SAME:
+            return None
+        self.current, resumed.since.frame = resumed.since, frame
+        return self._begun_anew(
+            f"the ledger of {resumed.before.cells} covered cells is of another building than the "
+            "map"
+        )
+
+    def _replace(self, ledger: CoverageLedger) -> None:
+        self.current, self._resumed, self._pose_before_motion = ledger, None, None
+
+    def _begun_anew(self, why: str) -> LedgerMismatchError:
+        misfit = LedgerMismatchError(why)
+        self.first_plan_reason = f"{misfit}: begun anew"
+        return misfit
