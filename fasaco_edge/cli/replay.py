@@ -130,6 +130,8 @@ def _document(step: ReplayStep) -> dict[str, Any]:
 
 
 def _path(update: PathUpdate) -> dict[str, Any]:
+    from msgspec.structs import asdict
+
     from fasaco_edge.bus.arrival import digest
     from fasaco_edge.daemon.loop.status import plan_figures
 
@@ -138,7 +140,7 @@ def _path(update: PathUpdate) -> dict[str, Any]:
         "reason": update.reason,
         "steps": max(len(update.cells) - 1, 0),
         "cells_digest": digest(update.cells.astype("<i4").tobytes()).hex(),
-        **plan_figures(update.plan),
+        **asdict(plan_figures(update.plan)),
     }
 
 

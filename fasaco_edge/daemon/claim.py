@@ -16,6 +16,7 @@ from enum import StrEnum
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.status import ClaimReport
 
 LOG = logging.getLogger(__name__)
 
@@ -147,9 +148,9 @@ class NameClaim:
         """What this daemon does."""
         return self._claim.stand
 
-    def document(self) -> dict[str, str]:
+    def report(self) -> ClaimReport:
         """Return this part of the status."""
-        return {"id": self._bus.id, "stand": str(self._claim.stand)}
+        return ClaimReport(self._bus.id, str(self._claim.stand))
 
     @property
     def reason(self) -> str:

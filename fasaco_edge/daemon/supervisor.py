@@ -7,9 +7,9 @@ import os
 import subprocess
 import time
 from pathlib import Path
-from typing import Any
 
 import msgspec
+from msgspec.structs import asdict
 
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, Sample
@@ -17,7 +17,8 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.host.processes import python_program
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.json_text import decode_tolerant
+from fasaco_edge.wire.status import Recorder, SupervisedRecorder
 
 LOG = logging.getLogger(__name__)
 
@@ -38,7 +39,7 @@ class RecorderSupervisor:
         program = python_program("fasaco_edge", "record")
         self._command = [*program, *parent, "--config", "-", "--out", str(folder)]
         self._word = LatestSlot[Sample]()
-        self._heard: dict[str, Any] = {}
+        self._heard: Recorder | None = None
         self._heard_at = time.monotonic()
         self._restarts = 0
         self._pause_s = FIRST_PAUSE_S
@@ -48,7 +49,7 @@ class RecorderSupervisor:
         self._process: subprocess.Popen[bytes] | None = None
         self._launch()
 
-    def poll(self, now: float) -> dict[str, Any]:
+    def poll(self, now: float) -> SupervisedRecorder:
         """Look after the process; return its state for the daemon's status."""
         self._listen(now)
         code = self._process.poll() if self._process is not None else None
@@ -63,9 +64,9 @@ class RecorderSupervisor:
         elif now >= self._start_at:
             self._start_at = None
             self._restarts += 1
-            self._heard, self._heard_at = {}, now
+            self._heard, self._heard_at = None, now
             self._launch()
-        return {"state": "restarting", "reason": self._death, "restarts": self._restarts}
+        return SupervisedRecorder("restarting", self._restarts, self._death)
 
     def _launch(self) -> None:
         """Start the process; a machine without memory or processes left may refuse."""
@@ -95,20 +96,21 @@ class RecorderSupervisor:
         if sample is None:
             return
         try:
-            heard = decode_json(sample.payload)
+            heard = decode_tolerant(sample.payload, Recorder)
         except MalformedMessage:
             return
-        if self._process is not None and heard.get("pid") == self._process.pid:
+        if self._process is not None and heard.pid == self._process.pid:
             self._heard, self._heard_at = heard, now
             self._pause_s = FIRST_PAUSE_S
 
-    def _running(self, now: float) -> dict[str, Any]:
+    def _running(self, now: float) -> SupervisedRecorder:
         patience_s = SILENT_AFTER_S if self._heard else START_WITHIN_S
         if now - self._heard_at > patience_s:
             # It hangs: what follows is the way of a recorder that died.
             assert self._process is not None
             self._process.kill()
-            state = {"state": "silent", "reason": f"no word for {patience_s:.0f} s"}
-        else:
-            state = self._heard or {"state": "starting"}
-        return {**state, "restarts": self._restarts}
+            reason = f"no word for {patience_s:.0f} s"
+            return SupervisedRecorder("silent", self._restarts, reason)
+        if self._heard is None:
+            return SupervisedRecorder("starting", self._restarts)
+        return SupervisedRecorder(restarts=self._restarts, **asdict(self._heard))

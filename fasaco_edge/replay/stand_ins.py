@@ -8,9 +8,9 @@ What a recording tells of the daemon that ran then: its configuration, its start
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
 
 import msgspec
 
@@ -28,7 +28,8 @@ from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.planners.planner import CoveragePlanner, ignore
 from fasaco_edge.planners.registry import planner_of
 from fasaco_edge.planners.stopping import AnyOf, SearchWork, WorkLimit
-from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.json_text import decode_tolerant
+from fasaco_edge.wire.status import PathAttachment, Settings, Status
 
 LOAD_S = 1.0
 
@@ -180,7 +181,7 @@ class RecordedRun:
         paths: what it published, by revision; of a second daemon, not.
     """
 
-    config: Mapping[str, Any] = field(default_factory=dict)
+    config: Settings = field(default_factory=dict)
     version: str = ""
     ready_ns: int | None = None
     restored_cells: int = 0
@@ -194,7 +195,7 @@ class RecordedRun:
             BadConfiguration: it is of a release whose settings this one does not know.
         """
         try:
-            return msgspec.convert(dict(self.config), DaemonConfig)
+            return msgspec.convert(self.config, DaemonConfig)
         except msgspec.ValidationError as error:
             raise BadConfiguration(
                 f"recorded configuration, of release {self.version}: {error}",
@@ -204,56 +205,39 @@ class RecordedRun:
 
 def read_run(samples: Iterable[Arrival]) -> RecordedRun:
     """Return what samples, in order, tell of the daemon that ran meanwhile."""
-    statuses: list[tuple[Arrival, Mapping[str, Any]]] = []
+    statuses: list[tuple[Arrival, Status]] = []
     paths: dict[int, RecordedPath] = {}
     for arrival in samples:
-        if arrival.topic == PATH_DIGEST and (path := _path(arrival)) is not None:
-            paths.setdefault(path.revision, path)
-        elif arrival.topic == "status" and (status := _json(arrival.sample.payload)) is not None:
-            statuses.append((arrival, status))
+        with suppress(MalformedMessage):
+            if arrival.topic == PATH_DIGEST and (path := _path(arrival)) is not None:
+                paths.setdefault(path.revision, path)
+            elif arrival.topic == "status":
+                statuses.append((arrival, decode_tolerant(arrival.sample.payload, Status)))
     if not statuses:
         return RecordedRun(paths=paths)
     first = statuses[0][1]
     # The mission begins with a map, and keeps it as long as it lives.
-    ready = [arrival.at_ns for arrival, status in statuses if status.get("map") is not None]
-    begun = [status.get("map") is not None for _, status in statuses]
-    ledger = first.get("ledger")
+    ready = [arrival.at_ns for arrival, status in statuses if status.map is not None]
+    begun = [status.map is not None for _, status in statuses]
     return RecordedRun(
-        config=_mapping(first.get("config")),
-        version=str(first.get("version", "")),
+        config=first.config,
+        version=first.version,
         ready_ns=ready[0] if ready else None,
-        restored_cells=_integer(_mapping(ledger).get("restored_cells")) or 0,
+        restored_cells=first.ledger.restored_cells,
         starts=sum(before and not now for before, now in pairwise(begun)),
         paths=paths,
     )
 
 
 def _path(arrival: Arrival) -> RecordedPath | None:
-    about = _json(arrival.sample.attachment)
-    revision = _integer(about.get("revision")) if about else None
-    if about is None or revision is None:
+    about = decode_tolerant(arrival.sample.attachment, PathAttachment)
+    if not about.revision:
         return None
-    counts = [_integer(about.get(name)) for name in ("ants", "kicks", "proposals")]
-    known = [count for count in counts if count is not None]
+    counts = [count for count in (about.ants, about.kicks, about.proposals) if count is not None]
     return RecordedPath(
         at_ns=arrival.at_ns,
-        revision=revision,
-        reason=str(about.get("reason", "")),
+        revision=about.revision,
+        reason=about.reason,
         digest=arrival.sample.payload,
-        work=SearchWork(*known) if len(known) == len(counts) else None,
+        work=SearchWork(*counts) if len(counts) == 3 else None,
     )
-
-
-def _json(payload: bytes) -> Mapping[str, Any] | None:
-    try:
-        return decode_json(payload)
-    except MalformedMessage:
-        return None
-
-
-def _mapping(value: object) -> Mapping[str, Any]:
-    return value if isinstance(value, dict) else {}
-
-
-def _integer(value: object) -> int | None:
-    return value if isinstance(value, int) and not isinstance(value, bool) else None

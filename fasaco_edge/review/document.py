@@ -7,6 +7,8 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
+from msgspec.structs import asdict
+
 from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.runcard import flat_settings
@@ -153,7 +155,6 @@ def _is_number(value: object) -> bool:
 
 
 def _replan(path: TakenPath) -> dict[str, Any]:
-    names = ("x_min", "y_min", "x_max", "y_max")
     return {
         "at_s": _rounded(path.at_s),
         "revision": path.revision,
@@ -164,7 +165,7 @@ def _replan(path: TakenPath) -> dict[str, Any]:
         "lower_bound_steps": path.lower_bound,
         "gap": path.gap,
         "cost_s": path.cost_s,
-        "changed": path.changed and dict(zip(names, path.changed, strict=True)),
+        "changed": path.changed and asdict(path.changed),
     }
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec.structs import astuple
 from numpy.typing import NDArray
 
 from fasaco_edge.review.charts import covered_share
@@ -61,7 +62,7 @@ def export(review: Review, folder: Path) -> None:
                     p.lower_bound,
                     p.gap,
                     p.cost_s,
-                    *(p.changed or (None,) * 4),
+                    *(astuple(p.changed) if p.changed else (None,) * 4),
                     p.reason,
                 ),
             )

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.fields import integer
 from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.moments import RECORDER_IN_ORDER
 from fasaco_edge.review.run_data import RunData
@@ -53,11 +52,10 @@ def faults_of(data: RunData, record: RunRecord) -> Faults:
     total = _counted(line for _, line in record.log.get(entities.MISSION_LOG, ()))
     if total > by_code.total():
         by_code[NOT_TOLD] = total - by_code.total()
-    lost = [integer(status.recorder, "lost") for status in data.statuses]
-    told = [count for count in lost if count is not None]
+    lost = [status.recorder_lost for status in data.statuses if status.recorder_lost is not None]
     return Faults(
         by_code=dict(sorted(by_code.items())),
-        lost=max(told) if told else None,
+        lost=max(lost, default=None),
         torn_bytes=sum(part.torn_bytes for part in record.parts),
         complaints=tuple(
             line

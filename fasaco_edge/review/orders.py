@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.mission.orders.order import MissionOrder
-from fasaco_edge.recording.fields import integer
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.run_data import HeardStatus, RunData
 
@@ -71,7 +69,7 @@ def is_complete(state: str, status: HeardStatus | None, covered: int, coverable:
         return False
     zones = status.zones if status else ()
     if zones:
-        return all(integer(zone, "covered") == integer(zone, "cells") for zone in zones)
+        return all(zone.covered == zone.cells for zone in zones)
     return covered == coverable > 0
 
 
@@ -120,11 +118,11 @@ def _chapter(
 ) -> OrderChapter:
     until = end_s if ended_by else float("inf")
     state = _state_at(states, until)
-    told = [s for s in data.statuses if begin_s <= s.at_s < until and s.coverage]
+    told = [s for s in data.statuses if begin_s <= s.at_s < until and s.coverage is not None]
     own = fractions[(fractions[:, 0] >= begin_s) & (fractions[:, 0] < until)]
     last = told[-1] if told and is_still_true(told[-1], own) else None
-    coverage: Mapping[str, Any] = last.coverage if last else {}
-    covered, coverable = integer(coverage, "covered"), integer(coverage, "coverable")
+    coverage = last.coverage if last else None
+    covered, coverable = (coverage.covered, coverage.coverable) if coverage else (None, None)
     complete: bool | None = None
     if state and state != "done":
         complete = False

@@ -15,7 +15,6 @@ from fasaco_edge.errors import MapTooLarge
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.mission.orders.zones import kept_out, without
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.fields import integer, number, section
 from fasaco_edge.recording.read.run import RunRecord, Told, count_frames, read_run_record
 from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.review.drive import Drive, WalkFigures, drive_over, first_covered, walk_figures
@@ -23,6 +22,7 @@ from fasaco_edge.review.faults import Faults, faults_of
 from fasaco_edge.review.moments import Moment, Replans, Span, spans_of, worst_moments
 from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_still_true
 from fasaco_edge.review.run_data import RunData, gather
+from fasaco_edge.wire.status import known_settings
 
 # So often is progress told: each so many-th frame or sample.
 EVERY = 200
@@ -151,7 +151,7 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
     """
     end_s = _end_s(record, data)
     lattice = _lattice(data)
-    lost_pose_s = number(section(data.config, "mission"), "lost_pose_s") or 0.0
+    lost_pose_s = known_settings(data.config).mission.lost_pose_s
     drive = drive_over(lattice, data.times, data.trail, lost_pose_s) if lattice else None
     states = spans_of(_mission_states(data, record), end_s)
     replans = Replans.of(data.paths)
@@ -176,11 +176,11 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
 
 
 def _lattice(data: RunData) -> CoverageLattice | None:
-    robot, maps = section(data.config, "robot"), section(data.config, "map")
-    cell_m, radius_m = number(robot, "tool_width_m"), number(robot, "radius_m")
+    known = known_settings(data.config)
+    cell_m, radius_m = known.robot.tool_width_m, known.robot.radius_m
     if data.grid is None or not cell_m or not radius_m:
         return None
-    free, occupied = integer(maps, "free_at_most"), integer(maps, "occupied_at_least")
+    free, occupied = known.map.free_at_most, known.map.occupied_at_least
     usual = Footprint(cell_m, radius_m)
     footprint = Footprint(
         cell_m,
@@ -228,16 +228,13 @@ def _counts(
     data: RunData, drive: Drive | None, fractions: NDArray[np.float64]
 ) -> CoverageCounts | None:
     """Return the daemon's own counts if its last status is still true, else those of the trail."""
-    told = [status for status in data.statuses if status.coverage]
-    if told and is_still_true(told[-1], fractions):
-        coverage = told[-1].coverage
-        covered, coverable = integer(coverage, "covered"), integer(coverage, "coverable")
-        if covered is not None and coverable is not None:
-            recovered, unreachable = (
-                integer(coverage, "recovered"),
-                integer(coverage, "unreachable"),
-            )
-            return CoverageCounts(covered, coverable, recovered, unreachable, source="status")
+    counted = [status for status in data.statuses if status.coverage is not None]
+    if counted and is_still_true(counted[-1], fractions):
+        own = counted[-1].coverage
+        assert own is not None
+        return CoverageCounts(
+            own.covered, own.coverable, own.recovered, own.unreachable, source="status"
+        )
     # What was covered before the recording began, no trail tells.
     if drive is None or any(status.restored_cells for status in data.statuses):
         return None

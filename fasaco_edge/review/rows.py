@@ -6,9 +6,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from msgspec.structs import astuple
+
 from fasaco_edge.review.drive import MILESTONES
 from fasaco_edge.review.run_data import TakenPath
 from fasaco_edge.review.setups import ANOTHER_PROBLEM, ANYWAY, do_compare, setup_differences
+from fasaco_edge.wire.status import Rectangle
 
 Row = tuple[str, str, str, str]
 """Name, the texts of one recording and of the other, and the difference; "" for none."""
@@ -138,10 +141,10 @@ def replan_rows(paths: Iterable[TakenPath]) -> list[tuple[str, ...]]:
     ]
 
 
-def _place(changed: tuple[float, ...] | None) -> str:
+def _place(changed: Rectangle | None) -> str:
     if changed is None:
         return "-"
-    x0, y0, x1, y1 = changed
+    x0, y0, x1, y1 = astuple(changed)
     return f"{x1 - x0:.1f} x {y1 - y0:.1f} m at ({(x0 + x1) / 2:.1f}, {(y0 + y1) / 2:.1f})"
 
 

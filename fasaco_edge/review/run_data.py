@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
+from msgspec import UNSET
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival
@@ -18,11 +18,19 @@ from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.orders.order import MissionOrder, read_command
-from fasaco_edge.recording.fields import Json, integer, number, section, text
-from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.pose_decoding import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
+from fasaco_edge.wire.status import (
+    CoverageReport,
+    PathAttachment,
+    Rectangle,
+    Settings,
+    Status,
+    ZoneReport,
+    known_settings,
+)
 from fasaco_edge.wire.turns import Turn, TurnBatch, decode_turns
 
 # As ``mission.route`` asks for better paths, and names them.
@@ -100,7 +108,7 @@ class TakenPath:
         gap: steps of the plan above the lower bound, as a share of it; None where not told.
         cost_s: what driving it takes [s]; None where not told.
         lower_bound: no plan has fewer steps; None where not told.
-        changed: x_min, y_min, x_max, y_max [m] of what of the map led to it; None for nothing.
+        changed: rectangle of the map that led to it; None for nothing.
     """
 
     at_s: float
@@ -113,7 +121,7 @@ class TakenPath:
     cost_s: float | None = None
     lower_bound: int | None = None
     planned_steps: int | None = None
-    changed: tuple[float, ...] | None = None
+    changed: Rectangle | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,21 +131,21 @@ class HeardStatus:
     Attributes:
         at_s: when, since the recording began [s].
         state, reason: of the mission.
-        coverage: its counts; empty where there were none.
+        coverage: its counts; None where there were none.
         zones: what of each zone is covered.
         restored_cells: covered cells taken over from before a restart.
         faults: what was refused so far, by code.
-        recorder: the recorder's own report, as far as it goes.
+        recorder_lost: samples the recorder says it could not write; None where it does not.
     """
 
     at_s: float
     state: str
     reason: str
-    coverage: Mapping[str, Any]
-    zones: tuple[Mapping[str, Any], ...]
+    coverage: CoverageReport | None
+    zones: tuple[ZoneReport, ...]
     restored_cells: int
     faults: Mapping[str, int]
-    recorder: Mapping[str, Any]
+    recorder_lost: int | None
 
 
 @dataclass(slots=True)
@@ -166,7 +174,7 @@ class RunData:
     made: PlanLog = field(default_factory=PlanLog)
     grid: OccupancyGrid | None = None
     keep_out: tuple[Polygon, ...] = ()
-    config: Mapping[str, Any] = field(default_factory=dict)
+    config: Settings = field(default_factory=dict)
     version: str = ""
     robot: str = ""
     undecodable: Counter[str] = field(default_factory=Counter)
@@ -249,26 +257,25 @@ class _Listener:
             self.data.keep_out = order.keep_out
 
     def _status(self, arrival: Arrival) -> None:
-        status, data = decode_json(arrival.sample.payload), self.data
-        data.config = section(status, "config") or data.config
-        data.version = text(status, "version") or data.version
-        data.robot = text(status, "robot") or data.robot
-        self._poses.schema = text(section(data.config, "pose"), "schema") or self._poses.schema
-        frames = section(section(data.config, "ros2"), "frames")
-        if frames:
-            self._poses.follow((text(frames, "map"), text(frames, "robot")))
-        zones = section(status, "mission").get("zones")
-        by_code = section(section(status, "errors"), "by_code")
+        status, data = decode_tolerant(arrival.sample.payload, Status), self.data
+        data.config = status.config or data.config
+        data.version = status.version or data.version
+        data.robot = status.robot or data.robot
+        known = known_settings(data.config)
+        self._poses.schema = known.pose.schema or self._poses.schema
+        if frames := known.ros2.frames:
+            self._poses.follow((frames.map, frames.robot))
+        lost = status.recorder.lost if status.recorder else UNSET
         data.statuses.append(
             HeardStatus(
                 at_s=self._now,
-                state=text(status, "state"),
-                reason=text(status, "reason"),
-                coverage=section(status, "coverage"),
-                zones=tuple(zone for zone in zones or () if isinstance(zone, dict)),
-                restored_cells=integer(section(status, "ledger"), "restored_cells") or 0,
-                faults={code: integer(by_code, code) or 0 for code in by_code},
-                recorder=section(status, "recorder"),
+                state=status.state,
+                reason=status.reason,
+                coverage=status.coverage,
+                zones=status.mission.zones,
+                restored_cells=status.ledger.restored_cells,
+                faults=status.errors.by_code,
+                recorder_lost=None if lost is UNSET else lost,
             )
         )
 
@@ -276,35 +283,23 @@ class _Listener:
         self.data.made.take(decode_turns(arrival.sample.payload), self._now)
 
     def _path(self, arrival: Arrival) -> None:
-        note = _note(arrival)
-        revision = integer(note, "revision") or 0
+        about = decode_tolerant(arrival.sample.attachment, PathAttachment)
         paths = self.data.paths
         # One that is published again is still the same.
-        if paths and paths[-1].revision == revision:
+        if paths and paths[-1].revision == about.revision:
             return
-        planner = text(note, "planner")
         paths.append(
             TakenPath(
                 at_s=self._now,
-                revision=revision,
-                reason=text(note, "reason"),
-                steps=integer(note, "steps") or 0,
-                planner=planner,
-                plan_ms=number(note, "plan_ms") if planner else None,
-                gap=number(note, "gap"),
-                cost_s=number(note, "planned_cost_s"),
-                lower_bound=integer(note, "lower_bound_steps"),
-                planned_steps=integer(note, "planned_steps"),
-                changed=_rectangle(section(note, "changed")),
+                revision=about.revision,
+                reason=about.reason,
+                steps=about.steps,
+                planner=about.planner or "",
+                plan_ms=about.plan_ms if about.planner else None,
+                gap=about.gap,
+                cost_s=about.planned_cost_s,
+                lower_bound=about.lower_bound_steps,
+                planned_steps=about.planned_steps,
+                changed=about.changed,
             )
         )
-
-
-def _rectangle(changed: Json) -> tuple[float, ...] | None:
-    edges = [number(changed, name) for name in ("x_min", "y_min", "x_max", "y_max")]
-    known = tuple(edge for edge in edges if edge is not None)
-    return known if len(known) == len(edges) else None
-
-
-def _note(arrival: Arrival) -> Json:
-    return decode_json(arrival.sample.attachment) if arrival.sample.attachment else {}

@@ -8,7 +8,13 @@ from rich.text import Text
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import phrases
 from fasaco_edge.watch.ink import Ink
-from fasaco_edge.watch.report import Coverage, Mission, PathReport, Recorder, Report
+from fasaco_edge.wire.status import (
+    CoverageReport,
+    MissionReport,
+    PathReport,
+    Status,
+    SupervisedRecorder,
+)
 
 Row = tuple[str, Text]
 
@@ -28,31 +34,31 @@ LABEL_WIDTH = 9
 WIDE = 30
 
 
-def figures(report: Report, width: int, ink: Ink) -> Table:
+def figures(status: Status, width: int, ink: Ink) -> Table:
     """Return all figures of a status as a table ``width`` characters wide."""
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(width=LABEL_WIDTH, style="cyan", no_wrap=True)
     table.add_column(overflow="fold")
     table.width = width
-    for name, value in _rows(report, width - LABEL_WIDTH - 1, ink):
+    for name, value in _rows(status, width - LABEL_WIDTH - 1, ink):
         table.add_row(name, value)
     return table
 
 
-def _rows(report: Report, width: int, ink: Ink) -> list[Row]:
-    state = Text(one_line(report.state), f"bold {state_colour(report.state)}")
+def _rows(status: Status, width: int, ink: Ink) -> list[Row]:
+    state = Text(one_line(status.state), f"bold {state_colour(status.state)}")
     # A path's number is told with the path.
-    if report.path is None or report.reason != f"path {report.path.revision}":
-        state.append(f": {one_line(report.reason)}", "not bold")
+    if status.path is None or status.reason != f"path {status.path.revision}":
+        state.append(f": {one_line(status.reason)}", "not bold")
     rows: list[Row] = [("state", state)]
-    if report.coverage is not None:
+    if status.coverage is not None:
         rows += _coverage(
-            report.coverage, ink.bar(report.coverage.fraction, min(width, LONGEST_BAR))
+            status.coverage, ink.bar(status.coverage.fraction, min(width, LONGEST_BAR))
         )
-    if report.path is not None:
-        rows += _path(report.path, width)
-    rows += _mission(report.mission)
-    rows += _running(report)
+    if status.path is not None:
+        rows += _path(status.path, width)
+    rows += _mission(status.mission)
+    rows += _running(status)
     return rows
 
 
@@ -61,7 +67,7 @@ def state_colour(state: str) -> str:
     return STATE_COLOURS.get(state, "bright_black")
 
 
-def _coverage(coverage: Coverage, bar: Text) -> list[Row]:
+def _coverage(coverage: CoverageReport, bar: Text) -> list[Row]:
     share = Text(phrases.percent(coverage.fraction), "bold")
     share.append(f", {coverage.covered} of {coverage.coverable} cells", "not bold")
     areas = f"{coverage.covered_m2:.1f} m2, {coverage.to_cover_m2:.1f} m2 to go"
@@ -84,12 +90,12 @@ def _path(path: PathReport, width: int) -> list[Row]:
     return rows
 
 
-def _mission(mission: Mission) -> list[Row]:
-    stage = (mission.stage, mission.zone, mission.turn, mission.passes)
+def _mission(mission: MissionReport) -> list[Row]:
+    stage = (mission.stage, mission.zone, mission.pass_number, mission.passes)
     rows: list[Row] = [("mission", _text(phrases.stage(*stage)))]
     for zone in mission.zones:
-        at, covered = phrases.zone_progress(zone.turn, zone.passes, zone.covered, zone.cells)
-        told = f"pass {at}, {covered}" if zone.turn else at
+        at, covered = phrases.zone_progress(zone.pass_number, zone.passes, zone.covered, zone.cells)
+        told = f"pass {at}, {covered}" if zone.pass_number else at
         rows.append((one_line(zone.name), _text(told)))
     more = []
     if mission.keep_out:
@@ -104,8 +110,8 @@ def _mission(mission: Mission) -> list[Row]:
     return rows
 
 
-def _running(report: Report) -> list[Row]:
-    latency, errors = report.latency_ms, report.errors
+def _running(status: Status) -> list[Row]:
+    latency, errors = status.latency_ms, status.errors
     told = [
         f"{name} {milliseconds:.0f}"
         for name, milliseconds in (
@@ -119,15 +125,15 @@ def _running(report: Report) -> list[Row]:
     rows: list[Row] = [
         ("latency", _text(f"{', '.join(told)} ms" if told else "-")),
         ("errors", _text(counted, "red") if errors.total else _text("none")),
-        ("ledger", _ledger(report)),
-        ("recorder", _recorder(report.recorder)),
-        ("daemon", _text(f"up {phrases.age(report.uptime_s)}, {report.rss_mb:.0f} MB")),
+        ("ledger", _ledger(status)),
+        ("recorder", _recorder(status.recorder)),
+        ("daemon", _text(f"up {phrases.age(status.uptime_s)}, {status.rss_mb:.0f} MB")),
     ]
     return rows
 
 
-def _ledger(report: Report) -> Text:
-    ledger = report.ledger
+def _ledger(status: Status) -> Text:
+    ledger = status.ledger
     if ledger.fault:
         return _text(ledger.fault, "red")
     if ledger.age_s is None:
@@ -135,7 +141,7 @@ def _ledger(report: Report) -> Text:
     return _text(f"written {phrases.age(ledger.age_s)} ago")
 
 
-def _recorder(recorder: Recorder | None) -> Text:
+def _recorder(recorder: SupervisedRecorder | None) -> Text:
     if recorder is None:
         return _text("none")
     good = recorder.state in ("recording", "starting")

@@ -95,7 +95,7 @@ def look_once(feed: Feed, view: RobotView, timeout_s: float) -> bool:
     """Wait up to ``timeout_s`` [s] until enough is known for a picture; return whether it is."""
     deadline = time.monotonic() + timeout_s
     with stop_event(*END_SIGNALS) as stop:
-        while view.report is None or not view.is_here:
+        while view.status is None or not view.is_here:
             if stop.is_set() or time.monotonic() > deadline:
                 return False
             take(feed, view, FRAME_S)
@@ -107,26 +107,26 @@ def look_once(feed: Feed, view: RobotView, timeout_s: float) -> bool:
 
 def status_line(view: RobotView, now: float) -> str:
     """Return how it stands, in a line."""
-    report = view.report
+    status = view.status
     if view.trouble:
         return f"waiting for the bus at {one_line(view.trouble)}"
     if view.gone_since is not None:
         return "waiting for the daemon to come back"
     if not view.is_here:
         return f"waiting for a daemon of robot {view.robot}"
-    if report is None:
+    if status is None:
         return "the daemon has said nothing yet"
     if view.silent_s(now):
         return "the daemon is silent"
-    coverage, path = report.coverage, report.path
+    coverage, path = status.coverage, status.path
     line = phrases.figures(
-        report.state,
+        status.state,
         coverage.covered if coverage else 0,
         coverage.coverable if coverage else 0,
         path.revision if path else 0,
         path.remaining_steps if path else 0,
-        report.plan.plans,
-        report.latency_ms.plan or 0.0,
+        status.plan.plans,
+        status.latency_ms.plan or 0.0,
     )
     return f"{phrases.percent(coverage.fraction if coverage else 0.0)}  {line}"
 

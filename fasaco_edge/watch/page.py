@@ -14,8 +14,8 @@ from fasaco_edge.watch.figures import figures, state_colour
 from fasaco_edge.watch.ink import Ink
 from fasaco_edge.watch.phrases import age, clock, percent
 from fasaco_edge.watch.picture import Picturing
-from fasaco_edge.watch.report import Report
 from fasaco_edge.watch.robot_view import BAD, GOOD, ORDER, PLAIN, Event, RobotView
+from fasaco_edge.wire.status import Status
 
 FAINT = "bright_black"
 TONES = {PLAIN: "", GOOD: "green", BAD: "red", ORDER: "yellow"}
@@ -95,12 +95,12 @@ class Page:
         if not plan.figures:
             return left
         # The status is a value: a new one is another object.
-        key = (view.report, plan)
-        right = self._keep("figures", key, lambda: self._figures(view.report, plan))
+        key = (view.status, plan)
+        right = self._keep("figures", key, lambda: self._figures(view.status, plan))
         return [f"{a} {b}" for a, b in zip(left, right, strict=True)]
 
-    def _figures(self, report: Report | None, plan: Plan) -> list[str]:
-        shown = Text("") if report is None else figures(report, plan.figures, self._ink)
+    def _figures(self, status: Status | None, plan: Plan) -> list[str]:
+        shown = Text("") if status is None else figures(status, plan.figures, self._ink)
         return self._block(shown, plan.figures, plan.lines)
 
     def _legend(self, path_is_whole: bool) -> Text:
@@ -138,7 +138,7 @@ class Page:
 def headline(view: RobotView, now: float) -> Text:
     """Return the line that says how it stands."""
     line = Text().append(f" {view.robot} ", "bold reverse").append("  ")
-    report, silent = view.report, view.silent_s(now)
+    status, silent = view.status, view.silent_s(now)
     if view.trouble:
         line.append(f"waiting for the bus at {one_line(view.trouble)}", "red")
     elif view.gone_since is not None:
@@ -148,16 +148,16 @@ def headline(view: RobotView, now: float) -> Text:
         others = ", ".join(sorted(view.robots - {view.robot}))
         line.append("waiting for a daemon of that name", "yellow")
         line.append(f"; on this bus: {one_line(others)}" if others else "")
-    elif report is None:
+    elif status is None:
         line.append("the daemon has said nothing yet", "yellow")
     elif silent:
         line.append(f"silent for {age(silent)}", "bold red")
     else:
-        line.append(one_line(report.state).upper(), f"bold {state_colour(report.state)}")
-        if report.coverage is not None:
-            line.append(f"  {percent(report.coverage.fraction)} covered")
-        if report.path is not None:
-            line.append(f"  path {report.path.revision}")
+        line.append(one_line(status.state).upper(), f"bold {state_colour(status.state)}")
+        if status.coverage is not None:
+            line.append(f"  {percent(status.coverage.fraction)} covered")
+        if status.path is not None:
+            line.append(f"  path {status.path.revision}")
     return _on_a_line(line.append(f"   {clock(now)}   q quits", FAINT))
 
 

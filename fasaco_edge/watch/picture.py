@@ -17,6 +17,7 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire import coverage as covering
+from fasaco_edge.wire.status import known_settings
 
 LEAST_PIXEL_M = 0.01
 # Pictures grow by so much at once [m]: with every row of a growing map they would jump.
@@ -254,8 +255,8 @@ class Picturing:
         self.pixel_m = frame.pixel_m
         self.path_is_whole = draw_path(kinds, frame, view.path_ahead)
         if view.pose is not None:
-            radius_m = view.report.config.robot.radius_m if view.report else 0.0
-            draw_robot(kinds, frame, view.pose, radius_m)
+            settings = known_settings(view.status.config if view.status else {})
+            draw_robot(kinds, frame, view.pose, settings.robot.radius_m)
         return kinds
 
     def _with_robot(self, view: RobotView) -> Bounds | None:

@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.session import Sample
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.text import one_line
-from fasaco_edge.watch.report import PathNote, Report, read
-from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.json_text import decode_document, decode_json
 from fasaco_edge.wire.limits import MAX_COORDINATE_M
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.poses import decode_pose
 from fasaco_edge.wire.schemas import POSE_STAMPED
+from fasaco_edge.wire.status import PathAttachment, Status, known_settings
 
 KEPT = 200
 # How an entry is to be taken.
@@ -55,7 +55,7 @@ class EventLog:
         return list(self.entries)[len(self.entries) - new :]
 
 
-def differences(before: Report | None, after: Report) -> list[tuple[str, str]]:
+def differences(before: Status | None, after: Status) -> list[tuple[str, str]]:
     """Return what a status says that the one before did not, as (text, tone)."""
     found: list[tuple[str, str]] = []
     if before is None or before.state != after.state:
@@ -96,7 +96,7 @@ class RobotView:
     Attributes:
         map, coverage: None before the first.
         pose: where the robot is; None as long as nobody says.
-        report: the newest status.
+        status: the newest one; None before the first.
         document: the same as it came, b"" before the first.
         walk: the path, and how far the robot is on it.
         robots: of all robots on the bus that have a daemon, the names.
@@ -111,7 +111,7 @@ class RobotView:
         self.map: OccupancyGrid | None = None
         self.coverage: OccupancyGrid | None = None
         self.pose: Pose2D | None = None
-        self.report: Report | None = None
+        self.status: Status | None = None
         self.document = b""
         self.walk = Walk()
         self.robots: set[str] = set()
@@ -142,7 +142,7 @@ class RobotView:
     def silent_s(self, now: float) -> float:
         """Return for how long the daemon should have spoken and did not [s]; 0 while it does."""
         silent = now - self._reported_at
-        return silent if self.report is not None and silent > SILENCE_S else 0.0
+        return silent if self.status is not None and silent > SILENCE_S else 0.0
 
     def take(self, topic: str, item: object, now: float) -> None:
         """Take in a sample of ``topic`` or a Token, which came ``now``, since the epoch [s].
@@ -183,36 +183,38 @@ class RobotView:
             self.map = self.map.patched(patch)
 
     def _read_pose(self, sample: Sample, now: float) -> None:
-        told = self.report.config.pose.schema if self.report else ""
-        stamped = decode_pose(sample.payload, sample.schema or told or POSE_STAMPED)
+        configured = known_settings(self.status.config).pose.schema if self.status else ""
+        stamped = decode_pose(sample.payload, sample.schema or configured or POSE_STAMPED)
         self._posed_at = now
         self._move(stamped.pose)
 
     def _read_path(self, sample: Sample, now: float) -> None:
-        note = read(decode_json(sample.attachment), PathNote) if sample.attachment else PathNote()
-        self.walk = Walk(decode_path(sample.payload).xy, note.revision)
-        steps = f"{note.steps} steps" if len(self.walk.xy) else "stop"
-        self.events.add(now, f"path {note.revision}, {steps}: {note.reason}")
+        about = decode_document(sample.attachment or b"{}", PathAttachment)
+        self.walk = Walk(decode_path(sample.payload).xy, about.revision)
+        steps = f"{about.steps} steps" if len(self.walk.xy) else "stop"
+        self.events.add(now, f"path {about.revision}, {steps}: {about.reason}")
 
     def _read_coverage(self, sample: Sample, _: float) -> None:
         self.coverage = decode_occupancy_grid(sample.payload)
 
     def _read_status(self, sample: Sample, now: float) -> None:
-        report = read(decode_json(sample.payload), Report)
-        if report.claim.stand != "plans":
+        status = decode_document(sample.payload, Status)
+        if not status.state:
+            raise MalformedMessage("status: it has no state")
+        if status.claim.stand != "plans":
             # It may be a second daemon of this name: what that is like is not how the robot is.
-            if report.claim.stand != "looks":
-                self.events.add(now, f"a second daemon is {report.state}: {report.reason}", BAD)
+            if status.claim.stand != "looks":
+                self.events.add(now, f"a second daemon is {status.state}: {status.reason}", BAD)
             return
-        for text, tone in differences(self.report, report):
+        for text, tone in differences(self.status, status):
             self.events.add(now, text, tone)
-        self.report, self.document, self._reported_at = report, sample.payload, now
-        if report.path is None:
+        self.status, self.document, self._reported_at = status, sample.payload, now
+        if status.path is None:
             # A daemon that was started anew has none of the old paths.
             self.walk = Walk()
-        elif report.path.revision == self.walk.revision:
-            self.walk.left(report.path.remaining_steps)
-        pose = report.pose
+        elif status.path.revision == self.walk.revision:
+            self.walk.left(status.path.remaining_steps)
+        pose = status.pose
         if pose is not None and now - self._posed_at > POSE_LASTS_S:
             self._move(Pose2D(pose.x, pose.y, pose.yaw))
 

@@ -1,14 +1,28 @@
-"""JSON on the bus: status, commands, error replies (RFC 8259; NaN and infinities have no place)."""
+"""JSON documents on the bus (RFC 8259; NaN and infinities have no place).
+
+Strict readers refuse a document with a member of the wrong type; tolerant ones, for what other
+versions wrote, leave that member out. Both ignore members they do not know.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from types import UnionType
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 import msgspec
+from msgspec import UNSET
 
-from fasaco_edge.errors import FasacoError, MalformedMessage
+from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
+
+# Bounds of a tolerant reader.
+MAX_INTEGER = 2**63 - 1
+MAX_NUMBER = 1e300
+MAX_TEXT = 500
+
+Struct = TypeVar("Struct", bound=msgspec.Struct)
 
 
 def encode_json(message: object) -> bytes:
@@ -24,7 +38,7 @@ def encode_json(message: object) -> bytes:
     return msgspec.json.encode(plain)
 
 
-def decode_json(payload: bytes) -> dict[str, Any]:
+def decode_json(payload: bytes) -> dict[str, object]:
     """Return the JSON object in ``payload``.
 
     Raises:
@@ -33,16 +47,77 @@ def decode_json(payload: bytes) -> dict[str, Any]:
     if len(payload) > MAX_JSON_BYTES:
         raise MalformedMessage(f"JSON must have at most {MAX_JSON_BYTES} bytes, got {len(payload)}")
     try:
-        return msgspec.json.decode(payload, type=dict[str, Any])
+        return msgspec.json.decode(payload, type=dict[str, object])
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise MalformedMessage(f"JSON object: {error}") from error
     except RecursionError as error:
         raise MalformedMessage("JSON object: nested too deeply") from error
 
 
-def encode_error(error: FasacoError) -> bytes:
-    """Return the reply for a failed query: JSON with code, message and hint."""
-    return encode_json({"code": error.code, "message": str(error), "hint": error.hint})
+def decode_document(payload: bytes, kind: type[Struct]) -> Struct:
+    """Return the JSON object in ``payload`` as values of ``kind``.
+
+    Raises:
+        MalformedMessage: it is no JSON object, or a member is missing or of another type.
+    """
+    try:
+        return msgspec.convert(decode_json(payload), kind)
+    except msgspec.ValidationError as error:
+        raise MalformedMessage(f"{kind.__name__.lower()}: {error}") from error
+
+
+def decode_tolerant(payload: bytes, kind: type[Struct]) -> Struct:
+    """Return what fits ``kind`` of the JSON object in ``payload``; no bytes are an empty object.
+
+    Raises:
+        MalformedMessage: it is no JSON object.
+    """
+    return tolerant(decode_json(payload) if payload else {}, kind)
+
+
+def tolerant(document: Mapping[str, object], kind: type[Struct]) -> Struct:
+    """Return what fits ``kind`` of a JSON object; other members keep their defaults.
+
+    Numbers beyond ``MAX_INTEGER`` and ``MAX_NUMBER`` do not fit, texts are cut at ``MAX_TEXT``.
+
+    Raises:
+        TypeError: a member without a default is missing, or does not fit.
+    """
+    fitting = {
+        field.name: _fitting(document.get(field.encode_name, UNSET), field.type)
+        for field in msgspec.structs.fields(kind)
+    }
+    return kind(**{name: value for name, value in fitting.items() if value is not UNSET})
+
+
+def _fitting(value: object, kind: Any) -> object:  # noqa: ANN401 - a type as annotations have it
+    """Return a JSON value as one of ``kind``; UNSET where it does not fit."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _fitting(value, arguments[0])
+    if origin in (Union, UnionType):
+        fitting = (_fitting(value, option) for option in arguments)
+        return next((found for found in fitting if found is not UNSET), UNSET)
+    if origin is tuple and isinstance(value, list):
+        items = (_fitting(item, arguments[0]) for item in value)
+        return tuple(item for item in items if item is not UNSET)
+    if origin is dict and isinstance(value, dict):
+        entries = {key: _fitting(item, arguments[1]) for key, item in value.items()}
+        return {key: item for key, item in entries.items() if item is not UNSET}
+    return _fitting_plain(value, kind)
+
+
+def _fitting_plain(value: object, kind: Any) -> object:  # noqa: ANN401 - a class, or None
+    if isinstance(value, int | float) and abs(value) > (MAX_INTEGER if kind is int else MAX_NUMBER):
+        return UNSET
+    if isinstance(value, str) and kind is str:
+        return value[:MAX_TEXT]
+    try:
+        if isinstance(value, dict) and issubclass(kind, msgspec.Struct):
+            return tolerant(value, kind)
+        return msgspec.convert(value, kind)
+    except (msgspec.ValidationError, TypeError):  # issubclass takes no None
+        return UNSET
 
 
 def _check_finite(value: object, where: str) -> None:
@@ -54,15 +129,3 @@ def _check_finite(value: object, where: str) -> None:
     elif isinstance(value, list | tuple):
         for index, item in enumerate(value):
             _check_finite(item, f"{where}[{index}]")
-
-
-def is_the_planners(payload: bytes) -> bool:
-    """Tell whether a status is of the daemon that plans; another of its name may wait.
-
-    What cannot be read is, so that whoever reads it says so.
-    """
-    try:
-        claim = decode_json(payload).get("claim")
-    except MalformedMessage:
-        return True
-    return not isinstance(claim, dict) or claim.get("stand", "plans") == "plans"

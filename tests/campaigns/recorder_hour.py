@@ -33,14 +33,15 @@ from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
 from fasaco_edge.recording.write.input_log import InputLog
 from fasaco_edge.recording.write.quota import DiskBudget
-from fasaco_edge.recording.write.settings import RecorderReport, RecorderSettings
+from fasaco_edge.recording.write.settings import RecorderSettings
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.wire.json_text import decode_json, encode_json
+from fasaco_edge.wire.json_text import decode_tolerant, encode_json
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path, encode_path
 from fasaco_edge.wire.pheromone import decode_pheromone, encode_pheromone
 from fasaco_edge.wire.poses import decode_pose, encode_pose_stamped
 from fasaco_edge.wire.schemas import POSE_STAMPED
+from fasaco_edge.wire.status import PathAttachment, Recorder, Status
 
 SECOND_NS = 1_000_000_000
 BEGAN_NS = 1_700_000_000 * SECOND_NS
@@ -198,11 +199,11 @@ class Desk:
             "map": lambda sample: scene.add_map(decode_occupancy_grid(sample.payload)),
             "pose": lambda sample: scene.add_pose(decode_pose(sample.payload, POSE_STAMPED)),
             "path": lambda sample: scene.add_path(
-                decode_path(sample.payload), decode_json(sample.attachment)
+                decode_path(sample.payload), decode_tolerant(sample.attachment, PathAttachment)
             ),
             "coverage": lambda sample: scene.add_coverage(decode_occupancy_grid(sample.payload)),
             "pheromone": lambda sample: scene.add_pheromone(decode_pheromone(sample.payload)),
-            "status": lambda sample: scene.add_status(decode_json(sample.payload)),
+            "status": lambda sample: scene.add_status(decode_tolerant(sample.payload, Status)),
         }
 
     def hear(self, topic: str, payload: bytes, attachment: bytes, at_ns: int) -> None:
@@ -218,7 +219,7 @@ class Desk:
 
     def report(self) -> None:
         """Say how the recorder is, and draw what waits, as is done once a second."""
-        word = RecorderReport("recording", "", "", 0, 0, 0, 0, resident_mb(), 1)
+        word = Recorder("recording", "", "", 0, 0, 0, 0, resident_mb(), 1)
         self._scene.add_report(word)
         self._scene.catch_up()
 

@@ -16,6 +16,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import PlanRequest
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.wire.status import CoverageReport, LedgerReport, LoopTimes, PathReport, Status
 
 
 class Told:
@@ -101,45 +102,35 @@ def test_it_is_fed_in_time_and_not_at_every_turn():
 
 
 def test_a_status_is_told_in_a_line():
-    coverage = {"covered_m2": 12.3, "to_cover_m2": 48.9, "fraction": 0.2515}
-    status = {
-        "state": "covering",
-        "reason": "",
-        "coverage": coverage,
-        "path": {"revision": 3, "remaining_steps": 120},
-        "ledger": {"fault": "cannot write: no space"},
-    }
+    status = Status(
+        state="covering",
+        coverage=CoverageReport(covered_m2=12.3, to_cover_m2=48.9, fraction=0.2515),
+        path=PathReport(revision=3, remaining_steps=120),
+        ledger=LedgerReport(fault="cannot write: no space"),
+    )
     assert status_line(status) == (
         "covering; 25 % covered, 12 of 49 m2; path 3 with 120 steps to go; cannot write: no space"
     )
-    waiting = {"state": "waiting", "reason": "no map", "coverage": None, "path": None, "ledger": {}}
-    assert status_line(waiting) == "waiting: no map"
+    assert status_line(Status(state="waiting", reason="no map")) == "waiting: no map"
 
 
 def test_how_long_turns_take_is_told_to_within_ten_percent():
     seconds = np.random.default_rng(1).lognormal(-7.0, 2.0, 20_000)
     times = CycleTimes()
-    assert set(times.document().values()) == {0, None}
+    assert times.report() == LoopTimes()
     for each in seconds:
         times.note(float(each))
-    told = times.document()
-    assert told["turns"] == len(seconds)
-    assert told["late"] == (seconds > LATE_S).sum() > 0
-    assert told["max"] == round(1e3 * seconds.max(), 3)
+    told = times.report()
+    assert told.turns == len(seconds)
+    assert told.late == (seconds > LATE_S).sum() > 0
+    assert told.max == round(1e3 * seconds.max(), 3)
     for name, share in (("p50", 0.5), ("p99", 0.99), ("p99_9", 0.999)):
         true = 1e3 * np.quantile(seconds, share, method="inverted_cdf")
-        assert true <= told[name] + 0.001 <= 1.1 * true + 0.002
+        assert true <= getattr(told, name) + 0.001 <= 1.1 * true + 0.002
 
 
 def test_turns_beyond_every_bucket_are_told_too():
     times = CycleTimes()
     for seconds in (0.0, 1e-9, 1e7):
         times.note(seconds)
-    assert times.document() == {
-        "turns": 3,
-        "late": 1,
-        "p50": 0.001,
-        "p99": 1e10,
-        "p99_9": 1e10,
-        "max": 1e10,
-    }
+    assert times.report() == LoopTimes(3, 1, p50=0.001, p99=1e10, p99_9=1e10, max=1e10)

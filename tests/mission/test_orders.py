@@ -9,14 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.host.resources import folder
 from fasaco_edge.mission.orders.order import (
     EVERYTHING_ONCE,
     MissionOrder,
     OrderError,
     Zone,
     command_document,
-    command_schema,
     order_document,
     read_command,
     read_order,
@@ -143,12 +141,6 @@ def test_whatever_is_written_is_an_order_or_refused(document):
     except OrderError:
         return
     assert read_order(order_document(order)) == order
-
-
-def test_the_schema_is_that_of_the_contract():
-    """To write it anew: json.dumps(command_schema(), indent=2)."""
-    written = json.loads((folder("protocol") / "schema" / "mission.json").read_text())
-    assert written == command_schema()
 
 
 TWO = read_order(zones(SQUARE, SQUARE, passes=2))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.daemon.loop.status import path_note
+from fasaco_edge.daemon.loop.status import path_attachment
 from fasaco_edge.mission.core.events import MapReceived, PlanReady
 from fasaco_edge.mission.core.route import SKIPPED_S, Attempt
 from fasaco_edge.planners.cost import CoverageCost
@@ -82,21 +82,21 @@ def test_all_figures_of_a_path_are_of_one_problem():
             drive.tell(PlanReady(request.number, NearOptimal().plan(request.problem, limit), 0.05))
         drive.go()
         for update in drive.updates[known:]:
-            notes.append(path_note(drive.mission, update) | {"asked": request, "update": update})
+            notes.append((path_attachment(drive.mission, update), request, update))
     assert drive.mission.state == "done"
-    better = [note for note in notes if note["reason"] == BETTER]
+    better = [note for note in notes if note[0].reason == BETTER]
     assert better
-    for note in better:
-        planned, bound = note["planned_steps"], note["lower_bound_steps"]
+    for about, request, update in better:
+        planned, bound = about.planned_steps, about.lower_bound_steps
         assert 0 < bound <= planned
-        assert note["gap"] == pytest.approx(planned / bound - 1, abs=1e-6)
+        assert about.gap == pytest.approx(planned / bound - 1, abs=1e-6)
         # The robot may have driven on meanwhile: the path is the end of what was planned.
-        cells = note["update"].cells
-        assert note["steps"] == len(cells) - 1 <= planned
-        plan, whole_problem = note["update"].plan, note["asked"].problem.whole
+        cells = update.cells
+        assert about.steps == len(cells) - 1 <= planned
+        plan, whole_problem = update.plan, request.problem.whole
         assert np.array_equal(plan.cells[len(plan.cells) - len(cells) :], cells)
         assert bound == lower_bound_steps(whole_problem)
-        assert note["planned_cost_s"] == pytest.approx(
+        assert about.planned_cost_s == pytest.approx(
             whole_problem.cost.of_walk(plan.cells), abs=1e-3
         )
         lattice = whole_problem.lattice

@@ -11,15 +11,13 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from rerun.chunk import RrdReader
-
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.recording.scene.anchor import NEAR_M, Anchor
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from tests.support import scripted_mission as made_up
-from tests.support.recordings import bus_on_free_port, read_column, recorder_process
+from tests.support.recordings import bus_on_free_port, read_column, read_static, recorder_process
 
 UTM = (500_012.0, 5_500_034.0)
 DRAWN_FROM = (500_000.0, 5_500_000.0)
@@ -43,18 +41,6 @@ def recorded(tmp_path_factory):
         recorder.process.send_signal(signal.SIGTERM)
         assert recorder.process.wait(60) == 0
     return Path(report["file"]), mission
-
-
-def static(path, entity, component):
-    """What was logged of an entity for all times."""
-    chunks = RrdReader(str(path)).stream().filter(content=f"/{entity}")
-    batches = [chunk.to_record_batch() for chunk in chunks if chunk.is_static]
-    return [
-        value
-        for batch in batches
-        if component in batch.schema.names
-        for value in batch.column(component).to_pylist()
-    ]
 
 
 def test_near_zero_nothing_is_moved():
@@ -91,9 +77,9 @@ def test_the_rectangle_of_a_reason_is_moved_with_all_else(recorded):
 
 def test_where_it_is_drawn_from_is_told(recorded):
     path, _ = recorded
-    (where,) = static(path, entities.WORLD, "Transform3D:translation")[-1]
+    (where,) = read_static(path, entities.WORLD, "Transform3D:translation")[-1]
     assert np.allclose(where, [*DRAWN_FROM, 0.0])
-    card = str(static(path, entities.RUN_CARD, "TextDocument:text")[-1][0])
+    card = str(read_static(path, entities.RUN_CARD, "TextDocument:text")[-1][0])
     assert "| drawn from | x 500000 m, y 5500000 m of the map's frame |" in card
 
 

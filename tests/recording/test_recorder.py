@@ -36,10 +36,11 @@ from tests.support.recordings import (
     RecordingSummary,
     bus_on_free_port,
     read_column,
+    read_static,
     read_summary,
     recorder_process,
 )
-from tests.support.scripted_mission import CELL_M, COLS, ORIGIN, ROWS, Mission, building
+from tests.support.scripted_mission import CELL_M, COLS, ORIGIN, RADIUS_M, ROWS, Mission, building
 
 ERRORS = {"total": 2, "last": "", "by_code": {"malformed_message": 2, "no code": 3}}
 FRAMES = 40
@@ -140,6 +141,11 @@ def test_the_robot_stands_where_it_was_published(recorded):
     places = read_column(recorded.path, entities.ROBOT, "Transform3D:translation").values
     assert np.allclose(places[0][0][:2], recorded.mission.walk[0], atol=1e-5)
     assert np.allclose(places[-1][0][:2], recorded.mission.walk[-1], atol=1e-5)
+
+
+def test_the_robot_is_as_large_as_its_configuration_says(recorded):
+    (half_size,) = read_static(recorded.path, entities.ROBOT_BODY, "Ellipsoids3D:half_sizes")[-1]
+    assert half_size[:2] == pytest.approx([RADIUS_M, RADIUS_M])
 
 
 def test_a_path_says_where_the_map_has_changed(recorded):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from msgspec.structs import asdict
 
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
 from fasaco_edge.bus.session import Sample
@@ -189,7 +190,11 @@ def with_paths(samples: Samples, story: Story) -> Samples:
         if (update := step.decision.path) is None:
             continue
         at_ns = samples[0].at_ns + round(1e9 * step.at_s)
-        about = {"revision": update.revision, "reason": update.reason, **plan_figures(update.plan)}
+        about = {
+            "revision": update.revision,
+            "reason": update.reason,
+            **asdict(plan_figures(update.plan)),
+        }
         points = lattice.centres(update.cells).tobytes()
         sample = Sample("robot/path", digest(points), attachment=encode_json(about))
         wall_ns = at_ns + samples[0].wall_ns - samples[0].at_ns

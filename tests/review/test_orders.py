@@ -13,6 +13,7 @@ from fasaco_edge.review.moments import spans_of
 from fasaco_edge.review.orders import chapters
 from fasaco_edge.review.rows import compared_rows, setup_words, verdicts
 from fasaco_edge.review.run_data import HeardStatus, RunData
+from fasaco_edge.wire.status import CoverageReport
 
 ALL = read_order({})
 KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]], "passes": 1}]})
@@ -21,7 +22,16 @@ KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]
 def told(*rows, commands=()):
     """Return the chapters of a data of (time, state, covered, coverable)."""
     statuses = [
-        HeardStatus(at_s, state, "", {"covered": covered, "coverable": coverable}, (), 0, {}, {})
+        HeardStatus(
+            at_s,
+            state,
+            "",
+            CoverageReport(covered=covered, coverable=coverable),
+            (),
+            0,
+            {},
+            None,
+        )
         for at_s, state, covered, coverable in rows
     ]
     states = spans_of([(at_s, state, "") for at_s, state, _, _ in rows], 100.0)

@@ -24,6 +24,7 @@ from fasaco_edge.review.moments import Span
 from fasaco_edge.review.page import page_of
 from fasaco_edge.review.picture import SIZE, draw_review
 from fasaco_edge.review.review import CoverageCounts, read_review, review_of
+from fasaco_edge.wire.status import ZoneReport
 from tests.review.test_parts import run_told
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge
 
@@ -107,14 +108,18 @@ def test_without_map_and_poses_there_are_still_charts(review):
     assert len(told["not_recorded"]) >= 2
 
 
+def zone(cells, covered):
+    return ZoneReport(cells=cells, covered=covered)
+
+
 @pytest.mark.parametrize(
     ("state", "covered", "zones", "complete"),
     [
         ("done", 24, (), True),
         ("done", 23, (), False),
         ("covering", 24, (), False),
-        ("done", 10, ({"cells": 4, "covered": 4}, {"cells": 2, "covered": 2}), True),
-        ("done", 10, ({"cells": 4, "covered": 4}, {"cells": 2, "covered": 1}), False),
+        ("done", 10, (zone(4, 4), zone(2, 2)), True),
+        ("done", 10, (zone(4, 4), zone(2, 1)), False),
         ("", 24, (), None),
     ],
 )

@@ -160,6 +160,20 @@ def read_column(path: Path, entity: str, component: str) -> Column:
     return Column(np.array([time for time, _ in rows], np.int64), [value for _, value in rows])
 
 
+def read_static(path: Path, entity: str, component: str) -> list[Any]:
+    """Return what was logged as ``component`` of ``entity`` for all times, in order.
+
+    Raises:
+        UnreadableRecording: ``path`` is no recording, or is torn.
+    """
+    return [
+        value
+        for chunk in _chunks(path, f"/{entity}")
+        if chunk.is_static and component in (batch := chunk.to_record_batch()).schema.names
+        for value in batch.column(component).to_pylist()
+    ]
+
+
 def read_summary(path: Path) -> RecordingSummary:
     """Return what the recording ``path`` holds.
 

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 
 from fasaco_edge.bus.session import Bus
+from fasaco_edge.config.config import DaemonConfig, RobotConfig
+from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.planner import ColonySnapshot
@@ -31,6 +33,8 @@ from fasaco_edge.wire.poses import encode_pose_stamped
 
 RESOLUTION_M = 0.05
 CELL_M = 0.25
+RADIUS_M = 0.17
+CONFIG = DaemonConfig(robot=RobotConfig(tool_width_m=CELL_M, radius_m=RADIUS_M))
 ORIGIN = (-1.0, -2.0)
 ROWS, COLS = 120, 160
 # The box that turns up half-way, where the map said free: rows and columns of pixels.
@@ -167,7 +171,7 @@ class Mission:
             "latency_ms": {"ingest": 4.0 + done, "plan": 45.0, "map_to_path": 60.0 + 20 * done},
             "errors": {"total": 0, "last": "", "by_code": {}},
             "rss_mb": 120.0,
-            "config": {"planner": "fasaco", "cell_m": CELL_M, "robot_radius_m": 0.2, "seed": 7},
+            "config": config_document(CONFIG),
         }
         self._status.put(encode_json(status | more))
 

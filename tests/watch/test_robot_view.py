@@ -65,15 +65,15 @@ def test_a_new_daemon_has_none_of_the_old_paths():
 
 def test_a_second_daemon_is_noted_and_changes_nothing():
     view = mid_mission()
-    before = view.report
+    before = view.status
     for stand, reason in (("looks", "no map yet"), ("waits", "another daemon plans: 2f")):
         claim = {"id": "1f", "stand": stand}
         tell(view, "status", status(state="blocked", reason=reason, path=None, claim=claim))
-    assert view.report is before
+    assert view.status is before
     assert len(view.path_ahead) == 12
     assert view.events.entries[-1].text == ("a second daemon is blocked: another daemon plans: 2f")
     tell(view, "status", status(state="paused", claim={"id": "2f", "stand": "plans"}))
-    assert view.report.state == "paused"
+    assert view.status.state == "paused"
 
 
 def test_updates_are_laid_over_the_map():
@@ -113,22 +113,22 @@ def test_without_poses_of_its_own_the_status_tells_where_the_robot_is():
 )
 def test_what_cannot_be_read_costs_only_itself(topic, payload):
     view = mid_mission()
-    before = view.map, view.coverage, view.pose, view.report
+    before = view.map, view.coverage, view.pose, view.status
     for _ in range(9):
         tell(view, topic, payload)
-    assert (view.map, view.coverage, view.pose, view.report) == before
+    assert (view.map, view.coverage, view.pose, view.status) == before
     assert [text for text in texts(view) if "cannot be read" in text][-1].startswith(
         f"{topic} cannot be read (8 so far): "
     )
     tell(view, "status", status(state="done"))
-    assert view.report is not None
-    assert view.report.state == "done"
+    assert view.status is not None
+    assert view.status.state == "done"
 
 
 def test_members_nobody_knows_yet_are_passed_over():
     view = RobotView("robot")
     tell(view, "status", status(weather={"rain": True}))
-    assert view.report is not None
+    assert view.status is not None
 
 
 def test_what_happened_is_told_once():

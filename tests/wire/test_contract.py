@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, NothingToCover
 from fasaco_edge.host.resources import folder
 from fasaco_edge.wire import coverage, limits, schemas, topics
-from fasaco_edge.wire.json_text import decode_json, encode_error, encode_json
+from fasaco_edge.wire.json_text import decode_json, encode_json
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.replies import encode_error
 from fasaco_edge.wire.topics import POSE_SCHEMAS
 
 PROTOCOL = folder("protocol")

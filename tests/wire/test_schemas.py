@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import re
+from typing import Any
 
 import pytest
 from jsonschema import Draft202012Validator, ValidationError
 
 from fasaco_edge.errors import NotYet
-from fasaco_edge.wire.json_text import encode_error
+from fasaco_edge.wire.replies import encode_error
+from fasaco_edge.wire.status import STATES
 from tests.wire.contract_files import PROTOCOL, load
+from tests.wire.make_schemas import files
 from tests.wire.schemas import NAMES, check, schema
 
 README = (PROTOCOL / "README.md").read_text()
@@ -21,12 +24,23 @@ def test_it_is_a_schema(name):
     Draft202012Validator.check_schema(schema(name))
 
 
+def test_they_are_what_the_structs_make():
+    """To write them anew: python -m tests.wire.make_schemas."""
+    written = {path.name: path.read_text() for path in (PROTOCOL / "schema").iterdir()}
+    assert written == files()
+
+
 def test_every_schema_has_a_use():
     table = load("keys.yaml")
     used = {entry["json"] for entry in (*table["keys"], *table["queries"])}
     used |= {entry["attachment"] for entry in table["keys"]}
     used |= {query["payload"] for query in table["queries"]}
     assert used - {None} | {"error.json"} == set(NAMES)
+
+
+def struct(file: str, name: str) -> dict[str, Any]:
+    """Return the part of a schema that a struct makes."""
+    return schema(file)["$defs"][name]
 
 
 def members(heading: str) -> list[str]:
@@ -39,12 +53,12 @@ def members(heading: str) -> list[str]:
 @pytest.mark.parametrize(
     ("heading", "documented"),
     [
-        ("member of `coverage`", schema("status.json")["$defs"]["coverage"]),
-        ("member of `mission`", schema("status.json")["$defs"]["mission"]),
-        ("member of `ledger`", schema("status.json")["properties"]["ledger"]),
-        ("member of `status`", schema("status.json")),
-        ("member", schema("path_attachment.json")),
-        ("member of `order`", schema("mission.json")["$defs"]["OrderDocument"]),
+        ("member of `coverage`", struct("status.json", "CoverageReport")),
+        ("member of `mission`", struct("status.json", "MissionReport")),
+        ("member of `ledger`", struct("status.json", "LedgerReport")),
+        ("member of `status`", struct("status.json", "Status")),
+        ("member", struct("path_attachment.json", "PathAttachment")),
+        ("member of `order`", struct("mission.json", "OrderDocument")),
     ],
 )  # fmt: skip
 def test_the_readme_has_the_members_of_a_schema(heading, documented):
@@ -57,13 +71,13 @@ def test_the_readme_has_the_members_of_a_schema(heading, documented):
 def test_the_readme_has_the_states():
     table = README.partition("\n| state |")[2].partition("\n\n")[0]
     cells = "".join(line.split(" | ")[0] for line in table.splitlines()[2:])
-    assert re.findall(r"`([^`]+)`", cells) == schema("status.json")["$defs"]["state"]["enum"]
+    assert re.findall(r"`([^`]+)`", cells) == list(STATES)
 
 
 def test_the_readme_has_the_commands():
     table = README.partition("\n| command |")[2].partition("\n\n")[0]
     cells = "".join(line.split(" | ")[0] for line in table.splitlines()[2:])
-    enum = schema("mission.json")["$defs"]["CommandDocument"]["properties"]["command"]["enum"]
+    enum = struct("mission.json", "CommandDocument")["properties"]["command"]["enum"]
     assert sorted(re.findall(r"`(\w+)`", cells)) == enum
 
 

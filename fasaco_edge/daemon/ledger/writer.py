@@ -24,11 +24,11 @@ import threading
 import time
 from collections import deque
 from pathlib import Path
-from typing import Any
 
 from fasaco_edge.daemon.faults import fault_text, log_fault
 from fasaco_edge.daemon.ledger.codec import LedgerFileError
 from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger, reason_of
+from fasaco_edge.wire.status import LedgerReport
 
 # An answer to a command waits so long for a slow disk [s].
 MOST_WAIT_S = 1.0
@@ -198,15 +198,15 @@ class LedgerWriter:
         """Return what went wrong since the last call; trouble that goes on is told once."""
         return [self._faults.popleft() for _ in range(len(self._faults))]
 
-    def document(self, now: float) -> dict[str, Any]:
+    def report(self, now: float) -> LedgerReport:
         """Return this part of the status; ``now`` is monotonic time [s]."""
         written_at = self._written_at
-        return {
-            "path": str(self._file.path),
-            "age_s": None if written_at is None else round(max(now - written_at, 0.0), 3),
-            "restored_cells": self._restored_cells,
-            "fault": self._trouble or self._told or None,
-        }
+        return LedgerReport(
+            path=str(self._file.path),
+            age_s=None if written_at is None else round(max(now - written_at, 0.0), 3),
+            restored_cells=self._restored_cells,
+            fault=self._trouble or self._told or None,
+        )
 
     def close(self, timeout_s: float) -> None:
         """Write what still waits and end the thread; a disk that hangs is not waited for."""

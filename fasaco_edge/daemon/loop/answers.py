@@ -9,7 +9,7 @@ import re
 import threading
 from collections.abc import Callable
 from functools import partial
-from typing import Any, cast
+from typing import cast
 
 import msgspec
 
@@ -19,8 +19,10 @@ from fasaco_edge.bus.session import ZENOH_VERSION, Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadQuery, FasacoError, NotYet, UnknownQuery
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import encode_error, encode_json
+from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import VERSION, Keys
+from fasaco_edge.wire.replies import Version, encode_error
+from fasaco_edge.wire.status import Settings
 
 NEWEST = "newest"
 Said = Reply | Shared
@@ -123,25 +125,23 @@ LEFT_OUT = "(left out)"
 
 def serve_about(bus: Bus, keys: Keys, config: Callable[[], DaemonConfig]) -> None:
     """Serve ``config``, as it is then, and ``version``; tell others what there is to ask."""
-    versions = {
-        "package": "fasaco-edge",
-        "version": __version__,
-        "protocol": VERSION.removeprefix("@"),
-        "zenoh": ZENOH_VERSION,
+    version = Version(__version__, VERSION.removeprefix("@"), ZENOH_VERSION)
+    documents: dict[str, Callable[[], object]] = {
+        "config": lambda: config_document(config()),
+        "version": lambda: version,
     }
-    documents = {"config": lambda: config_document(config()), "version": lambda: versions}
     for name, document in documents.items():
         bus.serve(keys.rpc(name), answering(partial(_tell, document)))
     bus.serve(f"{keys.prefix}/@rpc/*", partial(_unknown, keys), complete=False)
 
 
-def config_document(config: DaemonConfig) -> dict[str, Any]:
+def config_document(config: DaemonConfig) -> Settings:
     """Return the configuration in force as it may be shown to anybody: without secrets.
 
     An endpoint may carry any setting of Zenoh's behind its ``#``, keys and passwords among
     them: all that is left out.
     """
-    return cast("dict[str, Any]", _shown(msgspec.to_builtins(config)))
+    return cast(Settings, _shown(msgspec.to_builtins(config)))
 
 
 def _shown(value: object) -> object:
@@ -157,7 +157,7 @@ def _shown(value: object) -> object:
     return value
 
 
-def _tell(document: Callable[[], dict[str, Any]], request: Request) -> Reply:
+def _tell(document: Callable[[], object], request: Request) -> Reply:
     check(request)
     return Reply(encode_json(document()))
 

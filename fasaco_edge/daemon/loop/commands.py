@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.bus.queries import Question, Reply
@@ -19,6 +18,7 @@ from fasaco_edge.mission.orders.order import (
     read_command,
 )
 from fasaco_edge.mission.orders.order_state import CommandError
+from fasaco_edge.wire import replies
 from fasaco_edge.wire.json_text import decode_json, encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
@@ -95,7 +95,7 @@ class Commands:
         if any(answer.plan is not None for answer in answers):
             self._replanned_at = now
 
-    def answer(self, report: dict[str, Any], *, is_kept: bool) -> None:
+    def answer(self, report: replies.Reply, *, is_kept: bool) -> None:
         """Answer who wants to know how it is; and who commanded, once that outlives the daemon."""
         payload = encode_json(report)
         for question in self._curious:
@@ -108,7 +108,8 @@ class Commands:
             if answer.error is not None:
                 question.answer(error_reply(answer.error))
             elif question.key == self._replan_key:
-                accepted = {"robot": report["robot"], "accepted": True, "plan": answer.plan}
+                assert answer.plan is not None
+                accepted = replies.Replan(report.robot, answer.plan)
                 question.answer(Reply(encode_json(accepted)))
             else:
                 question.answer(Reply(payload))

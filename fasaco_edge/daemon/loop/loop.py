@@ -16,7 +16,7 @@ from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
 from fasaco_edge.daemon.loop.commands import Commands
 from fasaco_edge.daemon.loop.inbox import Inbox, Received
 from fasaco_edge.daemon.loop.outbox import CoveragePublisher, Outbox
-from fasaco_edge.daemon.loop.status import StatusBoard, path_note
+from fasaco_edge.daemon.loop.status import StatusBoard, path_attachment
 from fasaco_edge.daemon.loop.turn_log import TurnLog, TurnNote
 from fasaco_edge.daemon.loop.watchdog import MapLatency, Watchdog
 from fasaco_edge.daemon.reload import Reload
@@ -122,7 +122,7 @@ class Loop:
             self._gate.let_out("status", partial(self._publish_status, started))
             self._commands.note(answers, started)
             if self._commands.are_asked:
-                report = self._status.report(self._mission, self._assignment, self._loading)
+                report = self._status.reply(self._mission, self._assignment, self._loading)
                 is_kept = self._keeping.is_kept(time.monotonic())
                 self._gate.let_out(
                     "@rpc/mission", partial(self._commands.answer, report, is_kept=is_kept)
@@ -305,7 +305,7 @@ class Loop:
         assert mission.grid is not None
         assert mission.lattice is not None
         xy = mission.lattice.centres(update.cells)
-        about = path_note(mission, update)
+        about = path_attachment(mission, update)
         self._outbox.path(xy, mission.grid.frame, mission.grid.stamp_ns, about)
         self._status.path = update
         if update.plan is not None and (seconds := self._maps.answer()) is not None:
@@ -319,14 +319,14 @@ class Loop:
     def _publish_status(self, now: float) -> None:
         if self._recorder is not None:
             self._status.recorder = self._recorder.poll(now)
-        self._status.claim = self._claim.document()
-        self._status.ledger = self._ledger.document(now)
+        self._status.claim = self._claim.report()
+        self._status.ledger = self._ledger.report(now)
         self._status.faults.count(self._ledger.take_faults(), is_logged=True)
         self._status.faults.count(self._gate.take_faults(), is_logged=True)
-        document = self._status.due(self._mission, self._assignment, self._loading, now)
-        if document is not None:
-            self._outbox.status(document)
-            self._vitals.tell(document)
+        status = self._status.due(self._mission, self._assignment, self._loading, now)
+        if status is not None:
+            self._outbox.status(status)
+            self._vitals.tell(status)
 
 
 def _plans(items: list[tuple[str, object]]) -> list[Event]:

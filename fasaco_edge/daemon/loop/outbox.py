@@ -8,9 +8,10 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.queries import Reply, Shared
@@ -22,22 +23,19 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import command_document
 from fasaco_edge.wire import schemas, topics
+from fasaco_edge.wire.coverage import coverage_grid
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import encode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
+from fasaco_edge.wire.status import PathAttachment, Status
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanSnapshot
-
-
-from typing import TYPE_CHECKING
-
-from fasaco_edge.wire.coverage import coverage_grid
-
-if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
+
+PERIOD_S = 0.5
 
 
 class Outbox:
@@ -62,18 +60,18 @@ class Outbox:
         xy: NDArray[np.float64],
         frame: str,
         stamp_ns: int,
-        about: dict[str, Any],
+        about: PathAttachment,
     ) -> None:
         """Publish a path through ``xy`` [m], float64 (n, 2), facing along the way.
 
         Where it cannot be told an empty one is: the robot must not go on along the one before.
         """
         if not self.gate.let_out("path", lambda: self._say_path(xy, frame, stamp_ns, about)):
-            nothing = about | {"steps": 0}
+            nothing = replace(about, steps=0)
             self.gate.let_out("path", lambda: self._say_path(xy[:0], frame, stamp_ns, nothing))
 
     def _say_path(
-        self, xy: NDArray[np.float64], frame: str, stamp_ns: int, about: dict[str, Any]
+        self, xy: NDArray[np.float64], frame: str, stamp_ns: int, about: PathAttachment
     ) -> None:
         attachment = encode_json(about)
         path = Shared.of(encode_path(xy, headings(xy), frame, stamp_ns), schemas.PATH, attachment)
@@ -90,12 +88,12 @@ class Outbox:
             self._ros.path.forget()
             self._ros.coverage.forget()
 
-    def status(self, document: dict[str, Any]) -> None:
+    def status(self, status: Status) -> None:
         """Publish the status."""
-        self.gate.let_out("status", lambda: self._say_status(document))
+        self.gate.let_out("status", lambda: self._say_status(status))
 
-    def _say_status(self, document: dict[str, Any]) -> None:
-        payload = encode_json(document)
+    def _say_status(self, status: Status) -> None:
+        payload = encode_json(status)
         self._last.keep("status", Reply(payload))
         self._status.put(payload)
 
@@ -139,9 +137,6 @@ def headings(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     ahead = np.diff(xy, axis=0)
     yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
     return np.append(yaw, yaw[-1])
-
-
-PERIOD_S = 0.5
 
 
 class CoveragePublisher:

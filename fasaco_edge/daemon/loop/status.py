@@ -1,4 +1,4 @@
-"""What the daemon says about itself: one JSON document, on change and once a second."""
+"""The daemon's status: one JSON document, published on change and once a second."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import logging
 import time
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from msgspec.structs import asdict
 
 from fasaco_edge import __version__
 from fasaco_edge.config.config import DaemonConfig
@@ -17,6 +19,23 @@ from fasaco_edge.daemon.loop.watchdog import CycleTimes
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.host.processes import resident_mb, thread_count
 from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.wire.replies import Reply
+from fasaco_edge.wire.status import (
+    ClaimReport,
+    CoverageReport,
+    ErrorCounts,
+    Latencies,
+    LedgerReport,
+    MapReport,
+    PathAttachment,
+    PathReport,
+    PlanCounts,
+    PlanFigures,
+    PoseReport,
+    Rectangle,
+    Status,
+    SupervisedRecorder,
+)
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.geometry import Window
@@ -29,20 +48,6 @@ LOG = logging.getLogger(__name__)
 HEARTBEAT_S = 1.0
 # Changes closer together than this go out as one.
 LEAST_INTERVAL_S = 0.05
-
-
-# Of the plan as it was made; the path may have been driven in part since.
-PLAN_FIGURES = (
-    "planner",
-    "seed",
-    "ants",
-    "kicks",
-    "proposals",
-    "planned_steps",
-    "planned_cost_s",
-    "lower_bound_steps",
-    "gap",
-)
 
 
 class Faults:
@@ -60,17 +65,13 @@ class Faults:
             self._by_code[fault.code] += 1
             self._last = str(fault)
 
-    def document(self) -> dict[str, Any]:
+    def counts(self) -> ErrorCounts:
         """Return the counts as part of a status."""
-        return {
-            "total": self._by_code.total(),
-            "last": self._last,
-            "by_code": dict(self._by_code),
-        }
+        return ErrorCounts(self._by_code.total(), self._last, dict(self._by_code))
 
 
 class StatusBoard:
-    """Collects what a status says, and knows when one is due.
+    """Collects what a status holds, and knows when one is due.
 
     Attributes:
         claim: who this daemon is, and whether it plans, as the status has it.
@@ -83,17 +84,17 @@ class StatusBoard:
         self.ingest_s: float | None = None
         self.plan_s: float | None = None
         self.map_to_path_s: float | None = None
-        self.recorder: dict[str, Any] | None = None
-        self.ledger: dict[str, Any] = {}
+        self.recorder: SupervisedRecorder | None = None
+        self.ledger = LedgerReport()
         self.path: PathUpdate | None = None
         self.waits = "no map yet"
-        self.claim: dict[str, str] = {}
+        self.claim = ClaimReport()
         self.stands_back = ""
         self._config = config
         self.show(config)
         self._started = time.monotonic()
         self._sent_at = float("-inf")
-        self._sent_key: tuple[Any, ...] = ()
+        self._sent_key: tuple[object, ...] = ()
 
     def show(self, config: DaemonConfig) -> None:
         """Show this configuration as the one in force."""
@@ -101,44 +102,56 @@ class StatusBoard:
 
     def due(
         self, mission: Mission | None, assignment: OrderState, loading: str, now: float
-    ) -> dict[str, Any] | None:
+    ) -> Status | None:
         """Return the status if it changed or a second has passed, else None.
 
-        Who waits for another daemon leaves the seconds to that one.
+        A daemon that waits for another one leaves the heartbeat to that one.
         """
         state, reason = self._state(mission, assignment, loading)
-        recorder = (self.recorder or {}).get("state")
+        recorder = self.recorder and self.recorder.state
         revision = self.path and self.path.revision
-        claim = self.claim.get("stand")
-        key = (state, reason, revision, recorder, self.ledger.get("fault"), assignment, claim)
+        claim = self.claim.stand
+        key = (state, reason, revision, recorder, self.ledger.fault, assignment, claim)
         # Many small faults are not worth a message each: the heartbeat counts them.
         heartbeat_s = float("inf") if self.stands_back else HEARTBEAT_S
         wait = LEAST_INTERVAL_S if key != self._sent_key else heartbeat_s
         if now - self._sent_at < wait:
             return None
         self._sent_at, self._sent_key = now, key
-        return {
-            "robot": self._config.robot.name,
-            "version": __version__,
-            "state": state,
-            "reason": reason,
-            "claim": self.claim,
-            **self._document(mission, now),
-            "mission": mission_report(mission, assignment),
-        }
+        return Status(
+            robot=self._config.robot.name,
+            version=__version__,
+            state=state,
+            reason=reason,
+            claim=self.claim,
+            uptime_s=round(now - self._started, 3),
+            map=_map(mission),
+            pose=_pose(mission),
+            coverage=_coverage(mission),
+            path=self._path(mission),
+            plan=_plans(mission),
+            latency_ms=Latencies(_ms(self.ingest_s), _ms(self.plan_s), _ms(self.map_to_path_s)),
+            loop_ms=self.turns.report(),
+            errors=self.faults.counts(),
+            ledger=self.ledger,
+            recorder=self.recorder,
+            rss_mb=resident_mb(),
+            cpu_s=round(time.process_time(), 3),
+            threads=thread_count(),
+            config=self._shown_config,
+            mission=mission_report(mission, assignment),
+        )
 
-    def report(
-        self, mission: Mission | None, assignment: OrderState, loading: str
-    ) -> dict[str, Any]:
-        """Return what the answer to a command says."""
+    def reply(self, mission: Mission | None, assignment: OrderState, loading: str) -> Reply:
+        """Return the answer to a command."""
         state, reason = self._state(mission, assignment, loading)
-        return {
-            "robot": self._config.robot.name,
-            "state": state,
-            "reason": reason,
-            "coverage": _coverage(mission),
-            "mission": mission_report(mission, assignment),
-        }
+        return Reply(
+            robot=self._config.robot.name,
+            state=state,
+            reason=reason,
+            coverage=_coverage(mission),
+            mission=mission_report(mission, assignment),
+        )
 
     def _state(
         self, mission: Mission | None, assignment: OrderState, loading: str
@@ -153,128 +166,108 @@ class StatusBoard:
             return "paused", "paused by command"
         return ("loading", loading) if loading else ("waiting for map", self.waits)
 
-    def _document(self, mission: Mission | None, now: float) -> dict[str, Any]:
-        return {
-            "uptime_s": round(now - self._started, 3),
-            "map": _map(mission),
-            "pose": _pose(mission),
-            "coverage": _coverage(mission),
-            "path": self._path(mission),
-            "plan": {
-                "plans": mission.plans if mission else 0,
-                "unchanged": mission.unchanged if mission else 0,
-                "outdated": mission.outdated if mission else 0,
-                "attempts": mission.attempts if mission else 0,
-                "planning": bool(mission and mission.planning),
-            },
-            "latency_ms": {
-                "ingest": _ms(self.ingest_s),
-                "plan": _ms(self.plan_s),
-                "map_to_path": _ms(self.map_to_path_s),
-            },
-            "loop_ms": self.turns.document(),
-            "errors": self.faults.document(),
-            "ledger": self.ledger,
-            "recorder": self.recorder,
-            "rss_mb": resident_mb(),
-            "cpu_s": round(time.process_time(), 3),
-            "threads": thread_count(),
-            "config": self._shown_config,
-        }
-
-    def _path(self, mission: Mission | None) -> dict[str, Any] | None:
+    def _path(self, mission: Mission | None) -> PathReport | None:
         update = self.path
         if update is None or mission is None:
             return None
-        plan = update.plan
-        return {
-            "revision": update.revision,
-            "steps": max(len(update.cells) - 1, 0),
-            "remaining_steps": max(len(mission.path.ahead) - 1, 0),
-            "reason": update.reason,
-            **plan_figures(plan),
-        }
+        return PathReport(
+            revision=update.revision,
+            steps=max(len(update.cells) - 1, 0),
+            remaining_steps=max(len(mission.path.ahead) - 1, 0),
+            reason=update.reason,
+            **asdict(plan_figures(update.plan)),
+        )
 
 
-def path_note(mission: Mission, update: PathUpdate) -> dict[str, Any]:
-    """Return what is said of a path beside it."""
+def path_attachment(mission: Mission, update: PathUpdate) -> PathAttachment:
+    """Return what is sent with a path."""
     assert mission.grid is not None
     assert mission.lattice is not None
-    return {
-        "revision": update.revision,
-        "map_stamp_ns": mission.grid.stamp_ns,
-        "map_revision": mission.map_revision,
-        "reason": update.reason,
-        "steps": max(len(update.cells) - 1, 0),
-        **plan_figures(update.plan),
-        "plan_ms": round(1e3 * update.plan_s, 3),
-        "changed": changed_document(update.changed, mission.lattice.cell_m),
-    }
-
-
-def plan_figures(plan: CoveragePath | None) -> dict[str, Any]:
-    """Return what is known of the plan a path follows; each value is null without one."""
-    if plan is None:
-        return dict.fromkeys(PLAN_FIGURES)
-    values = (
-        plan.planner,
-        plan.seed,
-        plan.work.ants,
-        plan.work.kicks,
-        plan.work.proposals,
-        plan.steps,
-        round(plan.cost_s, 3),
-        plan.lower_bound_steps or None,
-        None if plan.gap is None else round(plan.gap, 6),
+    return PathAttachment(
+        revision=update.revision,
+        map_stamp_ns=mission.grid.stamp_ns,
+        map_revision=mission.map_revision,
+        reason=update.reason,
+        steps=max(len(update.cells) - 1, 0),
+        plan_ms=round(1e3 * update.plan_s, 3),
+        changed=rectangle(update.changed, mission.lattice.cell_m),
+        **asdict(plan_figures(update.plan)),
     )
-    return dict(zip(PLAN_FIGURES, values, strict=True))
 
 
-def changed_document(window: Window | None, cell_m: float) -> dict[str, float] | None:
+def plan_figures(plan: CoveragePath | None) -> PlanFigures:
+    """Return what is known of the plan a path follows."""
+    if plan is None:
+        return PlanFigures()
+    return PlanFigures(
+        planner=plan.planner,
+        seed=plan.seed,
+        ants=plan.work.ants,
+        kicks=plan.work.kicks,
+        proposals=plan.work.proposals,
+        planned_steps=plan.steps,
+        planned_cost_s=round(plan.cost_s, 3),
+        lower_bound_steps=plan.lower_bound_steps or None,
+        gap=None if plan.gap is None else round(plan.gap, 6),
+    )
+
+
+def rectangle(window: Window | None, cell_m: float) -> Rectangle | None:
     """Return where a window of the lattice lies in the map's frame [m]; None without one."""
     if window is None:
         return None
     edges = (window.col0, window.row0, window.col1, window.row1)
-    names = ("x_min", "y_min", "x_max", "y_max")
-    return {name: round(edge * cell_m, 3) for name, edge in zip(names, edges, strict=True)}
+    return Rectangle(*(round(edge * cell_m, 3) for edge in edges))
 
 
-def _map(mission: Mission | None) -> dict[str, Any] | None:
+def _map(mission: Mission | None) -> MapReport | None:
     if mission is None or mission.grid is None:
         return None
     geometry = mission.grid.geometry
-    return {
-        "rows": geometry.rows,
-        "cols": geometry.cols,
-        "resolution_m": geometry.resolution,
-        "revision": mission.map_revision,
-        "stamp_ns": mission.grid.stamp_ns,
-        "frame": mission.grid.frame,
-    }
+    return MapReport(
+        rows=geometry.rows,
+        cols=geometry.cols,
+        resolution_m=geometry.resolution,
+        revision=mission.map_revision,
+        stamp_ns=mission.grid.stamp_ns,
+        frame=mission.grid.frame,
+    )
 
 
-def _pose(mission: Mission | None) -> dict[str, float] | None:
+def _pose(mission: Mission | None) -> PoseReport | None:
     if mission is None or mission.pose is None:
         return None
     pose = mission.pose.pose
-    return {"x": round(pose.x, 3), "y": round(pose.y, 3), "yaw": round(pose.yaw, 4)}
+    return PoseReport(x=round(pose.x, 3), y=round(pose.y, 3), yaw=round(pose.yaw, 4))
 
 
-def _coverage(mission: Mission | None) -> dict[str, Any] | None:
+def _coverage(mission: Mission | None) -> CoverageReport | None:
     coverage = mission.coverage() if mission else None
     if coverage is None:
         return None
-    return {
-        "coverable": coverage.coverable,
-        "covered": coverage.covered,
-        "recovered": coverage.recovered,
-        "remaining": coverage.remaining,
-        "unreachable": coverage.unreachable,
-        "covered_m2": round(coverage.covered_m2, 3),
-        "to_cover_m2": round(coverage.to_cover_m2, 3),
-        "free_out_of_reach_m2": round(coverage.free_out_of_reach_m2, 3),
-        "fraction": round(coverage.fraction, 4),
-    }
+    return CoverageReport(
+        coverable=coverage.coverable,
+        covered=coverage.covered,
+        recovered=coverage.recovered,
+        remaining=coverage.remaining,
+        unreachable=coverage.unreachable,
+        covered_m2=round(coverage.covered_m2, 3),
+        to_cover_m2=round(coverage.to_cover_m2, 3),
+        free_out_of_reach_m2=round(coverage.free_out_of_reach_m2, 3),
+        fraction=round(coverage.fraction, 4),
+    )
+
+
+def _plans(mission: Mission | None) -> PlanCounts:
+    if mission is None:
+        return PlanCounts()
+    return PlanCounts(
+        plans=mission.plans,
+        unchanged=mission.unchanged,
+        outdated=mission.outdated,
+        attempts=mission.attempts,
+        planning=mission.planning,
+    )
 
 
 def _ms(seconds: float | None) -> float | None:

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fasaco_edge.daemon.notify import ServiceManager
+from fasaco_edge.wire.status import LoopTimes, Status
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker
@@ -45,12 +46,13 @@ class CycleTimes:
         self._late += seconds > LATE_S
         self._longest_s = max(self._longest_s, seconds)
 
-    def document(self) -> dict[str, Any]:
-        """Return the figures as part of a status [ms]; null before the first turn."""
-        figures: dict[str, Any] = {"turns": self._turns, "late": self._late}
-        for name, share in (("p50", 0.5), ("p99", 0.99), ("p99_9", 0.999), ("max", 1.0)):
-            figures[name] = round(1e3 * self._within(share), 3) if self._turns else None
-        return figures
+    def report(self) -> LoopTimes:
+        """Return the figures as part of a status [ms]; None before the first cycle."""
+        if not self._turns:
+            return LoopTimes()
+        shares = (0.5, 0.99, 0.999, 1.0)
+        within_ms = (round(1e3 * self._within(share), 3) for share in shares)
+        return LoopTimes(self._turns, self._late, *within_ms)
 
     def _within(self, share: float) -> float:
         """Return within how long this share of the turns was over [s]."""
@@ -91,30 +93,30 @@ class Watchdog:
         self._fed_at = now
         self._manager.alive()
 
-    def tell(self, status: dict[str, Any]) -> None:
+    def tell(self, status: Status) -> None:
         """Say in a line what a status says; log it where the state is another."""
-        if status["state"] != self._state:
-            self._state = status["state"]
+        if status.state != self._state:
+            self._state = status.state
             LOG.info("%s", _doing(status), extra={"event": "state", "state": self._state})
         remark = f"; {self.remark}" if self.remark else ""
         self._manager.status(status_line(status) + remark)
 
 
-def status_line(status: dict[str, Any]) -> str:
+def status_line(status: Status) -> str:
     """Return a status as a line: its state and why, how much is covered, what is wrong."""
     parts = [_doing(status)]
-    if coverage := status["coverage"]:
-        area = f"{coverage['covered_m2']:.0f} of {coverage['to_cover_m2']:.0f} m2"
-        parts.append(f"{100 * coverage['fraction']:.0f} % covered, {area}")
-    if path := status["path"]:
-        parts.append(f"path {path['revision']} with {path['remaining_steps']} steps to go")
-    if fault := status["ledger"].get("fault"):
-        parts.append(str(fault))
+    if coverage := status.coverage:
+        area = f"{coverage.covered_m2:.0f} of {coverage.to_cover_m2:.0f} m2"
+        parts.append(f"{100 * coverage.fraction:.0f} % covered, {area}")
+    if path := status.path:
+        parts.append(f"path {path.revision} with {path.remaining_steps} steps to go")
+    if fault := status.ledger.fault:
+        parts.append(fault)
     return "; ".join(parts)
 
 
-def _doing(status: dict[str, Any]) -> str:
-    return f"{status['state']}: {status['reason']}" if status["reason"] else str(status["state"])
+def _doing(status: Status) -> str:
+    return f"{status.state}: {status.reason}" if status.reason else status.state
 
 
 class MapLatency:

@@ -212,11 +212,6 @@ def command_document(command: CommandName, order: MissionOrder) -> dict[str, Any
     return {"command": command, "order": order_document(order)}
 
 
-def command_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a command."""
-    return msgspec.json.schema(CommandDocument)
-
-
 def order_of(document: OrderDocument) -> MissionOrder:
     """Return the order that a document holds.
 

@@ -5,15 +5,15 @@ metre. Far from 0 everything is drawn from whole kilometres near the first place
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+from msgspec.structs import replace as replace_members
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.recording.fields import Json, number
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
+from fasaco_edge.wire.status import PathAttachment, Rectangle
 
 # Nearer to 0 than this float32 tells a millimetre, and nothing is moved [m].
 NEAR_M = 10_000.0
@@ -53,17 +53,18 @@ class Anchor:
             return message
         return replace(message, xy=message.xy - np.array((self.x, self.y)), yaw=message.yaw)
 
-    def note(self, note: Json) -> Json:
+    def attachment(self, about: PathAttachment) -> PathAttachment:
         """Return what came with a path, with the rectangle of its reason where that is drawn."""
-        changed = note.get("changed")
-        if not self or not isinstance(changed, dict):
-            return note
-        moved: dict[str, Any] = dict(changed)
-        for name in changed:
-            at = number(changed, name)
-            if at is not None:
-                moved[name] = at - (self.x if name.startswith("x") else self.y)
-        return {**note, "changed": moved}
+        changed = about.changed
+        if not self or changed is None:
+            return about
+        moved = Rectangle(
+            changed.x_min - self.x,
+            changed.y_min - self.y,
+            changed.x_max - self.x,
+            changed.y_max - self.y,
+        )
+        return replace_members(about, changed=moved)
 
     def _geometry(self, geometry: GridGeometry) -> GridGeometry:
         return replace(geometry, origin=self.pose(geometry.origin))

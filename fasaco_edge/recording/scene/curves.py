@@ -11,10 +11,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from msgspec.structs import asdict
+
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.fields import Json, number, section
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
+from fasaco_edge.wire.status import PathAttachment, Status
 
 # A curve goes on as a step (``styles``); at the latest after so long it is drawn anyway, so
 # that a part, and what follows a gap, soon has all of them.
@@ -81,43 +83,42 @@ PLANS = ("plans", "unchanged", "outdated", "attempts")
 
 
 class StatusFigures:
-    """Draws the numbers of each status; any may be missing."""
+    """Draws the numbers of each status."""
 
     def __init__(self, curves: Curves) -> None:
         self._curves = curves
         # Uptime and processor time [s] where the share under way begins.
         self._since: tuple[float, float] | None = None
 
-    def add(self, status: Json) -> None:
+    def add(self, status: Status) -> None:
         """Draw what a status says in numbers."""
-        for name, value in section(status, "latency_ms").items():
-            if number({name: value}, name) is not None:
-                self._curves.draw(f"{entities.LATENCY}/{name}", value, TREMBLE)
-        memory = number(status, "rss_mb")
-        if memory is not None:
-            self._curves.draw(f"{entities.MEMORY}/planner", memory, TREMBLE)
-        self._add_processor(status)
-        self._draw(entities.THREADS, number(status, "threads"))
-        for name in CELLS:
-            self._draw(f"{entities.CELLS}/{name}", number(section(status, "coverage"), name))
-        steps = number(section(status, "path"), "remaining_steps")
-        self._draw(entities.REMAINING_STEPS, steps)
+        for name, milliseconds in asdict(status.latency_ms).items():
+            if milliseconds is not None:
+                self._curves.draw(f"{entities.LATENCY}/{name}", milliseconds, TREMBLE)
+        # No process has a memory of 0, or no threads: a daemon that does not send them.
+        if status.rss_mb:
+            self._curves.draw(f"{entities.MEMORY}/planner", status.rss_mb, TREMBLE)
+        if status.uptime_s:
+            self._add_processor(status.uptime_s, status.cpu_s)
+        if status.threads:
+            self._draw(entities.THREADS, status.threads)
+        if status.coverage is not None:
+            for name in CELLS:
+                self._draw(f"{entities.CELLS}/{name}", getattr(status.coverage, name))
+        if status.path is not None:
+            self._draw(entities.REMAINING_STEPS, status.path.remaining_steps)
         for name in PLANS:
-            self._draw(f"{entities.PLANS}/{name}", number(section(status, "plan"), name))
-        by_code = section(section(status, "errors"), "by_code")
+            self._draw(f"{entities.PLANS}/{name}", getattr(status.plan, name))
+        by_code = status.errors.by_code
         for code in sorted(filter(_CODE.fullmatch, by_code))[:MOST_CODES]:
-            self._draw(f"{entities.ERRORS}/{code}", number(by_code, code))
+            self._draw(f"{entities.ERRORS}/{code}", by_code[code])
 
-    def add_path(self, note: Json) -> None:
+    def add_path(self, about: PathAttachment) -> None:
         """Draw how good a planned path is; steps, bound and cost are in the log and the inputs."""
-        gap = number(note, "gap")
-        if gap is not None:
-            self._curves.draw(entities.GAP, gap)
+        if about.gap is not None:
+            self._curves.draw(entities.GAP, about.gap)
 
-    def _add_processor(self, status: Json) -> None:
-        uptime_s, cpu_s = number(status, "uptime_s"), number(status, "cpu_s")
-        if uptime_s is None or cpu_s is None:
-            return
+    def _add_processor(self, uptime_s: float, cpu_s: float) -> None:
         since = self._since
         if since is None or uptime_s < since[0]:  # it was started again
             self._since = uptime_s, cpu_s
@@ -126,6 +127,5 @@ class StatusFigures:
             self._since = uptime_s, cpu_s
             self._curves.draw(entities.PROCESSOR, percent, TREMBLE)
 
-    def _draw(self, entity: str, value: float | None) -> None:
-        if value is not None:
-            self._curves.draw(entity, value, spacing_ns=COUNT_SPACING_NS)
+    def _draw(self, entity: str, count: int) -> None:
+        self._curves.draw(entity, count, spacing_ns=COUNT_SPACING_NS)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.fields import Json, integer, number, section, text
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.curves import Curves
 from fasaco_edge.recording.scene.layers import Layers, size_in_file
@@ -20,6 +19,7 @@ from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
+from fasaco_edge.wire.status import PathAttachment, Rectangle
 
 # Edge of a region [steps], and at most about so many of them side by side.
 REGION_STEPS = 5
@@ -78,21 +78,22 @@ class PathDrawing:
     def __init__(self, writer: RecordingWriter, layers: Layers) -> None:
         self._writer = writer
         self._layers = layers
-        self._revision: int | None = None
+        self._revision = 0
         self._count = 0
         self._has_window = False
         self._directions = np.zeros((0, 2, 2))
         # Which of the paths is drawn, and its line.
         self._drawn: tuple[int, NDArray[np.float64] | None] = (0, None)
 
-    def add(self, message: PathMessage, note: Json) -> None:
+    def add(self, message: PathMessage, about: PathAttachment) -> None:
         """Draw a path; one that is published again is still the same."""
-        revision = integer(note, "revision")
-        if revision is not None:
+        revision = about.revision
+        if revision:
             self._writer.sequence(entities.REPLAN, revision)
         if not self._count or revision != self._revision:
-            self._writer.log(entities.PATH_LOG, rr.TextLog(_path_line(message, note), level="INFO"))
-            self._draw_window(section(note, "changed"), text(note, "reason"))
+            line = rr.TextLog(_path_line(message, about), level="INFO")
+            self._writer.log(entities.PATH_LOG, line)
+            self._draw_window(about.changed, about.reason)
             self._count += 1
         self._revision, count, line = revision, self._count, draw.corners(message.xy)
 
@@ -114,20 +115,18 @@ class PathDrawing:
         archetype = draw.lines_archetype(lines, draw.DIRECTION)
         self._writer.log(entities.DIRECTIONS, archetype, latched=True, size=lines.nbytes)
 
-    def _draw_window(self, changed: Json, reason: str) -> None:
+    def _draw_window(self, changed: Rectangle | None, reason: str) -> None:
         """Draw which part of the map the path is because of; nothing where it is not of the map."""
-        edges = [number(changed, name) for name in ("x_min", "y_min", "x_max", "y_max")]
-        known = [edge for edge in edges if edge is not None]
-        if len(known) == len(edges):
-            x0, y0, x1, y1 = known
-            box = draw.box_archetype((x0, y0, x1, y1), draw.WINDOW)
-            label = draw.label_archetype((x0, y0, x1, y1), reason)
+        if changed is not None:
+            bounds = changed.x_min, changed.y_min, changed.x_max, changed.y_max
+            box = draw.box_archetype(bounds, draw.WINDOW)
+            label = draw.label_archetype(bounds, reason)
         elif self._has_window:
             box = draw.line_archetype(np.zeros((0, 2)), draw.WINDOW)
             label = draw.no_label_archetype()
         else:
             return
-        self._has_window = len(known) == len(edges)
+        self._has_window = changed is not None
         self._writer.log(entities.REPLAN_WINDOW, box, latched=True)
         self._writer.log(entities.REPLAN_REASON, label, latched=True)
 
@@ -136,24 +135,19 @@ class PathDrawing:
         self._writer.log(entity, archetype, latched=True, size=line.nbytes)
 
 
-def _path_line(message: PathMessage, note: Json) -> str:
-    revision = integer(note, "revision")
-    named = "path" if revision is None else f"path {revision}"
+def _path_line(message: PathMessage, about: PathAttachment) -> str:
+    named = f"path {about.revision}" if about.revision else "path"
     facts = [f"{max(len(message.xy) - 1, 0)} steps"]
-    planner, plan_ms, gap = text(note, "planner"), number(note, "plan_ms"), number(note, "gap")
-    cost_s = number(note, "planned_cost_s")
-    if cost_s is not None:
-        facts.append(f"{cost_s:.0f} s")
-    planned = integer(note, "planned_steps")
-    if gap is not None and planned is not None:
+    if about.planned_cost_s is not None:
+        facts.append(f"{about.planned_cost_s:.0f} s")
+    if about.gap is not None and about.planned_steps is not None:
         # Of the plan as it was made; of the path, a part may have been driven since.
-        facts.append(f"planned {planned} steps, {100 * gap:.0f} % over the bound")
-    if planner:
-        facts.append(planner)
-    if plan_ms is not None:
-        facts.append(f"{plan_ms:.0f} ms")
-    reason = text(note, "reason")
-    return f"{named}{': ' if reason else ''}{reason} ({', '.join(facts)})"
+        over = f"{100 * about.gap:.0f} % over the bound"
+        facts.append(f"planned {about.planned_steps} steps, {over}")
+    if about.planner:
+        facts.append(about.planner)
+    facts.append(f"{about.plan_ms:.0f} ms")
+    return f"{named}{': ' if about.reason else ''}{about.reason} ({', '.join(facts)})"
 
 
 SPACING_M = 0.02

@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
-from fasaco_edge.recording.fields import Json
 from fasaco_edge.text import one_line
+from fasaco_edge.wire.status import Settings
 
 # Settings that say most about a run come first, the others by name.
-FIRST = ("planner", "cell_m", "robot_radius_m", "seed")
+FIRST = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
 
 HEAD = (
     ("seed", "seed", ""),
@@ -54,7 +53,7 @@ class RunDescription:
     robot: str
     began: str
     version: str = ""
-    config: dict[str, Any] = field(default_factory=dict)
+    config: Settings = field(default_factory=dict)
     trail_range: tuple[float, float] | None = None
     anchor: tuple[float, float] | None = None
 
@@ -79,7 +78,7 @@ class RunDescription:
 
     def markdown(self) -> str:
         """Return the run card."""
-        rows = [
+        rows: list[tuple[str, object]] = [
             ("robot", self.robot),
             ("began", self.began),
             ("version", self.version or "unknown until the first status"),
@@ -103,7 +102,7 @@ class RunDescription:
         )
 
 
-def flat_settings(config: Json, prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flat_settings(config: Settings, prefix: str = "") -> Iterator[tuple[str, str | float]]:
     """Yield the settings of a configuration by their dotted names, lists as text."""
     for name, value in config.items():
         if isinstance(value, dict):
@@ -114,9 +113,9 @@ def flat_settings(config: Json, prefix: str = "") -> Iterator[tuple[str, Any]]:
             yield f"{prefix}{name}", ", ".join(str(item) for item in value)
 
 
-def _rank(setting: tuple[str, Any]) -> tuple[int, str]:
-    leaf = setting[0].rpartition(".")[2]
-    return (FIRST.index(leaf) if leaf in FIRST else len(FIRST), setting[0])
+def _rank(setting: tuple[str, object]) -> tuple[int, str]:
+    name = setting[0]
+    return (FIRST.index(name) if name in FIRST else len(FIRST), name)
 
 
 def _cell(value: object) -> str:

@@ -11,7 +11,6 @@ from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.fields import Json, integer, number, section, text
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.anchor import Anchor
 from fasaco_edge.recording.scene.archetypes import log_styles
@@ -28,10 +27,16 @@ from fasaco_edge.recording.scene.layers import (
 )
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
-from fasaco_edge.recording.write.settings import RecorderReport
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
+from fasaco_edge.wire.status import (
+    ErrorCounts,
+    PathAttachment,
+    Recorder,
+    Status,
+    known_settings,
+)
 
 DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
@@ -99,18 +104,18 @@ class Scene:
         self._writer.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
         self._driven.add(pose.x, pose.y)
 
-    def add_command(self, command: Json) -> None:
-        """Log a command that the mission has taken."""
-        self._say(entities.MISSION_LOG, f"command: {text(command, 'command')}")
+    def add_command(self, command: str) -> None:
+        """Log the name of a command that the mission has taken."""
+        self._say(entities.MISSION_LOG, f"command: {command}")
 
-    def add_path(self, message: PathMessage, note: Json) -> None:
+    def add_path(self, message: PathMessage, about: PathAttachment) -> None:
         """Draw the path to drive, over the one before it, and log why it came."""
         anchor = self._anchor
         if anchor is None and len(message.xy):
             anchor = self._anchored(Pose2D(*message.xy[0].tolist()))
         anchor = anchor or Anchor()
-        self._paths.add(anchor.path(message), anchor.note(note))
-        self._figures.add_path(note)
+        self._paths.add(anchor.path(message), anchor.attachment(about))
+        self._figures.add_path(about)
 
     def add_coverage(self, grid: OccupancyGrid) -> None:
         """Tint what is covered, and plot how much that is."""
@@ -137,18 +142,16 @@ class Scene:
             self._run = replace(self._run, trail_range=self._pheromone.trail_range)
             self._describe()
 
-    def add_status(self, status: Json) -> None:
-        """Plot the planner's figures, show its states, log its errors; any key may be missing."""
+    def add_status(self, status: Status) -> None:
+        """Plot the planner's figures, show its states, log its errors."""
         self._figures.add(status)
         self._add_configuration(status)
-        self._add_restored(section(status, "ledger"))
-        self.enter(entities.MISSION_STATE, text(status, "state"), text(status, "reason"))
-        planning = section(status, "plan").get("planning")
-        if isinstance(planning, bool):
-            self.enter(entities.PLANNER_STATE, "planning" if planning else "idle")
-        self._add_errors(section(status, "errors"))
+        self._add_restored(status.ledger.restored_cells)
+        self.enter(entities.MISSION_STATE, status.state, status.reason)
+        self.enter(entities.PLANNER_STATE, "planning" if status.plan.planning else "idle")
+        self._add_errors(status.errors)
 
-    def add_report(self, report: RecorderReport) -> None:
+    def add_report(self, report: Recorder) -> None:
         """Show the recorder's own state and memory."""
         self.enter(entities.RECORDER_STATE, report.state, report.reason)
         self._curves.draw(f"{entities.MEMORY}/recorder", report.rss_mb, TREMBLE)
@@ -204,18 +207,19 @@ class Scene:
             self._framed = bounds
             self._writer.show(build_blueprint(bounds))
 
-    def _add_configuration(self, status: Json) -> None:
-        version, config = text(status, "version"), dict(section(status, "config"))
+    def _add_configuration(self, status: Status) -> None:
         known = replace(
-            self._run, version=version or self._run.version, config=config or self._run.config
+            self._run,
+            version=status.version or self._run.version,
+            config=status.config or self._run.config,
         )
         if known == self._run:
             return
         self._run = known
         self._describe()
-        radius = number(config, "robot_radius_m")
-        if radius is not None and radius > 0:
-            self._draw_robot(radius)
+        radius_m = known_settings(status.config).robot.radius_m
+        if radius_m > 0:
+            self._draw_robot(radius_m)
 
     def _describe(self) -> None:
         card = rr.TextDocument(self._run.markdown(), media_type="text/markdown")
@@ -227,21 +231,17 @@ class Scene:
         self._writer.log_static(entities.ROBOT_BODY, body)
         self._writer.log_static(entities.ROBOT_HEADING, heading)
 
-    def _add_restored(self, ledger: Json) -> None:
-        restored = integer(ledger, "restored_cells") or 0
+    def _add_restored(self, restored: int) -> None:
         if restored != self._restored:
             self._restored = restored
             self._say(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
 
-    def _add_errors(self, errors: Json) -> None:
-        total = integer(errors, "total")
-        if total is None or total == self._errors:
-            return
+    def _add_errors(self, errors: ErrorCounts) -> None:
         # Fewer than before: the planner was started again.
-        if total > self._errors:
-            last = text(errors, "last") or "no text"
-            self._say(entities.MISSION_LOG, f"error {total}: {last}", "ERROR")
-        self._errors = total
+        if errors.total > self._errors:
+            last = errors.last or "no text"
+            self._say(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")
+        self._errors = errors.total
 
     def _say(self, log: str, message: str, level: str = "INFO") -> None:
         self._writer.log(log, rr.TextLog(message, level=level))

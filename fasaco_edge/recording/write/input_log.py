@@ -15,11 +15,11 @@ from typing import Final
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.recording.fields import section
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.samples.codec import Numbered, SampleEncoder
-from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.json_text import decode_tolerant
 from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.status import Status
 from fasaco_edge.wire.topics import RECORDED_INPUTS
 
 # These hold for the moment they come alone; all other inputs stay in force.
@@ -94,16 +94,16 @@ class InputLog:
         if arrival.topic != "status":
             return False
         try:
-            status = decode_json(arrival.sample.payload)
+            status = decode_tolerant(arrival.sample.payload, Status)
         except MalformedMessage:
             return False
         # A map in it: the mission has begun.
-        has_map = status.get("map") is not None
+        has_map = status.map is not None
         told = (
-            *(status.get("state"), has_map, status.get("version"), status.get("config")),
-            sorted(section(section(status, "errors"), "by_code")),
-            section(status, "ledger").get("fault"),
-            section(status, "recorder").get("state"),
+            *(status.state, has_map, status.version, status.config),
+            sorted(status.errors.by_code),
+            status.ledger.fault,
+            status.recorder and status.recorder.state,
         )
         if told == self._told and arrival.at_ns - self._told_ns < STATUS_PERIOD_NS:
             return False

@@ -16,7 +16,7 @@ from pathlib import Path
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus, Sample, open_bus
-from fasaco_edge.errors import BadConfiguration, FasacoError
+from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.host.processes import resident_mb, return_soon
 from fasaco_edge.host.signals import stop_event
 from fasaco_edge.recording import entities
@@ -28,14 +28,16 @@ from fasaco_edge.recording.write.inbox import Inbox, RunClock
 from fasaco_edge.recording.write.input_log import InputLog
 from fasaco_edge.recording.write.live import serve_live
 from fasaco_edge.recording.write.quota import DiskBudget, Quota, next_run
-from fasaco_edge.recording.write.settings import RecorderReport, RecorderSettings
+from fasaco_edge.recording.write.settings import RecorderSettings
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import decode_json, encode_json, is_the_planners
+from fasaco_edge.wire.json_text import decode_json, decode_tolerant, encode_json
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.pose_decoding import PoseDecoder
+from fasaco_edge.wire.status import PathAttachment, Status
+from fasaco_edge.wire.status import Recorder as RecorderReport
 
 TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000
@@ -173,7 +175,7 @@ class Recorder:
     def _write(self, arrival: Arrival) -> None:
         self._messages += 1
         self._writer.message(arrival.wall_ns)
-        if arrival.topic == "status" and not is_the_planners(arrival.sample.payload):
+        if arrival.topic == "status" and _is_rival(arrival.sample.payload):
             line = "another daemon of this robot's name is there, and waits: it is not recorded"
             self._scene.complain(entities.BUS_LOG, line)
             return
@@ -200,11 +202,11 @@ class Recorder:
             self._scene.add_pose(pose)
 
     def _read_command(self, sample: Sample) -> None:
-        self._scene.add_command(decode_json(sample.payload))
+        self._scene.add_command(str(decode_json(sample.payload).get("command", "")))
 
     def _read_path(self, sample: Sample) -> None:
-        note = decode_json(sample.attachment) if sample.attachment else {}
-        self._scene.add_path(decode_path(sample.payload), note)
+        about = decode_tolerant(sample.attachment, PathAttachment)
+        self._scene.add_path(decode_path(sample.payload), about)
 
     def _read_coverage(self, sample: Sample) -> None:
         self._scene.add_coverage(decode_occupancy_grid(sample.payload))
@@ -214,7 +216,7 @@ class Recorder:
 
     def _read_status(self, sample: Sample) -> None:
         self._last_status_ns = time.monotonic_ns()
-        self._scene.add_status(decode_json(sample.payload))
+        self._scene.add_status(decode_tolerant(sample.payload, Status))
 
     def _watch_planner(self) -> None:
         last = self._last_status_ns
@@ -242,6 +244,14 @@ class Recorder:
         )
         self._scene.add_report(self._report)
         self._reporter.put(encode_json(self._report))
+
+
+def _is_rival(payload: bytes) -> bool:
+    """Tell whether a status is of a second daemon of the robot's name, which does not plan."""
+    try:
+        return decode_tolerant(payload, Status).claim.stand != "plans"
+    except MalformedMessage:
+        return False  # whoever reads it complains
 
 
 def _repaired(folder: Path) -> list[str]:

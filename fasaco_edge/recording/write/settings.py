@@ -1,7 +1,4 @@
-"""What the recorder says about itself on the bus.
-
-What the recorder is told: where to write, whom to listen to, how much room to leave.
-"""
+"""Settings of the recorder: where to write, what to listen to, how much disk to leave free."""
 
 from __future__ import annotations
 
@@ -13,34 +10,6 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.pose_decoding import DEFAULT_FRAMES
 from fasaco_edge.wire.schemas import POSE_STAMPED
-
-
-@dataclass(frozen=True, slots=True)
-class RecorderReport:
-    """The recorder's status, JSON on the key ``recorder``.
-
-    Attributes:
-        state: "recording", "disk full", "stalled" or "stopping".
-        reason: why, for a person; may be "".
-        file: the part being written; "" while there is none.
-        bytes: its size [bytes].
-        messages: samples taken from the bus.
-        lost: samples that were not written, or may not have been.
-        malformed: samples that were not what they should be.
-        rss_mb: memory of the process [MB].
-        pid: its process id.
-    """
-
-    state: str
-    reason: str
-    file: str
-    bytes: int
-    messages: int
-    lost: int
-    malformed: int
-    rss_mb: float
-    pid: int
-
 
 MEGABYTE = 1_000_000
 

@@ -1,0 +1,484 @@
+"""Status documents: what a daemon and a recorder publish about themselves, and read back.
+
+The structs are the contract: ``protocol/schema`` is generated from them. Each member has a
+default, so that a reader takes a document of another version (``json_text.decode_tolerant``).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+import msgspec
+from msgspec import UNSET, Meta, UnsetType
+
+from fasaco_edge.wire.json_text import tolerant
+
+STATES: Final = (
+    *("idle", "waiting for map", "waiting for pose", "loading", "planning", "covering"),
+    *("returning", "paused", "blocked", "degraded", "done"),
+)
+RECORDER_STATES: Final = ("recording", "disk full", "stalled", "stopping")
+SUPERVISED_STATES: Final = ("starting", *RECORDER_STATES, "silent", "restarting")
+CLAIMS: Final = ("looks", "waits", "yields", "plans")
+
+
+def _allowed(**schema: object) -> Meta:
+    """Return what a schema says of a member beyond its type; readers do not insist on it."""
+    return Meta(extra_json_schema=schema)
+
+
+Count = Annotated[int, _allowed(minimum=0)]
+Ordinal = Annotated[int, _allowed(minimum=1)]
+Amount = Annotated[float, _allowed(minimum=0)]
+Name = Annotated[str, _allowed(minLength=1)]
+State = Annotated[str, _allowed(enum=STATES)]
+Settings = dict[str, object]
+"""The configuration in force, without secrets, by sections."""
+
+
+class Document(msgspec.Struct, frozen=True):
+    """A JSON object whose writer sends all members."""
+
+
+class ClaimReport(Document, frozen=True):
+    """Who sends a status, and whether that daemon plans: of several of one name one does.
+
+    Attributes:
+        id: its Zenoh id.
+        stand: looks: it does not know yet whether another plans; yields: it waits, and planned
+            before.
+    """
+
+    id: Annotated[str, _allowed(pattern="^[0-9a-f]{1,32}$")] = ""
+    stand: Annotated[str, _allowed(enum=CLAIMS)] = "plans"
+
+
+class MapReport(Document, frozen=True):
+    """The newest map.
+
+    Attributes:
+        resolution_m: edge of a pixel.
+        revision: counts maps and updates taken in.
+        frame: name of its frame.
+    """
+
+    rows: Ordinal = 1
+    cols: Ordinal = 1
+    resolution_m: Annotated[float, _allowed(exclusiveMinimum=0)] = 1.0
+    revision: Ordinal = 1
+    stamp_ns: int = 0
+    frame: str = ""
+
+
+class Point(Document, frozen=True):
+    """A place.
+
+    Attributes:
+        x, y: [m] in the frame of the map.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+
+
+class PoseReport(Point, frozen=True):
+    """Where the robot is.
+
+    Attributes:
+        x, y: [m] in the frame of the map.
+        yaw: [rad], counter-clockwise.
+    """
+
+    yaw: float = 0.0
+
+
+class CoverageReport(Document, frozen=True):
+    """How many cells are covered.
+
+    Attributes:
+        coverable: cells that are coverable and that the robot can reach.
+        covered: of those.
+        recovered: of those, covered more than once.
+        remaining: of those, still to cover.
+        unreachable: cells where the robot would fit, but cannot come to.
+        free_out_of_reach_m2: area the map knows to be free, but in no reachable cell.
+        fraction: covered share of coverable.
+    """
+
+    coverable: Count = 0
+    covered: Count = 0
+    recovered: Count = 0
+    remaining: Count = 0
+    unreachable: Count = 0
+    covered_m2: Amount = 0.0
+    to_cover_m2: Amount = 0.0
+    free_out_of_reach_m2: Amount = 0.0
+    fraction: Annotated[float, _allowed(minimum=0, maximum=1)] = 0.0
+
+
+class PlanFigures(Document, frozen=True):
+    """The plan that a path follows, as it was made; all null without one.
+
+    Attributes:
+        planner: name of the planner.
+        seed: of all random streams.
+        ants: ants that walked.
+        kicks: perturbations of the local search.
+        proposals: moves that the local search tried.
+        planned_steps: steps of the plan as it was made.
+        planned_cost_s: seconds the plan takes, by configured speed and turn time.
+        lower_bound_steps: no walk has fewer steps.
+        gap: planned_steps / lower_bound_steps - 1.
+    """
+
+    planner: str | None = None
+    seed: Count | None = None
+    ants: Count | None = None
+    kicks: Count | None = None
+    proposals: Count | None = None
+    planned_steps: Count | None = None
+    planned_cost_s: Amount | None = None
+    lower_bound_steps: Ordinal | None = None
+    gap: float | None = None
+
+
+class PathReport(PlanFigures, frozen=True):
+    """The path being driven.
+
+    Attributes:
+        revision: counts the published paths.
+        steps: as published.
+        remaining_steps: still to be driven.
+        reason: why it replaced the one before.
+    """
+
+    revision: Ordinal = 1
+    steps: Count = 0
+    remaining_steps: Count = 0
+    reason: str = ""
+
+
+class Rectangle(Document, frozen=True):
+    """A rectangle along the axes.
+
+    Attributes:
+        x_min, y_min, x_max, y_max: [m] in the frame of the map.
+    """
+
+    x_min: float
+    y_min: float
+    x_max: float
+    y_max: float
+
+
+class PathAttachment(PlanFigures, frozen=True):
+    """What comes with each path, as its Zenoh attachment.
+
+    Attributes:
+        revision: counts the published paths.
+        map_stamp_ns: stamp of the map it was planned on [ns].
+        map_revision: counts the maps and updates taken in.
+        reason: why it replaces the one before.
+        steps: steps from pose to pose.
+        plan_ms: how long planning took; 0 where no plan was needed.
+        changed: rectangle of the map whose cells came, went or have other neighbours; null where
+            that is not the reason.
+    """
+
+    revision: Ordinal = 0
+    map_stamp_ns: int = 0
+    map_revision: Ordinal = 0
+    reason: Name = ""
+    steps: Count = 0
+    plan_ms: Amount = 0.0
+    changed: Rectangle | None = None
+
+
+class PlanCounts(Document, frozen=True):
+    """How many plans were made.
+
+    Attributes:
+        plans: how many plans were made.
+        unchanged: plans that found the path there is.
+        outdated: plans that did not hold any more when they came.
+        attempts: how often spare time went into a better path.
+        planning: whether one is being made.
+    """
+
+    plans: Count = 0
+    unchanged: Count = 0
+    outdated: Count = 0
+    attempts: Count = 0
+    planning: bool = False
+
+
+class Latencies(Document, frozen=True):
+    """How long things took last [ms]; null before the first time.
+
+    Attributes:
+        ingest: taking in the newest map.
+        plan: making the newest plan.
+        map_to_path: from a map's coming to its path's going.
+    """
+
+    ingest: Amount | None = None
+    plan: Amount | None = None
+    map_to_path: Amount | None = None
+
+
+class LoopTimes(Document, frozen=True):
+    """Cycles of the daemon's loop since its start, and how long they took [ms].
+
+    Attributes:
+        turns: how many there were.
+        late: of those, longer than 100 ms.
+        p50: half of the cycles took at most so long, to within 10 %; null before the first.
+        p99: 99 of 100.
+        p99_9: 999 of 1,000.
+        max: the longest.
+    """
+
+    turns: Count = 0
+    late: Count = 0
+    p50: Amount | None = None
+    p99: Amount | None = None
+    p99_9: Amount | None = None
+    max: Amount | None = None
+
+
+class ErrorCounts(Document, frozen=True):
+    """What was refused since the start.
+
+    Attributes:
+        last: message of the newest.
+        by_code: how often, by the codes in errors.yaml.
+    """
+
+    total: Count = 0
+    last: str = ""
+    by_code: Annotated[
+        dict[str, Ordinal], _allowed(propertyNames={"type": "string", "pattern": "^[a-z_]+$"})
+    ] = {}
+
+
+class LedgerReport(Document, frozen=True):
+    """The progress on disk.
+
+    Attributes:
+        path: the file; .previous behind its name is the one before.
+        age_s: since it was last written; null before the first time.
+        restored_cells: covered cells taken over from before the restart.
+        fault: what is or was wrong with it, and what to do.
+    """
+
+    path: str = ""
+    age_s: Amount | None = None
+    restored_cells: Count = 0
+    fault: str | None = None
+
+
+class Recorder(Document, frozen=True):
+    """What the recorder says about itself, on its key.
+
+    Attributes:
+        reason: why, for a person; may be empty.
+        file: the part being written; empty while there is none.
+        bytes: its size.
+        messages: samples taken from the bus.
+        lost: samples that were not written, or may not have been.
+        malformed: samples that were not what they should be.
+        rss_mb: memory of the process [MB].
+    """
+
+    state: Annotated[str, _allowed(enum=RECORDER_STATES)] = ""
+    reason: str = ""
+    file: str = ""
+    bytes: Count = 0
+    messages: Count = 0
+    lost: Count = 0
+    malformed: Count = 0
+    rss_mb: Amount = 0.0
+    pid: Ordinal = 0
+
+
+class SupervisedRecorder(Document, frozen=True):
+    """A supervised recorder: what it says, see recorder.json, if it has said anything.
+
+    Attributes:
+        restarts: how often it was started again.
+        reason: why, for a person; may be empty.
+        file: the part being written; empty while there is none.
+        bytes: its size.
+        messages: samples taken from the bus.
+        lost: samples that were not written, or may not have been.
+        malformed: samples that were not what they should be.
+        rss_mb: memory of the process [MB].
+    """
+
+    state: Annotated[str, _allowed(enum=SUPERVISED_STATES)] = ""
+    restarts: Count = 0
+    reason: str | UnsetType = UNSET
+    file: str | UnsetType = UNSET
+    bytes: Count | UnsetType = UNSET
+    messages: Count | UnsetType = UNSET
+    lost: Count | UnsetType = UNSET
+    malformed: Count | UnsetType = UNSET
+    rss_mb: Amount | UnsetType = UNSET
+    pid: Ordinal | UnsetType = UNSET
+
+
+class ZoneReport(Document, frozen=True):
+    """How far a zone is.
+
+    Attributes:
+        pass: its newest pass; 0: to come.
+        cells: that can be reached.
+        covered: in that pass.
+    """
+
+    name: str = ""
+    passes: Ordinal = 1
+    pass_number: Count = msgspec.field(name="pass", default=0)
+    cells: Count = 0
+    covered: Count = 0
+
+
+class UnreachedArea(Document, frozen=True):
+    """An area of the order that stays uncovered.
+
+    Attributes:
+        x, y: [m] in the frame of the map.
+    """
+
+    cells: Ordinal = 1
+    m2: Amount = 0.0
+    x: float = 0.0
+    y: float = 0.0
+    reason: str = ""
+
+
+class UnreachedReport(Document, frozen=True):
+    """What of the order stays uncovered as things are."""
+
+    cells: Count = 0
+    m2: Amount = 0.0
+    areas: Annotated[tuple[UnreachedArea, ...], _allowed(maxItems=20)] = ()
+    areas_left_out: Count = 0
+
+
+class MissionReport(Document, frozen=True):
+    """The order, and how far it is.
+
+    Attributes:
+        paused: whether the robot is to stand.
+        zone: what is being covered; null for everything reachable.
+        pass: which pass that is; null without an order.
+        passes: of how many.
+        keep_out: how many keep-out zones there are.
+        home: where the mission began.
+        tries: how often what was left over was tried again.
+        unreached: what of the order stays uncovered as things are.
+    """
+
+    ordered: Annotated[str | None, _allowed(enum=("command", "itself", None))] = None
+    stage: Annotated[
+        str | None, _allowed(enum=("covering", "retrying", "returning", "over", None))
+    ] = None
+    paused: bool = False
+    zone: str | None = None
+    pass_number: Ordinal | None = msgspec.field(name="pass", default=None)
+    passes: Ordinal | None = None
+    zones: tuple[ZoneReport, ...] = ()
+    keep_out: Count = 0
+    return_home: bool = False
+    home: Point | None = None
+    tries: Count = 0
+    unreached: UnreachedReport = UnreachedReport()
+
+
+class Status(Document, frozen=True):
+    """What a daemon says about itself. Members may be added; readers ignore unknown ones.
+
+    Attributes:
+        version: of the package.
+        reason: why it is in that state.
+        rss_mb: memory of the process [MB].
+        cpu_s: processor time the process has used [s].
+        threads: of the process.
+    """
+
+    robot: Name = ""
+    version: str = ""
+    state: State = ""
+    reason: str = ""
+    claim: ClaimReport = ClaimReport()
+    uptime_s: Amount = 0.0
+    map: MapReport | None = None
+    pose: PoseReport | None = None
+    coverage: CoverageReport | None = None
+    path: PathReport | None = None
+    plan: PlanCounts = PlanCounts()
+    latency_ms: Latencies = Latencies()
+    loop_ms: LoopTimes = LoopTimes()
+    errors: ErrorCounts = ErrorCounts()
+    ledger: LedgerReport = LedgerReport()
+    recorder: SupervisedRecorder | None = None
+    rss_mb: Amount = 0.0
+    cpu_s: Amount = 0.0
+    threads: Ordinal = 0
+    config: Annotated[Settings, _allowed(**{"$ref": "config.json"})] = {}
+    mission: MissionReport = MissionReport()
+
+
+class RobotSettings(Document, frozen=True):
+    """The robot's size, and the cell's [m]; 0 where not sent."""
+
+    radius_m: float = 0.0
+    tool_width_m: float = 0.0
+
+
+class MapSettings(Document, frozen=True):
+    """What is free and what is occupied [percent]."""
+
+    free_at_most: int | None = None
+    occupied_at_least: int | None = None
+
+
+class PoseSettings(Document, frozen=True):
+    """The type of poses whose sender names none."""
+
+    schema: str = ""
+
+
+class MissionSettings(Document, frozen=True):
+    """How long the mission goes on without a pose [s]."""
+
+    lost_pose_s: float = 0.0
+
+
+class Frames(Document, frozen=True):
+    """Names of the frames of map and robot."""
+
+    map: str = ""
+    robot: str = ""
+
+
+class RosSettings(Document, frozen=True):
+    """What poses as transforms are read by."""
+
+    frames: Frames | None = None
+
+
+class KnownSettings(Document, frozen=True):
+    """The settings of a daemon that its readers use."""
+
+    robot: RobotSettings = RobotSettings()
+    map: MapSettings = MapSettings()
+    pose: PoseSettings = PoseSettings()
+    mission: MissionSettings = MissionSettings()
+    ros2: RosSettings = RosSettings()
+
+
+def known_settings(config: Settings) -> KnownSettings:
+    """Return the settings of a status that readers use; what does not fit keeps its default."""
+    return tolerant(config, KnownSettings)

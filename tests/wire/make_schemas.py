@@ -1,0 +1,130 @@
+"""Writes protocol/schema: ``python -m tests.wire.make_schemas``, from the top folder.
+
+A test holds the files to what this module makes of the structs. A member's description stands
+in the docstring of its struct, below ``Attributes:``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+import msgspec
+
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.host.resources import folder
+from fasaco_edge.mission.orders.order import CommandDocument
+from fasaco_edge.wire.replies import Error, Replan, Reply, Version
+from fasaco_edge.wire.status import PathAttachment, Recorder, Status
+from fasaco_edge.wire.turns import TurnBatch
+
+DIALECT = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+DOCUMENTS = {
+    "error": Error,
+    "mission": CommandDocument,
+    "path_attachment": PathAttachment,
+    "recorder": Recorder,
+    "replan": Replan,
+    "reply": Reply,
+    "status": Status,
+    "turns": TurnBatch,
+    "version": Version,
+}
+
+
+def files() -> dict[str, str]:
+    """Return every file in protocol/schema, by its name there."""
+    made = {f"{name}.json": schema_of(kind) for name, kind in DOCUMENTS.items()}
+    made["config.json"] = config_schema()
+    return {name: json.dumps(DIALECT | made[name], indent=2) + "\n" for name in sorted(made)}
+
+
+def schema_of(kind: type[msgspec.Struct]) -> dict[str, Any]:
+    """Return the JSON Schema of a document."""
+    schema = msgspec.json.schema(kind, schema_hook=lambda _: {"$comment": "any value"})
+    for struct in structs_in(kind):
+        _complete(schema["$defs"][struct.__name__], struct)
+    return schema
+
+
+def config_schema() -> dict[str, Any]:
+    """Return the JSON Schema of the configuration: its sections, whatever stands in each."""
+    fields = msgspec.structs.fields(DaemonConfig)
+    return {
+        "title": "Config",
+        "description": "The configuration in force, by sections; secrets are left out. What may "
+        "stand in each section is the package's own business.",
+        "type": "object",
+        "properties": {
+            field.name: {
+                "description": _summary(next(_structs_of(field.type))),
+                "type": "object",
+            }
+            for field in fields
+        },
+        "required": [field.name for field in fields if field.default is not msgspec.UNSET],
+    }
+
+
+def structs_in(kind: type[msgspec.Struct]) -> set[type[msgspec.Struct]]:
+    """Return a struct and all those in its members."""
+    found = {kind}
+    for field in msgspec.structs.fields(kind):
+        for inner in _structs_of(field.type):
+            found |= structs_in(inner)
+    return found
+
+
+def _structs_of(kind: Any) -> Iterator[type[msgspec.Struct]]:
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        yield kind
+    for argument in get_args(kind):
+        yield from _structs_of(argument)
+
+
+def _complete(part: dict[str, Any], struct: type[msgspec.Struct]) -> None:
+    """Add what the docstring says, and that a writer sends all members it does not leave out."""
+    part["description"] = _summary(struct)
+    if part["type"] == "array":
+        return
+    for base in reversed(struct.__mro__):
+        for name, text in descriptions(base.__doc__ or "").items():
+            if name in part["properties"]:
+                part["properties"][name].setdefault("description", text)
+    config = struct.__struct_config__
+    if config.omit_defaults or (config.forbid_unknown_fields and struct is not Error):
+        return  # a member that is missing has its default
+    fields = msgspec.structs.fields(struct)
+    part["required"] = [field.encode_name for field in fields if field.default is not msgspec.UNSET]
+    for member in part["properties"].values():
+        member.pop("default", None)
+
+
+def _summary(struct: type[msgspec.Struct]) -> str:
+    paragraphs = inspect.cleandoc(struct.__doc__ or "").split("\n\n")
+    return " ".join(paragraphs[0].split())
+
+
+def descriptions(docstring: str) -> dict[str, str]:
+    """Return what a docstring says of each attribute."""
+    listed = inspect.cleandoc(docstring).partition("Attributes:\n")[2].partition("\n\n")[0]
+    found: dict[str, str] = {}
+    for entry in re.split(r"\n(?=    \S)", listed) if listed else ():
+        names, _, text = entry.partition(": ")
+        for name in names.split(","):
+            found[name.strip()] = " ".join(text.split()).rstrip(".")
+    return found
+
+
+def write(into: Path) -> None:
+    """Write all files to ``into``."""
+    for name, content in files().items():
+        (into / name).write_text(content)
+
+
+if __name__ == "__main__":
+    write(folder("protocol") / "schema")

@@ -1,0 +1,96 @@
+"""JSON documents as structs: strict readers refuse, tolerant ones take what fits."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.mission.core.events import State
+from fasaco_edge.wire.json_text import (
+    MAX_INTEGER,
+    MAX_TEXT,
+    decode_document,
+    decode_tolerant,
+    encode_json,
+    tolerant,
+)
+from fasaco_edge.wire.status import (
+    STATES,
+    CoverageReport,
+    PathAttachment,
+    Rectangle,
+    Status,
+    SupervisedRecorder,
+    ZoneReport,
+    known_settings,
+)
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner),
+    max_leaves=10,
+)
+MEMBERS = [field.encode_name for field in msgspec.structs.fields(Status)]
+
+
+def test_a_status_comes_back_as_it_was():
+    status = Status(
+        state="covering",
+        coverage=CoverageReport(coverable=3, covered=1),
+        recorder=SupervisedRecorder("starting", 2),
+        config={"robot": {"radius_m": 0.2}},
+    )
+    payload = encode_json(status)
+    assert decode_document(payload, Status) == decode_tolerant(payload, Status) == status
+    assert b"lost" not in payload
+
+
+def test_every_state_of_a_mission_may_stand_in_a_status():
+    assert {str(state) for state in State} <= set(STATES)
+
+
+def test_a_strict_reader_refuses_what_a_tolerant_one_leaves_out():
+    payload = encode_json({"state": "done", "coverage": {"covered": "all", "coverable": 3}})
+    with pytest.raises(MalformedMessage, match="covered"):
+        decode_document(payload, Status)
+    status = decode_tolerant(payload, Status)
+    assert (status.state, status.coverage) == ("done", CoverageReport(coverable=3))
+
+
+@pytest.mark.parametrize(
+    ("document", "expected"),
+    [
+        ({}, Status()),
+        ({"weather": "rain"}, Status()),
+        ({"state": 5, "reason": None}, Status()),
+        ({"reason": "x" * 900}, Status(reason="x" * MAX_TEXT)),
+        ({"threads": True}, Status()),
+        ({"threads": MAX_INTEGER + 1, "rss_mb": 10**400}, Status()),
+        ({"rss_mb": 5, "plan": []}, Status(rss_mb=5.0)),
+        ({"errors": {"total": 1, "by_code": {"a": 1, "b": "2"}}}, {"a": 1}),
+        ({"mission": {"zones": [{"name": "k", "pass": 2}, 7]}}, (ZoneReport("k", pass_number=2),)),
+    ],
+)
+def test_what_does_not_fit_keeps_its_default(document, expected):
+    status = tolerant(document, Status)
+    assert expected in (status, status.errors.by_code, status.mission.zones)
+
+
+def test_a_rectangle_is_whole_or_missing():
+    edges = {"x_min": 0, "y_min": 0, "x_max": 1, "y_max": 2}
+    assert tolerant({"changed": edges}, PathAttachment).changed == Rectangle(0.0, 0.0, 1.0, 2.0)
+    assert tolerant({"changed": edges | {"x_min": "0"}}, PathAttachment).changed is None
+
+
+def test_no_attachment_is_an_empty_one():
+    assert decode_tolerant(b"", PathAttachment) == PathAttachment()
+
+
+@given(st.dictionaries(st.sampled_from(MEMBERS), JSON))
+def test_a_tolerant_reader_takes_any_object(document):
+    status = tolerant(document, Status)
+    assert decode_document(encode_json(status), Status) == status
+    known_settings(status.config)
