@@ -1,8 +1,8 @@
 """What a benchmark is: options, samples one by one, and a report on any number of them.
 
-A new benchmark is a file that ends with a ``Benchmark``, and its name in
-``fasaco_edge.bench.table``. Whoever runs it may stop between two samples, or
-within one, and still gets the report on those there are.
+A new benchmark is a file that ends with a ``Benchmark``, and a row of ``BENCHMARKS`` in
+``fasaco_edge.cli.bench`` or ``tests.benchmarks.__main__``. Whoever runs it may stop between two
+samples, or within one, and still gets the report on those there are.
 """
 
 from __future__ import annotations
@@ -140,3 +140,28 @@ def seconds_above_zero(text: str) -> float:
     if number == 0.0:
         raise argparse.ArgumentTypeError(f"must be above 0 s, got {text}")
     return number
+
+
+def add_grid_options(parser: argparse.ArgumentParser, default_maps: tuple[str, ...]) -> None:
+    """Declare ``--grids`` and ``--maps``."""
+    parser.add_argument(
+        "--grids",
+        nargs="+",
+        default=[],
+        metavar="FILE.npy",
+        help="coverage grids (bool, True = free); FILE.json beside one may name "
+        'the start: {"start": [row, col]}',
+    )
+    parser.add_argument(
+        "--maps",
+        nargs="+",
+        default=[],
+        metavar="MAP",
+        help="map_server YAMLs or names from `maps`, in cells of 0.3 m for a robot of 0.18 m "
+        f"radius (default, without --grids: {' '.join(default_maps)})",
+    )
+
+
+def grid_names(args: argparse.Namespace, default_maps: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the grids and maps asked for, else the default ones."""
+    return (*args.grids, *args.maps) or default_maps

@@ -20,7 +20,7 @@ from fasaco_edge.bench.benchmark import (
 )
 from fasaco_edge.bench.machine import cpu_seconds, machine, peak_mb, place, weighed
 from fasaco_edge.bench.processes import DaemonProcess, warm_kernels
-from fasaco_edge.bench.workload import CoveringRobot, robot_beside
+from fasaco_edge.bench.robot import CoveringRobot, robot_beside
 from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.host.processes import python_program

@@ -11,8 +11,8 @@ from typing import Any
 
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seconds
 from fasaco_edge.bench.machine import machine, peak_mb
-from fasaco_edge.bench.processes import DaemonProcess, MapSource, recorder_beside, warm_kernels
-from fasaco_edge.bench.workload import building, robot_pose, with_crate
+from fasaco_edge.bench.processes import DaemonProcess, recorder_beside, warm_kernels
+from fasaco_edge.bench.robot import MapSource, building, robot_pose, with_crate
 from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import peak_mb as peak_mb_of

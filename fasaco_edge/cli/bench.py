@@ -8,7 +8,10 @@ from collections.abc import Sequence
 from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
-from fasaco_edge.bench.table import BENCHMARKS
+from fasaco_edge.bench.footprint import FOOTPRINT
+from fasaco_edge.bench.jitter import JITTER
+from fasaco_edge.bench.latency import LATENCY
+from fasaco_edge.bench.speed import SPEED
 from fasaco_edge.cli.console import exits
 from fasaco_edge.cli.console.streams import print_json
 
@@ -19,6 +22,7 @@ if TYPE_CHECKING:
     from fasaco_edge.cli.console.arguments import Subparsers
 
 WIDTH = 80
+BENCHMARKS: tuple[Benchmark[Any], ...] = (SPEED, FOOTPRINT, LATENCY, JITTER)
 
 EPILOG = """\
 Each benchmark explains itself with --help, prints a table or --json, and can be

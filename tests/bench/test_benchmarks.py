@@ -15,8 +15,8 @@ import pytest
 
 from fasaco_edge.bench import machine as placement
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report
-from fasaco_edge.bench.table import BENCHMARKS
 from fasaco_edge.cli import bench, main
+from fasaco_edge.cli.bench import BENCHMARKS
 
 MACHINE = {"processor", "cores", "load_1min", "python", "version"}
 CHECKOUT = Path(__file__).parents[2]
@@ -41,10 +41,9 @@ def test_speed(capsys, tmp_path):
     file = tmp_path / "room.npy"
     np.save(file, np.ones((7, 9), bool))
     file.with_suffix(".json").write_text('{"start": [3, 4]}')
-    options = ["--ants", "40", "--repeats", "2", "--naive-s", "0.2", "--return-home"]
+    options = ["--ants", "40", "--repeats", "2", "--return-home"]
     words = ["--grids", str(file), "--maps", "office", *options]
     document = figures(capsys, "speed", *words)
-    assert document["naive_available"]
     assert [grid["grid"] for grid in document["grids"]] == [str(file), "office"]
     for grid in document["grids"]:
         assert_ordered(grid["wall_s"])
@@ -54,22 +53,19 @@ def test_speed(capsys, tmp_path):
         assert grid["steps"] % 2 == 0
         assert grid["steps"] >= grid["cells"] - 1
         assert grid["ants_per_s"] == pytest.approx(40 / grid["wall_s"]["median"], rel=1e-2)
-        naive = grid["naive"]
-        assert naive["same_walk"] is True
-        assert 8 <= naive["ants"] <= 40
-        per_ant = naive["cpu_s"] / naive["ants"] / (grid["cpu_s"]["median"] / grid["ants"])
-        assert naive["ratio"] == pytest.approx(per_ant, rel=1e-2, abs=0.1)
+        assert grid["parallel"]["threads"] == 2
+        assert grid["parallel"]["same_walk"] is True
     assert document["grids"][0]["cells"] == 63
 
 
 def test_speed_goals_are_those_of_a_thousand_ants(capsys):
-    document = figures(capsys, "speed", "--maps", "office", "--repeats", "1", "--naive-s", "0")
+    document = figures(capsys, "speed", "--maps", "office", "--repeats", "1")
     (goal,) = document["goals"]
     assert (goal["limit"], goal["unit"], goal["at_least"]) == (0.25, "s", False)
     assert goal["measured"] == pytest.approx(document["grids"][0]["wall_s"]["median"], abs=1e-3)
 
 
-def test_speed_without_a_checkout_says_so(tmp_path):
+def test_speed_needs_no_checkout(tmp_path):
     """As in a wheel: no tests, no project file, maps inside the package."""
     shutil.copytree(
         CHECKOUT / "fasaco_edge",
@@ -86,7 +82,7 @@ def test_speed_without_a_checkout_says_so(tmp_path):
         text=True,
         check=True,
     )
-    assert "needs a source checkout" in result.stdout
+    assert "office" in result.stdout
 
 
 def test_footprint(capsys):
@@ -262,7 +258,7 @@ def test_help_teaches_by_example(benchmark, capsys):
     assert f"fasaco-edge bench {benchmark.name}" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("words", [["--ants", "0"], ["--repeats", "-1"], ["--naive-s", "nan"]])
+@pytest.mark.parametrize("words", [["--ants", "0"], ["--repeats", "-1"], ["--threads", "nan"]])
 def test_impossible_options_are_refused(words, capsys):
     with pytest.raises(SystemExit, match="2"):
         main(["bench", "speed", *words])

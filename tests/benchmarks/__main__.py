@@ -19,8 +19,11 @@ from tests.benchmarks.online.benchmark import ONLINE
 from tests.benchmarks.quality.benchmark import QUALITY
 from tests.benchmarks.scale.benchmark import SCALE
 from tests.benchmarks.table1.benchmark import TABLE1
+from tests.benchmarks.twins import TWINS
 
-BENCHMARKS: tuple[Benchmark[Any], ...] = (TABLE1, QUALITY, ONLINE, SCALE, CODEC, INGEST)
+BENCHMARKS: tuple[Benchmark[Any], ...] = (
+    TABLE1, QUALITY, ONLINE, SCALE, CODEC, INGEST, TWINS,
+)  # fmt: skip
 
 
 def main(argv: Sequence[str] | None = None) -> int:

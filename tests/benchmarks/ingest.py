@@ -15,7 +15,7 @@ import numpy as np
 
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive
 from fasaco_edge.bench.machine import machine, peak_mb
-from fasaco_edge.bench.workload import building, with_crate
+from fasaco_edge.bench.robot import building, with_crate
 from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window

@@ -6,8 +6,15 @@ import argparse
 from collections.abc import Callable, Generator, Sequence
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bench.benchmark import Benchmark, Report, Say, positive, seconds
-from fasaco_edge.bench.grid_options import add_grid_options, grid_names
+from fasaco_edge.bench.benchmark import (
+    Benchmark,
+    Report,
+    Say,
+    add_grid_options,
+    grid_names,
+    positive,
+    seconds,
+)
 
 if TYPE_CHECKING:
     from tests.benchmarks.online.run import MissionRun

@@ -13,11 +13,12 @@ from fasaco_edge.bench.benchmark import (
     Benchmark,
     Report,
     Say,
+    add_grid_options,
+    grid_names,
     positive,
     seconds,
     seconds_above_zero,
 )
-from fasaco_edge.bench.grid_options import add_grid_options, grid_names
 from fasaco_edge.errors import BadConfiguration
 
 if TYPE_CHECKING:

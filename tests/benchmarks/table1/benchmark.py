@@ -7,8 +7,14 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bench.benchmark import Benchmark, Report, Say, positive
-from fasaco_edge.bench.grid_options import add_grid_options, grid_names
+from fasaco_edge.bench.benchmark import (
+    Benchmark,
+    Report,
+    Say,
+    add_grid_options,
+    grid_names,
+    positive,
+)
 
 if TYPE_CHECKING:
     from tests.benchmarks.table1.runs import Run

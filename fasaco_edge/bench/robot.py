@@ -1,30 +1,43 @@
-"""A building to publish: halls of ten metres with doors, 50 m x 50 m as it comes from SLAM.
+"""A robot for a daemon to work for, and the building it publishes: halls of ten metres with doors.
 
-A robot for a daemon to work for: it drives along its paths, and its map changes.
+The building is fully known, 50 m x 50 m, as it comes from SLAM. A crate in it moves.
 """
 
 from __future__ import annotations
 
+import queue
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.processes import DaemonProcess, MapSource
+from fasaco_edge.bench.processes import LOOK_EVERY_S, START_TIMEOUT_S, DaemonProcess
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus, Sample
+from fasaco_edge.errors import BusUnavailable, NotYet
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid
 from fasaco_edge.wire import topics
+from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.maps import encode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.poses import encode_pose_stamped
 
 RESOLUTION_M = 0.05
 HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
 # A crate further along each time, by less than its own width and back again.
 CRATE_PLACES, CRATE_STEP_PX = 12, 12
+POSES_HZ = 10
+SPEED_M_S = 0.5
+# A crate moves so often [s]: each time the rest of the path is planned anew.
+MAP_EVERY_S = 1.0
+# The first path needs the kernels; on a slow computer their loading takes long.
+PATH_TIMEOUT_S = 120.0
 
 
 def building(side_px: int = 1000) -> OccupancyGrid:
@@ -63,10 +76,74 @@ def robot_pose(stamp_ns: int) -> StampedPose:
     return StampedPose(Pose2D(2.5, 2.5), stamp_ns=stamp_ns)
 
 
-POSES_HZ = 10
-SPEED_M_S = 0.5
-# A crate moves so often [s]: each time what is left of the path is planned anew.
-MAP_EVERY_S = 1.0
+@dataclass(frozen=True, slots=True)
+class PathArrival:
+    """A path as it came in: when [s, monotonic], and what its attachment says of it."""
+
+    at: float
+    about: dict[str, Any]
+
+
+class MapSource:
+    """Publishes maps and the pose to a daemon, and hears its paths."""
+
+    def __init__(self, daemon: DaemonProcess, bus: Bus) -> None:
+        keys = daemon.keys
+        self._daemon = daemon
+        self._maps = bus.advertise(keys, topics.MAP)
+        self._poses = bus.advertise(keys, topics.POSE)
+        self._arrivals = queue.SimpleQueue[tuple[float, Sample]]()
+        bus.subscribe(
+            keys.of(topics.PATH), lambda sample: self._arrivals.put((time.monotonic(), sample))
+        )
+        for publisher in (self._maps, self._poses):
+            self._await_listener(publisher)
+
+    def put_pose(self, pose: StampedPose) -> None:
+        """Publish a pose."""
+        self._poses.put(encode_pose_stamped(pose))
+
+    def put_map(self, grid: OccupancyGrid) -> float:
+        """Publish a map; return when [s, monotonic]."""
+        payload = encode_occupancy_grid(grid)
+        at = time.monotonic()
+        self._maps.put(payload)
+        return at
+
+    def wait_path(self, map_stamp_ns: int) -> PathArrival:
+        """Return the first path planned on the map of that stamp.
+
+        Paths without a plan, a walk cut off before a new obstacle, are passed over.
+
+        Raises:
+            NotYet: none came in time.
+            ProcessEnded: the daemon has ended.
+        """
+        deadline = time.monotonic() + PATH_TIMEOUT_S
+        while time.monotonic() < deadline:
+            try:
+                at, sample = self._arrivals.get(timeout=0.5)
+            except queue.Empty:
+                self._daemon.check()
+                continue
+            about = decode_json(sample.attachment)
+            if about["map_stamp_ns"] == map_stamp_ns and about["planner"] is not None:
+                return PathArrival(at, about)
+        raise NotYet(
+            f"no path for a map after {PATH_TIMEOUT_S:.0f} s", hint="is the machine overloaded?"
+        )
+
+    def forget_paths(self) -> None:
+        """Let go of the paths that nobody waited for."""
+        while not self._arrivals.empty():
+            self._arrivals.get()
+
+    def _await_listener(self, publisher: Publisher) -> None:
+        deadline = time.monotonic() + START_TIMEOUT_S
+        while not publisher.has_listeners():
+            if time.monotonic() > deadline:
+                raise BusUnavailable("the daemon does not subscribe to maps and poses")
+            time.sleep(LOOK_EVERY_S)
 
 
 class CoveringRobot:
