@@ -15,8 +15,9 @@ demo: $(STAMP)  ## watch a robot cover a building nobody mapped before
 test: $(STAMP)  ## all tests
 	# Compiles once what each test would wait for.
 	$(BIN)/fasaco-edge warmup
-	# Most tests wait for processes and their timers: three at a time take half as long.
-	$(BIN)/python -m pytest -n 3 --dist loadfile $(ARGS)
+	# Most tests wait for processes and their timers, so four run at a time. In the order of
+	# collection: by default files with few tests, which take longest, would come last.
+	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 check: $(STAMP)  ## format, lint, types, import contracts
 	$(BIN)/ruff format --check .
