@@ -162,7 +162,7 @@ class BadConfiguration(FasacoError):
 
 
 class OpenToEveryone(BadConfiguration):
-    """The daemon would listen beyond this computer without knowing who speaks to it."""
+    """The daemon would accept remote connections without authentication."""
 
     code = "open_to_everyone"
     hint = (

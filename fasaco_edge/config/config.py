@@ -1,4 +1,4 @@
-"""The daemon's configuration: typed, checked as a whole, nothing repaired."""
+"""The daemon's configuration: typed, checked as a whole, never repaired."""
 
 from __future__ import annotations
 
@@ -53,8 +53,7 @@ class RobotConfig(Section, frozen=True):
 class BusConfig(Section, frozen=True):
     """How to join the bus, and who else may.
 
-    Beyond loopback nothing is listened on unless it stands here, and there nobody may speak
-    without a name (``security``), unless ``open_to_everyone`` says so.
+    Remote access requires authentication (``security``), unless ``open_to_everyone`` is set.
     """
 
     base: str = "fasaco"
@@ -65,12 +64,12 @@ class BusConfig(Section, frozen=True):
     security: SecurityConfig = SecurityConfig()
 
     def settings(self, prefix: str, ros: RosConfig | None = None) -> BusSettings:
-        """Return these as settings of the session of a robot; its keys begin with ``prefix``.
+        """Return the settings of the session of a robot whose keys begin with ``prefix``.
 
-        ``ros`` has the keys it has besides.
+        ``ros`` are its keys under ROS 2.
 
         Raises:
-            BadConfiguration: a file that shows who this is cannot be read.
+            BadConfiguration: a file of ``security`` cannot be read.
         """
         part = self.security.of_daemon(prefix, ros.rights() if ros else None)
         if self.open_to_everyone:
@@ -79,10 +78,7 @@ class BusConfig(Section, frozen=True):
 
 
 class MapConfig(Section, frozen=True):
-    """What in an occupancy grid is free and occupied [percent], the largest map and lattice.
-
-    For what they take of memory see ``daemon.memory``.
-    """
+    """Thresholds of free and occupied [percent]; largest map and lattice (``daemon.memory``)."""
 
     free_at_most: Percent = 25
     occupied_at_least: Percent = 65
@@ -91,7 +87,7 @@ class MapConfig(Section, frozen=True):
 
 
 class PoseConfig(Section, frozen=True):
-    """The type of a pose whose sender names none, as ROS 2's do not."""
+    """The type of poses that come without one, as under ROS 2."""
 
     schema: Literal[
         "geometry_msgs/msg/PoseStamped",
@@ -101,7 +97,7 @@ class PoseConfig(Section, frozen=True):
 
 
 class DaemonConfig(Section, frozen=True):
-    """The whole configuration; without ``ros2`` the daemon has nothing to do with ROS."""
+    """The whole configuration; without ``ros2`` nothing is published or subscribed under ROS."""
 
     robot: RobotConfig = RobotConfig()
     bus: BusConfig = BusConfig()
@@ -121,7 +117,7 @@ class DaemonConfig(Section, frozen=True):
         return Keys(robot=self.robot.name, base=self.bus.base)
 
     def poses(self) -> PoseDecoder:
-        """Return what decodes poses, as they come by the native key or by ROS 2."""
+        """Return the decoder of poses, from the native key or from ROS 2."""
         frames = None
         if self.ros2 and self.ros2.pose == "tf":
             frames = (self.ros2.frames.map, self.ros2.frames.robot)
@@ -143,7 +139,7 @@ def load_config(path: Path | None) -> DaemonConfig:
     hint = first.error.hint
     if more:
         others = f"the {len(more)} others" if len(more) > 1 else "another one"
-        hint += f"; fasaco-edge check-config {path} tells {others}"
+        hint += f"; fasaco-edge check-config {path} shows {others}"
     raise type(first.error)(f"{where}: {first.error}", hint=hint) from first.error
 
 
@@ -160,9 +156,9 @@ def decode_config(document: bytes) -> DaemonConfig:
 
 
 def inspect_config(path: Path | None) -> tuple[DaemonConfig | None, tuple[Fault, ...]]:
-    """Read a YAML file; return the configuration, or None and all that is wrong.
+    """Read a YAML file; return the configuration, or None and all faults.
 
-    What does not go together is only looked for where each value by itself is right.
+    Whether values fit together is checked once each is valid by itself.
     """
     if path is None:
         return DaemonConfig(), ()
@@ -173,7 +169,7 @@ def inspect_config(path: Path | None) -> tuple[DaemonConfig | None, tuple[Fault,
     faults = [*text.twice, *section_faults(DaemonConfig, text.document)]
     if not faults:
         config = msgspec.convert(with_credentials(text.document), DaemonConfig)
-        faults = [Fault(_named_in(error), error) for error in _together(config)]
+        faults = [Fault(_named_in(error), error) for error in _misfits(config)]
         if not faults:
             return config, ()
     return None, tuple(
@@ -182,13 +178,13 @@ def inspect_config(path: Path | None) -> tuple[DaemonConfig | None, tuple[Fault,
 
 
 def _named_in(error: BadConfiguration) -> str:
-    """Return the key that an error begins with."""
+    """Return the key at the start of an error."""
     match = re.match(r"[\w.\[\]]*", str(error))
     return match[0] if match else ""
 
 
-def _together(config: DaemonConfig) -> Iterator[BadConfiguration]:
-    """Yield what no single value shows."""
+def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
+    """Yield values that do not fit together."""
     low, high = config.map.free_at_most, config.map.occupied_at_least
     if low >= high:
         yield BadConfiguration(
@@ -220,7 +216,7 @@ def _together(config: DaemonConfig) -> Iterator[BadConfiguration]:
 
 
 def _refused(before: str, make: Callable[[], object]) -> Iterator[BadConfiguration]:
-    """Yield why something cannot be made of the configuration, if so."""
+    """Yield why ``make`` refuses a value, if it does."""
     try:
         make()
     except BadConfiguration as error:

@@ -1,14 +1,7 @@
-"""Whether a certificate, its key and its CA fit together: tried, not read.
+"""Credentials: certificates, a client's security file, and files lent by a service manager.
 
-Both sides of a TLS connection are played in memory with the same files. What is found wrong is
-what others would find wrong with who connects with them; and with who listens with them.
-
-How a process that joins a secured daemon or router shows who it is.
-
-Files that a service manager lends the service, see LoadCredential= in systemd.exec(5).
-
-Their folder has another name for each service, so that a configuration that several read can
-only say where to find it: ``$CREDENTIALS_DIRECTORY/key.pem``.
+Whether certificate, key and CA fit together is tried in a TLS handshake in memory: what it finds
+wrong is what a remote side would find wrong.
 """
 
 from __future__ import annotations
@@ -51,11 +44,11 @@ class Certificate:
 
 
 def read_certificate(files: TlsConfig, *, listens: bool = True) -> Certificate:
-    """Return what the certificate says.
+    """Check a certificate, and return what it says.
 
     Args:
         files: certificate, key and CA.
-        listens: whether others connect to whom it belongs, too.
+        listens: whether its owner accepts connections, too.
 
     Raises:
         BadConfiguration: a file cannot be read, has ended, or does not fit the others.
@@ -65,12 +58,12 @@ def read_certificate(files: TlsConfig, *, listens: bool = True) -> Certificate:
         listening, connecting = _context(files, server=True), _context(files, server=False)
         if not listens:
             connecting.verify_mode = ssl.CERT_NONE
-        said = _shaken_hands(listening, connecting)
+        said = _handshake(listening, connecting)
         chain = [said, *listening.get_ca_certs()]
     except ssl.SSLCertVerificationError as error:
         raise BadConfiguration(f"{files.certificate}: {error.verify_message}") from error
     except ssl.SSLError as error:
-        # Where a file holds no PEM, or the key is locked, there is no reason given.
+        # OpenSSL gives no reason where a file is not PEM, or the key is locked.
         reason = (error.reason or "not PEM, or a key with a password").lower().replace("_", " ")
         together = f"{files.certificate}, {files.private_key} and {files.root_ca}"
         raise BadConfiguration(f"{together} do not fit together: {reason}") from error
@@ -83,7 +76,7 @@ def read_certificate(files: TlsConfig, *, listens: bool = True) -> Certificate:
     if now < begins:
         raise ClockBeforeCertificate(
             f"the clock says {now:%Y-%m-%d %H:%M} UTC, which is before the beginning of "
-            f"{files.certificate}, {begins:%Y-%m-%d %H:%M}: nobody can be connected with by it"
+            f"{files.certificate}, {begins:%Y-%m-%d %H:%M}: no connection can be made with it"
         )
     if now > ends:
         raise BadConfiguration(f"{files.certificate}: certificate has expired, {ends:%Y-%m-%d}")
@@ -104,16 +97,16 @@ def _context(files: TlsConfig, *, server: bool) -> ssl.SSLContext:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER if server else ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname = False
     context.verify_mode = ssl.CERT_REQUIRED
-    # Whether it is valid by now is told apart from whether it fits.
+    # Whether it is valid by now is a question of its own.
     context.verify_flags |= NO_CHECK_TIME
-    # A key that needs a password must not make us ask for it.
+    # A locked key must not prompt for its password.
     context.load_cert_chain(files.certificate, files.private_key, password=lambda: "")
     context.load_verify_locations(files.root_ca)
     return context
 
 
-def _shaken_hands(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> dict[str, Any]:
-    """Return what the side that listens is shown."""
+def _handshake(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> dict[str, Any]:
+    """Return the certificate that the listening side is shown."""
     there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
     client = connecting.wrap_bio(back, there)
     server = listening.wrap_bio(there, back, server_side=True)
@@ -127,7 +120,7 @@ def _shaken_hands(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> dict
 
 
 def read_client_security(file: str, connect: Sequence[str]) -> SecurityConfig:
-    """Return what the YAML file of ``--security`` says.
+    """Read the YAML file of ``--security``.
 
     Raises:
         BadConfiguration: it cannot be read, is incomplete, or does not fit the endpoints.
@@ -149,9 +142,10 @@ FOLDER = "CREDENTIALS_DIRECTORY"
 
 
 def with_credentials(part: object, environ: Mapping[str, str] = os.environ) -> object:
-    """Return a part of a configuration with the folder in place of its name.
+    """Return a part of a configuration with ``$CREDENTIALS_DIRECTORY/`` resolved.
 
-    Where nobody lends anything the name stays: the file is missing then, and is named so.
+    A service manager lends files in a folder of another name for each service, see
+    LoadCredential= in systemd.exec(5). Without one the name stays, and the file is missing.
     """
     folder = environ.get(FOLDER)
     if folder is None:

@@ -1,4 +1,4 @@
-"""Zenoh endpoints, and from where they can be reached.
+"""Zenoh endpoints: their parts, and from where they can be reached.
 
 An endpoint is ``<protocol>/<address>[?<metadata>][#<configuration>]``.
 """

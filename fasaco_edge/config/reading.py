@@ -1,7 +1,4 @@
-"""All that is wrong with a document that is to be a section of the configuration.
-
-The text of a configuration: YAML, with the line of each key.
-"""
+"""Reading a configuration: YAML with the line of each key, and all faults of a document."""
 
 from __future__ import annotations
 
@@ -40,7 +37,7 @@ class Fault:
 def section_faults(
     kind: type[Section], document: object, key: str = "", root: type[Section] | None = None
 ) -> Iterator[Fault]:
-    """Yield what keeps ``document`` from being a ``kind``, key by key.
+    """Yield the faults of ``document`` as a section ``kind``, key by key.
 
     Args:
         kind: the section.
@@ -71,7 +68,7 @@ def section_faults(
 
 
 def section_of(kind: object) -> type[Section] | None:
-    """Return the section that a key of this type holds, one that may be left out, too."""
+    """Return the section that a key of this type holds, also an optional one."""
     for choice in (kind, *get_args(kind)):
         if isinstance(choice, type) and issubclass(choice, Section):
             return choice
@@ -99,7 +96,7 @@ def _value_fault(kind: object, value: object, key: str) -> Fault | None:
 
 
 def _choices(kind: object) -> str:
-    """Return what a key may be where that is one of a few names, else ""."""
+    """Return the names allowed for a key; "" where it does not take names."""
     if get_origin(kind) is not Literal:
         return ""
     *others, last = get_args(kind)
@@ -107,7 +104,7 @@ def _choices(kind: object) -> str:
 
 
 def _meant(name: str, key: str, names: list[str], root: type[Section]) -> str:
-    """Return which key was meant, or which there are."""
+    """Return which key may have been meant, or which exist."""
     before = f"{key}." if key else ""
     if near := get_close_matches(name, names, 1):
         return f"; did you mean {before}{near[0]}?"
@@ -118,7 +115,7 @@ def _meant(name: str, key: str, names: list[str], root: type[Section]) -> str:
 
 
 def _paths(kind: type[Section], before: str) -> Iterator[str]:
-    """Yield all keys there are."""
+    """Yield all keys of a section."""
     for field in msgspec.structs.fields(kind):
         path = before + field.encode_name
         yield path
@@ -132,12 +129,12 @@ def _fault(key: str, text: str) -> Fault:
 
 @dataclass(frozen=True, slots=True)
 class ConfigText:
-    """What a file holds.
+    """The content of a file.
 
     Attributes:
         document: plain values.
         lines: of each key, from 1 on.
-        twice: keys that stand there more than once: YAML would take the last.
+        twice: faults of keys that occur more than once: YAML would take the last.
     """
 
     document: object
@@ -145,7 +142,7 @@ class ConfigText:
     twice: tuple[Fault, ...] = ()
 
     def line_of(self, key: str) -> int | None:
-        """Return the line of a key, or of what it would stand in; None where nothing does."""
+        """Return the line of a key, or of the part it belongs in; None where there is neither."""
         while key:
             if key in self.lines:
                 return self.lines[key]
@@ -169,8 +166,8 @@ def read_text(path: Path) -> ConfigText:
     twice = []
     for key, line in _keys(node, ""):
         if key in lines:
-            said = f"{key}: stands twice, in line {lines[key]} and in line {line}"
-            twice.append(Fault(key, BadConfiguration(said), line))
+            text = f"{key}: stands twice, in line {lines[key]} and in line {line}"
+            twice.append(Fault(key, BadConfiguration(text), line))
         lines[key] = line
     return ConfigText(document if document is not None else {}, lines, tuple(twice))
 

@@ -1,11 +1,4 @@
-"""What all sections of a configuration have in common.
-
-Configuration of the planner.
-
-Configuration of the mission, and of where its progress is kept.
-
-Configuration of the recorder that the daemon starts with --record.
-"""
+"""Sections of the configuration for planner, mission and recorder, and their common base."""
 
 from __future__ import annotations
 
@@ -28,7 +21,7 @@ else:
 
 
 class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Unknown keys are errors."""
+    """A section, in which unknown keys are errors."""
 
 
 class PlannerConfig(Section, frozen=True):
@@ -79,7 +72,7 @@ class PlannerConfig(Section, frozen=True):
 
 
 class MissionSettings(Section, frozen=True):
-    """Whether to begin without being told to, how patient to be, and where progress is kept.
+    """Whether to start without an order, how patient to be, and where progress is kept.
 
     What is blocked or left over in the end is tried again ``retries`` times, each after
     ``retry_s`` [s]. Without a pose for ``lost_pose_s`` [s], or a map or an update for

@@ -1,4 +1,4 @@
-"""Who may speak on the bus: ``bus.security`` of the configuration, and what Zenoh makes of it."""
+"""Security of the bus: the section ``bus.security``, and Zenoh's settings from it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Name = Annotated[str, Meta(min_length=1)]
 
 
 class TlsConfig(Section, frozen=True):
-    """Files, PEM: the CA that signs whoever takes part, this daemon's certificate and its key."""
+    """PEM files: the CA of all participants, this daemon's certificate and its key."""
 
     root_ca: str = ""
     certificate: str = ""
@@ -38,9 +38,9 @@ class TlsConfig(Section, frozen=True):
 
 
 class UserConfig(Section, frozen=True):
-    """This daemon's user name, and the file that holds nothing but its password.
+    """This daemon's user name, and a file with its password and nothing else.
 
-    ``dictionary_file`` has a line ``name:password`` for each who may connect.
+    ``dictionary_file`` has a line ``name:password`` for each user who may connect.
     """
 
     name: str = ""
@@ -49,7 +49,7 @@ class UserConfig(Section, frozen=True):
 
 
 class RolesConfig(Section, frozen=True):
-    """Who may do what: common names of certificates, or user names; see ``bus.access.ROLES``."""
+    """Names with each role: common names of certificates, or user names (``bus.access.ROLES``)."""
 
     mapper: tuple[Name, ...] = ()
     viewer: tuple[Name, ...] = ()
@@ -60,7 +60,7 @@ class RolesConfig(Section, frozen=True):
 
 
 class LimitsConfig(Section, frozen=True):
-    """What each who takes part may send at most [bytes, 1/s]; see ``bus.access.Limits``."""
+    """Limits on each sender [bytes, 1/s]; see ``bus.access.Limits``."""
 
     map_bytes: Annotated[int, Meta(ge=HEADER_BYTES)] = MAX_GRID_CELLS + HEADER_BYTES
     maps_hz: Hertz = 100.0
@@ -69,7 +69,7 @@ class LimitsConfig(Section, frozen=True):
 
 
 class SecurityConfig(Section, frozen=True):
-    """How others show who they are, and what they may do then."""
+    """How participants authenticate, and what they may do then."""
 
     kind: Literal["none", "tls", "user"] = "none"
     tls: TlsConfig = TlsConfig()
@@ -78,14 +78,14 @@ class SecurityConfig(Section, frozen=True):
     limits: LimitsConfig = LimitsConfig()
 
     def names(self) -> dict[str, tuple[str, ...]]:
-        """Return who has each role."""
+        """Return the names with each role."""
         return {role: getattr(self.roles, role) for role in self.roles.__struct_fields__}
 
     def warn_of_clock(self) -> None:
-        """Log where nobody can be connected with because the clock is before the certificate.
+        """Warn where the clock is before the certificate, so that no connection can be made.
 
-        Certificates are looked into, which takes memory and time, only where the clock is before
-        the time at which they, or this program, were written.
+        To read certificates takes memory and time: that is done only where the clock is before
+        the time at which their files, or this program, were written.
         """
         if self.kind != "tls":
             return
@@ -99,10 +99,10 @@ class SecurityConfig(Section, frozen=True):
         except ClockBeforeCertificate as error:
             LOG.warning("%s; %s", error, error.hint, extra={"event": "clock"})
         except (OSError, BadConfiguration):
-            return  # whoever opens the session tells that
+            return  # to open the session raises that
 
     def of_client(self) -> dict[str, Any]:
-        """Return what a session needs to show who it is, as a part of Zenoh's configuration.
+        """Return the credentials of a session, as a part of Zenoh's configuration.
 
         Raises:
             BadConfiguration: a file cannot be read.
@@ -127,11 +127,11 @@ class SecurityConfig(Section, frozen=True):
         return {"transport": transport, "scouting": {"gossip": {"enabled": False}}}
 
     def of_daemon(self, prefix: str, ros: access.Role | None = None) -> dict[str, Any]:
-        """Return what a daemon's session needs besides, to keep others to their roles.
+        """Return the same with access control for the other participants, for a daemon's session.
 
         Args:
-            prefix: what all keys of the robot begin with.
-            ros: what the role of that name may do; None without a block ``ros2``.
+            prefix: of all keys of the robot.
+            ros: rights of the role ``ros``; None without a section ``ros2``.
 
         Raises:
             BadConfiguration: a file cannot be read.
@@ -147,9 +147,11 @@ class SecurityConfig(Section, frozen=True):
         ]
         if ros is not None:
             grants.append(access.Grant("ros", self.roles.ros, "", rights=ros))
-            # A recorder hears what the daemon hears.
-            heard = access.Role(ros.told, listens=ros.speaks)
-            grants.append(access.Grant("ros", self.roles.recorder, "", of="recorder", rights=heard))
+            # A recorder receives what the daemon receives.
+            inputs = access.Role(ros.told, listens=ros.speaks)
+            grants.append(
+                access.Grant("ros", self.roles.recorder, "", of="recorder", rights=inputs)
+            )
         part["access_control"] = access.access_control(grants, ATTRIBUTES[self.kind])
         return part | self.thinned(prefix)
 
@@ -186,22 +188,21 @@ def security_faults(
     *,
     open_to_everyone: bool = False,
 ) -> Iterator[BadConfiguration]:
-    """Yield what is missing, or does not go together.
+    """Yield what is missing or does not fit together.
 
-    That is OpenToEveryone where anybody could speak at an endpoint that can be reached from
-    elsewhere.
+    Remote endpoints without authentication are OpenToEveryone.
     """
     beyond = [endpoint for endpoint in listen if not is_local(endpoint)]
     if security.kind == "none":
         if beyond and not open_to_everyone:
             yield OpenToEveryone(
-                f"bus.listen: {beyond[0]} can be reached from other computers, and everybody there "
-                "could give this robot maps and commands"
+                f"bus.listen: {beyond[0]} can be reached from other computers: remote access "
+                "requires authentication"
             )
         named = [role for role, who in security.names().items() if who]
         if named:
             yield BadConfiguration(
-                f"bus.security.roles.{named[0]}: with bus.security.kind none nobody shows a name"
+                f"bus.security.roles.{named[0]}: with bus.security.kind none nobody has a name"
             )
         return
     if open_to_everyone:

@@ -1,9 +1,9 @@
-"""The claim on a robot's name: of the daemons that have it, one plans.
+"""The claim on a robot's name: of the daemons that share it, one plans.
 
-Each says by a token, ``claim/<its Zenoh id>/<plans, waits or yields>``, that it is there. One
-that comes to where another plans waits until that one is gone. Who is first among those that
-wait, and who goes on where two find that both plan (they could not see each other), is decided by
-their ids alone: both sides come to the same answer, whatever their clocks say.
+Each shows a liveliness token ``claim/<its Zenoh id>/<waits, yields or plans>``. A daemon that
+finds another planning waits until that one is gone. Which of several waiting daemons is next, and
+which goes on where two find that both plan (they could not see each other), depends on their ids
+alone: both sides come to the same result, whatever their clocks say.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ LOG = logging.getLogger(__name__)
 
 # Two that start at the same moment see each other's tokens within this [s].
 SETTLE_S = 0.2
-# So often it is asked who is there, as long as one plans [s]; else at each turn of the loop.
+# How often to ask for tokens while one daemon plans [s]; otherwise in each cycle.
 ASK_PERIOD_S = 1.0
-# After a router was away, so long until all others have found it again, too [s].
+# How long the others need to find a router again that was away [s].
 REJOIN_S = 3.0
-# A session that says nothing for this long is taken for dead by the others: Zenoh's lease [s].
+# A session silent for this long is dead to the others: Zenoh's lease [s].
 LEASE_S = 10.0
-# One that could plan and does not is waited for no longer than this [s]: its lease, and some.
+# Longest wait for a daemon that could plan and does not [s]: its lease, and some.
 PATIENCE_S = 15.0
 
 _ID = re.compile(r"[0-9a-f]{1,32}")
@@ -37,7 +37,7 @@ _ID = re.compile(r"[0-9a-f]{1,32}")
 class ClaimState(StrEnum):
     """What a daemon does with its claim; all but the first are chunks of tokens.
 
-    One that ``yields`` waits, and planned before: by its last path the robot was to stand.
+    One that ``yields`` waits, and planned before: its last path was empty, to stop the robot.
     """
 
     LOOKS = "looks"
@@ -45,77 +45,81 @@ class ClaimState(StrEnum):
     YIELDS = "yields"
     PLANS = "plans"
 
+    @property
+    def is_waiting(self) -> bool:
+        """Whether another daemon is to plan."""
+        return self in (ClaimState.WAITS, ClaimState.YIELDS)
+
 
 _SHOWN = (ClaimState.WAITS, ClaimState.YIELDS, ClaimState.PLANS)
 
 
 class Claim:
-    """Who of the daemons of one name plans: a pure function of what was seen, and when.
+    """Which daemon of a name plans: a pure function of what was seen, and when.
 
     Attributes:
-        stand: what this one does.
-        rival: id of the other one that it waits for, or waited for last; "" for none.
-        hears_of_yielding: whether this one plans, and another that did so, too, has just yielded.
+        state: of this daemon.
+        rival: id of the daemon it waits for, or waited for last; "" for none.
+        rival_yielded: whether this one plans, and another that planned, too, has just yielded.
     """
 
     def __init__(self, own: str) -> None:
-        self.stand = ClaimState.LOOKS
+        self.state = ClaimState.LOOKS
         self.rival = ""
-        self.hears_of_yielding = False
+        self.rival_yielded = False
         self._own = own
         self._calm_since: float | None = None
         self._calm_s = SETTLE_S
-        self._doubts_until = float("-inf")
+        self._uncertain_until = float("-inf")
         self._was_in_touch = True
         self._yielding: set[str] = set()
         self._decided_at: float | None = None
 
-    def doubts(self, now: float) -> bool:
-        """Tell whether another may plan by now unseen: nothing should be said until that is known.
+    def is_uncertain(self, now: float) -> bool:
+        """Tell whether another may plan unseen by now: publish nothing until that is known.
 
-        So it is after a pause in which the others may have taken this one for dead.
+        So it is after a pause in which the others may have taken this daemon for dead.
         """
-        return self.stand is ClaimState.PLANS and now < self._doubts_until
+        return self.state is ClaimState.PLANS and now < self._uncertain_until
 
     def decide(
         self, others: Mapping[str, ClaimState], now: float, *, in_touch: bool = True
     ) -> None:
-        """Take up a stand.
+        """Update the state.
 
         Args:
-            others: the daemons that are there, by id.
+            others: the other daemons by id.
             now: time of any steady clock [s].
-            in_touch: whether anybody could be seen at all. Where not, all stays as it is.
+            in_touch: whether others can be seen at all; while not, nothing changes.
         """
-        self.hears_of_yielding = False
+        self.rival_yielded = False
         self._notice_absence(now, in_touch=in_touch)
         if not in_touch:
             return
-        planning = {one for one, stand in others.items() if stand is ClaimState.PLANS}
-        yielding = {one for one, stand in others.items() if stand is ClaimState.YIELDS}
-        plans = self.stand is ClaimState.PLANS
+        planning = {one for one, state in others.items() if state is ClaimState.PLANS}
+        yielding = {one for one, state in others.items() if state is ClaimState.YIELDS}
+        plans = self.state is ClaimState.PLANS
         if planning and (not plans or min(planning) < self._own):
-            self.stand = (
-                ClaimState.YIELDS if plans or self.stand is ClaimState.YIELDS else ClaimState.WAITS
-            )
+            yields = plans or self.state is ClaimState.YIELDS
+            self.state = ClaimState.YIELDS if yields else ClaimState.WAITS
             self.rival, self._calm_since = min(planning), None
         elif plans:
-            self.hears_of_yielding = bool(yielding - self._yielding)
+            self.rival_yielded = bool(yielding - self._yielding)
         else:
             self._wait_for_calm(min(others, default=""), now)
         self._yielding = yielding
 
     def _notice_absence(self, now: float, *, in_touch: bool) -> None:
-        """Look anew after a time in which the others could not be seen."""
+        """Be uncertain for a while after a time in which the others could not be seen."""
         paused_s = 0.0 if self._decided_at is None else now - self._decided_at
         self._decided_at = now
         if paused_s > LEASE_S or (in_touch and not self._was_in_touch):
             self._calm_since, self._calm_s = None, REJOIN_S
-            self._doubts_until = now + (REJOIN_S if paused_s > LEASE_S else SETTLE_S)
+            self._uncertain_until = now + (REJOIN_S if paused_s > LEASE_S else SETTLE_S)
         self._was_in_touch = in_touch
 
     def _wait_for_calm(self, first: str, now: float) -> None:
-        """Plan once nobody has done so for a while, and nobody is before this one."""
+        """Plan once nobody has planned for a while, and no other id comes first."""
         if self._calm_since is None:
             self._calm_since = now
         is_calm_for_s = now - self._calm_since - self._calm_s
@@ -123,10 +127,10 @@ class Claim:
             return
         if first and first < self._own and is_calm_for_s < PATIENCE_S:
             self.rival = first
-            if self.stand is ClaimState.LOOKS:
-                self.stand = ClaimState.WAITS
+            if self.state is ClaimState.LOOKS:
+                self.state = ClaimState.WAITS
         else:
-            self.stand, self._calm_s = ClaimState.PLANS, SETTLE_S
+            self.state, self._calm_s = ClaimState.PLANS, SETTLE_S
 
 
 class NameClaim:
@@ -141,16 +145,16 @@ class NameClaim:
         self._others: dict[str, ClaimState] = {}
         self._version = 0
         self._is_settled = False
-        self._stands_back = False
+        self._was_waiting = False
 
     @property
-    def stand(self) -> ClaimState:
+    def state(self) -> ClaimState:
         """What this daemon does."""
-        return self._claim.stand
+        return self._claim.state
 
     def report(self) -> ClaimReport:
         """Return this part of the status."""
-        return ClaimReport(self._bus.id, str(self._claim.stand))
+        return ClaimReport(self._bus.id, str(self._claim.state))
 
     @property
     def reason(self) -> str:
@@ -158,26 +162,21 @@ class NameClaim:
         return f"another daemon of this name plans: Zenoh id {self._claim.rival}"
 
     @property
-    def waits(self) -> bool:
-        """Whether another daemon is to plan."""
-        return self._claim.stand in (ClaimState.WAITS, ClaimState.YIELDS)
+    def rival_yielded(self) -> bool:
+        """See ``Claim.rival_yielded``."""
+        return self._claim.rival_yielded
 
-    @property
-    def hears_of_yielding(self) -> bool:
-        """Whether another daemon that planned, too, has just yielded to this one."""
-        return self._claim.hears_of_yielding
+    def is_uncertain(self, now: float) -> bool:
+        """See ``Claim.is_uncertain``."""
+        return self._claim.is_uncertain(now)
 
-    def doubts(self, now: float) -> bool:
-        """See ``Claim.doubts``."""
-        return self._claim.doubts(now)
+    def update(self, now: float) -> bool:
+        """Look for the others; tell whether the state of this daemon has changed.
 
-    def look(self, now: float) -> bool:
-        """Look who is there; tell whether this daemon has taken up another stand.
-
-        The token follows with ``show``: once what was said before is taken back.
+        The token follows with ``announce``, once the former path is withdrawn.
         """
-        before = self._claim.stand
-        is_settled = self._is_settled and not self._claim.doubts(now)
+        before = self._claim.state
+        is_settled = self._is_settled and not self._claim.is_uncertain(now)
         self._roll.ask(ASK_PERIOD_S if is_settled else 0.0)
         if not self._roll.version:
             return False
@@ -186,34 +185,33 @@ class NameClaim:
             self._others = claims_in(self._roll.there())
             self._others.pop(self._bus.id, None)
             # Where nobody plans, somebody soon will.
-            self._is_settled = ClaimState.PLANS in (self._claim.stand, *self._others.values())
+            self._is_settled = ClaimState.PLANS in (self._claim.state, *self._others.values())
         self._claim.decide(self._others, now, in_touch=self._bus.is_in_touch())
-        if self._claim.hears_of_yielding:
+        if self._claim.rival_yielded:
             LOG.warning("another daemon of this name planned, too, and has yielded to this one")
-        return self._claim.stand is not before
+        return self._claim.state is not before
 
-    def show(self) -> None:
-        """Let the token say what this daemon does, and tell people once."""
-        stand, before = self._claim.stand, self._token
-        if self._stands_back is not self.waits:
-            self._stands_back = self.waits
-            self._bus.let_others_answer(self._stands_back)
-        self._token = self._bus.token(self._keys.claim(self._bus.id, stand))
+    def announce(self) -> None:
+        """Show the state by the token, and log it once."""
+        state, before = self._claim.state, self._token
+        if self._was_waiting is not state.is_waiting:
+            self._was_waiting = state.is_waiting
+            self._bus.let_others_answer(state.is_waiting)
+        self._token = self._bus.token(self._keys.claim(self._bus.id, state))
         self._bus.withdraw(before)
-        if self._stands_back:
+        if state.is_waiting:
             LOG.warning("%s; this one waits", self.reason, extra={"event": "name_taken"})
         elif self._claim.rival:
             LOG.warning("%s is gone: this daemon plans", self._claim.rival)
 
 
 def claims_in(keys: Iterable[str]) -> dict[str, ClaimState]:
-    """Return the daemons whose tokens these are, by id; what is no claim is left out."""
+    """Return the states of the daemons with these tokens, by id; other keys are left out."""
     claims: dict[str, ClaimState] = {}
     for key in keys:
-        _, own, stand = key.rsplit("/", 2)
-        if _ID.fullmatch(own) and stand in _SHOWN:
-            # Who takes up another stand has two tokens for a moment: to plan comes before all.
-            claims[own] = max(
-                ClaimState(stand), claims.get(own, ClaimState.WAITS), key=_SHOWN.index
-            )
+        _, own, state = key.rsplit("/", 2)
+        if _ID.fullmatch(own) and state in _SHOWN:
+            # A daemon that changes its state has two tokens for a moment: PLANS comes first.
+            before = claims.get(own, ClaimState.WAITS)
+            claims[own] = max(ClaimState(state), before, key=_SHOWN.index)
     return claims

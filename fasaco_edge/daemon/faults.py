@@ -29,9 +29,9 @@ def fault_text(fault: FasacoError) -> str:
 
 
 class PublishGuard:
-    """The one way out for all that the loop publishes: what fails costs that message alone.
+    """Publishes what the loop sends: a failure costs that message alone.
 
-    Of a topic one failure in ``PERIOD_S`` is logged, all are counted.
+    All failures are counted; of each topic one in ``PERIOD_S`` is logged.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -39,8 +39,8 @@ class PublishGuard:
         self._faults: list[FasacoError] = []
         self._logged_at: dict[str, float] = {}
 
-    def let_out(self, topic: str, publish: Callable[[], None]) -> bool:
-        """Make and send a message; return whether that went well."""
+    def attempt(self, topic: str, publish: Callable[[], None]) -> bool:
+        """Make and send a message; tell whether that went well."""
         try:
             publish()
         except Exception as error:

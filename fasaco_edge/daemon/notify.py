@@ -1,4 +1,4 @@
-"""The service manager, as sd_notify(3) has it: one datagram for each thing it is told."""
+"""Notifications to the service manager by the protocol of sd_notify(3), one datagram each."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from fasaco_edge.text import one_line
 
 LOG = logging.getLogger(__name__)
 
-# A manager that is busy, as at a boot, is waited for with what it is told only once [s]; nothing
-# else may hold the loop up.
+# How long to wait for a busy manager, as at boot, with messages sent only once [s]; no other
+# message may delay the loop.
 PATIENCE_S = 1.0
 # `systemctl status` shows one line [characters].
 MOST_SAID = 500
 
 
 class ServiceManager:
-    """Who has started this process, and waits to be told how it is; nobody, outside of a service.
+    """The manager that started this process; outside of a service there is none.
 
     Attributes:
-        is_there: whether anybody listens.
-        watchdog_s: the longest silence before it takes this process for hung [s]; 0 for any.
+        is_there: whether there is one.
+        watchdog_s: silence after which it takes this process for hung [s]; 0 for no limit.
     """
 
     def __init__(self, environ: MutableMapping[str, str] = os.environ) -> None:
-        """Take the variables out of ``environ``: no other process may speak in our name."""
+        """Take the variables out of ``environ``, so that no child process uses them."""
         address = environ.pop("NOTIFY_SOCKET", "")
         silence_us = environ.pop("WATCHDOG_USEC", "0")
         is_ours = environ.pop("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
@@ -39,16 +39,16 @@ class ServiceManager:
         self._status = ""
 
     def ready(self) -> None:
-        """Say that the service is up, or that its configuration is read again."""
+        """Report that the service is up, or that its configuration is reloaded."""
         self._send("READY=1", PATIENCE_S)
 
     def status(self, text: str) -> None:
-        """Say in one line what the service does."""
+        """Set the status line of the service."""
         if text != self._status and self._send("STATUS=" + one_line(text, MOST_SAID)):
             self._status = text
 
     def alive(self) -> None:
-        """Say that there is progress; due before each ``watchdog_s`` is over."""
+        """Report progress; due within each ``watchdog_s``."""
         self._send("WATCHDOG=1")
 
     def extend(self, seconds: float) -> None:
@@ -56,12 +56,12 @@ class ServiceManager:
         self._send(f"EXTEND_TIMEOUT_USEC={seconds * 1e6:.0f}")
 
     def reloading(self) -> None:
-        """Say that the configuration is being read again; ``ready`` follows."""
+        """Report that the configuration is being reloaded; ``ready`` follows."""
         now_us = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
         self._send(f"RELOADING=1\nMONOTONIC_USEC={now_us}", PATIENCE_S)
 
     def stopping(self) -> None:
-        """Say that the service ends."""
+        """Report that the service ends."""
         self._send("STOPPING=1")
 
     def _send(self, text: str, patience_s: float = 0.0) -> bool:
@@ -75,7 +75,10 @@ class ServiceManager:
         except OSError as error:
             word = text.partition("=")[0]
             LOG.warning(
-                "the service manager cannot be told %s: %s", word, error, extra={"event": "unheard"}
+                "the service manager does not accept %s: %s",
+                word,
+                error,
+                extra={"event": "unheard"},
             )
             return False
         return True

@@ -1,4 +1,4 @@
-"""SIGHUP: the configuration is read again, and kept out if it is wrong."""
+"""Reload of the configuration on SIGHUP; a wrong one is refused as a whole."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from fasaco_edge.errors import BadConfiguration
 
 LOG = logging.getLogger(__name__)
 
-# Sections, and keys, that a running daemon can take up. What the session, the ledger or another
-# process was opened with, it cannot.
+# Sections and keys that can change in a running daemon; not those that session, ledger or another
+# process were opened with.
 CHANGEABLE = frozenset(
     {
         "planner",
@@ -33,10 +33,10 @@ CHANGEABLE = frozenset(
 
 
 class Reload:
-    """Reads the configuration again once that is asked for.
+    """Reads the configuration again on request.
 
     Attributes:
-        asked: set where it is, by a signal.
+        asked: set by the signal.
     """
 
     def __init__(self, read: Callable[[], DaemonConfig], manager: ServiceManager) -> None:
@@ -45,10 +45,10 @@ class Reload:
         self._manager = manager
 
     def read(self, running: DaemonConfig) -> DaemonConfig:
-        """Return the running configuration with all that has changed in the file and can change.
+        """Return the running configuration with those changes in the file that can be taken.
 
         Raises:
-            BadConfiguration: the file is wrong; nothing of it is taken.
+            BadConfiguration: the file is wrong.
         """
         self.asked.clear()
         self._manager.reloading()
@@ -69,12 +69,12 @@ class Reload:
         return with_changeable(running, written)
 
     def done(self) -> None:
-        """Tell that what was read is in force."""
+        """Report that the new configuration is in force."""
         self._manager.ready()
 
 
 def is_changeable(key: str) -> bool:
-    """Tell whether a running daemon can take up another value."""
+    """Tell whether the value can change in a running daemon."""
     return key in CHANGEABLE or key.partition(".")[0] in CHANGEABLE
 
 

@@ -13,11 +13,12 @@ from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.compiling import KernelCompiler
-from fasaco_edge.daemon.ledger.writer import LedgerWriter, open_ledger
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter, open_ledger
 from fasaco_edge.daemon.loop.answers import serve_about
+from fasaco_edge.daemon.loop.batch import make_mailbox
 from fasaco_edge.daemon.loop.commands import Commands
-from fasaco_edge.daemon.loop.inbox import Inbox, make_mailbox
-from fasaco_edge.daemon.loop.loop import Loop
+from fasaco_edge.daemon.loop.inbox import Inbox
+from fasaco_edge.daemon.loop.loop import BusPorts, Host, Loop
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.daemon.loop.watchdog import Watchdog
@@ -124,16 +125,17 @@ def _serve(
     max_pixels = config.map.max_pixels
     mailbox = make_mailbox(max_pixels)
     ros = RosBridge(bus, config.ros2, mailbox, max_pixels) if config.ros2 else None
-    outbox = Outbox(bus, keys, ros)
-    inbox = Inbox(bus, keys, mailbox, config.poses(), max_pixels, [ros.map] if ros else [])
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
-    commands = Commands(bus, keys, mailbox)
-    turns = TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored)
-    vitals = Watchdog(manager)
-    claim = NameClaim(bus, keys)
-    loop = Loop(
-        config, mailbox, inbox, commands, outbox, ledger, recorder, turns, vitals, reload, claim
+    ports = BusPorts(
+        mailbox=mailbox,
+        inbox=Inbox(bus, keys, mailbox, config.poses(), max_pixels, [ros.map] if ros else []),
+        commands=Commands(bus, keys, mailbox),
+        outbox=Outbox(bus, keys, ros),
+        turns=TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored),
+        claim=NameClaim(bus, keys),
     )
+    keeper = LedgerKeeper(ledger, config.robot.tool_width_m, autostart=config.mission.autostart)
+    loop = Loop(config, ports, keeper, Host(Watchdog(manager), reload, recorder))
     serve_about(bus, keys, lambda: loop.config)
     try:
         loop.announce()

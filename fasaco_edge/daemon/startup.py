@@ -1,19 +1,22 @@
-"""Before there is a mission: the first map sends for the kernels, what comes meanwhile is held.
+"""Startup: what arrives before there is a mission, and the loading of mission and planner.
 
-Kernels come with the first map: until then the daemon is small.
-
-Importing numba costs 60 MB, and compiling on a new machine takes many seconds;
-both happen in a thread of their own, so that the loop keeps answering.
+The first map starts the loading of kernels; until then the daemon is small. Importing numba costs
+60 MB, and compiling on a new machine takes many seconds: a thread of its own does both, so that
+the loop keeps answering.
 """
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, without_base
+from fasaco_edge.host.processes import release_unused
 from fasaco_edge.mission.core.events import (
     Answer,
     CommandReceived,
@@ -31,37 +34,24 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
 
 
-import threading
-from typing import TYPE_CHECKING
-
-from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.host.processes import release_unused
-
-if TYPE_CHECKING:
-    from fasaco_edge.daemon.loop.worker import PlanningWorker
-    from fasaco_edge.mission.core.mission import Mission
-
-
 class Startup:
-    """Holds events, takes commands, and hands both over to the mission.
+    """Holds events and takes commands until the mission is loaded.
 
     Attributes:
         assignment: what the mission will have to do.
-        held: of the newest two frames each the newest map, with the updates after it laid over it,
-            and the newest pose: which of them counts is for the mission to find. That updates were
-            lost stays, until there is another map. It may be held for long, and does not grow.
+        held: the newest map, with its updates applied, and the newest pose of each of the newest
+            two frames: which frame counts is for the mission to decide. That updates were lost
+            stays until the next map. However long it takes, this does not grow.
     """
 
     def __init__(
-        self, keeping: LedgerKeeper, load: Callable[[], Loader], held: Sequence[Event] = ()
+        self, keeper: LedgerKeeper, load: Callable[[], Loader], held: Sequence[Event] = ()
     ) -> None:
-        self.assignment = keeping.first
-        self.held: list[Event] = []
-        self._keeping = keeping
+        self.assignment = keeper.first
+        self.held = list(held)
+        self._keeper = keeper
         self._load = load
         self._loader: Loader | None = None
-        self.held.extend(held)
 
     @property
     def stage(self) -> str:
@@ -69,12 +59,12 @@ class Startup:
         return self._loader.stage if self._loader and not self._loader.is_done else ""
 
     def end(self) -> None:
-        """Let go of what is loaded, or is being loaded: another takes its place."""
+        """Drop what is loaded, or being loaded: another startup follows."""
         if self._loader is not None:
             self._loader.drop()
 
     def take(self, events: Sequence[Event]) -> list[FasacoError]:
-        """Hold events; return those that are of no use, and why."""
+        """Hold events; return why some are of no use."""
         faults: list[FasacoError] = []
         for event in in_runs(events):
             match event:
@@ -85,63 +75,64 @@ class Startup:
                     self._drop(_is_pose, pose.frame)
                     self.held.append(event)
                 case PatchRun(patches):
-                    faults += self._lay(patches)
+                    faults += self._apply(patches)
                 case PatchesLost(count):
                     faults.append(PatchWithoutBase(f"{count} map updates were lost"))
                     if self._maps() and not self._has_lost:
                         self.held.append(event)
         return faults
 
-    def _maps(self) -> dict[str, int]:
-        """Return where in ``held`` the map of each frame is."""
-        held = enumerate(self.held)
-        return {one.grid.frame: place for place, one in held if isinstance(one, MapReceived)}
+    def _maps(self) -> dict[str, tuple[int, OccupancyGrid]]:
+        """Return the map of each frame, and its index in ``held``."""
+        return {
+            held.grid.frame: (index, held.grid)
+            for index, held in enumerate(self.held)
+            if isinstance(held, MapReceived)
+        }
 
     @property
     def _has_lost(self) -> bool:
         return any(isinstance(held, PatchesLost) for held in self.held)
 
-    def _lay(self, patches: Sequence[MapPatch]) -> list[FasacoError]:
-        """Lay updates over the maps held; return why some cannot be."""
+    def _apply(self, patches: Sequence[MapPatch]) -> list[FasacoError]:
+        """Apply updates to the maps held; return why some cannot be."""
         maps = self._maps()
         if not maps or self._has_lost:
             return without_base(patches, updates_lost=bool(maps))
         faults: list[FasacoError] = []
         newest = next(reversed(maps))
-        for frame, place in maps.items():
-            # One of neither frame misfits the newest map.
+        for frame, (index, grid) in maps.items():
+            # An update of neither frame is a misfit of the newest map.
             theirs = [p for p in patches if (p.frame if p.frame in maps else newest) == frame]
-            updated = self._grid_at(place).with_updates(theirs)
-            self.held[place] = MapReceived(updated.grid)
+            updated = grid.with_updates(theirs)
+            self.held[index] = MapReceived(updated.grid)
             faults += updated.faults
         return faults
 
-    def _grid_at(self, place: int) -> OccupancyGrid:
-        held = self.held[place]
-        assert isinstance(held, MapReceived)
-        return held.grid
-
-    def load(self) -> None:
-        """Begin to load what plans, once there is a map."""
-        if self._loader is None and self._maps():
-            self._loader = self._load()
-
     def _drop(self, kind: Callable[[Event], bool], frame: str) -> None:
-        """Drop of a kind what is in this frame, and all but the newest of the other frames."""
+        """Drop events of a kind: all of this frame, and all but the newest of the others."""
         others = [_frame(held) for held in self.held if kind(held)]
         kept = next((other for other in reversed(others) if other not in ("", frame)), None)
         self.held = [held for held in self.held if not kind(held) or _frame(held) == kept]
 
+    def load(self) -> None:
+        """Begin to load the mission, once there is a map."""
+        if self._loader is None and self._maps():
+            self._loader = self._load()
+
     def loaded(self) -> tuple[Mission, PlanningWorker] | None:
-        """Return mission and worker once they are there."""
+        """Return mission and worker once they are loaded, with ledger and order restored."""
         self.load()
         loaded = self._loader.poll() if self._loader else None
         if loaded is not None:
-            self._keeping.restore(loaded[0], self.assignment)
+            self._keeper.restore(loaded[0], self.assignment)
         return loaded
 
-    def obey(self, commands: Sequence[CommandReceived], rival: str = "") -> list[Answer]:
-        """Take commands, as the mission will, unless another daemon is to; return the answers."""
+    def answer(self, commands: Sequence[CommandReceived], rival: str = "") -> list[Answer]:
+        """Take commands as the mission would, and return the answers.
+
+        ``rival`` says why another daemon is to be commanded; "" for none.
+        """
         answers = []
         for asked in commands:
             try:
@@ -154,7 +145,7 @@ class Startup:
                 answers.append(Answer(asked.number, error))
                 continue
             if asked.command == "reset":
-                self._keeping.forget()
+                self._keeper.forget()
             answers.append(Answer(asked.number))
         return answers
 
@@ -169,25 +160,25 @@ def _frame(event: Event) -> str:
             return grid.frame
         case PoseReceived(pose):
             return pose.frame
-    return ""  # it lies in none
+    return ""  # it has none
 
 
 def map_and_pose_of(mission: Mission) -> list[Event]:
-    """Return the events after which another mission knows map and pose, too."""
-    heard: list[Event] = []
+    """Return the events after which another mission has the same map and pose."""
+    events: list[Event] = []
     if mission.grid is not None:
-        heard.append(MapReceived(mission.grid))
+        events.append(MapReceived(mission.grid))
     if mission.pose is not None:
-        heard.append(PoseReceived(mission.pose))
-    return heard
+        events.append(PoseReceived(mission.pose))
+    return events
 
 
 class Loader:
-    """Imports what plans, warms the kernels up, and sets up mission and worker."""
+    """Imports the planner, warms its kernels up, and makes mission and worker, in a thread."""
 
     def __init__(self, config: DaemonConfig, mailbox: Mailbox[object]) -> None:
         self.stage = "importing"
-        self.error: BaseException | None = None
+        self._error: BaseException | None = None
         self._config = config
         self._mailbox = mailbox
         self._loaded: tuple[Mission, PlanningWorker] | None = None
@@ -196,17 +187,17 @@ class Loader:
 
     def poll(self) -> tuple[Mission, PlanningWorker] | None:
         """Return what was loaded, None until then; raise what went wrong."""
-        if self.error is not None:
-            raise self.error
+        if self._error is not None:
+            raise self._error
         return self._loaded
 
     @property
     def is_done(self) -> bool:
-        """Whether all is loaded, or went wrong."""
-        return self._loaded is not None or self.error is not None
+        """Whether loading has ended, well or not."""
+        return self._loaded is not None or self._error is not None
 
     def drop(self) -> None:
-        """Let the worker go, now or once it is there: nobody will ask for it."""
+        """End the worker, now or once it is loaded: nobody will ask for it."""
         self._is_dropped = True
         if self._loaded is not None:
             self._loaded[1].disown()
@@ -217,7 +208,7 @@ class Loader:
             if self._is_dropped:
                 self._loaded[1].disown()
         except BaseException as error:
-            self.error = error
+            self._error = error
         self._mailbox.post("loaded", None)
 
     def _load(self) -> tuple[Mission, PlanningWorker]:

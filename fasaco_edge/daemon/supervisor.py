@@ -1,4 +1,4 @@
-"""Keeps a recorder running beside the daemon; whatever happens to it harms only the recording."""
+"""The recorder's supervisor: starts it beside the daemon; its failures cost only the recording."""
 
 from __future__ import annotations
 
@@ -24,34 +24,34 @@ LOG = logging.getLogger(__name__)
 
 FIRST_PAUSE_S = 1.0
 LONGEST_PAUSE_S = 30.0
-# A recorder that says nothing for this long, although its process lives, hangs.
+# A recorder whose process lives and that reports nothing for this long hangs.
 SILENT_AFTER_S = 10.0
-# Its first word may take longer: a slow or busy computer loads its libraries for half a minute.
+# Its first report may take longer: a slow computer loads its libraries for half a minute.
 START_WITHIN_S = 120.0
 
 
 class RecorderSupervisor:
-    """Starts ``fasaco-edge record``, starts it again when it dies, and tells how it is."""
+    """Starts ``fasaco-edge record``, and starts it again when it dies or hangs."""
 
     def __init__(self, config: DaemonConfig, bus: Bus, folder: Path) -> None:
         self._config = msgspec.json.encode(config)
         parent = ["--with-parent", str(os.getpid())]
         program = python_program("fasaco_edge", "record")
         self._command = [*program, *parent, "--config", "-", "--out", str(folder)]
-        self._word = LatestSlot[Sample]()
-        self._heard: Recorder | None = None
-        self._heard_at = time.monotonic()
+        self._reports = LatestSlot[Sample]()
+        self._report: Recorder | None = None
+        self._reported_at = time.monotonic()
         self._restarts = 0
         self._pause_s = FIRST_PAUSE_S
         self._start_at: float | None = None
         self._death = ""
-        bus.listen(config.keys(), topics.RECORDER, self._word.put)
+        bus.listen(config.keys(), topics.RECORDER, self._reports.put)
         self._process: subprocess.Popen[bytes] | None = None
         self._launch()
 
     def poll(self, now: float) -> SupervisedRecorder:
-        """Look after the process; return its state for the daemon's status."""
-        self._listen(now)
+        """Restart the process where needed; return its state for the daemon's status."""
+        self._take_report(now)
         code = self._process.poll() if self._process is not None else None
         if self._process is not None and code is None:
             return self._running(now)
@@ -64,12 +64,12 @@ class RecorderSupervisor:
         elif now >= self._start_at:
             self._start_at = None
             self._restarts += 1
-            self._heard, self._heard_at = None, now
+            self._report, self._reported_at = None, now
             self._launch()
         return SupervisedRecorder("restarting", self._restarts, self._death)
 
     def _launch(self) -> None:
-        """Start the process; a machine without memory or processes left may refuse."""
+        """Start the process, which a computer out of memory or processes may refuse."""
         try:
             # In memory and not in a pipe, which would have to be written while it is read.
             with open(os.memfd_create("configuration"), "w+b") as document:
@@ -80,7 +80,7 @@ class RecorderSupervisor:
             self._process, self._death = None, f"could not be started: {error.strerror}"
 
     def close(self, timeout_s: float) -> None:
-        """Ask the recorder to end, wait for its footer, and insist if it hangs."""
+        """End the recorder; kill it where its footer is not written in ``timeout_s`` [s]."""
         if self._process is None:
             return
         self._process.terminate()
@@ -91,26 +91,26 @@ class RecorderSupervisor:
             self._process.kill()
             self._process.wait()
 
-    def _listen(self, now: float) -> None:
-        sample = self._word.take(timeout_s=0.0)
+    def _take_report(self, now: float) -> None:
+        sample = self._reports.take(timeout_s=0.0)
         if sample is None:
             return
         try:
-            heard = decode_tolerant(sample.payload, Recorder)
+            report = decode_tolerant(sample.payload, Recorder)
         except MalformedMessage:
             return
-        if self._process is not None and heard.pid == self._process.pid:
-            self._heard, self._heard_at = heard, now
+        if self._process is not None and report.pid == self._process.pid:
+            self._report, self._reported_at = report, now
             self._pause_s = FIRST_PAUSE_S
 
     def _running(self, now: float) -> SupervisedRecorder:
-        patience_s = SILENT_AFTER_S if self._heard else START_WITHIN_S
-        if now - self._heard_at > patience_s:
-            # It hangs: what follows is the way of a recorder that died.
+        patience_s = SILENT_AFTER_S if self._report else START_WITHIN_S
+        if now - self._reported_at > patience_s:
+            # What follows is the same as for a recorder that died.
             assert self._process is not None
             self._process.kill()
             reason = f"no word for {patience_s:.0f} s"
             return SupervisedRecorder("silent", self._restarts, reason)
-        if self._heard is None:
+        if self._report is None:
             return SupervisedRecorder("starting", self._restarts)
-        return SupervisedRecorder(restarts=self._restarts, **asdict(self._heard))
+        return SupervisedRecorder(restarts=self._restarts, **asdict(self._report))

@@ -1,1 +1,1 @@
-"""What ``fasaco-edge doctor`` looks at: each check one function, all in ``table.CHECKS``."""
+"""Checks of a computer, its bus and a configuration: ``fasaco-edge doctor``."""

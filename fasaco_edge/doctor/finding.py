@@ -1,14 +1,11 @@
-"""What systemd says of the daemon's unit, where there are systemd and the unit.
-
-What a check finds, and what it looks at.
-"""
+"""What a check finds, what it looks at, and the daemon's unit as systemd has it."""
 
 from __future__ import annotations
 
 import os
 import shlex
 import subprocess
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -71,17 +68,17 @@ def find_unit(root: Path = Path("/")) -> Unit | None:
         return None
     command = ["systemctl", "show", NAME, f"--property={','.join(PROPERTIES)}"]
     try:
-        told = subprocess.run(
+        shown = subprocess.run(
             command, check=True, capture_output=True, text=True, timeout=TIMEOUT_S
         ).stdout
     except (OSError, subprocess.SubprocessError):
         return None
-    properties = dict(line.partition("=")[::2] for line in told.splitlines())
+    properties = dict(line.partition("=")[::2] for line in shown.splitlines())
     return Unit(properties) if properties.get("LoadState") == "loaded" else None
 
 
 class Level(StrEnum):
-    """How it is: good; good, but worth a thought; not to be left like that."""
+    """Severity of a finding."""
 
     OK = "ok"
     WARN = "warn"
@@ -107,7 +104,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class CheckContext:
-    """What checks look at; more may come to it.
+    """What checks look at.
 
     Attributes:
         config: the daemon's configuration.
@@ -142,6 +139,21 @@ class Check:
     name: str
     look: Callable[[CheckContext], Finding]
     of_machine: bool = False
+
+
+def ok(found: str, details: Iterable[str] = ()) -> Finding:
+    """Return a finding without a fault."""
+    return Finding(Level.OK, found, "", tuple(details))
+
+
+def warn(found: str, to_do: str, details: Iterable[str] = ()) -> Finding:
+    """Return a finding to think about: it works."""
+    return Finding(Level.WARN, found, to_do, tuple(details))
+
+
+def fail(found: str, to_do: str, details: Iterable[str] = ()) -> Finding:
+    """Return a finding to be mended."""
+    return Finding(Level.FAIL, found, to_do, tuple(details))
 
 
 def worst(levels: list[Level]) -> Level:

@@ -1,7 +1,4 @@
-"""The computer: whether the package runs here at all, and what time it is.
-
-Memory, and who sees to it that the daemon takes no more than its share.
-"""
+"""Checks of the computer: platform, C library, clock, memory and its limits."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 
 from fasaco_edge.daemon.memory import afforded, limits_mib, needed_bytes
-from fasaco_edge.doctor.finding import CheckContext, Finding, Level
+from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 
 MACHINES = ("x86_64", "aarch64")
 # What makes a difference to array code, as /proc/cpuinfo spells it.
@@ -29,60 +26,60 @@ STA_UNSYNC = 0x40
 TIME_ERROR = 5
 
 
-def system(patient: CheckContext) -> Finding:
-    """Tell about the processor, the system and Python."""
+def system(context: CheckContext) -> Finding:
+    """Check processor, system and Python."""
     bits, machine = 8 * struct.calcsize("P"), platform.machine()
     cores = len(os.sched_getaffinity(0))
     python = platform.python_version()
-    found = f"{_model(patient.root) or machine}, {cores} cores; Python {python}"
-    name = _os_name(patient.root) or "Linux"
-    details = (
-        f"{name}, kernel {platform.release()}, {machine}, {bits} bits; {_features(patient.root)}",
-    )
+    found = f"{_model(context.root) or machine}, {cores} cores; Python {python}"
+    name = _os_name(context.root) or "Linux"
+    details = [
+        f"{name}, kernel {platform.release()}, {machine}, {bits} bits; {_features(context.root)}"
+    ]
     if bits != 64:
         to_do = "install a 64-bit system: there are no packages for 32 bits"
-        return Finding(Level.FAIL, f"{found}: a 32-bit system", to_do, details)
+        return fail(f"{found}: a 32-bit system", to_do, details)
     if machine not in MACHINES:
         to_do = f"use one of {', '.join(MACHINES)}: for others there are no packages"
-        return Finding(Level.FAIL, f"{found}: {machine}", to_do, details)
+        return fail(f"{found}: {machine}", to_do, details)
     if sys.version_info < LEAST_PYTHON:
-        return Finding(Level.FAIL, f"{found}: too old", "install Python 3.11 or newer", details)
+        return fail(f"{found}: too old", "install Python 3.11 or newer", details)
     if cores == 1:
         to_do = "let whatever controls the robot have a higher priority: the unit has Nice=10"
-        return Finding(Level.WARN, f"{found}: planning shares it with all else", to_do, details)
-    return Finding(Level.OK, found, details=details)
+        return warn(f"{found}: planning shares it with all else", to_do, details)
+    return ok(found, details)
 
 
-def c_library(patient: CheckContext) -> Finding:
-    """Tell whether the C library is as new as the installed packages want it."""
+def c_library(context: CheckContext) -> Finding:
+    """Check that the C library is as new as the installed packages need."""
     name, _, version = (os.confstr("CS_GNU_LIBC_VERSION") or "").partition(" ")
     if name != "glibc":
         to_do = "use a system with glibc, as Debian and Raspberry Pi OS are"
-        return Finding(Level.FAIL, "not glibc: the packages are built for that", to_do)
+        return fail("not glibc: the packages are built for that", to_do)
     needs = {package: need for package in COMPILED if (need := _needed_glibc(package))}
     least = max(needs.values(), default=(0, 0))
     details = tuple(f"{package}: {_dotted(need)}" for package, need in needs.items())
     found = f"glibc {version}, packages need {_dotted(least)}"
     if tuple(int(part) for part in re.findall(r"\d+", version)[:2]) < least:
-        return Finding(Level.FAIL, found, "install a newer system release", details)
-    return Finding(Level.OK, found, details=details)
+        return fail(found, "install a newer system release", details)
+    return ok(found, details)
 
 
-def clock(patient: CheckContext) -> Finding:
-    """Tell whether the clock is right: recordings, certificates and stamps go by it."""
+def clock(context: CheckContext) -> Finding:
+    """Check the clock, on which recordings, certificates and stamps depend."""
     written = (Path(__file__)).stat().st_mtime
     now = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime())
     wait = "timedatectl set-ntp true, or wait until the network is there"
     if time.time() < written - 86_400:
         found = f"{now}, before this program was installed: the computer forgot the time"
-        return Finding(Level.FAIL, found, wait)
+        return fail(found, wait)
     kept = kernel_clock()
     if kept is None:
-        return Finding(Level.WARN, f"{now}; nobody can say whether it is right", wait)
+        return warn(f"{now}; it is not known whether that is right", wait)
     is_synchronised, error_s = kept
-    if is_synchronised or (patient.root / "run/systemd/timesync/synchronized").exists():
-        return Finding(Level.OK, f"{now}, synchronised, off by at most {error_s:.3g} s")
-    return Finding(Level.WARN, f"{now}, not synchronised", wait)
+    if is_synchronised or (context.root / "run/systemd/timesync/synchronized").exists():
+        return ok(f"{now}, synchronised, off by at most {error_s:.3g} s")
+    return warn(f"{now}, not synchronised", wait)
 
 
 def kernel_clock() -> tuple[bool, float] | None:
@@ -152,33 +149,30 @@ WANTED_MB = 350
 PI_CMDLINES = ("boot/firmware/cmdline.txt", "boot/cmdline.txt")
 
 
-def memory(patient: CheckContext) -> Finding:
-    """Tell how much memory there is, and whether its limits hold."""
-    total_mb, free_mb = _meminfo_mb(patient.root, "Total"), _meminfo_mb(patient.root, "Available")
+def memory(context: CheckContext) -> Finding:
+    """Check how much memory there is, and whether limits on it hold."""
+    total_mb, free_mb = _meminfo_mb(context.root, "Total"), _meminfo_mb(context.root, "Available")
     found = f"{free_mb:.0f} MB of {total_mb:.0f} MB free"
-    version = controller(patient.root)
-    details = (_told(patient, version),)
-    unit = patient.unit
+    version = controller(context.root)
+    details = (_limits(context, version),)
+    unit = context.unit
     limit = unit.limit("MemoryMax") if unit else None
     if version is None:
         holds = "limits of the unit do not hold" if limit else "no limit on memory would hold"
-        return Finding(
-            Level.WARN,
-            f"{found}; the memory controller is off: {holds}",
-            _how_to_enable(patient.root),
-            details,
+        return warn(
+            f"{found}; the memory controller is off: {holds}", _how_to_enable(context.root), details
         )
     if free_mb < WANTED_MB:
         to_do = "end what else runs, or plan with larger cells (robot.tool_width_m)"
-        return Finding(Level.WARN, f"{found}; the daemon may want {WANTED_MB} MB", to_do, details)
-    if limit and limit < needed_bytes(patient.config):
-        high, most = limits_mib(patient.config)
-        smaller = afforded(patient.config, limit).map
+        return warn(f"{found}; the daemon may want {WANTED_MB} MB", to_do, details)
+    if limit and limit < needed_bytes(context.config):
+        high, most = limits_mib(context.config)
+        smaller = afforded(context.config, limit).map
         found += f"; the unit's limit is {limit / 1e6:.0f} MB: maps of no more than "
         found += f"{smaller.max_pixels} pixels and {smaller.max_lattice_cells} cells are taken"
         to_do = f"systemctl edit fasaco-edge: MemoryHigh={high}M, MemoryMax={most}M"
-        return Finding(Level.WARN, found, to_do, details)
-    return Finding(Level.OK, found, details=details)
+        return warn(found, to_do, details)
+    return ok(found, details)
 
 
 def controller(root: Path) -> int | None:
@@ -190,14 +184,14 @@ def controller(root: Path) -> int | None:
     return 1 if enabled and (root / "sys/fs/cgroup/memory").is_dir() else None
 
 
-def _told(patient: CheckContext, version: int | None) -> str:
+def _limits(context: CheckContext, version: int | None) -> str:
     groups = f"control groups version {version}" if version else "no memory controller"
-    if patient.unit is None:
+    if context.unit is None:
         return f"{groups}; no unit fasaco-edge.service here: nothing limits the daemon"
     limits = [
         f"{name} {'none' if limit is None else f'{limit / 1e6:.0f} MB'}"
         for name in ("MemoryHigh", "MemoryMax")
-        for limit in [patient.unit.limit(name)]
+        for limit in [context.unit.limit(name)]
     ]
     return f"{groups}; of the unit: {', '.join(limits)}"
 

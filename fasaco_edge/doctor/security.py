@@ -1,7 +1,4 @@
-"""What is open to whom.
-
-How the daemon shows who it is, and whether its secrets are kept.
-"""
+"""Checks of access: endpoints, roles, limits, the daemon's identity and its secrets."""
 
 from __future__ import annotations
 
@@ -13,8 +10,8 @@ from fasaco_edge.bus.access import ROLES
 from fasaco_edge.config.config import BusConfig
 from fasaco_edge.config.credentials import read_certificate
 from fasaco_edge.config.endpoints import UNIX, is_local, protocol_of
-from fasaco_edge.daemon.loop.inbox import MAP_SPACING_S
-from fasaco_edge.doctor.finding import CheckContext, Finding, Level, worst
+from fasaco_edge.daemon.loop.batch import MAP_SPACING_S
+from fasaco_edge.doctor.finding import CheckContext, Finding, Level, fail, ok, warn, worst
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
 
 SHOWS = {
@@ -24,72 +21,66 @@ SHOWS = {
 }
 
 
-def endpoints(patient: CheckContext) -> Finding:
-    """Tell where the daemon listens, from where that can be reached, and by whom."""
-    bus = patient.config.bus
+def endpoints(context: CheckContext) -> Finding:
+    """Check where the daemon listens, and from where and by whom that can be reached."""
+    bus = context.config.bus
     kind = bus.security.kind
     details = [f"{endpoint}: {_reach(endpoint)}, {SHOWS[kind]}" for endpoint in bus.listen]
     details += [f"{endpoint}: connects there" for endpoint in bus.connect]
     beyond = [endpoint for endpoint in bus.listen if not is_local(endpoint)]
     if not beyond:
         where = "on this computer alone" if bus.listen else "nowhere"
-        return Finding(Level.OK, f"listens {where}; security: {kind}", details=tuple(details))
+        return ok(f"listens {where}; security: {kind}", details)
     found = f"listens beyond this computer; security: {kind}"
     if kind == "none":
-        return Finding(
-            Level.WARN,
+        return warn(
             f"{found}: everybody in reach may give maps, poses and commands",
             "choose bus.security.kind tls, or keep the network to yourself",
-            tuple(details),
+            details,
         )
     if kind == "user":
-        return Finding(
-            Level.WARN,
+        return warn(
             f"{found}: names are checked, but all that is said can be read on the way",
             "choose bus.security.kind tls where others share the network",
-            tuple(details),
+            details,
         )
-    return Finding(Level.OK, found, details=tuple(details))
+    return ok(found, details)
 
 
-def roles(patient: CheckContext) -> Finding:
-    """Tell who may do what."""
-    security = patient.config.bus.security
+def roles(context: CheckContext) -> Finding:
+    """Check that each role has a name."""
+    security = context.config.bus.security
     if security.kind == "none":
-        return Finding(Level.OK, "no roles: whoever reaches the daemon may do everything")
+        return ok("no roles: whoever reaches the daemon may do everything")
     names = security.names()
-    details = tuple(
+    details = [
         f"{role} ({', '.join(who) or 'nobody'}): {ROLES[role].told}" for role, who in names.items()
-    )
-    if names["router"] or not patient.config.bus.listen:
+    ]
+    if names["router"] or not context.config.bus.listen:
         missing = [] if names["router"] else ["router"]
     else:
         missing = [role for role in ("mapper", "operator") if not names[role]]
     if missing:
         lacking = " or ".join(missing)
-        return Finding(
-            Level.WARN,
+        return warn(
             f"nobody is {lacking}: what that role does, nobody can do",
             f"name somebody in bus.security.roles.{missing[0]}",
             details,
         )
     count = len({name for who in names.values() for name in who})
-    return Finding(
-        Level.OK, f"names with a role: {count}; everybody else may do nothing", details=details
-    )
+    return ok(f"names with a role: {count}; everybody else may do nothing", details)
 
 
-def limits(patient: CheckContext) -> Finding:
-    """Tell how much each who sends may send."""
-    bus = patient.config.bus
+def limits(context: CheckContext) -> Finding:
+    """Show how much each sender may send."""
+    bus = context.config.bus
     if bus.security.kind == "none" and not bus.open_to_everyone:
         own = f"takes in at most {1 / MAP_SPACING_S:g} maps a second, the newest always"
-        return Finding(Level.OK, f"none for who sends; the daemon {own}")
+        return ok(f"no limits on senders; the daemon {own}")
     most = bus.security.limits
-    return Finding(
-        Level.OK,
+    return ok(
         f"of each: maps up to {most.map_bytes / 1e6:.1f} MB, {most.maps_hz:g} maps, "
-        f"{most.poses_hz:g} poses and {most.queries_hz:g} queries of a key a second",
+        f"{most.poses_hz:g} poses and {most.queries_hz:g} queries of a key a second"
     )
 
 
@@ -107,37 +98,37 @@ SECRETS = {
 HOW_TO = "protocol/README.md, Security, tells how to make them"
 
 
-def identity(patient: CheckContext) -> Finding:
-    """Tell by what name others know the daemon, and until when."""
-    bus = patient.config.bus
+def identity(context: CheckContext) -> Finding:
+    """Check the daemon's certificate or password, and until when it holds."""
+    bus = context.config.bus
     security, listens = bus.security, bool(bus.listen)
     if security.kind == "none":
-        return Finding(Level.OK, "shows no name, asks for none")
+        return ok("shows no name, asks for none")
     try:
-        security.of_daemon(patient.config.keys().prefix)
+        security.of_daemon(context.config.keys().prefix)
         if security.kind == "user":
             return _login(bus)
         certificate = read_certificate(security.tls, listens=listens)
     except (BadConfiguration, ClockBeforeCertificate) as error:
         to_do = error.hint if isinstance(error, ClockBeforeCertificate) else HOW_TO
-        return Finding(Level.FAIL, str(error), to_do)
+        return fail(str(error), to_do)
     left = certificate.ends - datetime.now(UTC)
     details = [_recording(bus, certificate.name)]
     if listens:
         details.insert(0, f"others connect to it as {', '.join(certificate.hosts) or 'nothing'}")
     found = f"certificate of {certificate.name!r}, ends {certificate.ends:%Y-%m-%d}"
     if not certificate.name or (listens and not certificate.hosts):
-        return Finding(Level.FAIL, f"{found}: a name is missing in it", HOW_TO, tuple(details))
+        return fail(f"{found}: a name is missing in it", HOW_TO, details)
     if left < SOON:
-        return Finding(Level.WARN, f"{found}, in {left.days} days", "renew it", tuple(details))
-    return Finding(Level.OK, found, details=tuple(details))
+        return warn(f"{found}, in {left.days} days", "renew it", details)
+    return ok(found, details)
 
 
-def secret_files(patient: CheckContext) -> Finding:
-    """Tell whether others on this computer can read keys and passwords."""
-    security = patient.config.bus.security
+def secret_files(context: CheckContext) -> Finding:
+    """Check that others on this computer cannot read keys and passwords."""
+    security = context.config.bus.security
     if security.kind == "none":
-        return Finding(Level.OK, "there are none")
+        return ok("there are none")
     section = getattr(security, security.kind)
     paths = [Path(file) for name in SECRETS[security.kind] if (file := getattr(section, name))]
     levels, details = [], []
@@ -145,19 +136,19 @@ def secret_files(patient: CheckContext) -> Finding:
         try:
             mode = path.stat().st_mode
         except OSError as error:
-            return Finding(Level.FAIL, f"{path}: {error.strerror}", HOW_TO)
+            return fail(f"{path}: {error.strerror}", HOW_TO)
         levels.append(_level(mode))
         details.append(f"{path}: {stat.filemode(mode)}")
     level = worst(levels)
     if level is Level.OK:
-        return Finding(level, "read by their owner alone", details=tuple(details))
+        return ok("read by their owner alone", details)
     whom = "everybody on this computer" if level is Level.FAIL else "their group"
     command = "chmod 600 " + " ".join(map(str, paths))
     return Finding(level, f"can be read by {whom}", command, tuple(details))
 
 
 def _login(bus: BusConfig) -> Finding:
-    """Tell about user and password; the files can be read."""
+    """Check user and password; the files can be read."""
     security, user = bus.security, bus.security.user
     names = []
     text = Path(user.dictionary_file).read_text(encoding="utf-8") if user.dictionary_file else ""
@@ -165,17 +156,15 @@ def _login(bus: BusConfig) -> Finding:
         name, colon, password = line.partition(":")
         if not (name and colon and password):
             where = f"{user.dictionary_file}, line {number}"
-            return Finding(Level.FAIL, f"{where}: no name:password", "correct the line")
+            return fail(f"{where}: no name:password", "correct the line")
         names.append(name)
     unknown = {name for who in security.names().values() for name in who} - set(names)
     details = (f"may connect: {', '.join(names) or 'nobody'}", _recording(bus, user.name))
     if user.dictionary_file and unknown:
         missing = ", ".join(sorted(unknown))
         found = f"user {user.name!r}; {missing}: a role, but no password"
-        return Finding(Level.WARN, found, f"add lines to {user.dictionary_file}", details)
-    return Finding(
-        Level.OK, f"user {user.name!r}; {len(names)} others may connect", details=details
-    )
+        return warn(found, f"add lines to {user.dictionary_file}", details)
+    return ok(f"user {user.name!r}; {len(names)} others may connect", details)
 
 
 def _recording(bus: BusConfig, name: str) -> str:

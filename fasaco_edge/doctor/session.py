@@ -1,6 +1,6 @@
-"""Who listens at an endpoint, found out without Zenoh.
+"""Checks of the bus: whether the daemon can join it, and who is there.
 
-The bus: whether the daemon can join it, and who is there.
+Who listens at an endpoint is found out without Zenoh.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, check_settings, open_bus
 from fasaco_edge.config.endpoints import from_here, host_of, protocol_of
 from fasaco_edge.daemon.claim import claims_in
-from fasaco_edge.doctor.finding import CheckContext, Finding, Level
+from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 from fasaco_edge.errors import BadConfiguration, BusUnavailable, MalformedMessage
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_json
@@ -104,13 +104,13 @@ LISTEN_S = 0.7
 ASK_S = 0.7
 
 
-def session(patient: CheckContext) -> Finding:
-    """Tell whether a session can be opened as the daemon would, or who is in its place."""
-    bus = patient.config.bus
+def session(context: CheckContext) -> Finding:
+    """Check that a session can be opened as the daemon would, or find who is in its place."""
+    bus = context.config.bus
     try:
-        check_settings(bus.settings(patient.config.keys().prefix, patient.config.ros2 or None))
+        check_settings(bus.settings(context.config.keys().prefix, context.config.ros2 or None))
     except (BadConfiguration, BusUnavailable) as error:
-        return Finding(Level.FAIL, str(error), error.hint)
+        return fail(str(error), error.hint)
     details, is_taken = [], False
     for endpoint in bus.listen:
         if answers(from_here(endpoint)):
@@ -119,42 +119,40 @@ def session(patient: CheckContext) -> Finding:
             details.append(f"{endpoint}: {who} listens there")
         elif why := why_not_bound(endpoint):
             to_do = "correct bus.listen: that address is not this computer's, or not for this user"
-            return Finding(Level.FAIL, f"{endpoint}: nobody can listen there: {why}", to_do)
+            return fail(f"{endpoint}: nobody can listen there: {why}", to_do)
         else:
             details.append(f"{endpoint}: free")
     silent = [endpoint for endpoint in bus.connect if answers(endpoint) is False]
     details += [f"{endpoint}: nobody answers" for endpoint in silent]
-    told = tuple(details)
     if len(silent) == len(bus.connect) > 0:
-        level = Level.FAIL if bus.mode == "client" else Level.WARN
-        then = "does not start" if bus.mode == "client" else "tries again and again"
+        make, then = (fail, "does not start") if bus.mode == "client" else (warn, "keeps trying")
         found = f"nobody answers at {', '.join(silent)}: the daemon {then}"
-        return Finding(level, found, "start the router there, or correct bus.connect", told)
+        return make(found, "start the router there, or correct bus.connect", details)
     if not is_taken:
-        return Finding(Level.OK, "nobody is in the way", details=told)
+        return ok("nobody is in the way", details)
     try:
-        with _joined(patient) as joined:
+        with _joined(context) as joined:
             met = " and ".join(joined.met()) or "nobody"
-            return Finding(Level.OK, f"joined {met} as a client", details=told)
+            return ok(f"joined {met} as a client", details)
     except BusUnavailable as error:
         to_do = "end what listens there, or choose another port in bus.listen"
         found = f"what listens there does not speak Zenoh with us: {error}"
-        return Finding(Level.FAIL, found, to_do, told)
+        return fail(found, to_do, details)
 
 
-def peers(patient: CheckContext) -> Finding:
-    """Tell who is on the bus: the daemon, its recorder, other robots, maps and poses."""
-    if not any(answers(endpoint) is not False for endpoint in _ways(patient)):
-        return Finding(Level.OK, "nobody to ask: neither daemon nor router is there")
+def peers(context: CheckContext) -> Finding:
+    """Check who is on the bus: the daemon, other robots, maps and poses."""
+    if not any(answers(endpoint) is not False for endpoint in _ways(context)):
+        return ok("nobody to ask: neither daemon nor router is there")
     try:
-        with _joined(patient) as bus:
-            return _seen(patient, bus)
+        with _joined(context) as bus:
+            return _seen(context, bus)
     except (BadConfiguration, BusUnavailable) as error:
-        return Finding(Level.WARN, f"could not be asked: {error}", error.hint)
+        return warn(f"could not be asked: {error}", error.hint)
 
 
-def _seen(patient: CheckContext, bus: Bus) -> Finding:
-    keys, ros = patient.config.keys(), patient.config.ros2
+def _seen(context: CheckContext, bus: Bus) -> Finding:
+    keys, ros = context.config.keys(), context.config.ros2
     wanted = {"map": [keys.of(topics.MAP)], "pose": [keys.of(topics.POSE)]}
     if ros:
         poses = [topic for name, topic in ros.inputs.items() if name in ("pose", "tf_static")]
@@ -171,23 +169,21 @@ def _seen(patient: CheckContext, bus: Bus) -> Finding:
         details.append(f"{kind}: {f'{count} in {LISTEN_S:g} s' if count else 'nothing heard'}")
     if keys.of(topics.ALIVE) not in alive:
         found = f"no daemon of robot {keys.robot!r}; {_in_words(heard)}"
-        return Finding(Level.OK, found, details=tuple(details))
+        return ok(found, details)
     if status is None:
         found = "the daemon runs, and does not tell us how it is"
         to_do = "ask under a name with the role viewer (bus.security.roles)"
-        return Finding(Level.WARN, found, to_do, tuple(details))
+        return warn(found, to_do, details)
     found = f"the daemon runs: {status['state']}, {status['reason']}"
     if len(claims) > 1:
         found = f"{len(claims)} daemons have the name {keys.robot!r}, of which one plans; {found}"
         to_do = "end those that wait, or give them names of their own (robot.name)"
-        return Finding(Level.WARN, found, to_do, tuple(details))
+        return warn(found, to_do, details)
     if status["map"] is None or status["pose"] is None:
         lacking = " and ".join(kind for kind in ("map", "pose") if status[kind] is None)
-        lack = ", ".join(key for kind in wanted if status[kind] is None for key in wanted[kind])
-        return Finding(
-            Level.WARN, f"{found}; it has no {lacking}", f"publish on {lack}", tuple(details)
-        )
-    return Finding(Level.OK, found, details=tuple(details))
+        missing = [key for kind in wanted if status[kind] is None for key in wanted[kind]]
+        return warn(f"{found}; it has no {lacking}", f"publish on {', '.join(missing)}", details)
+    return ok(found, details)
 
 
 def _listen(bus: Bus, wanted: dict[str, list[str]]) -> dict[str, int]:
@@ -224,15 +220,15 @@ def _status(bus: Bus, key: str) -> dict[str, Any] | None:
     return None
 
 
-def _ways(patient: CheckContext) -> list[str]:
-    bus = patient.config.bus
+def _ways(context: CheckContext) -> list[str]:
+    bus = context.config.bus
     return [*map(from_here, bus.listen), *bus.connect]
 
 
 @contextmanager
-def _joined(patient: CheckContext) -> Iterator[Bus]:
+def _joined(context: CheckContext) -> Iterator[Bus]:
     """Join the bus as one client more, by the endpoints at which somebody answers."""
-    ways = tuple(way for way in _ways(patient) if answers(way) is not False)
-    secured = patient.config.bus.security.of_client()
+    ways = tuple(way for way in _ways(context) if answers(way) is not False)
+    secured = context.config.bus.security.of_client()
     with open_bus(BusSettings("client", ways, (), secured)) as bus:
         yield bus

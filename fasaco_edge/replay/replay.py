@@ -16,7 +16,8 @@ from dataclasses import dataclass
 from fasaco_edge.bus.arrival import Arrival, digest
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
-from fasaco_edge.daemon.loop.inbox import Inbox, Received, make_mailbox
+from fasaco_edge.daemon.loop.batch import Received, make_mailbox, take_batch
+from fasaco_edge.daemon.loop.inbox import Inbox
 from fasaco_edge.daemon.loop.loop import TICK_S
 from fasaco_edge.daemon.startup import Startup
 from fasaco_edge.errors import FasacoError
@@ -91,7 +92,7 @@ class Replay:
         keeping = LedgerKeeper(
             NoDisk(), config.robot.tool_width_m, autostart=config.mission.autostart
         )
-        self._beginning = Startup(keeping, lambda: loader)
+        self._startup = Startup(keeping, lambda: loader)
         self._is_begun = False
         self._commands = 0
         self._state = ""
@@ -137,18 +138,17 @@ class Replay:
         self._now = now
         for arrival in arrivals:
             if arrival.topic != COMMAND:
-                self._mailbox.post(arrival.topic, Received(arrival.sample, now))
-        items = self._mailbox.take(0.0)
-        events, refused = self._inbox.decode(items, self._mailbox.take_lost("map_update"))
+                self._mailbox.post(arrival.topic, Received(arrival.topic, arrival.sample, now))
+        events, refused = self._inbox.decode(take_batch(self._mailbox, 0.0))
         commands = self._read_commands(arrivals, refused)
         if not self._is_begun:
-            refused += self._beginning.take(events)
-            self._is_begun = self._is_ready() and self._beginning.loaded() is not None
-            events = self._beginning.held
+            refused += self._startup.take(events)
+            self._is_begun = self._is_ready() and self._startup.loaded() is not None
+            events = self._startup.held
         if self._is_begun:
             yield self._step([*events, *commands, *self.plans.take(now)], tuple(refused))
             return
-        self._beginning.obey(commands)
+        self._startup.answer(commands)
         if refused:
             yield ReplayStep(now - self._began, "loading", "", False, Decision(), tuple(refused))
 

@@ -15,7 +15,8 @@ from fasaco_edge.bus.session import Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
-from fasaco_edge.daemon.loop.inbox import Inbox, Received, make_mailbox
+from fasaco_edge.daemon.loop.batch import Batch, Received, make_mailbox
+from fasaco_edge.daemon.loop.inbox import Inbox
 from fasaco_edge.daemon.loop.turn_log import (
     POSE,
     POSE_BYTES,
@@ -85,7 +86,7 @@ class TurnReplay:
         cell_m, ledger = config.robot.tool_width_m, record.beginning.ledger
         disk = NoDisk(decode_ledger(ledger, cell_m) if ledger else None)
         keeping = LedgerKeeper(disk, cell_m, autostart=config.mission.autostart)
-        self._beginning = Startup(keeping, lambda: loader)
+        self._startup = Startup(keeping, lambda: loader)
         self._is_begun = False
         self._waiting = Waiting(record.taken)
         self._decoder = SampleDecoder()
@@ -134,17 +135,17 @@ class TurnReplay:
                 yield step
 
     def _turn(self, turn: Turn, now: float) -> ReplayStep | None:
-        items = self._items(turn)
-        events, refused = self._inbox.decode(items, turn.patches_lost)
+        batch = Batch(samples=self._received(turn), updates_lost=turn.patches_lost)
+        events, refused = self._inbox.decode(batch)
         commands = [
             CommandReceived(number, *read_command(document)) for number, document in turn.commands
         ]
         if not self._is_begun:
-            refused += self._beginning.take(events)
-            self._is_begun = turn.is_begun and self._beginning.loaded() is not None
-            events = self._beginning.held
+            refused += self._startup.take(events)
+            self._is_begun = turn.is_begun and self._startup.loaded() is not None
+            events = self._startup.held
         if not self._is_begun:
-            decision = Decision(answers=tuple(self._beginning.obey(commands)))
+            decision = Decision(answers=tuple(self._startup.answer(commands)))
             self._compare(turn, self._news.of(decision, None))
             if refused:
                 return ReplayStep(self._at_s, "loading", "", False, decision, tuple(refused))
@@ -174,13 +175,11 @@ class TurnReplay:
             else _facts(turn.decided)["path"] == _facts(decided)["path"],
         )
 
-    def _items(self, turn: Turn) -> list[tuple[str, object]]:
+    def _received(self, turn: Turn) -> list[Received]:
         """Return what the daemon took in, as far as it was recorded."""
         found = [(taken, self._find(turn, taken)) for taken in turn.samples]
         return [
-            (taken.topic, Received(sample, taken.at))
-            for taken, sample in found
-            if sample is not None
+            Received(taken.topic, sample, taken.at) for taken, sample in found if sample is not None
         ]
 
     def _find(self, turn: Turn, taken: Taken) -> Sample | None:

@@ -25,9 +25,9 @@ def planning(own, now=0.0):
     """A claim that found nobody."""
     claim = Claim(own)
     claim.decide({}, now)
-    assert claim.stand is ClaimState.LOOKS
+    assert claim.state is ClaimState.LOOKS
     claim.decide({}, now + CALM_S)
-    assert claim.stand is ClaimState.PLANS
+    assert claim.state is ClaimState.PLANS
     return claim
 
 
@@ -41,10 +41,10 @@ def test_who_comes_to_where_another_plans_waits(own):
     claim = Claim(own)
     for now in (0.0, 1.0, 2.0, 100.0):
         claim.decide({B: ClaimState.PLANS}, now)
-        assert (claim.stand, claim.rival) == (ClaimState.WAITS, B)
+        assert (claim.state, claim.rival) == (ClaimState.WAITS, B)
     before = planning(B)
     before.decide({own: ClaimState.WAITS}, 1.0)
-    assert before.stand is ClaimState.PLANS
+    assert before.state is ClaimState.PLANS
 
 
 def test_of_two_that_start_at_once_one_plans():
@@ -52,7 +52,7 @@ def test_of_two_that_start_at_once_one_plans():
     for now in (0.0, CALM_S):
         first.decide({B: ClaimState.WAITS}, now)
         second.decide({A: ClaimState.WAITS}, now)
-    assert (first.stand, second.stand) == (ClaimState.PLANS, ClaimState.WAITS)
+    assert (first.state, second.state) == (ClaimState.PLANS, ClaimState.WAITS)
     assert second.rival == A
 
 
@@ -61,9 +61,9 @@ def test_who_waits_takes_over_when_the_other_is_gone():
     for now in range(50):
         claim.decide({A: ClaimState.PLANS}, float(now))
     claim.decide({}, 50.0)
-    assert claim.stand is ClaimState.WAITS
+    assert claim.state is ClaimState.WAITS
     claim.decide({}, 50.0 + CALM_S)
-    assert claim.stand is ClaimState.PLANS
+    assert claim.state is ClaimState.PLANS
 
 
 def test_of_two_that_wait_the_one_with_the_smaller_id_takes_over():
@@ -72,18 +72,18 @@ def test_of_two_that_wait_the_one_with_the_smaller_id_takes_over():
         claims[own].decide({A: ClaimState.PLANS, other: ClaimState.WAITS}, 0.0)
         claims[own].decide({other: ClaimState.WAITS}, 1.0)
         claims[own].decide({other: ClaimState.WAITS}, 1.0 + CALM_S)
-    assert (claims[B].stand, claims[C].stand) == (ClaimState.PLANS, ClaimState.WAITS)
+    assert (claims[B].state, claims[C].state) == (ClaimState.PLANS, ClaimState.WAITS)
 
 
 def test_one_that_could_plan_and_does_not_is_not_waited_for_for_ever():
     claim, now = Claim(B), 0.0
     claim.decide({A: ClaimState.WAITS}, now)
     while now < SETTLE_S + PATIENCE_S:
-        assert claim.stand is not ClaimState.PLANS
+        assert claim.state is not ClaimState.PLANS
         now += 1.0
         claim.decide({A: ClaimState.WAITS}, now)
     claim.decide({A: ClaimState.WAITS}, now + 1.0)
-    assert claim.stand is ClaimState.PLANS
+    assert claim.state is ClaimState.PLANS
 
 
 def test_where_two_plan_one_goes_on_and_knows_when_the_other_has_stopped():
@@ -91,17 +91,17 @@ def test_where_two_plan_one_goes_on_and_knows_when_the_other_has_stopped():
     first, second = planning(A), planning(B)
     first.decide({B: ClaimState.PLANS}, 5.0)
     second.decide({A: ClaimState.PLANS}, 5.0)
-    assert (first.stand, second.stand) == (ClaimState.PLANS, ClaimState.YIELDS)
-    assert not first.hears_of_yielding
+    assert (first.state, second.state) == (ClaimState.PLANS, ClaimState.YIELDS)
+    assert not first.rival_yielded
     first.decide({B: ClaimState.YIELDS}, 5.1)
-    assert first.hears_of_yielding
+    assert first.rival_yielded
     first.decide({B: ClaimState.YIELDS}, 5.2)
-    assert not first.hears_of_yielding
+    assert not first.rival_yielded
     # It may have yielded unseen.
     first.decide({}, 6.0, in_touch=False)
     first.decide({}, 7.0)
     first.decide({B: ClaimState.YIELDS}, 7.1)
-    assert first.hears_of_yielding
+    assert first.rival_yielded
 
 
 def test_out_of_touch_nobody_takes_over():
@@ -110,33 +110,33 @@ def test_out_of_touch_nobody_takes_over():
     claim.decide({A: ClaimState.PLANS}, 0.0)
     for now in range(1, 60):
         claim.decide({}, float(now), in_touch=False)
-        assert (claim.stand, claim.rival) == (ClaimState.WAITS, A)
+        assert (claim.state, claim.rival) == (ClaimState.WAITS, A)
     # It is back, and the other needs a moment longer to find it.
     claim.decide({}, 60.0)
     claim.decide({}, 60.0 + SETTLE_S)
-    assert claim.stand is ClaimState.WAITS
+    assert claim.state is ClaimState.WAITS
     claim.decide({A: ClaimState.PLANS}, 61.0)
     claim.decide({A: ClaimState.PLANS}, 61.0 + REJOIN_S)
-    assert (claim.stand, claim.rival) == (ClaimState.WAITS, A)
+    assert (claim.state, claim.rival) == (ClaimState.WAITS, A)
     # Who planned goes on, but for a moment in which it looks.
     claim = planning(A)
     claim.decide({}, 1.0, in_touch=False)
-    assert not claim.doubts(1.0)
+    assert not claim.is_uncertain(1.0)
     claim.decide({}, 9.0)
-    assert claim.stand is ClaimState.PLANS
-    assert claim.doubts(9.0)
-    assert not claim.doubts(9.0 + SETTLE_S)
+    assert claim.state is ClaimState.PLANS
+    assert claim.is_uncertain(9.0)
+    assert not claim.is_uncertain(9.0 + SETTLE_S)
 
 
 def test_who_was_frozen_says_nothing_until_it_has_seen_who_plans_now():
     claim = planning(B)
     claim.decide({}, LEASE_S / 2)
-    assert not claim.doubts(LEASE_S / 2)
+    assert not claim.is_uncertain(LEASE_S / 2)
     woken = 3 * LEASE_S
     claim.decide({}, woken)
-    assert claim.doubts(woken)
+    assert claim.is_uncertain(woken)
     claim.decide({A: ClaimState.PLANS}, woken + 1.0)
-    assert claim.stand is ClaimState.YIELDS
+    assert claim.state is ClaimState.YIELDS
 
 
 def test_only_what_is_a_claim_counts():
@@ -158,9 +158,9 @@ def test_any_course_of_things_ends_with_one_that_plans(seed):
         for own, claim in claims.items():
             for other, its in claims.items():
                 if own != other and (settled or rng.random() < 0.1):
-                    seen[own][other] = its.stand
+                    seen[own][other] = its.state
                 if not settled and rng.random() < 0.01:
                     seen[own].pop(other, None)
             if settled or rng.random() < 0.9:
                 claim.decide(dict(seen[own]), now, in_touch=settled or rng.random() < 0.95)
-    assert [claim.stand for claim in claims.values()].count(ClaimState.PLANS) == 1
+    assert [claim.state for claim in claims.values()].count(ClaimState.PLANS) == 1

@@ -8,10 +8,17 @@ import weakref
 import pytest
 
 from fasaco_edge.bus.session import BusSettings, Sample, open_bus
-from fasaco_edge.daemon.loop.inbox import Inbox, Received, make_mailbox
-from fasaco_edge.errors import MalformedMessage, PatchWithoutBase
+from fasaco_edge.daemon.loop.batch import Received, make_mailbox, take_batch
+from fasaco_edge.daemon.loop.inbox import Inbox
+from fasaco_edge.errors import MalformedMessage, PatchWithoutBase, PlanFailed
 from fasaco_edge.grid.lattice import Footprint
-from fasaco_edge.mission.core.events import MapReceived, PatchesLost, PatchReceived, PoseReceived
+from fasaco_edge.mission.core.events import (
+    MapReceived,
+    PatchesLost,
+    PatchReceived,
+    PlanBroken,
+    PoseReceived,
+)
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.pose_decoding import PoseDecoder
@@ -42,12 +49,11 @@ class Arrivals:
     def post(self, kind, payload):
         self.clock += 1.0
         sample = Sample(f"fasaco/@v1/robot/{kind}", payload)
-        self.mailbox.post(kind, Received(sample, self.clock))
+        self.mailbox.post(kind, Received(kind, sample, self.clock))
 
     def events(self):
         """Return the events, and the faults."""
-        items = self.mailbox.take(0.0)
-        return self.inbox.decode(items, self.mailbox.take_lost("map_update"))
+        return self.inbox.decode(take_batch(self.mailbox, 0.0))
 
     def decode(self):
         """Return the types of the events, and the faults."""
@@ -178,10 +184,16 @@ def test_a_broken_sample_costs_that_sample_alone(arrivals):
     assert len(faults) == 3
 
 
-def test_what_is_no_sample_is_not_its_business(arrivals):
-    arrivals.mailbox.post("plan", object())
-    arrivals.mailbox.post("failed", RuntimeError())
+def test_what_is_no_sample_gives_no_event(arrivals):
+    arrivals.mailbox.post("plan", PlanBroken(1, PlanFailed("broke")))
+    arrivals.mailbox.post("loaded", None)
     assert arrivals.decode() == ([], [])
+
+
+def test_a_thread_that_failed_ends_the_daemon(arrivals):
+    arrivals.mailbox.post("failed", RuntimeError("planner"))
+    with pytest.raises(RuntimeError, match="planner"):
+        take_batch(arrivals.mailbox, 0.0)
 
 
 @pytest.mark.parametrize("kind", ["map", "map_update", "pose"])

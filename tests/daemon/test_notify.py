@@ -77,7 +77,7 @@ def test_a_watchdog_is_ours_or_none(environ, seconds):
 def test_a_manager_that_is_gone_costs_nothing_but_a_warning(tmp_path, caplog):
     manager = ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
     manager.ready()
-    assert "cannot be told READY" in caplog.text
+    assert "does not accept READY" in caplog.text
 
 
 def test_a_status_that_was_not_taken_is_told_again(tmp_path):

@@ -154,22 +154,22 @@ def test_folders_and_who_may_write_there(tmp_path):
         mission=MissionSettings(state_dir=str(state)),
         bus=BusConfig(connect=("tcp/127.0.0.1:1#key=secret",)),
     )
-    patient = CheckContext(config, file, recordings=tmp_path / "later" / "recordings")
-    disk = folders.disk(patient)
+    context = CheckContext(config, file, recordings=tmp_path / "later" / "recordings")
+    disk = folders.disk(context)
     assert disk.level is Level.OK
     assert [line.partition(":")[0] for line in disk.details] == [
         "state",
         "kernel cache",
         "recordings",
     ]
-    assert folders.permissions(patient).level is Level.WARN
-    assert "secret" not in folders.permissions(patient).found
+    assert folders.permissions(context).level is Level.WARN
+    assert "secret" not in folders.permissions(context).found
     file.chmod(0o640)
-    assert folders.permissions(patient).level is Level.OK
+    assert folders.permissions(context).level is Level.OK
     state.chmod(0o777)
-    assert folders.permissions(patient).to_do == f"chmod o-w {state}"
+    assert folders.permissions(context).to_do == f"chmod o-w {state}"
     file.chmod(0o666)
-    both = folders.permissions(patient)
+    both = folders.permissions(context)
     assert both.level is Level.FAIL
     assert len(both.details) == 2
     # Nothing was made.
@@ -195,8 +195,8 @@ def test_a_read_only_disk_is_told(tmp_path):
 
 def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch):
     told = {"Environment": f"NUMBA_CACHE_DIR={tmp_path}", "DynamicUser": "yes"}
-    patient = CheckContext(DaemonConfig(), unit=Unit(told | {"CacheDirectory": "fasaco-edge"}))
-    found = kernels.kernels(patient)
+    context = CheckContext(DaemonConfig(), unit=Unit(told | {"CacheDirectory": "fasaco-edge"}))
+    found = kernels.kernels(context)
     assert found.level is Level.WARN
     assert found.found.startswith("not compiled for this version")
     # As root it would make a folder that the daemon does not trust.
@@ -209,7 +209,7 @@ def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch)
     from fasaco_edge.kernels.cache import cache_folder
 
     folder = cache_folder()
-    assert "never all compiled" in kernels.kernels(patient).found
+    assert "never all compiled" in kernels.kernels(context).found
     folder.chmod(0o770)
     found = kernels.kernels(CheckContext(DaemonConfig()))
     assert found.level is Level.WARN
@@ -246,7 +246,7 @@ def test_nobody_is_there():
     assert session.peers(alone).found.startswith("nobody to ask")
     away = session.session(at(endpoint, connect=("tcp/127.0.0.1:1",)))
     assert away.level is Level.WARN
-    assert "the daemon tries again and again" in away.found
+    assert "the daemon keeps trying" in away.found
     assert session.session(at(connect=("tcp/127.0.0.1:1",), mode="client")).level is Level.FAIL
 
 
@@ -258,11 +258,11 @@ def test_an_address_that_is_not_this_computers():
 
 def test_a_daemon_is_found_with_what_it_lacks(tmp_path):
     with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
-        patient = at(daemon.endpoint)
-        met = session.session(patient)
+        context = at(daemon.endpoint)
+        met = session.session(context)
         assert met.level is Level.OK
         assert f"process {daemon.pid} listens there" in met.details[0]
-        lacking = session.peers(patient)
+        lacking = session.peers(context)
         assert lacking.level is Level.WARN
         assert lacking.found == (
             "the daemon runs: waiting for map, no map yet; it has no map and pose"
@@ -274,8 +274,8 @@ def test_a_daemon_is_found_with_what_it_lacks(tmp_path):
         outsider.put("map", map_bytes(pillared_room()))
         outsider.put("pose", pose_bytes(1.0, 1.0))
         outsider.wait_status(lambda status: status["state"] == "covering")
-        assert session.peers(patient).level is Level.OK
-        assert session.peers(patient).found.startswith("the daemon runs: covering, path 1")
+        assert session.peers(context).level is Level.OK
+        assert session.peers(context).found.startswith("the daemon runs: covering, path 1")
 
 
 def test_who_publishes_is_heard_without_a_daemon(tmp_path):
@@ -310,8 +310,8 @@ def test_a_program_that_says_nothing_hangs_nobody():
     with socket.socket() as mute:
         mute.bind(("127.0.0.1", 0))
         mute.listen()
-        patient = at(f"tcp/127.0.0.1:{mute.getsockname()[1]}")
-        slow = Check("slow", lambda _: session.session(patient))
+        context = at(f"tcp/127.0.0.1:{mute.getsockname()[1]}")
+        slow = Check("slow", lambda _: session.session(context))
         began = time.monotonic()
         told = dict(report.findings(None, (slow,)))
         assert time.monotonic() - began < report.PATIENCE_S + 30.0

@@ -1,48 +1,50 @@
-"""What is to outlive the daemon: handed to the disk's thread when it has changed.
-
-The thread that writes the ledger: a slow or full disk costs the mission nothing.
+"""The ledger's writer: a thread, so that a slow or full disk does not delay the mission.
 
 What cannot be written stays in memory and is tried again; the status says so meanwhile.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
-
-from fasaco_edge.errors import FasacoError
-from fasaco_edge.mission.coverage.ledger import LedgerMismatchError, LedgerSnapshot
-from fasaco_edge.mission.orders.order import OrderError
-from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
-
-if TYPE_CHECKING:
-    from fasaco_edge.mission.core.mission import Mission
-
-
 import logging
 import threading
 import time
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fasaco_edge.daemon.faults import fault_text, log_fault
 from fasaco_edge.daemon.ledger.codec import LedgerFileError
 from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger, reason_of
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.mission.coverage.ledger import LedgerMismatchError, LedgerSnapshot
+from fasaco_edge.mission.orders.order import OrderError
+from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 from fasaco_edge.wire.status import LedgerReport
 
-# An answer to a command waits so long for a slow disk [s].
+if TYPE_CHECKING:
+    from fasaco_edge.mission.core.mission import Mission
+
+LOG = logging.getLogger(__name__)
+
+# Coverage that is a second old is on disk, although a cycle takes up to a tenth of a second, and
+# a memory card some tenths.
+PERIOD_S = 0.5
+# Time between tries after a failure [s].
+RETRY_S = 2.0
+# How long the answer to a command waits for a slow disk [s].
 MOST_WAIT_S = 1.0
 
 
 class LedgerKeeper:
-    """Keeps the ledger with the order; also before there is a mission.
+    """Keeps coverage and order in the ledger; also before there is a mission.
 
     Attributes:
-        fault: what was wrong with the order that was kept; None if nothing.
+        first: the order to begin with: the one that was under way, if any.
     """
 
     def __init__(self, writer: LedgerWriter, cell_m: float, *, autostart: bool) -> None:
-        self.fault: OrderError | None = None
+        self._faults: list[FasacoError] = []
         self._writer = writer
         self._before = writer.restored or LedgerSnapshot(cell_m, "", 0, {})
         self.first = self._first_assignment(autostart)
@@ -50,17 +52,17 @@ class LedgerKeeper:
         self._kept_at = float("-inf")
 
     def restore(self, mission: Mission, assignment: OrderState) -> None:
-        """Let a mission go on where the one before ended."""
+        """Let a mission go on where the former one ended."""
         if self._before.cells:
             mission.restore_ledger(self._before)
         mission.restore_order(assignment)
 
     def take_back(self, mission: Mission) -> None:
-        """Keep what a mission has done for the one that goes on in its place."""
+        """Take what a mission has done, for the one that replaces it."""
         self._before, self.first = mission.snapshot(), mission.order_state
 
     def keep(self, mission: Mission | None, assignment: OrderState, now: float) -> None:
-        """Hand over what has changed: an order at once, coverage once a period."""
+        """Have changes written: an order at once, coverage once a period."""
         total = mission.ledger.total if mission else self._before.total
         kept_total, kept_assignment = self._kept
         if total == kept_total and assignment == kept_assignment:
@@ -75,17 +77,26 @@ class LedgerKeeper:
             self._writer.put(self._before)
 
     def is_kept(self, now: float) -> bool:
-        """Tell whether what was handed over is on the disk, or no disk is to be waited for."""
+        """Tell whether the changes are on disk, or the disk has been waited for long enough."""
         return not self._writer.is_behind() or now - self._kept_at > MOST_WAIT_S
 
+    def report(self, now: float) -> LedgerReport:
+        """Return this part of the status; ``now`` is monotonic time [s]."""
+        return self._writer.report(now)
+
+    def take_faults(self) -> list[FasacoError]:
+        """Return what went wrong since the last call; it is logged already."""
+        faults, self._faults = self._faults, []
+        return faults + self._writer.take_faults()
+
     def note_faults(self, faults: tuple[FasacoError, ...]) -> None:
-        """Keep the files aside where the mission found them to be of another building."""
+        """Set the files aside where the mission found that they are of another building."""
         for fault in faults:
             if isinstance(fault, LedgerMismatchError):
                 self._begin_anew(fault, "mismatch")
 
     def forget(self) -> None:
-        """Keep the files aside: everything is to be covered again."""
+        """Set the files aside: everything is to be covered again."""
         self._begin_anew(None, "reset")
         self._before = LedgerSnapshot(self._before.cell_m, "", 0, {})
 
@@ -94,13 +105,14 @@ class LedgerKeeper:
         self._kept, self._kept_at = (-1, OrderState()), float("-inf")
 
     def _first_assignment(self, autostart: bool) -> OrderState:
-        """Return what to do first: what was being done, if anything."""
+        """Return the order that was under way, or the one to begin with."""
         kept = OrderState.idle(NO_ORDER)
         try:
             if self._before.note:
                 kept = OrderState.from_json(self._before.note)
         except OrderError as error:
-            self.fault = error
+            log_fault(LOG, error)
+            self._faults.append(error)
             return OrderState.idle(str(error))
         if autostart and kept == OrderState.idle(NO_ORDER):
             return OrderState.autostart()
@@ -109,23 +121,14 @@ class LedgerKeeper:
         return kept
 
 
-LOG = logging.getLogger(__name__)
-
-# So that what is a second old is on disk, although the loop takes up to a tenth to look, and
-# a memory card some tenths to write.
-PERIOD_S = 0.5
-# After a failure, so long until the next try.
-RETRY_S = 2.0
-
-
 def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False) -> LedgerWriter:
-    """Find a robot's ledger and start the thread that writes it.
+    """Load a robot's ledger and start the thread that writes it.
 
     Args:
         folder: where it is kept.
         robot: the robot's name.
         cell_m: edge of a cell [m].
-        fresh: keep aside what there is, and begin anew.
+        fresh: set aside what there is, and begin anew.
 
     Raises:
         LedgerFileError: another process writes this ledger.
@@ -144,7 +147,7 @@ def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False)
 
 
 class LedgerWriter:
-    """Writes the newest ledger it is given.
+    """Writes the newest of the ledgers it is given.
 
     Attributes:
         restored: the ledger to go on with, if any.
@@ -157,10 +160,10 @@ class LedgerWriter:
         self._file = file
         self._written_at: float | None = None
         self._faults = deque[FasacoError]()
-        # What is wrong as long as nothing can be written, and what was found at the start.
-        self._trouble, self._told = "", ""
+        # What keeps it from writing now; what was wrong with the files at the start.
+        self._trouble, self._finding = "", ""
         if found.fault is not None:
-            self._told = log_fault(LOG, found.fault)
+            self._finding = log_fault(LOG, found.fault)
             self._faults.append(found.fault)
         self._changed = threading.Condition()
         self._waiting: LedgerSnapshot | None = None
@@ -176,18 +179,16 @@ class LedgerWriter:
             self._changed.notify()
 
     def is_behind(self) -> bool:
-        """Tell whether something it was given is not on the disk yet, and may soon be."""
+        """Tell whether something is still to be written, and nothing keeps it from that."""
         with self._changed:
             return self._has_work() and not self._trouble
 
     def begin_anew(self, fault: FasacoError | None, why: str) -> None:
-        """Keep the files aside, ``why`` in their names: another ledger follows.
+        """Set the files aside, with the word ``why`` in their names: another ledger follows.
 
-        Args:
-            fault: what has been told already, for the status; None where it was asked for.
-            why: a word.
+        ``fault`` is for the status; None where somebody asked for it.
         """
-        self._told = fault_text(fault) if fault is not None else ""
+        self._finding = fault_text(fault) if fault is not None else ""
         self._restored_cells = 0
         with self._changed:
             self._waiting = None
@@ -195,7 +196,7 @@ class LedgerWriter:
             self._changed.notify()
 
     def take_faults(self) -> list[FasacoError]:
-        """Return what went wrong since the last call; trouble that goes on is told once."""
+        """Return what went wrong since the last call; trouble that lasts is returned once."""
         return [self._faults.popleft() for _ in range(len(self._faults))]
 
     def report(self, now: float) -> LedgerReport:
@@ -205,11 +206,11 @@ class LedgerWriter:
             path=str(self._file.path),
             age_s=None if written_at is None else round(max(now - written_at, 0.0), 3),
             restored_cells=self._restored_cells,
-            fault=self._trouble or self._told or None,
+            fault=self._trouble or self._finding or None,
         )
 
     def close(self, timeout_s: float) -> None:
-        """Write what still waits and end the thread; a disk that hangs is not waited for."""
+        """Write what is left and end the thread, within ``timeout_s`` [s]."""
         with self._changed:
             self._stopping = True
             self._changed.notify()
@@ -235,7 +236,7 @@ class LedgerWriter:
         return self._waiting is not None or bool(self._unwanted)
 
     def _work(self, ledger: LedgerSnapshot | None, unwanted: list[str]) -> bool:
-        """Do what there is to do; tell whether that went well."""
+        """Write a ledger, and set files aside; tell whether that went well."""
         try:
             kept = [name for why in unwanted for name in self._file.set_aside(why)]
             if ledger is not None:

@@ -36,7 +36,7 @@ class Commands:
         self._count = 0
         # Those the mission has to decide on, by number, and those who only want to know.
         self._open: dict[int, Question] = {}
-        self._curious: list[Question] = []
+        self._status_questions: list[Question] = []
         self._decided: list[Answer] = []
         self._replan_key = keys.rpc("replan")
         self._replanned_at = float("-inf")
@@ -45,22 +45,20 @@ class Commands:
             post = partial(mailbox.post, "command")
             bus.take_questions(keys.rpc(name), post, QUERY_BYTES, too_long)
 
-    def take(self, items: Sequence[tuple[str, object]], now: float) -> list[CommandReceived]:
-        """Return the commands in ``items``; what is none is answered at once."""
+    def take(self, questions: Sequence[Question], now: float) -> list[CommandReceived]:
+        """Return the commands in ``questions``; one that is none is answered at once."""
         commands = []
-        for _, item in items:
-            if not isinstance(item, Question):
-                continue
+        for question in questions:
             try:
-                name, order = self._read(item, now)
+                name, order = self._read(question, now)
             except FasacoError as error:
-                item.answer(error_reply(error))
+                question.answer(error_reply(error))
                 continue
             if name == "status":
-                self._curious.append(item)
+                self._status_questions.append(question)
                 continue
             self._count += 1
-            self._open[self._count] = item
+            self._open[self._count] = question
             commands.append(CommandReceived(self._count, name, order))
         return commands
 
@@ -87,7 +85,7 @@ class Commands:
     @property
     def are_asked(self) -> bool:
         """Whether anybody waits for an answer."""
-        return bool(self._open or self._curious)
+        return bool(self._open or self._status_questions)
 
     def note(self, answers: Sequence[Answer], now: float) -> None:
         """Note what the mission has decided."""
@@ -98,9 +96,9 @@ class Commands:
     def answer(self, report: replies.Reply, *, is_kept: bool) -> None:
         """Answer who wants to know how it is; and who commanded, once that outlives the daemon."""
         payload = encode_json(report)
-        for question in self._curious:
+        for question in self._status_questions:
             question.answer(Reply(payload))
-        self._curious.clear()
+        self._status_questions.clear()
         if not is_kept:
             return
         for answer in self._decided:

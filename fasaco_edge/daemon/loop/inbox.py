@@ -1,15 +1,13 @@
-"""What comes in: samples off the bus, decoded into events of the mission."""
+"""The inbox: subscriptions to what the mission needs, and its samples decoded into events."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 from fasaco_edge.bus.latched import Subscription
-from fasaco_edge.bus.mailbox import Mailbox, Spacing
-from fasaco_edge.bus.session import Bus, Sample
-from fasaco_edge.daemon.memory import most_bytes, queues
+from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.daemon.loop.batch import Batch, Oversized, Received, poster
 from fasaco_edge.errors import FasacoError, MalformedMessage, MapTooLarge
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import (
@@ -24,69 +22,20 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.pose_decoding import PoseDecoder
 
-# From one map to the next that is taken in, at least [s]: a flood of maps, by mistake or malice,
-# must not take a core. No mapper is that fast.
-MAP_SPACING_S = 0.05
-TOO_LONG = "too long"
 MAPS = ("map", "map_update")
-# Updates without their map come in swarms; it is asked for no more often than this [s].
+# Updates without their map come in swarms; the map is asked for no more often than this [s].
 ASK_FOR_MAP_S = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class Received:
-    """A sample and when it came in [s, monotonic]."""
-
-    sample: Sample
-    at: float
-
-
-@dataclass(frozen=True, slots=True)
-class Oversized:
-    """A sample that was let go as it came: of what kind, how long it was, and might be [bytes]."""
-
-    kind: str
-    size: int
-    most: int
-
-
-def make_mailbox(max_pixels: int, map_spacing_s: float = MAP_SPACING_S) -> Mailbox[object]:
-    """Return the mailbox of a daemon; a replay, whose clock is another, spaces nothing.
-
-    Poses are queued: each tells what the tool passed over. Some seconds of them
-    are plenty. A map does not clear what was before it: it may be broken. An update
-    patches the map before it, so it waits with that.
-    """
-    spacing = Spacing("map", map_spacing_s, followers=("map_update",))
-    return Mailbox(queues(max_pixels), spacing, _size_of)
-
-
-def _size_of(item: object) -> int:
-    return item.sample.size if isinstance(item, Received) else 0
-
-
-def poster(mailbox: Mailbox[object], kind: str, max_pixels: int) -> Callable[[Sample], None]:
-    """Return what posts samples of a kind, on a Zenoh thread; one that is too long is let go."""
-    most = most_bytes(kind, max_pixels)
-
-    def post(sample: Sample) -> None:
-        if sample.size > most:
-            mailbox.post(TOO_LONG, Oversized(kind, sample.size, most))
-        else:
-            mailbox.post(kind, Received(sample, time.monotonic()))
-
-    return post
 
 
 class Inbox:
     """Subscribes to what the mission needs, and decodes it.
 
     Args:
-        bus, keys: where the native keys are heard.
-        mailbox: where all samples wait.
+        bus, keys: where to subscribe to the native keys.
+        mailbox: where samples wait for the loop.
         poses: decodes poses.
-        max_pixels: the most that a map, or an update, may have.
-        maps: other subscriptions that maps come by.
+        max_pixels: of a map or an update.
+        maps: further subscriptions that deliver maps.
     """
 
     def __init__(
@@ -109,67 +58,68 @@ class Inbox:
             bus.listen(keys, topic, poster(mailbox, topic.name, max_pixels))
 
     def ask_for_map(self, now: float) -> None:
-        """Ask whoever publishes the map, and keeps the newest for late joiners, for it."""
+        """Ask the publishers of the map for their newest one, unless that was done lately."""
         if now - self._asked_for_map_at < ASK_FOR_MAP_S:
             return
         self._asked_for_map_at = now
         for subscription in self._maps:
             subscription.ask()
 
-    def decode(
-        self, items: Sequence[tuple[str, object]], patches_lost: int
-    ) -> tuple[list[Event], list[FasacoError]]:
-        """Return the events in ``items``; a malformed sample costs that sample alone.
+    def decode(self, batch: Batch) -> tuple[list[Event], list[FasacoError]]:
+        """Return the events in a batch, and the faults; a malformed sample costs itself alone.
 
-        Of each frame the newest map that can be read counts, and makes the updates of that
-        frame before it worthless, those that were lost too.
+        Of each frame the newest readable map counts. It replaces the updates of that frame that
+        arrived before it, those that were lost included.
         """
-        maps, faults = self._newest_maps(items)
-        events = list[Event](map(MapReceived, (grid for grid, _ in maps.values())))
+        maps, faults = self._newest_maps(batch.samples)
+        events = list[Event](MapReceived(grid) for grid, _ in maps.values())
         map_at = {frame: at for frame, (_, at) in maps.items()}
-        faults.extend(_fault(item) for _, item in items if isinstance(item, Oversized))
-        for kind, item in items:
-            if not isinstance(item, Received) or kind == "map":
+        faults.extend(map(_size_fault, batch.oversized))
+        lost = batch.updates_lost
+        for received in batch.samples:
+            if received.kind == "map":
                 continue
             try:
-                event = self._event(kind, item.sample)
+                event = self._event(received)
             except FasacoError as error:
                 faults.append(_bare(error))
                 continue
             if isinstance(event, PatchReceived):
-                if item.at < map_at.get(event.patch.frame, float("-inf")):
-                    patches_lost = 0  # they were older still
+                if received.at < map_at.get(event.patch.frame, float("-inf")):
+                    lost = 0  # they were older still
                     continue
-                if patches_lost:
-                    events.append(PatchesLost(patches_lost))
-                    patches_lost = 0
+                if lost:
+                    events.append(PatchesLost(lost))
+                    lost = 0
             if event is not None:
                 events.append(event)
-        if patches_lost:
-            events.append(PatchesLost(patches_lost))
+        if lost:
+            events.append(PatchesLost(lost))
         return events, faults
 
     def _newest_maps(
-        self, items: Sequence[tuple[str, object]]
+        self, samples: Sequence[Received]
     ) -> tuple[dict[str, tuple[OccupancyGrid, float]], list[FasacoError]]:
-        """Return by frame the newest map that can be read, and when it came in, in that order.
+        """Return the newest readable map of each frame with its time of arrival, oldest first.
 
-        Which frame counts is for the mission to find, and a map may come only once.
+        Which frame counts is for the mission to decide, and a map may come only once.
         """
         maps: dict[str, tuple[OccupancyGrid, float]] = {}
         faults: list[FasacoError] = []
-        for kind, item in reversed(items):
-            if kind == "map" and isinstance(item, Received):
-                try:
-                    grid = decode_occupancy_grid(item.sample.payload, self._max_pixels)
-                except FasacoError as error:
-                    faults.append(_bare(error))
-                else:
-                    maps.setdefault(grid.frame, (grid, item.at))
+        for received in reversed(samples):
+            if received.kind != "map":
+                continue
+            try:
+                grid = decode_occupancy_grid(received.sample.payload, self._max_pixels)
+            except FasacoError as error:
+                faults.append(_bare(error))
+            else:
+                maps.setdefault(grid.frame, (grid, received.at))
         return dict(reversed(maps.items())), faults
 
-    def _event(self, kind: str, sample: Sample) -> Event | None:
-        """Return the event in a sample; None for transforms that tell no new pose."""
+    def _event(self, received: Received) -> Event | None:
+        """Return the event in a sample; None for transforms that give no new pose."""
+        kind, sample = received.kind, received.sample
         if kind == "map_update":
             return PatchReceived(decode_map_update(sample.payload, self._max_pixels))
         is_static = kind == "tf_static"
@@ -178,13 +128,14 @@ class Inbox:
 
 
 def _bare(error: FasacoError) -> FasacoError:
-    """Return the error without its traceback, which would hold the payload until garbage is
-    collected: of a flood of broken maps, gigabytes.
+    """Return the error without its traceback.
+
+    That would hold the payload until garbage is collected: gigabytes in a flood of broken maps.
     """
     return error.with_traceback(None)
 
 
-def _fault(told: Oversized) -> FasacoError:
-    kind = told.kind.replace("_", " ")
-    text = f"a {kind} of {told.size} bytes was let go: it may have at most {told.most}"
-    return MapTooLarge(text) if told.kind in MAPS else MalformedMessage(text)
+def _size_fault(dropped: Oversized) -> FasacoError:
+    kind = dropped.kind.replace("_", " ")
+    text = f"a {kind} of {dropped.size} bytes was dropped: it may have at most {dropped.most}"
+    return MapTooLarge(text) if dropped.kind in MAPS else MalformedMessage(text)

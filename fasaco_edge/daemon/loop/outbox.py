@@ -18,6 +18,7 @@ from fasaco_edge.bus.queries import Reply, Shared
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.faults import PublishGuard
 from fasaco_edge.daemon.loop.answers import LastSamples
+from fasaco_edge.daemon.loop.batch import PlanSnapshot
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived
@@ -32,7 +33,6 @@ from fasaco_edge.wire.pheromone import encode_pheromone
 from fasaco_edge.wire.status import PathAttachment, Status
 
 if TYPE_CHECKING:
-    from fasaco_edge.daemon.loop.worker import PlanSnapshot
     from fasaco_edge.mission.core.mission import Mission
 
 PERIOD_S = 0.5
@@ -42,11 +42,11 @@ class Outbox:
     """The publishers of a daemon; what they have said last is kept for who asks later.
 
     Attributes:
-        gate: all that is published passes it.
+        guard: publishes all of it.
     """
 
     def __init__(self, bus: Bus, keys: Keys, ros: RosBridge | None = None) -> None:
-        self.gate = PublishGuard()
+        self.guard = PublishGuard()
         self._ros = ros
         self._last = LastSamples(bus, keys)
         self._path = bus.advertise(keys, topics.PATH)
@@ -66,9 +66,9 @@ class Outbox:
 
         Where it cannot be told an empty one is: the robot must not go on along the one before.
         """
-        if not self.gate.let_out("path", lambda: self._say_path(xy, frame, stamp_ns, about)):
+        if not self.guard.attempt("path", lambda: self._say_path(xy, frame, stamp_ns, about)):
             nothing = replace(about, steps=0)
-            self.gate.let_out("path", lambda: self._say_path(xy[:0], frame, stamp_ns, nothing))
+            self.guard.attempt("path", lambda: self._say_path(xy[:0], frame, stamp_ns, nothing))
 
     def _say_path(
         self, xy: NDArray[np.float64], frame: str, stamp_ns: int, about: PathAttachment
@@ -90,7 +90,7 @@ class Outbox:
 
     def status(self, status: Status) -> None:
         """Publish the status."""
-        self.gate.let_out("status", lambda: self._say_status(status))
+        self.guard.attempt("status", lambda: self._say_status(status))
 
     def _say_status(self, status: Status) -> None:
         payload = encode_json(status)
@@ -102,14 +102,14 @@ class Outbox:
         refused = {answer.number for answer in answers if answer.error is not None}
         for asked in commands:
             if asked.number not in refused:
-                self.gate.let_out("command", partial(self._say_command, asked))
+                self.guard.attempt("command", partial(self._say_command, asked))
 
     def _say_command(self, asked: CommandReceived) -> None:
         self._command.put(encode_json(command_document(asked.command, asked.order)))
 
     def coverage(self, grid: OccupancyGrid) -> None:
         """Publish the coverage, a grid on the lattice."""
-        self.gate.let_out("coverage", lambda: self._say_coverage(grid))
+        self.guard.attempt("coverage", lambda: self._say_coverage(grid))
 
     def _say_coverage(self, grid: OccupancyGrid) -> None:
         coverage = Shared.of(encode_occupancy_grid(grid), schemas.OCCUPANCY_GRID)
@@ -120,7 +120,7 @@ class Outbox:
 
     def pheromone(self, seen: PlanSnapshot, frame: str) -> None:
         """Keep the pheromone field, and publish it if anyone listens."""
-        self.gate.let_out("pheromone", lambda: self._say_pheromone(seen, frame))
+        self.guard.attempt("pheromone", lambda: self._say_pheromone(seen, frame))
 
     def _say_pheromone(self, seen: PlanSnapshot, frame: str) -> None:
         payload = encode_pheromone(seen.snapshot, frame, time.time_ns())

@@ -21,7 +21,8 @@ from fasaco_edge.bus.session import Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import encode_ledger
 from fasaco_edge.daemon.loop.answers import config_document
-from fasaco_edge.daemon.loop.inbox import Received
+from fasaco_edge.daemon.loop.batch import Batch, Received
+from fasaco_edge.daemon.loop.inbox import MAPS
 from fasaco_edge.kernels.cache import sources_digest
 from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanBroken, PlanReady
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
@@ -60,17 +61,15 @@ MAP_BYTES = 100_000
 FULL_BYTES = 4_000_000
 # From when somebody listens, until everything surely comes to them, too.
 MARGIN_S = 0.2
-MAPS = ("map", "map_update")
 POSE = "pose"
 
 
 @dataclass(frozen=True, slots=True)
 class TurnNote:
-    """A turn: when it was [s, monotonic], what the loop took in, and what was decided."""
+    """A cycle: when it was [s, monotonic], what the loop took in, and what was decided."""
 
     now: float
-    items: Sequence[tuple[str, object]]
-    patches_lost: int
+    batch: Batch
     commands: Sequence[CommandReceived]
     decision: Decision
 
@@ -105,15 +104,14 @@ class TurnLog:
         if not self._is_open:
             return
         self._listen(turn.now)
-        samples = [
-            self._taken(kind, item) for kind, item in turn.items if isinstance(item, Received)
-        ]
-        plans = [item for _, item in turn.items if isinstance(item, PlanReady)]
-        if any(isinstance(item, PlanBroken) for _, item in turn.items):
+        batch = turn.batch
+        if any(isinstance(plan, PlanBroken) for plan in batch.plans):
             self.end("a plan broke, which no replay repeats")
             return
+        samples = [self._taken(received) for received in batch.samples]
+        plans = [plan for plan in batch.plans if isinstance(plan, PlanReady)]
         decided = self._news.of(turn.decision, mission)
-        is_empty = not (samples or plans or turn.commands or turn.patches_lost or decided)
+        is_empty = not (samples or plans or turn.commands or batch.updates_lost or decided)
         if is_empty and mission is None:
             return
         self._times.append(turn.now)
@@ -123,7 +121,7 @@ class TurnLog:
                     number=self._first + len(self._times) - 1,
                     is_begun=mission is not None,
                     samples=samples,
-                    patches_lost=turn.patches_lost,
+                    patches_lost=batch.updates_lost,
                     commands=[
                         (asked.number, command_document(asked.command, asked.order))
                         for asked in turn.commands
@@ -133,7 +131,7 @@ class TurnLog:
                 )
             )
         self._has_begun = mission is not None
-        self._forget_poses([i.sample for _, i in turn.items if isinstance(i, Received)])
+        self._forget_poses([received.sample for received in batch.samples])
         is_full = self._samples.waiting_bytes > FULL_BYTES
         if is_full or turn.now - self._published_at >= PERIOD_S:
             self._published_at = turn.now
@@ -178,16 +176,16 @@ class TurnLog:
         self._times, self._turns, self._restored = [], [], None
         self._samples = SampleEncoder(run=0)
 
-    def _taken(self, kind: str, item: Received) -> Taken:
-        sample = item.sample
+    def _taken(self, received: Received) -> Taken:
+        kind, sample, at = received.kind, received.sample, received.at
         if kind == POSE and len(sample.payload) <= POSE_BYTES:
             self._samples.add(Arrival(kind, sample, 0, 0))
             return Taken(kind, 0)
-        if kind == "map" and len(sample.payload) <= MAP_BYTES and item.at >= self._told_until:
+        if kind == "map" and len(sample.payload) <= MAP_BYTES and at >= self._told_until:
             self._samples.add(Arrival(kind, sample, 0, 0))
-            return Taken(kind, 0, item.at)
-        told = self._told(sample) if item.at < self._told_until else None
-        return Taken(kind, zlib.crc32(sample.payload), item.at if kind in MAPS else 0.0, told)
+            return Taken(kind, 0, at)
+        told = self._told(sample) if at < self._told_until else None
+        return Taken(kind, zlib.crc32(sample.payload), at if kind in MAPS else 0.0, told)
 
     def _told(self, sample: Sample) -> Told | None:
         """Return the sample itself; None where there is no room for it."""

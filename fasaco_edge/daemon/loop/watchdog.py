@@ -1,12 +1,10 @@
-"""How the loop gets on: what the service manager is told, and how long the turns take.
-
-How long it takes from a map that calls for a plan until the path that answers it.
-"""
+"""The watchdog: progress and state for the service manager; durations of cycles and plans."""
 
 from __future__ import annotations
 
 import logging
 import math
+import time
 from typing import TYPE_CHECKING
 
 from fasaco_edge.daemon.notify import ServiceManager
@@ -15,23 +13,20 @@ from fasaco_edge.wire.status import LoopTimes, Status
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker
 
-
-import time
-
 LOG = logging.getLogger(__name__)
 
-# Of the silence that is allowed: a turn may come late, and a word get lost.
+# Of the longest silence allowed: a cycle may be late, and a message may get lost.
 SHARE = 0.25
 
-# What comes in waits for the turn before: from so long a turn on it is late [s].
+# A cycle longer than this [s] makes what arrives meanwhile late.
 LATE_S = 0.1
-# Durations are told to within 10 %: their logarithms, in buckets from this one up, the last for
-# all beyond 18 minutes. So the figures of a year take as much memory as those of a minute.
+# Durations are counted to within 10 %, in logarithmic buckets, the last for all beyond 18 minutes:
+# so the figures of a year take as much memory as those of a minute.
 LEAST_S, PER_DOUBLING, BUCKETS = 1e-6, 8, 8 * 30
 
 
 class CycleTimes:
-    """How long the turns of a loop took, since it began."""
+    """Durations of the cycles of the loop since its start."""
 
     def __init__(self) -> None:
         self._counts = [0] * BUCKETS
@@ -39,7 +34,7 @@ class CycleTimes:
         self._longest_s = 0.0
 
     def note(self, seconds: float) -> None:
-        """Count a turn."""
+        """Count a cycle."""
         doublings = math.log2(max(seconds, LEAST_S) / LEAST_S)
         self._counts[min(int(doublings * PER_DOUBLING), BUCKETS - 1)] += 1
         self._turns += 1
@@ -55,7 +50,7 @@ class CycleTimes:
         return LoopTimes(self._turns, self._late, *within_ms)
 
     def _within(self, share: float) -> float:
-        """Return within how long this share of the turns was over [s]."""
+        """Return the duration that this share of the cycles did not exceed [s]."""
         missing = math.ceil(share * self._turns)
         for bucket, count in enumerate(self._counts[:-1]):
             missing -= count
@@ -66,35 +61,35 @@ class CycleTimes:
 
 
 class Watchdog:
-    """Feeds the watchdog from the loop itself, and only while the planning thread gets on, too.
+    """Notifies the service manager's watchdog, from the loop and only while planning progresses.
 
-    A thread of its own that fed it would do so beside a loop that hangs.
+    A thread of its own would go on beside a loop that hangs.
 
     Attributes:
-        remark: what else is to be known of the service; "" for nothing.
+        remark: added to the status line of the service; "" for nothing.
     """
 
     def __init__(self, manager: ServiceManager) -> None:
         self.remark = ""
         self._manager = manager
         self._period_s = SHARE * manager.watchdog_s
-        self._fed_at = float("-inf")
+        self._notified_at = float("-inf")
         self._progress = -1
         self._state = ""
 
     def beat(self, worker: PlanningWorker | None, now: float) -> None:
-        """Feed the watchdog if that is due; before there is a worker, nothing can hang but us."""
-        if not self._period_s or now - self._fed_at < self._period_s:
+        """Notify the watchdog if that is due, and the worker, if any, has made progress."""
+        if not self._period_s or now - self._notified_at < self._period_s:
             return
         if worker is not None:
             if worker.progress == self._progress:
                 return
             self._progress = worker.progress
-        self._fed_at = now
+        self._notified_at = now
         self._manager.alive()
 
     def tell(self, status: Status) -> None:
-        """Say in a line what a status says; log it where the state is another."""
+        """Show a status as the service's status line; log it when the state changes."""
         if status.state != self._state:
             self._state = status.state
             LOG.info("%s", _doing(status), extra={"event": "state", "state": self._state})
@@ -120,10 +115,10 @@ def _doing(status: Status) -> str:
 
 
 class MapLatency:
-    """Follows a map from its arrival over the plan it calls for to that plan's path.
+    """Time from the arrival of a map that calls for a plan to that plan's path.
 
     Attributes:
-        arrived: when the newest map of this turn arrived [s, monotonic]; None without one.
+        arrived: when the newest map of this cycle arrived [s, monotonic]; None without one.
     """
 
     def __init__(self) -> None:

@@ -6,10 +6,10 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 from fasaco_edge.bus.mailbox import LatestSlot
+from fasaco_edge.daemon.loop.batch import PlanSnapshot
 from fasaco_edge.errors import PlanFailed
 from fasaco_edge.mission.core.events import PlanBroken, PlanReady, PlanRequest
 from fasaco_edge.planners.planner import ColonySnapshot, CoveragePlanner
@@ -19,14 +19,6 @@ LOG = logging.getLogger(__name__)
 
 # An attempt to make a path better takes so long [s].
 SPARE_S = 0.05
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PlanSnapshot:
-    """What plan ``plan`` lets others see."""
-
-    plan: int
-    snapshot: ColonySnapshot
 
 
 class PlanningWorker:
