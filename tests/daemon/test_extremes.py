@@ -16,7 +16,7 @@ def test_a_recorder_that_cannot_be_started_is_tried_again(tmp_path, monkeypatch)
         monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
         recorder = RecorderSupervisor(config, bus, tmp_path)
         state = recorder.poll(100.0)
-        assert state["state"] == "restarting"
-        assert "could not be started" in state["reason"]
-        assert recorder.poll(100.0 + 2 * FIRST_PAUSE_S)["restarts"] == 1
+        assert state.state == "restarting"
+        assert "could not be started" in state.reason
+        assert recorder.poll(100.0 + 2 * FIRST_PAUSE_S).restarts == 1
         recorder.close(1.0)
