@@ -178,7 +178,7 @@ class Replay:
         mission = self.mission
         decision = mission.step(events, self._now)
         if decision.plan is not None:
-            self.plans.ask(decision.plan, mission.revision + 1, self._now)
+            self.plans.ask(decision.plan, mission.route.revision + 1, self._now)
         before, self._state = self._state, str(mission.state)
         return ReplayStep(
             at_s=self._now - self._began,

@@ -155,7 +155,7 @@ class MissionTrial:
         self.counts["missions"] += 1
 
     def _drive(self, event: Event) -> None:
-        path, lattice = self._mission.path, self._mission.lattice
+        path, lattice = self._mission.route.path, self._mission.lattice
         if lattice is None or path is None or not len(path.ahead):
             return
         x, y = lattice.centres(path.ahead[: self._rng.choice([1, 2, 2, 3])])[-1].tolist()

@@ -27,7 +27,7 @@ def test_the_robot_stands_and_the_reason_is_told():
     assert drive.mission.reason == (
         "plan 2 failed: Oh; tried again with the next map, or after 30 s"
     )
-    assert drive.mission.outdated == 1
+    assert drive.mission.route.outdated == 1
     for _ in range(20):
         assert drive.tell(pose_at(*drive.cell)).plan is None
 
@@ -62,4 +62,4 @@ def test_a_plan_for_another_order_that_breaks_costs_nothing():
     assert drive.request is not None
     drive.plan()
     drive.finish()
-    assert np.array_equal(drive.mission.path.ahead, drive.mission.path.cells[-1:])
+    assert np.array_equal(drive.mission.route.path.ahead, drive.mission.route.path.cells[-1:])

@@ -27,9 +27,9 @@ def test_a_far_building_is_covered_as_one_at_zero(place):
     for drive, at in ((near, (0, 0)), (far, (row, col))):
         drive.tell(MapReceived(building(*ROOM, at=at)), pose_in(drive.cell))
         drive.plan()
-    walk = near.mission.path.cells
-    assert np.array_equal(far.mission.path.cells, walk + np.array((row, col)))
-    centres = far.mission.lattice.centres(far.mission.path.cells)
+    walk = near.mission.route.path.cells
+    assert np.array_equal(far.mission.route.path.cells, walk + np.array((row, col)))
+    centres = far.mission.lattice.centres(far.mission.route.path.cells)
     assert np.abs(centres - near.mission.lattice.centres(walk) - place).max() < 1e-8
     while far.walk:
         far.go()

@@ -45,7 +45,7 @@ def test_it_waits_for_a_map_then_for_a_pose_then_asks_for_the_first_plan():
     assert drive.mission.state is State.WAITING_FOR_POSE
     decision = drive.tell(pose_at(1, 2))
     assert drive.mission.state is State.PLANNING
-    assert drive.mission.planning
+    assert drive.mission.route.is_planning
     assert decision.path is None
     assert decision.plan.reason == "first plan"
     assert decision.plan.problem.start == (1, 2)
@@ -303,11 +303,11 @@ def test_a_plan_leaves_out_what_was_driven_while_it_was_made():
     drive.request = None
     for _ in range(4):
         drive.go()
-    revision = drive.mission.revision
+    revision = drive.mission.route.revision
     # The rest of the plan is what is being driven: nobody needs to hear of it again.
     assert drive.tell(stale).path is None
-    assert drive.mission.revision == revision
-    assert drive.mission.path.ahead.tolist() == [[0, col] for col in range(4, 9)]
+    assert drive.mission.route.revision == revision
+    assert drive.mission.route.path.ahead.tolist() == [[0, col] for col in range(4, 9)]
 
 
 def test_an_answer_nobody_asked_for_changes_nothing():
@@ -320,7 +320,7 @@ def test_an_answer_to_another_question_leaves_the_question_open():
     drive = Drive((0, 0), MapReceived(building(*CORRIDOR)), pose_at(0, 0))
     path = CoveragePath(np.array([[0, 0], [0, 1]], np.int32), "fasaco", 0)
     assert drive.tell(PlanReady(drive.request.number + 1, path, 0.1)) == Decision()
-    assert drive.mission.planning
+    assert drive.mission.route.is_planning
     assert drive.plan().path.revision == 1
     drive.finish()
 
@@ -328,11 +328,12 @@ def test_an_answer_to_another_question_leaves_the_question_open():
 def fault_of(drive, event):
     """Tell the mission an event it cannot use; it must change nothing."""
     mission = drive.mission
-    before = (mission.grid, mission.pose, mission.map_revision, mission.revision, mission.state)
+    route = mission.route
+    before = (mission.grid, mission.pose, mission.map_revision, route.revision, mission.state)
     visited, total = drive.visited, mission.ledger.total
     decision = drive.tell(event)
     assert (decision.plan, decision.path) == (None, None)
-    after = (mission.grid, mission.pose, mission.map_revision, mission.revision, mission.state)
+    after = (mission.grid, mission.pose, mission.map_revision, route.revision, mission.state)
     assert after == before
     assert (drive.visited, mission.ledger.total) == (visited, total)
     (fault,) = decision.faults

@@ -177,14 +177,14 @@ def test_what_comes_too_late_is_dropped(what):
     else:
         # Something stands where the robot was about to drive: the path ends before it, at once.
         drive.tell(patch("#", at=(0, 5)))
-        assert drive.mission.wants_plan
-        assert drive.mission.is_improving
+        assert drive.mission.route.wanted
+        assert drive.mission.route.is_improving
     drive.request = None
     drive.tell(better)
     assert BETTER not in [update.reason for update in drive.updates]
     if what == "path is new":
         assert drive.request.reason.startswith("path blocked")
-        assert not drive.mission.is_improving
+        assert not drive.mission.route.is_improving
 
 
 def test_what_is_needed_comes_next():
@@ -192,7 +192,7 @@ def test_what_is_needed_comes_next():
     drive = driving()
     request, drive.request = drive.request, None
     drive.tell(patch("#", at=(11, 11)))
-    assert drive.mission.wants_plan
+    assert drive.mission.route.wanted
     drive.tell(plan(request, whole(request, request.problem.before)))
     assert not drive.request.problem.only_better
-    assert not drive.mission.wants_plan
+    assert not drive.mission.route.wanted

@@ -52,7 +52,7 @@ def mission_in(grid, order=None):
     pose = StampedPose(Pose2D(0.6, 0.6))
     events = [MapReceived(grid), PoseReceived(pose)]
     mission.step([*events, *([CommandReceived(1, "start", order)] if order else [])], 0.0)
-    assert mission.path is not None
+    assert mission.route.path is not None
     return mission
 
 

@@ -87,7 +87,7 @@ def played(samples: Samples, config: DaemonConfig) -> Story:
 
 def assert_legal(mission: Mission) -> None:
     """Check that the rest of the path passes nothing that is blocked on the newest map."""
-    lattice, ahead = mission.lattice, mission.path.ahead
+    lattice, ahead = mission.lattice, mission.route.path.ahead
     if lattice is None or not len(ahead):
         return
     around = naive.neighbours(lattice.steps)

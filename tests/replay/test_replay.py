@@ -58,7 +58,7 @@ def assert_told(story):
         assert left(mission) == set()
     else:
         assert mission.state == "covering", mission.reason
-        assert left(mission) <= {(row, col) for row, col in mission.path.ahead.tolist()}
+        assert left(mission) <= {(row, col) for row, col in mission.route.path.ahead.tolist()}
 
 
 def assert_covered(story):
@@ -195,7 +195,7 @@ def test_plans_come_late(samples, config, late_s):
 def test_nobody_says_that_it_may_go_on(samples, config):
     story = played(scenarios.without(samples, places(samples, "command")[1:]), config)
     assert story.mission.state == "paused"
-    assert not len(story.mission.path.ahead)
+    assert not len(story.mission.route.path.ahead)
 
 
 def test_a_command_that_is_none_costs_itself(samples, config):

@@ -192,7 +192,7 @@ class Loop:
         for seen in batch.snapshots:
             self._bus.outbox.pheromone(seen, frame)
         for plan in batch.plans:
-            if isinstance(plan, PlanReady) and not (mission and mission.is_improving):
+            if isinstance(plan, PlanReady) and not (mission and mission.route.is_improving):
                 self._status.plan_s = plan.seconds
         maps = [received.at for received in batch.samples if received.kind in MAPS]
         self._latency.arrived = maps[-1] if maps else None
@@ -215,9 +215,9 @@ class Loop:
             return self._recover(mission, commands, error)
         if mission.map_revision > maps:
             self._status.ingest_s = time.monotonic() - now
-            if decision.plan is not None or mission.wants_plan:
+            if decision.plan is not None or mission.route.wanted:
                 self._latency.call_for_plan()
-        if mission.wants_plan and mission.is_improving:
+        if mission.route.wanted and mission.route.is_improving:
             self._runner.interrupt()  # what is needed comes before what is only better
         self._perform(mission, decision)
         self._guard.attempt("coverage", partial(self._coverage.publish, mission, now))
@@ -257,8 +257,12 @@ class Loop:
 
     def _withdraw_path(self, mission: Mission, reason: str) -> None:
         """Publish an empty path in place of that of a mission which ends."""
-        if mission.grid is not None and mission.lattice is not None and len(mission.path.cells):
-            stop = PathUpdate(mission.revision + 1, mission.path.cells[:0], reason)
+        if (
+            mission.grid is not None
+            and mission.lattice is not None
+            and len(mission.route.path.cells)
+        ):
+            stop = PathUpdate(mission.route.revision + 1, mission.route.path.cells[:0], reason)
             self._publish_path(mission, stop)
 
     # What leaves for the bus.

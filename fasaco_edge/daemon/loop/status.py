@@ -173,7 +173,7 @@ class StatusBoard:
         return PathReport(
             revision=update.revision,
             steps=max(len(update.cells) - 1, 0),
-            remaining_steps=max(len(mission.path.ahead) - 1, 0),
+            remaining_steps=max(len(mission.route.path.ahead) - 1, 0),
             reason=update.reason,
             **asdict(plan_figures(update.plan)),
         )
@@ -262,11 +262,11 @@ def _plans(mission: Mission | None) -> PlanCounts:
     if mission is None:
         return PlanCounts()
     return PlanCounts(
-        plans=mission.plans,
-        unchanged=mission.unchanged,
-        outdated=mission.outdated,
-        attempts=mission.attempts,
-        planning=mission.planning,
+        plans=mission.route.plans,
+        unchanged=mission.route.unchanged,
+        outdated=mission.route.outdated,
+        attempts=mission.route.attempts,
+        planning=mission.route.is_planning,
     )
 
 

@@ -19,7 +19,7 @@ from fasaco_edge.mission.core.executive import Executive
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.coverage.progress import Coverage, DrivenPath, ZoneProgress, zone_progress
+from fasaco_edge.mission.coverage.progress import Coverage, ZoneProgress, zone_progress
 from fasaco_edge.mission.coverage.unreached import Unreached
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
@@ -34,6 +34,7 @@ class Mission:
 
     Attributes:
         state, reason: what it is doing, and why.
+        route: the path, the plan under way, and counts of both; to be read only.
     """
 
     def __init__(self, config: MissionConfig, order: OrderState | None = None) -> None:
@@ -42,8 +43,8 @@ class Mission:
         self._ledger = MissionLedger(config.footprint.cell_m)
         monitor = InputMonitor(config)
         self._orders = Sequencer(config, self._map, self._ledger)
-        self._route = Route(config.spare_share, self._map, self._orders)
-        owners = self._map, self._ledger, monitor, self._orders, self._route
+        self.route = Route(config.spare_share, self._map, self._orders)
+        owners = self._map, self._ledger, monitor, self._orders, self.route
         self._handler, self._executive = EventHandler(*owners), Executive(*owners)
         self.restore_order(order or OrderState.autostart())
 
@@ -126,48 +127,3 @@ class Mission:
     def ledger(self) -> CoverageLedger:
         """What is covered."""
         return self._ledger.current
-
-    @property
-    def path(self) -> DrivenPath:
-        """The published path, and how far the robot is on it."""
-        return self._route.path
-
-    @property
-    def revision(self) -> int:
-        """How many paths were published."""
-        return self._route.revision
-
-    @property
-    def plans(self) -> int:
-        """How many plans were made."""
-        return self._route.plans
-
-    @property
-    def attempts(self) -> int:
-        """How many attempts at a better path were made in spare time."""
-        return self._route.attempts
-
-    @property
-    def unchanged(self) -> int:
-        """How many of the plans found the published path again."""
-        return self._route.unchanged
-
-    @property
-    def outdated(self) -> int:
-        """How many of the plans no longer held when they came."""
-        return self._route.outdated
-
-    @property
-    def planning(self) -> bool:
-        """Whether a plan that is needed has been requested and is not there yet."""
-        return self._route.pending is not None and not self.is_improving
-
-    @property
-    def is_improving(self) -> bool:
-        """Whether the plan under way is only to improve the path."""
-        return self._route.is_improving
-
-    @property
-    def wants_plan(self) -> bool:
-        """Whether a plan will be requested once the one under way is there."""
-        return bool(self._route.wanted)

@@ -146,6 +146,11 @@ class Route:
         self._failure = "", 0.0
 
     @property
+    def is_planning(self) -> bool:
+        """Whether a plan that is needed is under way."""
+        return self.pending is not None and self._attempt is None
+
+    @property
     def is_improving(self) -> bool:
         """Whether the plan under way is only to improve the path."""
         return self.pending is not None and self._attempt is not None

@@ -121,6 +121,10 @@ class CoverageLedger:
         tiles = MappingProxyType(dict(self._frozen))
         return LedgerSnapshot(self._cell_m, self.frame, self.total, tiles, self._under_tool)
 
+    def move_to(self, frame: str) -> None:
+        """Take the cells to lie in ``frame`` from now on."""
+        self.frame = frame
+
     def record(self, pose: Pose2D) -> frozenset[Cell]:
         """Note that the robot drove on to ``pose``; return the cells newly visited."""
         last = self._last or pose

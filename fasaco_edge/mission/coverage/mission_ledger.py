@@ -195,7 +195,7 @@ class MissionLedger:
         """Lie in ``frame`` from now on; begin anew, and say so, if another holds covered cells."""
         was = self.current.frame
         if was in ("", frame):
-            self.current.frame = frame
+            self.current.move_to(frame)
             return None
         cells = self.current.snapshot().cells
         self._replace(CoverageLedger(self._cell_m, frame))
@@ -221,7 +221,8 @@ class MissionLedger:
         self._resumed = None
         if verdict is Verdict.SAME:
             return None
-        self.current, resumed.since.frame = resumed.since, frame
+        self.current = resumed.since
+        self.current.move_to(frame)
         return self._begun_anew(
             f"the ledger of {resumed.before.cells} covered cells is of another building than the "
             "map"

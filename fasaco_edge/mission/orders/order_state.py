@@ -1,8 +1,7 @@
-"""How far an order is carried out: which zone, which pass, paused or not; kept with the ledger.
+"""Order state: an order and how far it is: which zone, which pass, paused or not.
 
-Nothing here knows a map, so that commands are taken before there is one.
-
-How far each zone of an order is.
+It is kept with the ledger. Nothing here needs a map, so that commands are accepted before there
+is one.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from fasaco_edge.mission.orders.order import (
 
 VERSION = 1
 
-# Why a daemon that does not begin by itself stands.
+# Why a daemon without autostart is idle.
 NO_ORDER = "no order yet: start a mission"
 
 
@@ -39,7 +38,7 @@ class CommandError(FasacoError):
 
 
 class Stage(StrEnum):
-    """What of an order is being carried out."""
+    """Which part of an order is being carried out."""
 
     COVERING = "covering"
     RETRYING = "retrying"
@@ -53,7 +52,7 @@ class OrderState:
 
     Attributes:
         order: what to do; None for nothing at all.
-        automatic: whether it began by itself, and goes on whenever the map shows more.
+        automatic: whether it began without a command, and goes on whenever the map shows more.
         stage: what is being done: zones covered pass by pass, then what was left over tried
             again, then the way home.
         zone: index of the zone.
@@ -61,7 +60,7 @@ class OrderState:
         begun: whether that pass has begun.
         tries: how often what was left over was tried again.
         home: the cell (row, col) the mission began in.
-        paused: whether the robot is to stand.
+        paused: whether the robot is to stop.
         why: why there is no order, where there is none.
     """
 
@@ -78,12 +77,12 @@ class OrderState:
 
     @classmethod
     def autostart(cls) -> OrderState:
-        """Return what a daemon does that was told nothing: cover all that is not covered yet."""
+        """Return the order of a daemon without a command: cover all that is not covered yet."""
         return cls(MissionOrder(keep_covered=True), automatic=True)
 
     @classmethod
     def idle(cls, why: str) -> OrderState:
-        """Return the assignment of a mission that waits for an order."""
+        """Return the state of a mission that waits for an order."""
         return cls(why=why)
 
     @property
@@ -108,7 +107,7 @@ class OrderState:
         return self.order is not None and self.order.return_home and self.next_pass() is self
 
     def next_pass(self) -> OrderState:
-        """Return the assignment in its next pass, or the next zone; itself after the last."""
+        """Return the state in its next pass, or the next zone; itself after the last."""
         if self.order is None or self.stage is not Stage.COVERING:
             return self
         if self.pass_number < self.order.zones[self.zone].passes:
@@ -118,10 +117,10 @@ class OrderState:
         return self
 
     def commanded(self, command: CommandName, order: MissionOrder) -> OrderState:
-        """Return what a command makes of it.
+        """Return the state after a command.
 
-        What is so already stays as it is: a command may be sent twice. ``start`` replaces
-        another order; the same one goes on, unless it is over.
+        A command may be sent twice: the second time changes nothing. ``start`` replaces another
+        order; the same one goes on, unless it is over.
 
         Raises:
             CommandError: there is nothing to pause, to resume or to plan.
@@ -144,15 +143,15 @@ class OrderState:
         return self
 
     def in_other_building(self, why: str) -> OrderState:
-        """Return what is left of it in another building, where its zones mean nothing."""
+        """Return the state in another building, where its zones mean nothing."""
         if self.automatic:
             return replace(OrderState.autostart(), paused=self.paused)
         return self if self.order is None else OrderState.idle(f"{why}: the order was dropped")
 
     def in_other_frame(self, why: str) -> OrderState:
-        """Return what is left of it in another frame, before anything was covered.
+        """Return the state in another frame, before anything was covered.
 
-        To cover everything means the same there; zones do not.
+        An order for everything means the same there; zones do not.
         """
         has_places = self.order is not None and (
             bool(self.order.keep_out) or any(zone.polygon for zone in self.order.zones)
@@ -188,7 +187,7 @@ class OrderState:
 
     @classmethod
     def from_json(cls, note: str) -> OrderState:
-        """Return the assignment that ``note`` gave.
+        """Return the state that ``to_json`` gave.
 
         Raises:
             OrderError: it is of another version, or not whole.
@@ -207,26 +206,17 @@ class OrderState:
             raise OrderError(
                 f"the order kept has no zone {kept.zone} with a pass {kept.pass_number}"
             )
-        return cls(
-            order,
-            kept.standing,
-            Stage(kept.stage),
-            kept.zone,
-            kept.pass_number,
-            kept.begun,
-            kept.tries,
-            kept.home,
-            kept.paused,
-            kept.why,
-        )
+        fields = msgspec.structs.asdict(kept) | {"order": order, "stage": Stage(kept.stage)}
+        del fields["version"]
+        return cls(**fields)
 
 
 class _Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An assignment as it is kept."""
+    """An order state as it is kept; its names are those of the files on disk."""
 
     version: Literal[1]
     order: OrderDocument | None
-    standing: bool
+    automatic: bool = msgspec.field(name="standing")
     stage: Literal["covering", "retrying", "returning", "over"]
     zone: Annotated[int, Meta(ge=0)]
     pass_number: Annotated[int, Meta(ge=1)] = msgspec.field(name="pass")

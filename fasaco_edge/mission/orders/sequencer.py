@@ -12,7 +12,7 @@ from fasaco_edge.grid.geometry import Polygon, Window
 from fasaco_edge.grid.lattice import UNKNOWN, Cell
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.coverage.unreached import ReachHistory, Unreached
+from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Zone
@@ -82,6 +82,10 @@ class Exploration:
         self.viewpoints = {goal}
         return f"looking for a way to zone {zone.name!r}"
 
+    def aim_at(self, viewpoints: set[Cell]) -> None:
+        """Look from these cells."""
+        self.viewpoints = viewpoints
+
     def end_if_reached(self, zone: Zone | None, area: ReachableArea) -> None:
         """Look no more for a zone that can be reached now."""
         if zone is not None and self.viewpoints and is_in_reach(zone, area):
@@ -139,7 +143,7 @@ class Sequencer:
         self._map = map_state
         self._ledger = ledger
         self._run = _Run()
-        self._history = ReachHistory(map_state, ledger)
+        self._unreached = UnreachedFinder(map_state, ledger)
         # Whether anything is worth trying again, and as of which map and ledger.
         self._retry_check: tuple[object, bool] = (None, False)
 
@@ -162,7 +166,7 @@ class Sequencer:
         """Begin with another order, or with none."""
         self.state, self._run = state, _Run()
         self._retry_check = (None, False)
-        self._history.restart()
+        self._unreached.restart()
 
     def set_state(self, state: OrderState) -> None:
         """Go on with the same order in another state, as a command has left it."""
@@ -170,7 +174,7 @@ class Sequencer:
 
     def note_area(self) -> None:
         """Remember what can be reached now."""
-        self._history.update()
+        self._unreached.note_area()
 
     def note_cell(self, cell: Cell) -> None:
         """Note that the robot is in ``cell``."""
@@ -245,7 +249,7 @@ class Sequencer:
         """Note that a path came to its end; return whether what it left over has to wait."""
         run, cells = self._run, self._left()
         if cells > 0:
-            self._history.note_failure()
+            self._unreached.note_failure()
         run.same_again = run.same_again + 1 if cells == run.left_over else 1
         run.left_over = cells
         is_given_up = cells > 0 and run.same_again > MOST_TRIES
@@ -289,24 +293,25 @@ class Sequencer:
         )
 
     def unreached(self) -> Unreached:
-        """Return what of the order stays uncovered as things are."""
-        return self._history.unreached(self.state)
+        """Return what of the order stays uncovered on the map as it is."""
+        return self._unreached.unreached(self.state)
 
     def _begin_try(self, cell: Cell) -> str:
         run = self._run
-        run.retry_at, run.exploration.viewpoints = None, self._viewpoints() - {cell}
+        run.retry_at = None
+        run.exploration.aim_at(self._viewpoints() - {cell})
         # One path that changes nothing is enough this time.
         run.left_over, run.same_again = self._left(), MOST_TRIES
         return f"tried again, {self.state.tries + 1} of {self._config.retries}"
 
     def _end(self) -> None:
-        left, order = self._left(), self.state.order
-        self._run.retry_at = None
+        run, left, order = self._run, self._left(), self.state.order
+        run.retry_at = None
         self.state = replace(self.state, stage=Stage.OVER)
         every = order is None or order.zones[0].polygon is None
-        self._run.ending = f"every reachable cell{'' if every else ' of the zones'} is covered"
+        run.ending = f"every reachable cell{'' if every else ' of the zones'} is covered"
         if left:
-            self._run.ending += f" but {left} left over"
+            run.ending += f" but {left} left over"
 
     def _is_worth_trying(self) -> bool:
         """Tell whether there is anything to try again; searched anew if anything changed."""
@@ -325,4 +330,4 @@ class Sequencer:
     def _viewpoints(self) -> set[Cell]:
         """Return the cells to look at closed areas from."""
         order, area = self.state.order, self._map.area
-        return set() if order is None or area is None else self._history.viewpoints(order, area)
+        return set() if order is None or area is None else self._unreached.viewpoints(order, area)

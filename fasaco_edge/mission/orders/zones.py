@@ -1,4 +1,4 @@
-"""An order on the lattice: the cells of its zones, and those its keep-out zones take away."""
+"""Zones on the lattice: the cells inside them, and those that keep-out zones take away."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def kept_out(
 
     Those that a polygon touches, or where the robot would touch it.
     """
-    return _near_any(polygons, window, cell_m, max(0.5 * cell_m, robot_radius_m))
+    return cells_near(polygons, window, cell_m, max(0.5 * cell_m, robot_radius_m))
 
 
 def cells_inside(polygon: Polygon, window: Window, cell_m: float) -> NDArray[np.bool_]:
@@ -49,18 +49,6 @@ def cells_inside(polygon: Polygon, window: Window, cell_m: float) -> NDArray[np.
     cells = np.zeros((window.rows, window.cols), bool)
     turn_inside(np.array(polygon, np.float64), window.row0, window.col0, cell_m, cells)
     return cells
-
-
-def cells_near(
-    polygon: Polygon, window: Window, cell_m: float, reach_m: float
-) -> NDArray[np.bool_]:
-    """Return which cells of ``window`` the polygon comes near, bool (rows, cols).
-
-    Near is where it touches the square around the cell's centre that reaches ``reach_m`` [m] to
-    each side, and all inside. With half a cell or more, a disc of that radius can drive from
-    centre to centre of the other cells, and touches no polygon.
-    """
-    return _near_any((polygon,), window, cell_m, reach_m)
 
 
 def without(lattice: CoverageLattice, cells: NDArray[np.bool_]) -> CoverageLattice:
@@ -101,9 +89,15 @@ def _planes(polygons: tuple[Polygon, ...], window: Window, cell_m: float) -> NDA
 
 
 @lru_cache(maxsize=2)
-def _near_any(
+def cells_near(
     polygons: tuple[Polygon, ...], window: Window, cell_m: float, reach_m: float
 ) -> NDArray[np.bool_]:
+    """Return which cells of ``window`` polygons come near, bool (rows, cols), read-only.
+
+    Near is where one touches the square around the cell's centre that reaches ``reach_m`` [m] to
+    each side, and all inside. With half a cell or more, a disc of that radius can drive from
+    centre to centre of the other cells, and touches no polygon.
+    """
     starts = np.zeros((window.rows, window.cols + 1), np.int32)
     inside = np.zeros((window.rows, window.cols), bool)
     for polygon in polygons:
