@@ -1,13 +1,12 @@
-"""Errors named by the domain, and the one table that gives each its code.
+"""The table of all errors that users meet: each with its code, and a hint on what to do.
 
-The code is what travels: in a status message, in an error reply, in the
-command line's ``--json``. The text says what was wrong and where, the hint
-what to do about it.
+The code is what travels: in a status, an error reply, the command line's ``--json``. The text says
+what is wrong and where. (``cli.console.asking`` repeats errors that a daemon has answered with.)
 """
 
 
 class FasacoError(Exception):
-    """Base of all errors a user of this package is meant to see."""
+    """Base of all errors meant for the users of this package."""
 
     code = "error"
     hint = ""
@@ -219,3 +218,43 @@ class DifferentRuns(FasacoError):
 
     code = "different_runs"
     hint = "review the parts of one run at a time, or compare two runs with --against"
+
+
+class LedgerFileError(FasacoError):
+    """A ledger's file is broken, or cannot be read or written."""
+
+    code = "ledger_file"
+
+
+class LedgerFullError(FasacoError):
+    """A ledger is full: what lay farthest from the robot is to be covered again."""
+
+    code = "ledger_full"
+    hint = "look for poses or maps that jump; begin anew (`mission reset`) in another building"
+
+
+class LedgerMismatchError(FasacoError):
+    """A ledger is of another building, of other cells, or of another release."""
+
+    code = "ledger_mismatch"
+    hint = "it was kept aside and a new one begun; nothing has to be done to go on"
+
+
+class OrderError(FasacoError):
+    """An order that cannot be carried out as it is written."""
+
+    code = "bad_order"
+    hint = "correct the named member; see protocol/schema/mission.json"
+
+
+class CommandError(FasacoError):
+    """A command that makes no sense in the state the mission is in."""
+
+    code = "not_now"
+    hint = "ask for the status, and start a mission first"
+
+
+class NobodyAnswersError(FasacoError):
+    """No daemon of that robot is on the bus."""
+
+    code = "nobody_answers"

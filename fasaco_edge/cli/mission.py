@@ -118,7 +118,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _order(args: argparse.Namespace) -> dict[str, Any]:
     """Return the order as a document, checked: what is wrong is told without a daemon."""
-    from fasaco_edge.mission.orders.order import OrderError, order_document, read_order
+    from fasaco_edge.errors import OrderError
+    from fasaco_edge.mission.orders.order import order_document, read_order
 
     options = {
         "zones": args.zone,
@@ -145,8 +146,8 @@ def _order(args: argparse.Namespace) -> dict[str, Any]:
 def _read(path: Path) -> object:
     import json
 
+    from fasaco_edge.errors import OrderError
     from fasaco_edge.host.plain_yaml import load, read_bounded
-    from fasaco_edge.mission.orders.order import OrderError
 
     try:
         text = read_bounded(path)

@@ -105,7 +105,7 @@ def _leave(code: int) -> NoReturn:
 
 
 def _once(args: argparse.Namespace, feed: Feed, view: RobotView, console: Console) -> None:
-    from fasaco_edge.cli.console.asking import NobodyAnswersError
+    from fasaco_edge.cli.console.asking import nobody_answers
     from fasaco_edge.errors import BusUnavailable
     from fasaco_edge.watch.live import look_once, print_json
     from fasaco_edge.watch.page import Page
@@ -114,7 +114,7 @@ def _once(args: argparse.Namespace, feed: Feed, view: RobotView, console: Consol
     if not look_once(feed, view, args.timeout):
         if view.trouble:
             raise BusUnavailable(view.trouble)
-        raise NobodyAnswersError(f"{args.base}/@v1/{args.robot}", view.robots)
+        raise nobody_answers(f"{args.base}/@v1/{args.robot}", view.robots)
     if args.json:
         print_json(view.document)
         return

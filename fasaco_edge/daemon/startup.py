@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
-from fasaco_edge.errors import FasacoError, PatchWithoutBase
+from fasaco_edge.errors import CommandError, FasacoError, PatchWithoutBase
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, without_base
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.mission.core.events import (
@@ -27,7 +27,6 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     in_runs,
 )
-from fasaco_edge.mission.orders.order_state import CommandError
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker

@@ -20,9 +20,9 @@ from pathlib import Path
 import yaml
 
 from fasaco_edge.bus.session import Sample
-from fasaco_edge.daemon.ledger.codec import LedgerFileError, decode_ledger
+from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
-from fasaco_edge.errors import UnreadableRecording
+from fasaco_edge.errors import LedgerFileError, UnreadableRecording
 from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys

@@ -30,9 +30,9 @@ from pathlib import Path
 
 import yaml
 
-from fasaco_edge.daemon.ledger.codec import LedgerFileError, decode_ledger
+from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
-from fasaco_edge.errors import UnreadableRecording
+from fasaco_edge.errors import LedgerFileError, UnreadableRecording
 from fasaco_edge.recording.read.repair import repair_folder, scan_recording
 from tests.campaigns.file_calls import Call, Kind, Watch, why_not
 from tests.campaigns.power_states import Cut, Disk, Spread, cuts_of

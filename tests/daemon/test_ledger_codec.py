@@ -11,13 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.daemon.ledger.codec import (
-    MOST_BYTES,
-    LedgerFileError,
-    decode_ledger,
-    encode_ledger,
-)
-from fasaco_edge.mission.coverage.ledger import MOST_TILES, LedgerMismatchError
+from fasaco_edge.daemon.ledger.codec import MOST_BYTES, decode_ledger, encode_ledger
+from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
+from fasaco_edge.mission.coverage.ledger import MOST_TILES
 from tests.support.ledgers import CELL_M, contents, driven, lane
 
 CELLS = st.tuples(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))

@@ -11,14 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.daemon.ledger.codec import (
-    MOST_BYTES,
-    LedgerFileError,
-    decode_ledger,
-    encode_ledger,
-)
+from fasaco_edge.daemon.ledger.codec import MOST_BYTES, decode_ledger, encode_ledger
 from fasaco_edge.daemon.ledger.file import KEPT_ASIDE, LedgerFile
-from fasaco_edge.mission.coverage.ledger import LedgerMismatchError
+from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
 from tests.daemon.test_ledger_codec import enveloped
 from tests.support.ledgers import (
     CELL_M,

@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 
 from fasaco_edge.daemon.ledger import writer as ledger_writer
-from fasaco_edge.daemon.ledger.codec import LedgerFileError, decode_ledger, encode_ledger
+from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.daemon.ledger.writer import LedgerWriter, open_ledger
-from fasaco_edge.mission.coverage.ledger import LedgerMismatchError
+from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
 from tests.support.ledgers import CELL_M, contents, lane
 
 DEADLINE_S = 60.0

@@ -2,10 +2,10 @@
 
 import pytest
 
+from fasaco_edge.errors import CommandError, OrderError
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
-from fasaco_edge.mission.orders.order import OrderError
-from fasaco_edge.mission.orders.order_state import CommandError, OrderState
+from fasaco_edge.mission.orders.order_state import OrderState
 from tests.mission.world import (
     CONFIG,
     Drive,

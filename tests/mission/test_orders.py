@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fasaco_edge.errors import CommandError, OrderError
 from fasaco_edge.mission.orders.order import (
     EVERYTHING_ONCE,
     MissionOrder,
-    OrderError,
     Zone,
     command_document,
     order_document,
     read_command,
     read_order,
 )
-from fasaco_edge.mission.orders.order_state import CommandError, OrderState, Stage
+from fasaco_edge.mission.orders.order_state import OrderState, Stage
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
 KITCHEN = {"name": "kitchen", "polygon": SQUARE}

@@ -1,7 +1,4 @@
-"""What is said where no daemon answers.
-
-A question to a daemon on the bus, and what comes of it.
-"""
+"""Questions to a daemon on the bus, and its answer."""
 
 from __future__ import annotations
 
@@ -11,28 +8,23 @@ from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.cli.console.arguments import add_robot_on_bus, client_settings, seconds
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.errors import FasacoError, NobodyAnswersError
 from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.queries import Reply
 
-
-class NobodyAnswersError(FasacoError):
-    """No daemon of that robot is on the bus."""
-
-    code = "nobody_answers"
-
-    def __init__(self, prefix: str, robots: Collection[str]) -> None:
-        names = one_line(", ".join(sorted(robots)))
-        there = f"there are {names}: give one as --robot" if names else "there is none"
-        super().__init__(
-            f"no daemon answers at {prefix}",
-            hint=f"of robots on this bus {there}; `fasaco-edge run` starts a daemon",
-        )
-
-
 TIMEOUT_S = 5.0
+
+
+def nobody_answers(prefix: str, robots: Collection[str]) -> NobodyAnswersError:
+    """Return the error that no daemon answers at ``prefix``, where these robots are."""
+    names = one_line(", ".join(sorted(robots)))
+    there = f"there are {names}: give one as --robot" if names else "there is none"
+    return NobodyAnswersError(
+        f"no daemon answers at {prefix}",
+        hint=f"of robots on this bus {there}; `fasaco-edge run` starts a daemon",
+    )
 
 
 class RefusedError(FasacoError):
@@ -76,7 +68,7 @@ def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: byte
         replies = bus.get(selector, args.timeout, payload)
         if not replies:
             alive = bus.alive(f"{args.base}/@v1/*/alive")
-            raise NobodyAnswersError(keys.prefix, {key.split("/")[-2] for key in alive})
+            raise nobody_answers(keys.prefix, {key.split("/")[-2] for key in alive})
     reply = replies[0]
     if reply.is_error:
         if args.json:

@@ -29,13 +29,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import FasacoError
-from fasaco_edge.mission.coverage.ledger import (
-    MOST_TILES,
-    TILE,
-    LedgerMismatchError,
-    LedgerSnapshot,
-)
+from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
+from fasaco_edge.mission.coverage.ledger import MOST_TILES, TILE, LedgerSnapshot
 
 MAGIC = b"FASACOLG"
 VERSION = 1
@@ -49,12 +44,6 @@ MOST_BYTES = MOST_TILES * (_TILE_BYTES + _CELL_BYTES) + 2_000_000
 """Of a body, and of a file, which is smaller; longer ones are not read."""
 # Mostly zeros and ones: the fastest level takes a hundredth of the size.
 _LEVEL = 1
-
-
-class LedgerFileError(FasacoError):
-    """A ledger's file is broken, or cannot be read or written."""
-
-    code = "ledger_file"
 
 
 def encode_ledger(snapshot: LedgerSnapshot) -> bytes:

@@ -17,16 +17,11 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from fasaco_edge.daemon.ledger.codec import (
-    MOST_BYTES,
-    LedgerFileError,
-    decode_ledger,
-    encode_ledger,
-)
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.daemon.ledger.codec import MOST_BYTES, decode_ledger, encode_ledger
+from fasaco_edge.errors import FasacoError, LedgerFileError, LedgerMismatchError
 from fasaco_edge.host.durable import make_folder, sync_folder, write_through
 from fasaco_edge.host.files import open_own, read_own
-from fasaco_edge.mission.coverage.ledger import LedgerMismatchError, LedgerSnapshot
+from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 
 # So many files of each kind are kept aside, and the largest.
 KEPT_ASIDE = 3

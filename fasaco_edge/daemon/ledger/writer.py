@@ -14,11 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fasaco_edge.daemon.faults import fault_text, log_fault
-from fasaco_edge.daemon.ledger.codec import LedgerFileError
 from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger, reason_of
-from fasaco_edge.errors import FasacoError
-from fasaco_edge.mission.coverage.ledger import LedgerMismatchError, LedgerSnapshot
-from fasaco_edge.mission.orders.order import OrderError
+from fasaco_edge.errors import FasacoError, LedgerFileError, LedgerMismatchError, OrderError
+from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 from fasaco_edge.wire.status import LedgerReport
 

@@ -9,7 +9,7 @@ from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.bus.queries import Question, Reply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.loop.answers import check, error_reply
-from fasaco_edge.errors import BadQuery, FasacoError
+from fasaco_edge.errors import BadQuery, CommandError, FasacoError
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import (
     EVERYTHING_ONCE,
@@ -17,7 +17,6 @@ from fasaco_edge.mission.orders.order import (
     MissionOrder,
     read_command,
 )
-from fasaco_edge.mission.orders.order_state import CommandError
 from fasaco_edge.wire import replies
 from fasaco_edge.wire.json_text import decode_json, encode_json
 from fasaco_edge.wire.keys import Keys

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.errors import CommandError, FasacoError, LedgerMismatchError
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.core.events import (
@@ -22,11 +22,10 @@ from fasaco_edge.mission.core.events import (
     in_runs,
 )
 from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.coverage.ledger import LedgerMismatchError
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.orders.order_state import CommandError, OrderState
+from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Pose2D, Window
 
 if TYPE_CHECKING:
@@ -31,20 +30,6 @@ MOST_TILES = 2048
 DROPPED_TILES = MOST_TILES // 16
 
 Tiles = Mapping["Cell", NDArray[np.uint16]]
-
-
-class LedgerFullError(FasacoError):
-    """A ledger is full: what lay farthest from the robot is to be covered again."""
-
-    code = "ledger_full"
-    hint = "look for poses or maps that jump; begin anew (`mission reset`) in another building"
-
-
-class LedgerMismatchError(FasacoError):
-    """A ledger is of another building, of other cells, or of another release."""
-
-    code = "ledger_mismatch"
-    hint = "it was kept aside and a new one begun; nothing has to be done to go on"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -30,6 +30,7 @@ from enum import Enum, auto
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.errors import LedgerFullError, LedgerMismatchError
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
 from fasaco_edge.mission.coverage.ledger import (
@@ -37,8 +38,6 @@ from fasaco_edge.mission.coverage.ledger import (
     MOST_TILES,
     TILE,
     CoverageLedger,
-    LedgerFullError,
-    LedgerMismatchError,
     LedgerSnapshot,
 )
 from fasaco_edge.mission.map.loop_closure import Motion, uncertain_cells

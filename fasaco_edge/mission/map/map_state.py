@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fasaco_edge.errors import FasacoError, MapTooFar, MapTooLarge, PatchWithoutBase, WrongFrame
+from fasaco_edge.errors import (
+    FasacoError,
+    MapTooFar,
+    MapTooLarge,
+    OrderError,
+    PatchWithoutBase,
+    WrongFrame,
+)
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Polygon, StampedPose, Window, polygon_bounds
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice, lattice_window
@@ -15,7 +22,7 @@ from fasaco_edge.mission.coverage.progress import Coverage, FreeArea
 from fasaco_edge.mission.map.inputs import FrameSelector
 from fasaco_edge.mission.map.loop_closure import has_moved
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
-from fasaco_edge.mission.orders.order import MissionOrder, OrderError
+from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.mission.orders.zones import kept_out, without
 
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 import msgspec
 from msgspec import Meta
 
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M, Polygon, polygon_flaw
 
 # What an order may hold at most: it is kept with the ledger, written once a second.
@@ -25,13 +25,6 @@ MOST_POINTS = 1_000
 MOST_POINTS_IN_ALL = 5_000
 MOST_PASSES = 100
 LONGEST_NAME = 64
-
-
-class OrderError(FasacoError):
-    """An order that cannot be carried out as it is written."""
-
-    code = "bad_order"
-    hint = "correct the named member; see protocol/schema/mission.json"
 
 
 @dataclass(frozen=True, slots=True)

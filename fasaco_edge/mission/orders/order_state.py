@@ -13,12 +13,11 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.errors import CommandError, OrderError
 from fasaco_edge.mission.orders.order import (
     CommandName,
     MissionOrder,
     OrderDocument,
-    OrderError,
     Zone,
     order_document,
     order_of,
@@ -28,13 +27,6 @@ VERSION = 1
 
 # Why a daemon without autostart is idle.
 NO_ORDER = "no order yet: start a mission"
-
-
-class CommandError(FasacoError):
-    """A command that makes no sense in the state the mission is in."""
-
-    code = "not_now"
-    hint = "ask for the status, and start a mission first"
 
 
 class Stage(StrEnum):
