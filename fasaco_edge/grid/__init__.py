@@ -1,1 +1,1 @@
-"""Values with meaning: geometry, occupancy grids, the coverage lattice, map files."""
+"""Value types: geometry, occupancy grids, the coverage lattice, map files."""

@@ -1,9 +1,8 @@
-"""What a new map changes of the coverage lattice, at the cost of what changed.
+"""Lattice changes: what a new map changes of the coverage lattice, at the cost of the change.
 
-Where the new map lies on the raster of the one before - it was patched, it has grown,
-or its origin has moved by whole pixels - pixels are compared, and only those cells are
-classified anew for which changed pixels may matter. On another raster - its origin has
-moved by a fraction of a pixel, or was turned - no pixel is what it was, and all cells
+Where the new map lies on the raster of the one before (it was patched, it has grown, or its origin
+has moved by whole pixels), pixels are compared, and only cells near changed pixels are classified
+anew. On another raster (its origin has moved by a fraction of a pixel, or was rotated) all cells
 are. Either way the lattice is, bit for bit, ``CoverageLattice.from_map`` of the new map.
 """
 
@@ -70,7 +69,7 @@ class LatticeChange:
     def first(
         cls, grid: OccupancyGrid, footprint: Footprint, max_cells: int = MAX_LATTICE_CELLS
     ) -> Self:
-        """Return the lattice over a map that none came before.
+        """Return the lattice over a first map.
 
         Raises:
             MapTooLarge: it would have more than ``max_cells`` cells.
@@ -95,7 +94,7 @@ class LatticeChange:
             footprint: what the lattice is made for.
             max_cells: the most cells that the new lattice may have.
             within: which pixels (row, col) of a map on its old place may differ, as a patch
-                names them; no others are looked at. None for any.
+                names them; no others are compared. None for any.
 
         Raises:
             MapTooLarge: the new lattice would have more than ``max_cells`` cells, or the pixels
@@ -156,7 +155,7 @@ def regions_to_compare(
 
 
 def carried(array: NDArray[Scalar], old: Window, new: Window) -> NDArray[Scalar]:
-    """Return what an array over the old window says on the new one, 0 where it says nothing.
+    """Return an array over the old window on the new one, 0 beyond the old one.
 
     That is the array itself where the windows are the same.
     """

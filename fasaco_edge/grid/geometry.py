@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# A raster's corner is told in this many parts of a pixel: a map that grows by whole
-# pixels stays on its raster, also where its origin is rounded to float32.
+# A raster's corner is rounded to this part of a pixel: a map that grows by whole pixels stays on
+# its raster, also where its origin is rounded to float32.
 RASTER_STEPS = 2048
 
-# So far from the frame's origin a map may lie, and all that is said of it [m]: UTM northings go
-# up to 10,000 km. ``protocol/limits.yaml`` has the same number.
+# The largest distance of a map, a pose or a path from the frame's origin [m]: UTM northings go up
+# to 10,000 km. ``protocol/limits.yaml`` has the same number.
 FARTHEST_M = 2e7
 
-# Edge of a pixel [m]; the same holds there.
+# Limits of the edge of a pixel [m], as there.
 MIN_RESOLUTION_M, MAX_RESOLUTION_M = 1e-4, 100.0
 
 
@@ -81,7 +81,7 @@ class Window:
         )
 
     def moved(self, rows: int, cols: int) -> Window:
-        """Return the rectangle so many rows and columns further on."""
+        """Return the rectangle moved by ``rows`` and ``cols``."""
         return Window(self.row0 + rows, self.col0 + cols, self.row1 + rows, self.col1 + cols)
 
     def without(self, hole: Window) -> tuple[Window, ...]:
@@ -172,7 +172,7 @@ class GridGeometry:
 
 @dataclass(frozen=True, slots=True)
 class StampedPose:
-    """A pose as it came off the bus.
+    """A pose as received.
 
     Attributes:
         pose: the robot's pose in ``frame``.
@@ -188,9 +188,9 @@ class StampedPose:
 Point = tuple[float, float]
 Polygon = tuple[Point, ...]
 
-# Less than a postage stamp is a slip of the hand [m2].
+# A smaller polygon is a mistake [m2].
 LEAST_AREA_M2 = 1e-4
-# So many pairs of edges are compared at once: more take memory, and no less time.
+# Pairs of edges compared at once: more take memory, and no less time.
 MOST_PAIRS = 65536
 
 
@@ -225,7 +225,7 @@ def _edges(polygon: Polygon) -> Iterator[tuple[Point, Point]]:
 
 
 def _signed_area(polygon: Polygon) -> float:
-    # From a corner of its own, else a polygon far from the origin has none to speak of.
+    # Relative to a corner: far from the origin the differences would drown in rounding.
     x0, y0 = polygon[0]
     return 0.5 * math.fsum(
         (ax - x0) * (by - y0) - (bx - x0) * (ay - y0) for (ax, ay), (bx, by) in _edges(polygon)
@@ -235,7 +235,7 @@ def _signed_area(polygon: Polygon) -> float:
 def _crossing(polygon: Polygon) -> tuple[int, int] | None:
     """Return two edges, by the number of their first points, that meet where they must not.
 
-    Many edges are compared with all at a time, and looked at only where their boxes meet.
+    Blocks of edges are compared with all edges, exactly only where their boxes meet.
     """
     start = np.array(polygon)
     end = np.roll(start, -1, axis=0)

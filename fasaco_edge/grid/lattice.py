@@ -30,8 +30,8 @@ MAX_LATTICE_CELLS = 4_000_000
 # Indices of cells are int32, and sums of two of them, too.
 MOST_INDEX = 2**30
 
-# How many pixels robot and tool may reach over: beyond that, the tables by which a map is looked
-# through take more memory than the map itself, see ``kernels.classification``.
+# The most pixels that robot and tool may span: beyond that, the tables for classifying a map take
+# more memory than the map itself, see ``kernels.lattice.classification``.
 MOST_REACH_PX = 400
 
 # A robot exactly as wide as a corridor fits; float32 resolutions on the wire
@@ -41,7 +41,7 @@ TOUCH_TOLERANCE_PX = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """What the lattice is made for.
+    """Tool, robot and thresholds that a lattice is made for.
 
     Attributes:
         cell_m: edge of a lattice cell, the width of the tool [m].
@@ -64,7 +64,7 @@ class Footprint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoverageLattice:
-    """What can be covered, cell by cell.
+    """Which cells can be covered, and the steps between them.
 
     Attributes:
         window: which cells of the unbounded lattice the arrays span.
@@ -144,8 +144,7 @@ class CoverageLattice:
 def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Window:
     """Return which cells of the unbounded lattice, ``cell_m`` [m] wide, a map reaches into.
 
-    What can be said of no cell is refused with the map: cells have int32 indices, and all that
-    is published of them lies within ``FARTHEST_M`` of 0.
+    Cells have int32 indices, and all that is published of them lies within ``FARTHEST_M`` of 0.
 
     Raises:
         MapTooLarge: they are more than ``max_cells``.
@@ -177,7 +176,7 @@ def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Win
 
 
 def pixels_of(grid: OccupancyGrid) -> Pixels:
-    """Return a map as a window of its raster, in the one memory layout kernels know."""
+    """Return a map as a window of its raster, in the memory layout of the kernels."""
     cells = np.ascontiguousarray(grid.cells)
     cells.flags.writeable = False
     _, shown = grid.geometry.on_raster()

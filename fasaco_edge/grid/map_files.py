@@ -1,4 +1,4 @@
-"""Map files: map_server's YAML and image, coverage grids, and the maps that come along.
+"""Map files: map_server's YAML and image, coverage grids, and built-in maps.
 
 A map file means here what it means to nav2_map_server (map_io.cpp). Its releases
 differ on transparent pixels in trinary mode: older ones average the alpha channel
@@ -119,7 +119,7 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
             f"{path}: expected a bool array of two dimensions, got {array.dtype} {array.shape}"
         )
     check_size(path, array.shape[1], array.shape[0])
-    # A bool of another program may be any byte but 0; kernels look at its lowest bit alone.
+    # A bool of another program may be any byte but 0; kernels read its lowest bit alone.
     cells: NDArray[np.bool_] = np.ascontiguousarray(array).view(np.uint8) != 0
     return cells
 

@@ -1,4 +1,4 @@
-"""Pixels of a map image: how bright, and whether opaque."""
+"""Map images: brightness and transparency of their pixels."""
 
 from __future__ import annotations
 

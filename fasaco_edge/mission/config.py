@@ -1,4 +1,4 @@
-"""What a mission is for."""
+"""Mission configuration."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 
 @dataclass(frozen=True, slots=True)
 class MissionConfig:
-    """What the mission is for, and how patient it is.
+    """Robot, cost and limits of a mission.
 
     Attributes:
         footprint: of robot and tool.
-        max_lattice_cells: the largest lattice it plans on.
-        cost: of walks.
+        max_lattice_cells: the most cells of a lattice it plans on.
+        cost: of paths.
         retries: how often what is blocked or left over in the end is tried again.
-        retry_s: how long to wait before each time [s].
-        lost_pose_s: without a pose for so long nobody knows where the robot is [s]; 0 for never.
-        spare_share: share of a processor core that may go into making a path better that nothing
-            forces to be changed; 0 for none.
-        stale_map_s: without a map or an update for so long the map is stale [s]; 0 for never.
+        retry_s: pause before each retry [s].
+        lost_pose_s: the pose is lost after this time without one [s]; 0 for never.
+        stale_map_s: the map is stale after this time without a map or an update [s]; 0 for never.
+        spare_share: share of a processor core for improving a path that need not change; 0 for
+            none.
     """
 
     footprint: Footprint

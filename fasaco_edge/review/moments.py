@@ -152,7 +152,7 @@ def _drops(
 
 # "path blocked at cell (2, 3)" is of the kind "path blocked".
 _DETAIL = re.compile(r":| at cell|,| \d")
-# As ``mission.ground.GroundChange`` says them.
+# As ``mission.map.reachable_area.AreaChange`` says them.
 _MAP = "map: "
 _CHANGES = ("more", "fewer", "passages changed")
 

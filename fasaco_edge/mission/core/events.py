@@ -1,4 +1,4 @@
-"""What a mission hears and what it decides."""
+"""Events and decisions: the interface of the mission."""
 
 from __future__ import annotations
 
@@ -16,44 +16,48 @@ from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.orders.order import EVERYTHING_ONCE, CommandName, MissionOrder
 
 if TYPE_CHECKING:
-    # Only named here: the daemon hears events before it has loaded what plans.
+    # For types only: the daemon receives events before it has loaded the planners.
     from fasaco_edge.planners.path import CoveragePath
     from fasaco_edge.planners.problem import CoverageProblem
 
 
 @dataclass(frozen=True, slots=True)
 class MapReceived:
-    """A full map came in."""
+    """A full map."""
 
     grid: OccupancyGrid
 
 
 @dataclass(frozen=True, slots=True)
 class PatchReceived:
-    """New values for a part of the map came in."""
+    """An update: new values for a part of the map."""
 
     patch: MapPatch
 
 
 @dataclass(frozen=True, slots=True)
 class PatchesLost:
-    """Map updates were lost: the map is wrong until the next full one."""
+    """Map updates were lost: updates are refused until the next full map."""
 
     count: int
 
 
 @dataclass(frozen=True, slots=True)
 class PoseReceived:
-    """The robot's pose came in."""
+    """A pose of the robot."""
 
     pose: StampedPose
 
 
 @dataclass(frozen=True, slots=True)
 class PlanReady:
-    """The plan asked for by request ``number`` is there, made in ``seconds``.
+    """The plan for request ``number``.
 
-    ``stops`` tells where it was stopped, see ``planners.stopping.StopRecorder``.
+    Attributes:
+        number: of the request.
+        path: the plan.
+        seconds: how long planning took [s].
+        stops: where it was stopped, see ``planners.stopping.StopRecorder``.
     """
 
     number: int
@@ -64,7 +68,7 @@ class PlanReady:
 
 @dataclass(frozen=True, slots=True)
 class PlanBroken:
-    """The planner broke on request ``number``; ``why`` says how."""
+    """The planner failed on request ``number`` by ``why``."""
 
     number: int
     why: PlanFailed
@@ -72,7 +76,7 @@ class PlanBroken:
 
 @dataclass(frozen=True, slots=True)
 class CommandReceived:
-    """Somebody commands; ``order`` is what ``start`` is to start."""
+    """Command ``number``; ``order`` goes with ``start``."""
 
     number: int
     command: CommandName
@@ -92,13 +96,13 @@ Event = (
 
 @dataclass(frozen=True, slots=True)
 class PatchRun:
-    """Map updates with nothing between them: laid over the map together, at one copy of it."""
+    """Consecutive map updates: laid over the map together, at one copy of it."""
 
     patches: tuple[MapPatch, ...]
 
 
 def in_runs(events: Iterable[Event]) -> Iterator[Event | PatchRun]:
-    """Yield events in order, updates of the map as runs."""
+    """Yield events in order, consecutive updates of the map as one."""
     run: list[MapPatch] = []
     for event in events:
         if isinstance(event, PatchReceived):
@@ -114,10 +118,14 @@ def in_runs(events: Iterable[Event]) -> Iterator[Event | PatchRun]:
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """A walk is wanted; ``reason`` says why.
+    """A plan to make.
 
-    ``changed`` is the window of cells that have changed since the plan before; None where the
-    reason is another.
+    Attributes:
+        number: counts the requests, from 1; ``PlanReady`` or ``PlanBroken`` returns it.
+        problem: what to plan.
+        reason: why.
+        changed: window of the cells that have changed since the plan before; None where that is
+            not the reason.
     """
 
     number: int
@@ -128,15 +136,15 @@ class PlanRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathUpdate:
-    """A path to publish, in place of the one before.
+    """A path to publish; it replaces the one before.
 
     Attributes:
         revision: counts the published paths, from 1.
-        cells: int32 (n, 2), the walk still to be driven; n = 0 tells the robot to stop.
+        cells: int32 (n, 2), the cells (row, col) still to be driven; n = 0 stops the robot.
         reason: why it replaces the one before.
         plan: the plan it comes from; None where none was needed.
-        plan_s: how long that took [s].
-        changed: window of the cells whose change is the reason; None where it is another.
+        plan_s: how long planning took [s].
+        changed: window of the cells whose change is the reason; None where that is not the reason.
     """
 
     revision: int
@@ -149,9 +157,12 @@ class PathUpdate:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The answer to command ``number``: done, or why not.
+    """The answer to command ``number``.
 
-    ``plan`` is the number of the plan request that ``replan`` leads to.
+    Attributes:
+        number: of the command.
+        error: why it was refused; None where it was carried out.
+        plan: for ``replan`` the number that the new plan will have among the plans made.
     """
 
     number: int
@@ -161,14 +172,14 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What is to be done after some events.
+    """What is to be done after a step.
 
     Attributes:
-        plan: a plan to make; replaces none, there is one at a time.
-        path: a path to publish; of several in one step the last is the one that holds.
-        faults: events that were refused, and why; they changed nothing.
+        plan: a plan to make; there is never more than one under way.
+        path: a path to publish; of several in one step only the last.
+        faults: why events were refused, and faults that occurred with others.
         answers: to the commands among the events, in order.
-        forgotten: whether what was covered is to be forgotten on disk too.
+        forgotten: whether the ledger on disk is to be deleted, too.
     """
 
     plan: PlanRequest | None = None

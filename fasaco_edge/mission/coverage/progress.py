@@ -128,7 +128,7 @@ class FreeArea:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrivenPath:
-    """The published path and how far the robot has come on it.
+    """The published path and the robot's progress on it.
 
     Attributes:
         cells: int32 (n, 2).
@@ -140,7 +140,7 @@ class DrivenPath:
 
     @classmethod
     def none(cls) -> Self:
-        """Return the path of a robot that has nothing to do."""
+        """Return an empty path."""
         return cls(np.empty((0, 2), np.int32))
 
     @property
@@ -156,8 +156,8 @@ class DrivenPath:
     def driven_to(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> DrivenPath:
         """Return the path with the robot in ``cell``, if it drove there along the path.
 
-        The path may come back beside itself: a pose that flickers into the next lane
-        is no reason to leave out what lies between.
+        The path may come back beside itself: a pose that flickers into the next lane must not
+        skip what lies between.
         """
         near: list[Cell] = [
             (row, col) for row, col in self.cells[self.index : self.index + LOOK_AHEAD].tolist()

@@ -25,7 +25,7 @@ LOCAL_SHARE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class AreaChange:
-    """How many reachable cells came, went, or have other steps than before.
+    """How many reachable cells were gained, lost, or have other steps than before.
 
     ``window`` is the smallest around all of them; None where there are none.
     """
@@ -51,7 +51,7 @@ class AreaChange:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReachableArea:
-    """A lattice and what of it is reachable, bool (rows, cols)."""
+    """A lattice and which of its cells the robot can reach, bool (rows, cols)."""
 
     lattice: CoverageLattice
     reachable: NDArray[np.bool_]

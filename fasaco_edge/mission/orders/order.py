@@ -1,6 +1,4 @@
-"""What a mission is ordered to do: zones, passes, where never to go, whether to drive home.
-
-Orders and commands as documents, in JSON or YAML: what may stand in them, and their schema.
+"""Orders and commands: zones, passes, keep-out zones; their JSON or YAML form and its schema.
 
 ``protocol/schema/mission.json`` is made from these definitions; a test holds it to them.
 """
@@ -18,7 +16,7 @@ from msgspec import Meta
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M, Polygon, polygon_flaw
 
-# What an order may hold at most: it is kept with the ledger, written once a second.
+# Limits of an order: it is kept with the ledger, written once a second.
 MOST_ZONES = 100
 MOST_KEEP_OUT = 100
 MOST_POINTS = 1_000
@@ -32,9 +30,9 @@ class Zone:
     """An area to cover.
 
     Attributes:
-        name: tells it from others.
+        name: unique in its order.
         polygon: its corners (x, y) [m] in the map frame, the last joined to the first; None for
-            everything the robot can come to.
+            everything the robot can reach.
         passes: how often.
     """
 
@@ -53,8 +51,8 @@ class MissionOrder:
     Attributes:
         zones: one after the other, in this order; at least one.
         keep_out: polygons (x, y) [m] in the map frame that the robot must not touch.
-        return_home: whether to drive back in the end to where the mission began.
-        keep_covered: whether what is covered already counts in the first pass.
+        return_home: whether to drive back to the start in the end.
+        keep_covered: whether cells covered before count in the first pass.
     """
 
     zones: tuple[Zone, ...] = (Zone(EVERYTHING, None),)

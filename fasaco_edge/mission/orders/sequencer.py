@@ -131,7 +131,7 @@ class _Run:
 
 
 class Sequencer:
-    """Knows what of an order is to be done next, on the map as it is now. Times are [s].
+    """Decides what part of an order is next, on the map as it is now. Times are [s].
 
     Attributes:
         state: the order, and how far it is.

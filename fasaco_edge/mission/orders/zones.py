@@ -13,7 +13,7 @@ from fasaco_edge.kernels.cells import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.mission.orders.order import Zone
 
-# A polygon drawn along the border of a cell does not touch it; rounding must not decide [m].
+# A polygon along the border of a cell does not touch it; rounding must not decide [m].
 TOUCH_TOLERANCE_M = 1e-6
 
 
@@ -65,7 +65,7 @@ def without(lattice: CoverageLattice, cells: NDArray[np.bool_]) -> CoverageLatti
     return CoverageLattice(lattice.window, lattice.cell_m, states, steps)
 
 
-# A map moves its window seldom; zones and passes ask for the same cells again and again.
+# A map seldom moves its window; zones and passes ask for the same cells again and again.
 @lru_cache(maxsize=1)
 def _everything(window: Window) -> NDArray[np.bool_]:
     cells = np.ones((window.rows, window.cols), bool)

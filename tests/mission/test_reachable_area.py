@@ -11,7 +11,7 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.coverage.progress import FAR_CELLS, LOOK_AHEAD, DrivenPath
-from fasaco_edge.mission.map import reachable_area as ground_module
+from fasaco_edge.mission.map import reachable_area as area_module
 from fasaco_edge.mission.map.reachable_area import AreaChange, ReachableArea, anchor_cell
 from tests import naive
 from tests.support.grids import lattice, placed, problems, with_passages_closed
@@ -96,7 +96,7 @@ def test_after_a_change_the_same_is_reachable_as_if_all_were_searched(given_grou
         start = start if start in set(map(tuple, places.tolist())) else here
         with pytest.MonkeyPatch.context() as patch:
             # However much has changed, first it is tried to look at that alone.
-            patch.setattr(ground_module, "LOCAL_SHARE", 1.0)
+            patch.setattr(area_module, "LOCAL_SHARE", 1.0)
             ground = before.updated(change_to(before.lattice, after), start)
         assert ground.lattice is after
         assert np.array_equal(ground.reachable, ReachableArea.around(after, start).reachable)
@@ -154,7 +154,7 @@ def test_a_map_that_no_longer_shows_the_way_between_two_rooms_parts_them(monkeyp
     """The way led through cells that fell out of the map: among those left nothing came apart."""
     before = ground("......##", "........", "#######.", "........", "......##")
     after = lattice("......#", ".......", "#######", ".......", "......#")
-    monkeypatch.setattr(ground_module, "LOCAL_SHARE", 1.0)
+    monkeypatch.setattr(area_module, "LOCAL_SHARE", 1.0)
     here = before.updated(change_to(before.lattice, after), (0, 0))
     assert before.contains((4, 0))
     assert not here.contains((4, 0))
