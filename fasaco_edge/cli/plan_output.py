@@ -75,7 +75,7 @@ def draw(
     figures: dict[str, Any],
 ) -> None:
     """Draw the walk."""
-    from fasaco_edge.drawing.walk import draw_walk
+    from fasaco_edge.drawing.pictures import draw_walk
 
     ants = path.work.ants
     counted = "1 ant" if ants == 1 else f"{ants} ants"

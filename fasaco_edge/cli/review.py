@@ -63,7 +63,8 @@ def run(args: argparse.Namespace) -> int:
     """Review."""
     from fasaco_edge.cli.console.arguments import check_output, writing
     from fasaco_edge.cli.review_report import print_comparison, print_review
-    from fasaco_edge.review.document import document, side_by_side
+    from fasaco_edge.review.comparison import side_by_side
+    from fasaco_edge.review.document import document
 
     for file in (args.png, args.html):
         check_output(file)

@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.cli.console import terminal
+from fasaco_edge.review import rows
 from fasaco_edge.review.charts import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
-from fasaco_edge.review.document import troubles
-from fasaco_edge.review.rows import (
-    MOST_REPLANS,
-    REASONS,
-    REPLANS,
-    amount,
-    card_rows,
-    clock,
+from fasaco_edge.review.comparison import (
     compared_rows,
-    figure_rows,
-    reason_rows,
-    replan_rows,
+    reason_counts,
+    setup_differences,
     setup_words,
-    verdicts,
 )
-from fasaco_edge.review.setups import setup_differences
 from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
@@ -35,78 +26,46 @@ PLOT_WIDTH, PLOT_HEIGHT = 64, 6
 MOST_TROUBLES = 12
 
 
-def print_review(review: Review, told: dict[str, Any]) -> None:
-    """Print all of a review; ``told`` is its document."""
+def print_review(review: Review, document: dict[str, Any]) -> None:
+    """Print all of a review, whose document is given, too."""
     from rich.text import Text
 
     console = terminal.out()
     colours = {True: "green", False: "red", None: "yellow"}
-    for complete, text in verdicts(told):
-        said = Text(one_line(text), colours[complete])
-        console.print(f"{told['recording']}:", said, style="bold", soft_wrap=True)
-    console.print(terminal.figures(card_rows(told)))
+    for complete, text in rows.verdicts(document):
+        verdict = Text(one_line(text), colours[complete])
+        console.print(f"{document['recording']}:", verdict, style="bold", soft_wrap=True)
+    console.print(terminal.figures(rows.card_rows(document)))
     _print_curve(console, review)
-    console.print(terminal.figures(figure_rows(told)))
+    console.print(terminal.figures(rows.figure_rows(document)))
+    _print_table(console, "Why replans came", rows.REASONS, rows.reason_rows(document))
+    _print_table(console, "The slowest replans", rows.REPLANS, rows.replan_rows(review))
+    moments = rows.moment_rows(review)
     _print_table(
-        console,
-        "Why replans came",
-        REASONS,
-        reason_rows(told),
+        console, "Worst moments", ("what", "how much", "at", "what else is known"), moments
     )
-    slowest = replan_rows(review.replans.slowest_first(MOST_REPLANS))
-    _print_table(console, "The slowest replans", REPLANS, slowest)
-    _print_table(
-        console,
-        "Worst moments",
-        ("what", "how much", "at", "what else is known"),
-        [
-            (moment.what, amount(moment.value, moment.unit), clock(moment.at_s), moment.note)
-            for moment in review.moments
-        ],
-    )
-    found = troubles(review)
-    _print_table(
-        console,
-        "Troubles",
-        ("state", "at", "for", "reason"),
-        [
-            (span.name, clock(span.begin_s), f"{span.seconds:.1f} s", span.reason)
-            for span in found[:MOST_TROUBLES]
-        ],
-    )
-    if len(found) > MOST_TROUBLES:
-        console.print(f"and {len(found) - MOST_TROUBLES} more; all are in the JSON document")
-    _print_table(
-        console,
-        "Refused messages",
-        ("code", "messages"),
-        [(code, str(count)) for code, count in told["faults_by_code"].items()],
-    )
-    _print_remarks(console, told)
+    troubles = rows.trouble_rows(review.troubles)
+    _print_table(console, "Troubles", ("state", "at", "for", "reason"), troubles[:MOST_TROUBLES])
+    if len(troubles) > MOST_TROUBLES:
+        console.print(f"and {len(troubles) - MOST_TROUBLES} more; all are in the JSON document")
+    _print_table(console, "Refused messages", ("code", "messages"), rows.fault_rows(document))
+    _print_remarks(console, document)
 
 
-def print_comparison(told: dict[str, Any], other: dict[str, Any]) -> None:
+def print_comparison(one: dict[str, Any], other: dict[str, Any]) -> None:
     """Print the figures of two documents side by side."""
     console = terminal.out()
-    names = (told["recording"], other["recording"])
-    console.print(setup_words(told, other), style="bold", soft_wrap=True)
-    _print_table(console, "Set-up", ("", *names), setup_differences(told, other))
-    rows = compared_rows(told, other)
-    _print_table(console, "Two runs", ("", *names, "difference"), rows)
-    kinds = dict.fromkeys((*told["replans_by_reason"], *other["replans_by_reason"]))
+    names = (one["recording"], other["recording"])
+    console.print(setup_words(one, other), style="bold", soft_wrap=True)
+    _print_table(console, "Set-up", ("", *names), setup_differences(one, other))
+    compared = compared_rows(one, other)
+    _print_table(console, "Two runs", ("", *names, "difference"), compared)
     counts = [
-        [document["replans_by_reason"].get(kind, 0) for document in (told, other)] for kind in kinds
+        (kind, str(mine), str(theirs), f"{mine - theirs:+d}")
+        for kind, (mine, theirs) in reason_counts([one, other])
     ]
-    _print_table(
-        console,
-        "Why replans came",
-        ("reason", *names, "difference"),
-        [
-            (kind, str(mine), str(theirs), f"{mine - theirs:+d}")
-            for kind, (mine, theirs) in zip(kinds, counts, strict=True)
-        ],
-    )
-    for document in (told, other):
+    _print_table(console, "Why replans came", ("reason", *names, "difference"), counts)
+    for document in (one, other):
         _print_remarks(console, document)
 
 
@@ -122,37 +81,32 @@ def _print_curve(console: Console, review: Review) -> None:
     console.print(Text("Coverage over time", "bold"), "of the cells coverable at the end")
     for label, line in zip(labels, lines, strict=True):
         console.print(f"{label:>6}", Text(line, "cyan"))
-    end = clock(review.duration_s)
+    end = rows.clock(review.duration_s)
     console.print(f"{'':>6} 0:00{end:>{PLOT_WIDTH - 4}}")
 
 
-def _print_remarks(console: Console, told: dict[str, Any]) -> None:
-    for part in told["files"]:
+def _print_remarks(console: Console, document: dict[str, Any]) -> None:
+    for part in document["files"]:
         if part["torn_bytes"]:
-            console.print(
-                f"{part['path']}: torn, its last {part['torn_bytes']} bytes are lost",
-                soft_wrap=True,
-            )
-    for remark in told["remarks"]:
+            torn = f"torn, its last {part['torn_bytes']} bytes are lost"
+            console.print(f"{part['path']}: {torn}", soft_wrap=True)
+    for remark in document["remarks"]:
         console.print(f"recorder: {remark}", soft_wrap=True)
-    for topic, count in told["unreadable"].items():
-        console.print(f"{count} samples of {topic} cannot be read")
-    for names, why in told["not_recorded"].items():
-        console.print(f"not known: {names}: {why}", soft_wrap=True)
+    for line in rows.unknown_lines(document):
+        console.print(line, soft_wrap=True)
 
 
 def _print_table(
-    console: Console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]
+    console: Console, title: str, columns: Sequence[str], cells: Sequence[Sequence[str]]
 ) -> None:
     from rich.table import Table
 
-    rows = list(rows)
-    if not rows:
+    if not cells:
         return
     table: Table = Table(title=title, title_justify="left", title_style="bold")
     for index, column in enumerate(columns):
         last = index == len(columns) - 1 and index > 1
         table.add_column(column, overflow="fold", justify="left" if last or not index else "right")
-    for row in rows:
+    for row in cells:
         table.add_row(*row)
     console.print(table)

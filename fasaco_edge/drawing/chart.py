@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from PIL import Image, ImageDraw, ImageFont
@@ -12,19 +12,18 @@ from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.palette import Colour
 from fasaco_edge.text import one_line
 
-# Okabe and Ito's colours, which all eyes tell apart, without the yellow: it is lost on white.
 COLOURS: tuple[Colour, ...] = (
-    (0, 114, 178),
-    (213, 94, 0),
-    (0, 158, 115),
-    (204, 121, 167),
-    (86, 180, 233),
-    (230, 159, 0),
+    palette.BLUE,
+    palette.VERMILION,
+    palette.GREEN,
+    palette.PURPLE,
+    palette.SKY,
+    palette.ORANGE,
 )
 
 PANEL_PX = (430, 290)
-# Left, top, right, bottom: room for numbers and names around a panel's axes.
-ROOM_PX = (62, 52, 16, 46)
+# Left, top, right, bottom: space for numbers and names around a panel's axes.
+BORDER_PX = (62, 52, 16, 46)
 MARGIN_PX = 20
 TITLE_PX, LABEL_PX, NUMBER_PX = 22, 14, 12
 DOT_PX, LINE_PX, GOAL_PX = 3.0, 2, 13
@@ -33,7 +32,12 @@ BAND_SHARE = 0.22
 OVERSAMPLING = 3
 MOST_TICKS = 6
 # Of one text [characters].
-MOST_SAID = 200
+MOST_CHARACTERS = 200
+
+Box = tuple[float, float, float, float]
+"""Left, upper, right and lower edge [px]."""
+Placer = Callable[[float, float], tuple[float, float]]
+"""Where a value (x, y) lies [px]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +86,7 @@ class Line:
     """Points (x, y), joined or not, and around them a band (x, low, high).
 
     Attributes:
-        label: stands in the key; "" for no entry.
+        label: its text in the key; "" for no entry.
         colour: of all its parts.
         points: in the order they are joined in.
         band: drawn pale.
@@ -110,6 +114,14 @@ class Panel:
     y: Axis
     lines: tuple[Line, ...]
     goals: tuple[tuple[float, float], ...] = ()
+
+    def placer(self, box: Box) -> Placer:
+        """Return where values lie in a box, y downward as on a screen."""
+        x0, y0, x1, y1 = box
+        return lambda x, y: (
+            x0 + self.x.share(x) * (x1 - x0),
+            y1 - self.y.share(y) * (y1 - y0),
+        )
 
 
 def draw_panels(
@@ -144,7 +156,7 @@ class _Pen:
         self._draw = draw
 
     def text(self, x: float, y: float, text: str, size: int, colour: Colour, anchor: str) -> None:
-        text = one_line(text, MOST_SAID)
+        text = one_line(text, MOST_CHARACTERS)
         font = ImageFont.load_default(size * OVERSAMPLING)
         self._draw.text((x * OVERSAMPLING, y * OVERSAMPLING), text, colour, font, anchor=anchor)
 
@@ -162,13 +174,11 @@ class _Pen:
 
 def _draw_panel(pen: _Pen, panel: Panel, left: float, top: float) -> None:
     """Draw a panel whose upper left corner is (left, top)."""
-    x0, y0 = left + ROOM_PX[0], top + ROOM_PX[1]
-    x1, y1 = left + PANEL_PX[0] - ROOM_PX[2], top + PANEL_PX[1] - ROOM_PX[3]
+    x0, y0 = left + BORDER_PX[0], top + BORDER_PX[1]
+    x1, y1 = left + PANEL_PX[0] - BORDER_PX[2], top + PANEL_PX[1] - BORDER_PX[3]
     pen.text(x0, top + 8, panel.title, LABEL_PX, palette.INK, "lt")
     pen.text(x0, top + 28, panel.caption, NUMBER_PX, palette.FAINT_INK, "lt")
-
-    def place(x: float, y: float) -> tuple[float, float]:
-        return x0 + panel.x.share(x) * (x1 - x0), y1 - panel.y.share(y) * (y1 - y0)
+    place = panel.placer((x0, y0, x1, y1))
 
     for value, text in panel.x.ticks:
         x, _ = place(value, panel.y.low)

@@ -25,6 +25,14 @@ UNREACHABLE: Colour = (200, 60, 60)
 START: Colour = (13, 128, 92)
 END: Colour = (190, 24, 60)
 
+# Okabe and Ito's colours, safe for colour-blind eyes, without the yellow: it is lost on white.
+BLUE: Colour = (0, 114, 178)
+VERMILION: Colour = (213, 94, 0)
+GREEN: Colour = (0, 158, 115)
+PURPLE: Colour = (204, 121, 167)
+SKY: Colour = (86, 180, 233)
+ORANGE: Colour = (230, 159, 0)
+
 # Matplotlib's plasma (CC0) at nine even places of its first four fifths: perceptually
 # uniform, and without the yellow end that is lost on white.
 _GRADIENT = np.array(

@@ -1,4 +1,4 @@
-"""The drawing area: a map, tinted cells, trails and marks, in map coordinates."""
+"""The drawing area: a map, tinted cells, tracks and marks, in map coordinates."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Plot:
         mask = np.asarray(spread) * stripes
         self._image.paste(colour, mask=Image.fromarray(mask))
 
-    def trail(self, starts: NDArray[np.float64], ends: NDArray[np.float64], width_m: float) -> None:
+    def track(self, starts: NDArray[np.float64], ends: NDArray[np.float64], width_m: float) -> None:
         """Draw segments (n, 2) to (n, 2) [m], coloured from the first to the last."""
         colours = palette.gradient(np.linspace(0.0, 1.0, len(starts))).tolist()
         thinnest = LINE_PX * self.view.oversampling

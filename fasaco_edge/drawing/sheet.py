@@ -24,7 +24,7 @@ BAR_PX = (220, 10)
 SYMBOL_PX = 16
 OVERSAMPLING = 4
 # Of one line of a caption [characters].
-MOST_SAID = 400
+MOST_CHARACTERS = 400
 
 # Pillow's own font knows little beyond ASCII; it needs no file, so it stays.
 IN_FONT = frozenset("·°±…“”‘’")
@@ -38,7 +38,7 @@ class KeyEntry:
     Attributes:
         symbol: "tile", "hatch", "disc" or "square".
         colour: its colour.
-        label: what it stands for.
+        label: its meaning.
     """
 
     symbol: str
@@ -151,7 +151,7 @@ def _drawable(text: str) -> str:
     """Return ``text`` in letters the font has: m² becomes m2, é becomes e."""
     decomposed = "".join(
         letter if letter in IN_FONT else unicodedata.normalize("NFKD", letter)
-        for letter in one_line(text, MOST_SAID).translate(SPELT_OUT)
+        for letter in one_line(text, MOST_CHARACTERS).translate(SPELT_OUT)
     )
     return "".join(
         letter if letter.isascii() or letter in IN_FONT else "?"

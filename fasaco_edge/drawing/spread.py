@@ -1,4 +1,4 @@
-"""Repeated measurements in three numbers: machines are never quiet, so a mean says little."""
+"""The spread of repeated measurements in three numbers: a mean is sensitive to other load."""
 
 from __future__ import annotations
 

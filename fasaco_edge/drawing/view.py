@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.geometry import Bounds, Window
 from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
 
 MAX_WIDTH, MAX_HEIGHT = 1760, 1600
 MAX_CELL = 36
@@ -19,8 +18,6 @@ MARGIN_CELLS = 1.0
 # Three samples a pixel and axis look better, two need less memory.
 FINE, COARSE = 3, 2
 FINE_UP_TO = 1_200_000
-
-Bounds = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +51,7 @@ class View:
         Args:
             bounds: what to show.
             cell_m: edge of a cell [m], the width of the margin.
-            widest, highest: the most room there is [px].
+            widest, highest: the most the picture may take [px].
         """
         margin = MARGIN_CELLS * cell_m
         x0, y0, x1, y1 = bounds
@@ -80,38 +77,17 @@ def bounds_of(
     grid: OccupancyGrid | None, lattice: CoverageLattice, points: NDArray[np.float64]
 ) -> Bounds:
     """Return the bounds [m] of all that is known: of the map, or else the lattice, and points."""
-    corners = [_known_corners(lattice if grid is None else grid), points]
-    everything = np.concatenate([part for part in corners if len(part)] or [np.zeros((1, 2))])
-    x0, y0 = everything.min(axis=0)
-    x1, y1 = everything.max(axis=0)
-    return float(x0), float(y0), float(x1), float(y1)
-
-
-def bounds_around(centres: NDArray[np.float64], cell_m: float) -> Bounds:
-    """Return the bounds [m] of cells, n >= 1, by their centres, float64 (n, 2)."""
-    x0, y0 = (centres.min(axis=0) - cell_m / 2).tolist()
-    x1, y1 = (centres.max(axis=0) + cell_m / 2).tolist()
+    if grid is not None:
+        known = known_bounds(grid) or grid.geometry.bounds()
+    else:
+        box = Window.of(lattice.states != UNKNOWN) or Window(0, 0, *lattice.states.shape)
+        here = box.moved(lattice.window.row0, lattice.window.col0)
+        x0, y0, x1, y1 = (
+            lattice.cell_m * at for at in (here.col0, here.row0, here.col1, here.row1)
+        )
+        known = x0, y0, x1, y1
+    if not len(points):
+        return known
+    corners = np.concatenate([np.reshape(known, (2, 2)), points])
+    (x0, y0), (x1, y1) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     return x0, y0, x1, y1
-
-
-def _known_corners(source: OccupancyGrid | CoverageLattice) -> NDArray[np.float64]:
-    if isinstance(source, CoverageLattice):
-        box = _box(source.states != UNKNOWN)
-        window, cell_m = source.window, source.cell_m
-        corner = np.array([window.col0, window.row0], np.float64)
-        return (_corners(box) + corner) * cell_m
-    geometry = source.geometry
-    corners = _corners(_box(source.cells >= 0))
-    return np.array([geometry.to_map(col, row) for col, row in corners]).reshape(-1, 2)
-
-
-def _box(mask: NDArray[np.bool_]) -> Window:
-    rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows):
-        return Window(0, 0, *mask.shape)
-    return Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
-
-
-def _corners(box: Window) -> NDArray[np.float64]:
-    pairs = itertools.product((box.col0, box.col1), (box.row0, box.row1))
-    return np.array(list(pairs), np.float64)

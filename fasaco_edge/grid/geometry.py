@@ -24,6 +24,10 @@ FARTHEST_M = 2e7
 MIN_RESOLUTION_M, MAX_RESOLUTION_M = 1e-4, 100.0
 
 
+Bounds = tuple[float, float, float, float]
+"""An upright rectangle of the map frame: x_min, y_min, x_max, y_max [m]."""
+
+
 @dataclass(frozen=True, slots=True)
 class Pose2D:
     """A pose in a plane: x [m], y [m], yaw [rad]."""
@@ -57,6 +61,14 @@ class Window:
         row0, col0 = max(self.row0, other.row0), max(self.col0, other.col0)
         row1, col1 = min(self.row1, other.row1), min(self.col1, other.col1)
         return Window(row0, col0, row1, col1) if row0 < row1 and col0 < col1 else None
+
+    @classmethod
+    def of(cls, mask: NDArray[np.bool_]) -> Window | None:
+        """Return the smallest rectangle around the marked cells, bool (n, m); None without any."""
+        rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        if not len(rows):
+            return None
+        return cls(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
 
     @classmethod
     def around(cls, *windows: Window | None) -> Window | None:
@@ -163,11 +175,21 @@ class GridGeometry:
         raster = Raster(self.resolution, self.origin.yaw, right / RASTER_STEPS, up / RASTER_STEPS)
         return raster, window
 
-    def bounds(self) -> tuple[float, float, float, float]:
-        """Return (x_min, y_min, x_max, y_max) [m] of the grid in the map frame."""
-        corners = [self.to_map(col, row) for col in (0, self.cols) for row in (0, self.rows)]
-        xs, ys = zip(*corners, strict=True)
+    def bounds(self, window: Window | None = None) -> Bounds:
+        """Return the bounds of the grid, or of a window of its pixels, in the map frame."""
+        part = window or Window(0, 0, self.rows, self.cols)
+        cols, rows = (part.col0, part.col1), (part.row0, part.row1)
+        xs, ys = zip(*(self.to_map(col, row) for col in cols for row in rows), strict=True)
         return min(xs), min(ys), max(xs), max(ys)
+
+
+def union_bounds(*parts: Bounds | None) -> Bounds | None:
+    """Return the bounds around all parts; None without any."""
+    held = [part for part in parts if part is not None]
+    if not held:
+        return None
+    x0, y0, x1, y1 = zip(*held, strict=True)
+    return min(x0), min(y0), max(x1), max(y1)
 
 
 @dataclass(frozen=True, slots=True)

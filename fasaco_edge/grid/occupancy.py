@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
-from fasaco_edge.grid.geometry import GridGeometry, Window
+from fasaco_edge.grid.geometry import Bounds, GridGeometry, Window
 
 UNKNOWN = -1
 FREE = 0
 OCCUPIED = 100
+
+# So many pixels of a map are looked at together: a mask of all would be another map.
+BLOCK_PIXELS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,3 +125,21 @@ class MapPatch:
     cells: NDArray[np.int8]
     frame: str = "map"
     stamp_ns: int = 0
+
+
+def known_bounds(grid: OccupancyGrid) -> Bounds | None:
+    """Return the bounds of what is known of a map; None where nothing is."""
+    window = marked_window(grid.cells.shape, lambda rows: grid.cells[rows] >= FREE)
+    return grid.geometry.bounds(window) if window else None
+
+
+def marked_window(
+    shape: tuple[int, ...], marked: Callable[[slice], NDArray[np.bool_]]
+) -> Window | None:
+    """Return the window of marked pixels; ``marked`` returns the mask, bool, of some rows."""
+    some, found = max(BLOCK_PIXELS // max(shape[1], 1), 1), None
+    for start in range(0, shape[0], some):
+        here = Window.of(marked(slice(start, start + some)))
+        if here is not None:
+            found = Window.around(found, here.moved(start, 0))
+    return found

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.chart import COLOURS, Axis, Line, Panel
 from fasaco_edge.drawing.palette import Colour
 from fasaco_edge.review.review import Review
@@ -40,18 +41,16 @@ def replan_times(review: Review) -> Points:
 
 MOST_POINTS = 700
 FAINT: Colour = (150, 156, 166)
-GREEN, BLUE, SKY = (0, 158, 115), (0, 114, 178), (86, 180, 233)
-AMBER, RED, VIOLET = (230, 159, 0), (213, 94, 0), (204, 121, 167)
 # From the bottom up; what is not in it is drawn as the last one.
 STATES: dict[str, Colour] = {
-    "done": BLUE,
-    "returning": SKY,
-    "covering": GREEN,
-    "planning": SKY,
-    "paused": VIOLET,
-    "degraded": AMBER,
-    "blocked": RED,
-    "silent": RED,
+    "done": palette.BLUE,
+    "returning": palette.SKY,
+    "covering": palette.GREEN,
+    "planning": palette.SKY,
+    "paused": palette.PURPLE,
+    "degraded": palette.ORANGE,
+    "blocked": palette.VERMILION,
+    "silent": palette.VERMILION,
 }
 SHORT = {"waiting for map": "no map", "waiting for pose": "no pose"}
 BAND_PX = 12
@@ -80,7 +79,7 @@ class TimeAxis:
     def points(
         self, at_s: NDArray[np.float64], values: NDArray[np.float64]
     ) -> tuple[tuple[float, float], ...]:
-        """Return points of a line, not more than can be told apart."""
+        """Return points of a line, not more than can be distinguished."""
         places = np.unique(np.linspace(0, len(at_s) - 1, MOST_POINTS).round().astype(int))
         chosen = places if len(at_s) > MOST_POINTS else np.arange(len(at_s))
         pairs = np.column_stack((at_s[chosen] / self.unit_s, values[chosen]))
@@ -90,7 +89,7 @@ class TimeAxis:
 def coverage_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
     """Return how the covered share grew; of one review also the share of what was known then.
 
-    Of two, ``labels`` tell them apart.
+    ``labels`` name two of them.
     """
     time = TimeAxis.over(max(review.duration_s for review in reviews))
     lines = [

@@ -1,9 +1,7 @@
-"""A review as a JSON document, and two of them side by side; ``fields.FIELDS`` explains it."""
+"""A review as a JSON document; ``fields.FIELDS`` explains its members."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -13,10 +11,8 @@ from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.runcard import flat_settings
 from fasaco_edge.review.drive import milestones
-from fasaco_edge.review.moments import RECORDER_IN_ORDER, TROUBLES, Span
 from fasaco_edge.review.review import Review, seconds_by_state
-from fasaco_edge.review.run_data import TakenPath
-from fasaco_edge.review.setups import ANYWAY, do_compare, setup_differences
+from fasaco_edge.review.run_data import PublishedPath
 
 
 def document(review: Review) -> dict[str, Any]:
@@ -26,7 +22,7 @@ def document(review: Review) -> dict[str, Any]:
     replans, faults = review.replans, review.faults
     geometry = grid.geometry if grid else None
     began = datetime.fromtimestamp(1e-9 * record.began_ns, UTC)
-    told: dict[str, Any] = {
+    members: dict[str, Any] = {
         "recording": record.recording_id,
         "files": [
             {
@@ -93,7 +89,7 @@ def document(review: Review) -> dict[str, Any]:
         "troubles": [
             {"state": s.name, "reason": s.reason, "at_s": _rounded(s.begin_s)}
             | {"seconds": _rounded(s.seconds)}
-            for s in troubles(review)
+            for s in review.troubles
         ],
         "worst": [
             {"what": m.what, "value": _rounded(m.value), "unit": m.unit, "at_s": _rounded(m.at_s)}
@@ -107,54 +103,10 @@ def document(review: Review) -> dict[str, Any]:
         "unreadable": dict(data.undecodable),
         "remarks": list(faults.complaints),
     }
-    return told | {"not_recorded": _not_recorded(review)}
+    return members | {"not_recorded": _not_recorded(review)}
 
 
-def troubles(review: Review) -> list[Span]:
-    """Return each time the mission was not as it should be, or the recorder, in order."""
-    mission = [span for span in review.states if span.name in TROUBLES]
-    recorder = [
-        replace(span, name=f"recorder: {span.name}")
-        for span in review.recorder_states
-        if span.name not in RECORDER_IN_ORDER
-    ]
-    return sorted(mission + recorder, key=lambda span: span.begin_s)
-
-
-def side_by_side(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Return two documents, what differs in how they were set up, and of numbers the difference.
-
-    That is the first less the second, of each number that both have and that compares.
-    """
-    setup = setup_differences(one, other)
-    mine = one if do_compare(setup) else {name: one[name] for name in ANYWAY}
-    return {
-        "recording": dict(one),
-        "against": dict(other),
-        "setup": [{"what": what, "recording": this, "against": that} for what, this, that in setup],
-        "compare": do_compare(setup),
-        "difference": differences(mine, other),
-    }
-
-
-def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Return of each number that both documents have the first less the second."""
-    found: dict[str, Any] = {}
-    for name, value in one.items():
-        mate = other.get(name)
-        if isinstance(value, dict) and isinstance(mate, dict):
-            if inner := differences(value, mate):
-                found[name] = inner
-        elif _is_number(value) and _is_number(mate):
-            found[name] = round(value - mate, 6)
-    return found
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _replan(path: TakenPath) -> dict[str, Any]:
+def _replan(path: PublishedPath) -> dict[str, Any]:
     return {
         "at_s": _rounded(path.at_s),
         "revision": path.revision,
@@ -170,8 +122,8 @@ def _replan(path: TakenPath) -> dict[str, Any]:
 
 
 def _plans(review: Review) -> dict[str, Any]:
-    """Return what the turn log tells of plans; null where there is none."""
-    made = review.data.made.plans
+    """Return counts and times of plans by the turn log; null without one."""
+    made = review.data.plan_log.plans
     plans = [plan for plan in made if not plan.is_attempt]
     attempts = [plan for plan in made if plan.is_attempt]
     took = [plan.took_ms for plan in plans]
@@ -228,7 +180,7 @@ def _not_recorded(review: Review) -> dict[str, str]:
         )
     if not review.replans.later:
         why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "no plan was made anew"
-    if not data.made.plans:
+    if not data.plan_log.plans:
         why["plans, plans_unused, plan_ms_p50, plan_ms_p99, plan_ms_max, attempts"] = (
             "there is no turn log"
         )

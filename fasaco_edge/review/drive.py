@@ -1,4 +1,4 @@
-"""What the robot drove: its walk over the cells, when each was first covered, how it stood.
+"""The robot's drive: its walk over the cells, and when each was first covered.
 
 Cells count as the mission's own ledger counts them: one is covered when the tool passes over
 its centre. So a walk is the cells in the order they were passed over.
@@ -57,7 +57,7 @@ class WalkFigures:
 def drive_over(
     lattice: CoverageLattice,
     at_s: NDArray[np.float64],
-    trail: NDArray[np.float64],
+    track: NDArray[np.float64],
     lost_pose_s: float = 0.0,
 ) -> Drive:
     """Return the way of a robot over the lattice that the map has at the end.
@@ -65,16 +65,16 @@ def drive_over(
     Args:
         lattice: without the cells to keep out of.
         at_s: float64 (n,), when each pose came [s].
-        trail: float64 (n, 3), the poses: x [m], y [m], yaw [rad].
-        lost_pose_s: after so long without a pose [s] nobody knows how the robot came to the
-            next; 0 for never.
+        track: float64 (n, 3), the poses: x [m], y [m], yaw [rad].
+        lost_pose_s: after so long without a pose [s] the way to the next one is unknown; 0 for
+            never.
     """
     ledger = CoverageLedger(lattice.cell_m)
     walk: list[Cell] = []
     times: list[float] = []
     before = at_s[0] if len(at_s) else 0.0
-    last = trail[0] if len(trail) else np.zeros(3)
-    for now, pose in zip(at_s.tolist(), trail, strict=True):
+    last = track[0] if len(track) else np.zeros(3)
+    for now, pose in zip(at_s.tolist(), track, strict=True):
         x, y = float(pose[0]), float(pose[1])
         # As the mission has it: a pose kilometres astray is no drive.
         if not lattice.contains(lattice.cell_at(x, y)):
@@ -86,14 +86,14 @@ def drive_over(
         times += [now] * len(entered)
         before, last = now, pose
     visits = ledger.visits(lattice.window)
-    reachable = _reachable(lattice, trail)
+    reachable = _reachable(lattice, track)
     return Drive(
         cells=np.array(walk, np.int32).reshape(-1, 2),
         at_s=np.array(times, np.float64),
         visits=visits,
         reachable=reachable,
         coverage=Coverage.of(lattice, reachable, visits),
-        driven_m=_driven_m(trail, JUMP_CELLS * lattice.cell_m),
+        driven_m=_driven_m(track, JUMP_CELLS * lattice.cell_m),
     )
 
 
@@ -139,17 +139,17 @@ def milestones(first_s: NDArray[np.float64], coverable: int) -> dict[int, float 
     }
 
 
-def _reachable(lattice: CoverageLattice, trail: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _reachable(lattice: CoverageLattice, track: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return what can be reached from where the robot was last on coverable ground."""
-    for x, y, _ in trail[::-1].tolist():
+    for x, y, _ in track[::-1].tolist():
         cell = anchor_cell(lattice, Pose2D(x, y))
         if cell is not None:
             return ReachableArea.around(lattice, cell).reachable
     return np.zeros(lattice.states.shape, np.bool_)
 
 
-def _driven_m(trail: NDArray[np.float64], jump_m: float) -> float:
-    lengths = np.hypot(*np.diff(trail[:, :2], axis=0).T) if len(trail) > 1 else np.zeros(0)
+def _driven_m(track: NDArray[np.float64], jump_m: float) -> float:
+    lengths = np.hypot(*np.diff(track[:, :2], axis=0).T) if len(track) > 1 else np.zeros(0)
     return float(lengths[lengths <= jump_m].sum())
 
 

@@ -27,90 +27,83 @@ PATH_COLUMNS = (
 def export(review: Review, folder: Path) -> None:
     """Write all series of a review into ``folder``, which is made if missing.
 
-    ==============  ==========================================================================
-    trail.csv       at_s, x_m, y_m, yaw_rad: each pose
-    paths.csv       at_s, revision, steps, planner, plan_ms, planned_steps, lower_bound_steps,
-                    gap, cost_s, x_min, y_min, x_max, y_max, reason: each published path, and
-                    where the map had changed [m]
-    plans.csv       at_s, took_ms, attempt, used, reason: each plan that was made
-    states.csv      begin_s, end_s, state, reason: what the mission was doing
-    coverage.csv    at_s, share: covered share of the cells coverable at the end
-    plots.csv       at_s, name, value: all that was plotted: latencies, memory, fractions
-    end.npz         map int8 and its origin (x, y, yaw) and resolution_m; visits uint16 and
-                    reachable bool of the lattice with its first row, column and cell_m
-    ==============  ==========================================================================
+    =============  =======================================================================
+    trail.csv      each pose [m, rad]
+    paths.csv      each published path, and the rectangle in which the map had changed [m]
+    plans.csv      each plan that was made, also those that became no path
+    states.csv     the states of the mission
+    coverage.csv   covered share of the cells coverable at the end
+    plots.csv      all that was plotted: latencies, memory, fractions
+    end.npz        map int8 and its origin (x, y, yaw) and resolution_m; visits uint16 and
+                   reachable bool of the lattice with its first row, column and cell_m
+    =============  =======================================================================
 
     Raises:
         OSError: a file cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    data = review.data
-    trail = zip(data.pose_s, data.poses, strict=True)
-    _write(
-        folder / "trail.csv",
-        ("at_s", "x_m", "y_m", "yaw_rad"),
-        ((f"{at:.6f}", f"{x:.4f}", f"{y:.4f}", f"{yaw:.5f}") for at, (x, y, yaw) in trail),
-    )
-    _write(
-        folder / "paths.csv",
-        PATH_COLUMNS,
-        (
-            (
-                *(f"{p.at_s:.6f}", p.revision, p.steps, p.planner, p.plan_ms),
-                *(
-                    p.planned_steps,
-                    p.lower_bound,
-                    p.gap,
-                    p.cost_s,
-                    *(astuple(p.changed) if p.changed else (None,) * 4),
-                    p.reason,
-                ),
-            )
-            for p in data.paths
-        ),
-    )
-    _write(
-        folder / "plans.csv",
-        ("at_s", "took_ms", "attempt", "used", "reason"),
-        (
-            (f"{p.at_s:.6f}", f"{p.took_ms:.3f}", int(p.is_attempt), int(p.is_used), p.reason)
-            for p in data.made.plans
-        ),
-    )
-    _write(
-        folder / "states.csv",
-        ("begin_s", "end_s", "state", "reason"),
-        ((f"{s.begin_s:.6f}", f"{s.end_s:.6f}", s.name, s.reason) for s in review.states),
-    )
-    _write(
-        folder / "coverage.csv",
-        ("at_s", "share"),
-        ((f"{at:.6f}", f"{share:.6f}") for at, share in zip(*covered_share(review), strict=True)),
-    )
-    _write(
-        folder / "plots.csv",
-        ("at_s", "name", "value"),
-        (
-            (f"{at:.6f}", name, f"{value:.9g}")
-            for name, points in sorted(review.record.plots.items())
-            for at, value in points.tolist()
-        ),
-    )
+    for name, (columns, rows) in _tables(review).items():
+        with (folder / f"{name}.csv").open("w", encoding="utf-8", newline="") as target:
+            writer = csv.writer(target)
+            writer.writerow(columns)
+            writer.writerows([_cell(value) for value in row] for row in rows)
     _write_arrays(review, folder / "end.npz")
 
 
-def _write(file: Path, names: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    with file.open("w", encoding="utf-8", newline="") as target:
-        writer = csv.writer(target)
-        writer.writerow(names)
-        writer.writerows([_cell(value) for value in row] for row in rows)
+def _tables(review: Review) -> dict[str, tuple[Sequence[str], Iterable[Sequence[object]]]]:
+    """Return columns and rows of each CSV file; times are since the recording began [s]."""
+    data, none = review.data, (None,) * 4
+    return {
+        "trail": (
+            ("at_s", "x_m", "y_m", "yaw_rad"),
+            (
+                (f"{at:.6f}", f"{x:.4f}", f"{y:.4f}", f"{yaw:.5f}")
+                for at, (x, y, yaw) in zip(data.pose_s, data.poses, strict=True)
+            ),
+        ),
+        "paths": (
+            PATH_COLUMNS,
+            (
+                (
+                    *(f"{p.at_s:.6f}", p.revision, p.steps, p.planner, p.plan_ms),
+                    *(p.planned_steps, p.lower_bound, p.gap, p.cost_s),
+                    *(astuple(p.changed) if p.changed else none),
+                    p.reason,
+                )
+                for p in data.paths
+            ),
+        ),
+        "plans": (
+            ("at_s", "took_ms", "attempt", "used", "reason"),
+            (
+                (f"{p.at_s:.6f}", f"{p.took_ms:.3f}", int(p.is_attempt), int(p.is_used), p.reason)
+                for p in data.plan_log.plans
+            ),
+        ),
+        "states": (
+            ("begin_s", "end_s", "state", "reason"),
+            ((f"{s.begin_s:.6f}", f"{s.end_s:.6f}", s.name, s.reason) for s in review.states),
+        ),
+        "coverage": (
+            ("at_s", "share"),
+            (
+                (f"{at:.6f}", f"{share:.6f}")
+                for at, share in zip(*covered_share(review), strict=True)
+            ),
+        ),
+        "plots": (
+            ("at_s", "name", "value"),
+            (
+                (f"{at:.6f}", name, f"{value:.9g}")
+                for name, points in sorted(review.record.plots.items())
+                for at, value in points.tolist()
+            ),
+        ),
+    }
 
 
 def _cell(value: object) -> object:
-    """Return a value as a table's program shows it, and does not reckon with it.
-
-    What begins like a formula is one to such a program, unless it is a number.
-    """
+    """Return a value that no spreadsheet takes for a formula, unless it is a number."""
     text = one_line(value) if isinstance(value, str) else value
     return f"'{text}" if isinstance(text, str) and FORMULA.match(text) else text
 

@@ -1,4 +1,4 @@
-"""What was refused, and what the recorder lost."""
+"""The faults in a recording: refused messages, lost samples, torn files."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from fasaco_edge.review.moments import RECORDER_IN_ORDER
 from fasaco_edge.review.run_data import RunData
 
 _ERROR = re.compile(r"error (\d+): ")
-# What the recorder says of itself where nothing is wrong.
+# Log lines of a recorder where nothing is wrong.
 IN_ORDER = tuple(f"{state}: " for state in RECORDER_IN_ORDER)
-NOT_TOLD = "code not recorded"
+NOT_RECORDED = "code not recorded"
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +26,11 @@ class Faults:
     """Refused messages and losses.
 
     Attributes:
-        by_code: what the daemon refused; under ``NOT_TOLD`` what it counted after the last
+        by_code: what the daemon refused; under ``NOT_RECORDED`` what it counted after the last
             counts by code that were recorded.
-        lost: samples that the recorder could not write; None where it never said.
+        lost: samples that the recorder could not write; None where that is not recorded.
         torn_bytes: what a crash tore off the files [bytes].
-        complaints: what the recorder wrote into its log.
+        complaints: warnings in the recorder's log.
     """
 
     by_code: dict[str, int]
@@ -45,13 +45,13 @@ class Faults:
 
 
 def faults_of(data: RunData, record: RunRecord) -> Faults:
-    """Return what a recording tells of faults."""
+    """Return the faults in a recording."""
     by_code = _over_restarts(status.faults for status in data.statuses)
     # As curves they are recorded up to the end; of a daemon that was started again not each one.
     by_code |= _plotted(record.plots)
     total = _counted(line for _, line in record.log.get(entities.MISSION_LOG, ()))
     if total > by_code.total():
-        by_code[NOT_TOLD] = total - by_code.total()
+        by_code[NOT_RECORDED] = total - by_code.total()
     lost = [status.recorder_lost for status in data.statuses if status.recorder_lost is not None]
     return Faults(
         by_code=dict(sorted(by_code.items())),
@@ -67,7 +67,7 @@ def faults_of(data: RunData, record: RunRecord) -> Faults:
 
 
 def _plotted(plots: Mapping[str, NDArray[np.float64]]) -> Counter[str]:
-    """Return what curves tell of the counts by code, over restarts."""
+    """Return the counts by code by their curves, over restarts."""
     counts: Counter[str] = Counter()
     for entity, points in plots.items():
         if entity.startswith(f"{entities.ERRORS}/"):

@@ -1,9 +1,4 @@
-"""What of a mission is worth a second look: states and how long they lasted, stands, gaps.
-
-Why and how fast plans were made anew.
-
-The worst moments of a mission, one of each kind.
-"""
+"""States of a mission and how long they lasted, its replans, and its worst moments."""
 
 from __future__ import annotations
 
@@ -18,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.drawing.spread import percentile
-from fasaco_edge.review.run_data import RunData, TakenPath
+from fasaco_edge.review.run_data import PublishedPath, RunData
 
-# Less than this is no drive, and no turn on the spot.
+# Less than this is no motion.
 STILL_M = 0.05
 STILL_RAD = 0.1
 # In these the robot has nothing to do, or not yet.
 AT_REST = ("idle", "waiting for map", "waiting for pose", "loading", "done", "silent")
 TROUBLES = ("degraded", "blocked", "silent")
-# What a command does is told so long after it at most [s].
+# The effect of a command is published at most so long after it [s].
 COMMAND_S = 1.5
 RECORDER_IN_ORDER = ("recording", "stopping")
 
@@ -48,7 +43,7 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """Something that stands out.
+    """An extreme of some figure.
 
     Attributes:
         what: which figure it is the extreme of.
@@ -85,7 +80,7 @@ def under_way(states: Sequence[Span]) -> tuple[Span, ...]:
 
 def longest_stand(
     at_s: NDArray[np.float64],
-    trail: NDArray[np.float64],
+    track: NDArray[np.float64],
     during: Span,
     states: Sequence[Span] = (),
 ) -> Moment | None:
@@ -93,12 +88,12 @@ def longest_stand(
 
     Args:
         at_s: float64 (n,), when each pose came [s].
-        trail: float64 (n, 3), x [m], y [m], yaw [rad].
+        track: float64 (n, 3), x [m], y [m], yaw [rad].
         during: the time to look at.
         states: what the mission did meanwhile.
     """
     chosen = (at_s >= during.begin_s) & (at_s <= during.end_s)
-    times, poses = at_s[chosen].tolist(), trail[chosen].tolist()
+    times, poses = at_s[chosen].tolist(), track[chosen].tolist()
     if not times:
         return None
     best, anchor = (0.0, times[0], poses[0]), 0
@@ -130,7 +125,7 @@ def largest_drop(
     """Return by how much a new map made the covered share of what was known smaller, at most.
 
     Args:
-        fractions: float64 (n, 2), when [s], and the covered share as the daemon told it.
+        fractions: float64 (n, 2), when [s], and the covered share as the daemon published it.
         map_s: when maps and updates came [s].
         command_s: when commands came [s]: what drops with one, no map has made smaller.
     """
@@ -166,11 +161,11 @@ class Replans:
         later: all others, in order, without the first ones of a daemon that was started again.
     """
 
-    first: TakenPath | None
-    later: tuple[TakenPath, ...]
+    first: PublishedPath | None
+    later: tuple[PublishedPath, ...]
 
     @classmethod
-    def of(cls, paths: Sequence[TakenPath]) -> Replans:
+    def of(cls, paths: Sequence[PublishedPath]) -> Replans:
         """Sort out ``paths``; those that no plan was needed for are none."""
         planned = [path for path in paths if path.planner]
         later = [after for before, after in pairwise(planned) if after.revision > before.revision]
@@ -190,12 +185,12 @@ class Replans:
                 took[kind_of(path.reason)].append(path.plan_ms)
         return {kind: (percentile(ms, 50), percentile(ms, 100)) for kind, ms in took.items()}
 
-    def slowest_first(self, most: int) -> list[TakenPath]:
+    def slowest_first(self, most: int) -> list[PublishedPath]:
         """Return up to ``most`` of them, those that took longest first."""
         return sorted(self.later, key=lambda path: -(path.plan_ms or 0.0))[:most]
 
     @property
-    def slowest(self) -> TakenPath | None:
+    def slowest(self) -> PublishedPath | None:
         """The one that took longest."""
         timed = [path for path in self.later if path.plan_ms is not None]
         return max(timed, key=lambda path: path.plan_ms or 0.0, default=None)
@@ -223,15 +218,15 @@ def worst_moments(
     """Return the worst of each kind of moment there was.
 
     Args:
-        data: what the samples tell.
+        data: of the samples.
         states: of the mission, in order.
         replans: plans made anew.
-        fractions: float64 (n, 2), when [s] and the covered share as the daemon told it.
+        fractions: float64 (n, 2), when [s] and the covered share as the daemon published it.
     """
     found: list[Moment | None] = []
     for during in under_way(states):
         found += [
-            longest_stand(data.times, data.trail, during, states),
+            longest_stand(data.times, data.track, during, states),
             longest_gap("longest time without a pose", data.pose_s, during),
             longest_gap("longest time without a map", data.map_s, during),
         ]

@@ -1,4 +1,4 @@
-"""The orders of a recording, one chapter each: when it held, and what came of it."""
+"""The orders of a recording, one chapter each: when it held, and its result."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.review.moments import Span
-from fasaco_edge.review.run_data import HeardStatus, RunData
+from fasaco_edge.review.run_data import RunData, StatusSample
 
 # What comes so soon after a status [s] is still of the same step.
 SAME_STEP_S = 1.5
@@ -24,13 +24,13 @@ class OrderChapter:
     """An order, from its command to the next one.
 
     Attributes:
-        ordered: "command", or "itself" for one that nobody gave while it was recorded.
+        ordered: "command", or "itself" for one that was given before the recording.
         begin_s, end_s: while it held [s].
         ended_by: "cancel" or "reset"; "start" where another took its place; "" for the end of
             the recording.
-        state: of the mission, the last one; "" where nothing was told.
+        state: of the mission, the last one; "" without any.
         covered, coverable: cells by the last status; None where that is outdated.
-        complete: whether it came to ``done`` with nothing missing; None where nobody can tell.
+        complete: whether it came to ``done`` with nothing missing; None where that is not recorded.
     """
 
     ordered: str
@@ -49,9 +49,9 @@ def chapters(
     """Return the chapters of a recording, in order; one at least.
 
     Args:
-        data: what its samples tell.
+        data: of its samples.
         states: of the mission, in order.
-        fractions: float64 (n, 2), when [s], and the covered share as the daemon told it.
+        fractions: float64 (n, 2), when [s], and the covered share as the daemon published it.
         end_s: of the recording [s].
     """
     held = list(_held(data, states, end_s))
@@ -63,8 +63,8 @@ def chapters(
     )
 
 
-def is_complete(state: str, status: HeardStatus | None, covered: int, coverable: int) -> bool:
-    """Tell whether an order is carried out with nothing of it left over."""
+def is_complete(state: str, status: StatusSample | None, covered: int, coverable: int) -> bool:
+    """Return whether an order is done with nothing left uncovered."""
     if state != "done":
         return False
     zones = status.zones if status else ()
@@ -95,9 +95,9 @@ def _goes_on(order: MissionOrder | None, given: MissionOrder, state: str) -> boo
 
 
 def _state_at(states: Sequence[Span], at_s: float) -> str:
-    """Return the last state told before a time [s]; "" where none was."""
-    told = [span.name for span in states if span.begin_s < at_s and span.name != "silent"]
-    return told[-1] if told else ""
+    """Return the last state before a time [s]; "" without any."""
+    names = [span.name for span in states if span.begin_s < at_s and span.name != "silent"]
+    return names[-1] if names else ""
 
 
 def _has_begun(states: Sequence[Span], begin_s: float, end_s: float) -> bool:
@@ -118,9 +118,9 @@ def _chapter(
 ) -> OrderChapter:
     until = end_s if ended_by else float("inf")
     state = _state_at(states, until)
-    told = [s for s in data.statuses if begin_s <= s.at_s < until and s.coverage is not None]
+    counted = [s for s in data.statuses if begin_s <= s.at_s < until and s.coverage is not None]
     own = fractions[(fractions[:, 0] >= begin_s) & (fractions[:, 0] < until)]
-    last = told[-1] if told and is_still_true(told[-1], own) else None
+    last = counted[-1] if counted and is_still_true(counted[-1], own) else None
     coverage = last.coverage if last else None
     covered, coverable = (coverage.covered, coverage.coverable) if coverage else (None, None)
     complete: bool | None = None
@@ -131,8 +131,8 @@ def _chapter(
     return OrderChapter(ordered, begin_s, end_s, ended_by, state, covered, coverable, complete)
 
 
-def is_still_true(status: HeardStatus, fractions: NDArray[np.float64]) -> bool:
-    """Tell whether the covered share stayed what it was when a status came."""
+def is_still_true(status: StatusSample, fractions: NDArray[np.float64]) -> bool:
+    """Return whether the covered share has not changed since a status came."""
     later = fractions[fractions[:, 0] > status.at_s + SAME_STEP_S]
     then = fractions[fractions[:, 0] <= status.at_s + SAME_STEP_S]
     return not len(later) or (len(then) > 0 and bool((later[:, 1] == then[-1, 1]).all()))

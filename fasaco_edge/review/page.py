@@ -1,36 +1,29 @@
-"""A review as a page: one file, no script, nothing from the net; light and dark.
+"""A review as an HTML page: one file, no script, nothing from the network; light and dark.
 
-It is built of elements, in which all that is not mark-up of ours is escaped (``text.html``).
+It is built of elements, which escape all text that is put into them (``text.Html``).
 """
 
 from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 from fasaco_edge.drawing.chart import COLOURS, Panel
+from fasaco_edge.review import rows
 from fasaco_edge.review.charts import coverage_panel, replan_panel, state_panel
-from fasaco_edge.review.document import document, troubles
+from fasaco_edge.review.comparison import (
+    Document,
+    compared_rows,
+    reason_counts,
+    setup_differences,
+    setup_words,
+)
+from fasaco_edge.review.document import document
 from fasaco_edge.review.picture import draw_map
 from fasaco_edge.review.review import Review
-from fasaco_edge.review.rows import (
-    MOST_REPLANS,
-    REASONS,
-    REPLANS,
-    amount,
-    card_rows,
-    clock,
-    compared_rows,
-    figure_rows,
-    reason_rows,
-    replan_rows,
-    setup_words,
-    verdicts,
-)
-from fasaco_edge.review.setups import setup_differences
-from fasaco_edge.review.svg import STYLE, svg_of
+from fasaco_edge.review.svg import svg_of
 from fasaco_edge.text import Html, element, html
 
 MAP_ROOM = (1000, 700)
@@ -65,25 +58,25 @@ GLOSSARY = {
 def page_of(review: Review, other: Review | None = None) -> str:
     """Return an HTML document about a review, or about two side by side."""
     reviews = [review] if other is None else [review, other]
-    told = [document(each) for each in reviews]
-    title = " against ".join(document["recording"] for document in told)
+    documents = [document(each) for each in reviews]
+    title = " against ".join(each["recording"] for each in documents)
     kind = "Review of a recorded mission" if other is None else "Two recorded missions compared"
     body = html(
         element(
             "header",
             element("p", kind, class_="kind"),
             element("h1", title),
-            *(_verdict(document, index, len(told)) for index, document in enumerate(told)),
+            *(_verdict(each, index, len(documents)) for index, each in enumerate(documents)),
             element("p", INTRODUCTION, class_="lead"),
         ),
-        *(_tiles(told[0]) if other is None else (_setup(told),)),
-        _maps(reviews, told),
-        _section("Over time", *_charts(reviews, told)),
-        _section("Figures", *_figures(told)),
-        _section("Replans", *_reasons(reviews, told)),
+        _tiles(documents[0]) if other is None else _setup(*documents),
+        _maps(reviews, documents),
+        _section("Over time", *_charts(reviews, documents)),
+        _section("Figures", _figures(documents)),
+        _section("Replans", *_reasons(reviews, documents)),
         *(
-            _stories(each, document, len(told))
-            for each, document in zip(reviews, told, strict=True)
+            _remarkable(each, figures, len(documents))
+            for each, figures in zip(reviews, documents, strict=True)
         ),
         _section("What the words mean", _table(("", ""), GLOSSARY.items(), "plain")),
         element(
@@ -93,31 +86,30 @@ def page_of(review: Review, other: Review | None = None) -> str:
             ". All times count from the beginning of the recording.",
         ),
     )
+    style = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n'
-        f"{element('title', title)}\n<style>{STYLE}</style></head>\n"
+        f"{element('title', title)}\n<style>\n{style}</style></head>\n"
         f"<body>{element('main', body)}</body></html>\n"
     )
 
 
-def _verdict(told: Mapping[str, Any], index: int, of: int) -> Html:
+def _verdict(figures: Document, index: int, of: int) -> Html:
     """Return a verdict for each order of a run."""
-    who = (_mark(index), f"{told['recording']}: ") if of > 1 else ()
-    found = verdicts(told)
+    who = (_mark(index), f"{figures['recording']}: ") if of > 1 else ()
+    found = rows.verdicts(figures)
     return html(
         *(element("p", *who, text, class_=f"verdict {KINDS[complete]}") for complete, text in found)
     )
 
 
-def _setup(told: Sequence[Mapping[str, Any]]) -> Html:
-    """Return what two runs were not set up alike with."""
-    one, other = told
-    rows = setup_differences(one, other)
-    names = ("", one["recording"], other["recording"])
-    table = (_table(names, rows),) if rows else ()
+def _setup(one: Document, other: Document) -> Html:
+    """Return in what the set-ups of two runs differ."""
+    found = setup_differences(one, other)
+    table = (_table(("", one["recording"], other["recording"]), found),) if found else ()
     return _section("Do they compare?", element("p", setup_words(one, other)), *table)
 
 
@@ -127,42 +119,40 @@ def _mark(index: int) -> Html:
     return element("i", class_="dot", style=f"background:rgb({red},{green},{blue})")
 
 
-def _tiles(told: Mapping[str, Any]) -> list[Html]:
-    covered, coverable = told["covered_cells"], told["coverable_cells"]
+def _tiles(figures: Document) -> Html:
+    covered, coverable = figures["covered_cells"], figures["coverable_cells"]
     share = f"{100 * covered / coverable:.1f} %" if covered is not None and coverable else "-"
-    tiles = [
+    tiles = (
         (share, "of the reachable cells covered"),
-        (clock(told["duration_s"]), "recorded"),
-        (amount(told["driven_m"], "m"), "driven"),
-        (amount(told["revisits"], ""), "revisits"),
-        (amount(told["replan_ms_p50"], "ms"), "a replan, median"),
-        (amount(told["replan_ms_max"], "ms"), "the slowest replan"),
-        (amount(told["faults"], ""), "messages refused"),
-    ]
+        (rows.clock(figures["duration_s"]), "recorded"),
+        (rows.amount(figures["driven_m"], "m"), "driven"),
+        (rows.amount(figures["revisits"], ""), "revisits"),
+        (rows.amount(figures["replan_ms_p50"], "ms"), "a replan, median"),
+        (rows.amount(figures["replan_ms_max"], "ms"), "the slowest replan"),
+        (rows.amount(figures["faults"], ""), "messages refused"),
+    )
     cells = (element("div", element("b", v), element("span", n)) for v, n in tiles)
-    return [element("div", *cells, class_="tiles")]
+    return element("div", *cells, class_="tiles")
 
 
-def _maps(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> Html:
-    figures = []
-    for review, its_figures in zip(reviews, told, strict=True):
+def _maps(reviews: Sequence[Review], documents: Sequence[Document]) -> Html:
+    maps = []
+    for review, figures in zip(reviews, documents, strict=True):
         picture = draw_map(review, MAP_ROOM)
-        card = _table(("", ""), card_rows(its_figures), "plain")
-        if picture is None:
-            figures.append(element("figure", element("p", "no map was recorded"), card))
-            continue
-        buffer = io.BytesIO()
-        picture.save(buffer, "PNG", optimize=True)
-        content = base64.b64encode(buffer.getvalue()).decode()
-        text = "map, covered cells and the way of the robot"
-        image = Html(f'<img alt="{text}" src="data:image/png;base64,{content}">')
-        figures.append(element("figure", image, card))
-    kind = "maps two" if len(figures) > 1 else "maps"
-    return _section("The map in the end", element("div", *figures, class_=kind))
+        shown = element("p", "no map was recorded")
+        if picture is not None:
+            buffer = io.BytesIO()
+            picture.save(buffer, "PNG", optimize=True)
+            content = base64.b64encode(buffer.getvalue()).decode()
+            text = "map, covered cells and the way of the robot"
+            shown = Html(f'<img alt="{text}" src="data:image/png;base64,{content}">')
+        maps.append(element("figure", shown, _table(("", ""), rows.card_rows(figures), "plain")))
+    kind = "maps two" if len(maps) > 1 else "maps"
+    return _section("The map in the end", element("div", *maps, class_=kind))
 
 
-def _charts(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> list[Html]:
-    labels = [document["recording"] for document in told]
+def _charts(reviews: Sequence[Review], documents: Sequence[Document]) -> list[Html]:
+    labels = [each["recording"] for each in documents]
     key = Html()
     if len(reviews) > 1:
         marks = (html(_mark(index), label) for index, label in enumerate(labels))
@@ -184,57 +174,46 @@ def _chart(panel: Panel, height: int, name: str = "") -> Html:
     return element("figure", title, *caption, svg_of(panel, height), class_="chart")
 
 
-def _figures(told: Sequence[Mapping[str, Any]]) -> list[Html]:
-    if len(told) == 1:
-        return [_table(("", ""), figure_rows(told[0]))]
-    names = tuple(document["recording"] for document in told)
-    return [_table(("", *names, "first less second"), compared_rows(told[0], told[1]))]
+def _figures(documents: Sequence[Document]) -> Html:
+    if len(documents) == 1:
+        return _table(("", ""), rows.figure_rows(documents[0]))
+    names = (each["recording"] for each in documents)
+    return _table(("", *names, "first less second"), compared_rows(*documents))
 
 
-def _reasons(reviews: Sequence[Review], told: Sequence[Mapping[str, Any]]) -> list[Html]:
-    counts = [document["replans_by_reason"] for document in told]
-    kinds = dict.fromkeys(kind for count in counts for kind in count)
-    if not kinds:
+def _reasons(reviews: Sequence[Review], documents: Sequence[Document]) -> list[Html]:
+    counts = reason_counts(documents)
+    if not counts:
         return [element("p", "There were none.")]
-    if len(told) == 1:
-        slowest = replan_rows(reviews[0].replans.slowest_first(MOST_REPLANS))
+    if len(documents) == 1:
         return [
-            _table(("why it came", *REASONS[1:]), reason_rows(told[0])),
+            _table(("why it came", *rows.REASONS[1:]), rows.reason_rows(documents[0])),
             element("p", "The slowest ones:"),
-            _table(REPLANS, slowest, "told"),
+            _table(rows.REPLANS, rows.replan_rows(reviews[0]), "notes"),
         ]
-    names = tuple(document["recording"] for document in told)
-    rows = [(kind, *(str(count.get(kind, 0)) for count in counts)) for kind in kinds]
-    return [_table(("why it came", *names), rows)]
+    names = (each["recording"] for each in documents)
+    return [_table(("why it came", *names), [(kind, *map(str, n)) for kind, n in counts])]
 
 
-def _stories(review: Review, told: Mapping[str, Any], of: int) -> Html:
-    """Return what stands out in one run."""
-    moments = [(m.what, amount(m.value, m.unit), clock(m.at_s), m.note) for m in review.moments]
-    found = [(s.name, clock(s.begin_s), f"{s.seconds:.1f} s", s.reason) for s in troubles(review)]
-    faults = [(code, str(count)) for code, count in told["faults_by_code"].items()]
-    remarks = [
-        *(
-            f"{p['path']}: torn, {p['torn_bytes']} bytes lost"
-            for p in told["files"]
-            if p["torn_bytes"]
-        ),
-        *told["remarks"],
-        *(
-            f"{count} samples of {topic} cannot be read"
-            for topic, count in told["unreadable"].items()
-        ),
-        *(f"not known: {names}: {why}" for names, why in told["not_recorded"].items()),
-    ]
-    parts = [_table(("worst moments", "how much", "at", "what else is known"), moments, "told")]
+def _remarkable(review: Review, figures: Document, of: int) -> Html:
+    """Return moments, troubles, faults and remarks of one run."""
+    moments = rows.moment_rows(review)
+    parts = [_table(("worst moments", "how much", "at", "what else is known"), moments, "notes")]
+    troubles, faults = rows.trouble_rows(review.troubles), rows.fault_rows(figures)
     none = "It was never degraded, blocked or silent, and the recorder could always write."
     titles = ("trouble", "at", "for", "why")
-    parts.append(_table(titles, found, "told") if found else element("p", none))
+    parts.append(_table(titles, troubles, "notes") if troubles else element("p", none))
     none = "No message was refused."
     parts.append(_table(("refused messages", "how many"), faults) if faults else element("p", none))
+    torn = [part for part in figures["files"] if part["torn_bytes"]]
+    remarks = [
+        *(f"{part['path']}: torn, {part['torn_bytes']} bytes lost" for part in torn),
+        *figures["remarks"],
+        *rows.unknown_lines(figures),
+    ]
     if remarks:
         parts.append(element("ul", *(element("li", remark) for remark in remarks)))
-    name = f" in {told['recording']}" if of > 1 else ""
+    name = f" in {figures['recording']}" if of > 1 else ""
     return _section(f"What stands out{name}", *parts)
 
 
@@ -242,9 +221,9 @@ def _section(title: str, *parts: Html) -> Html:
     return element("section", element("h2", title), *parts)
 
 
-def _table(names: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "numbers") -> Html:
-    """Return a table: of "numbers", "plain" of text, "told" where the last column is text."""
+def _table(names: Sequence[str], cells: Iterable[Sequence[str]], kind: str = "numbers") -> Html:
+    """Return a table: of "numbers", "plain" of text, "notes" where the last column is text."""
     head = element("tr", *(element("th", name) for name in names))
-    lines = (element("tr", *(element("td", cell) for cell in row)) for row in rows)
+    lines = (element("tr", *(element("td", cell) for cell in row)) for row in cells)
     parts = (*((element("thead", head),) if any(names) else ()), element("tbody", *lines))
     return element("div", element("table", *parts, class_=kind), class_="wide")

@@ -8,7 +8,7 @@ from PIL import Image
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.chart import draw_panels
-from fasaco_edge.drawing.mission import draw_mission
+from fasaco_edge.drawing.pictures import draw_mission
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.review.charts import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.review import Review
@@ -32,35 +32,35 @@ def draw_review(review: Review) -> Image.Image:
     sheet = Image.new("RGB", SIZE, palette.PAPER)
     # The empty title above the charts may be cut off.
     sheet.paste(charts, (SIZE[0] - charts.width, SIZE[1] - charts.height))
-    room = SIZE[0] - charts.width
-    mission = draw_map(review, (room - AROUND[0], SIZE[1] - AROUND[1]))
+    space = SIZE[0] - charts.width
+    mission = draw_map(review, (space - AROUND[0], SIZE[1] - AROUND[1]))
     if mission is not None:
-        # A caption of many lines leaves less room for the map.
-        mission.thumbnail((room, SIZE[1]))
-        place = ((room - mission.width) // 2, (SIZE[1] - mission.height) // 2)
+        # A caption of many lines leaves less space for the map.
+        mission.thumbnail((space, SIZE[1]))
+        place = ((space - mission.width) // 2, (SIZE[1] - mission.height) // 2)
         sheet.paste(mission, place)
     return sheet
 
 
-def draw_map(review: Review, room: tuple[int, int]) -> Image.Image | None:
-    """Return the map at the end with cells and trail; None where a recording has them not.
+def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
+    """Return the map at the end with cells and track; None where a recording lacks them.
 
     Args:
         review: of what.
-        room: the most the map may take (width, height) [px].
+        space: the most the map may take (width, height) [px].
     """
     grid, lattice, drive = review.data.grid, review.lattice, review.drive
-    trail = _thinned(review.data.trail[:, :2])
-    if grid is None or lattice is None or drive is None or not len(trail):
+    track = _thinned(review.data.track[:, :2])
+    if grid is None or lattice is None or drive is None or not len(track):
         return None
     return draw_mission(
         grid,
         lattice,
-        trail,
+        track,
         drive.visits,
         title=f"{review.record.recording_id}: {DONE[review.complete]}",
         lines=_caption(review),
-        room=room,
+        space=space,
         jump_m=JUMP_CELLS * lattice.cell_m,
     )
 
@@ -86,11 +86,11 @@ def _caption(review: Review) -> list[str]:
     return lines
 
 
-def _thinned(trail: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a trail (n, 2) without the points that lie as good as on others."""
-    if len(trail) < 3:
-        return trail
-    way = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(trail, axis=0).T))))
+def _thinned(track: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a track (n, 2) without the points that lie as good as on others."""
+    if len(track) < 3:
+        return track
+    way = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))))
     kept = np.diff(np.floor(way / TRAIL_SPACING_M), prepend=-1.0) > 0
     kept[-1] = True
-    return trail[kept]
+    return track[kept]

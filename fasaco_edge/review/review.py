@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 from typing import TypeVar
@@ -15,48 +15,56 @@ from fasaco_edge.errors import MapTooLarge
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.mission.orders.zones import kept_out, without
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.run import RunRecord, Told, count_frames, read_run_record
+from fasaco_edge.recording.read.run import RunRecord, TimedText, count_frames, read_run_record
 from fasaco_edge.recording.read.samples import RecordedSamples
 from fasaco_edge.review.drive import Drive, WalkFigures, drive_over, first_covered, walk_figures
 from fasaco_edge.review.faults import Faults, faults_of
-from fasaco_edge.review.moments import Moment, Replans, Span, spans_of, worst_moments
+from fasaco_edge.review.moments import (
+    RECORDER_IN_ORDER,
+    TROUBLES,
+    Moment,
+    Replans,
+    Span,
+    spans_of,
+    worst_moments,
+)
 from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_still_true
 from fasaco_edge.review.run_data import RunData, gather
 from fasaco_edge.wire.status import known_settings
 
-# So often is progress told: each so many-th frame or sample.
-EVERY = 200
+# Progress is reported with each so many-th sample.
+REPORT_EVERY = 200
 
-Tell = Callable[[str, int, int], None]
-"""Hears what is being done, how much of it is done, and how much there is in all."""
+Progress = Callable[[str, int, int], None]
+"""Called with the task, how much of it is done, and how much there is in all."""
 Item = TypeVar("Item")
 
 
-def read_review(paths: Sequence[Path], tell: Tell = lambda *_: None) -> Review:
+def read_review(paths: Sequence[Path], progress: Progress = lambda *_: None) -> Review:
     """Read the parts of one run, and review it.
 
     Args:
         paths: the files, in any order; they are left as they are.
-        tell: hears of progress now and then.
+        progress: called now and then.
 
     Raises:
         UnreadableRecording: a file is missing, no recording, or without samples.
         DifferentRuns: the parts are not of one run.
     """
     total, numbers = count_frames(paths), count(1)
-    record = read_run_record(paths, lambda: tell("reading", next(numbers), total))
+    record = read_run_record(paths, lambda: progress("reading", next(numbers), total))
     samples = RecordedSamples.of(record.batches)
-    # Samples are numbered: the last batch tells about how many there are.
+    # Samples are numbered: the last batch shows about how many there are.
     about = max(batch.place.first for batch in record.batches) + 1
-    data = gather(_told(samples, tell, "decoding", about), record.began_ns)
-    tell("following the robot", 0, 1)
+    data = gather(_reported(samples, progress, "decoding", about), record.began_ns)
+    progress("following the robot", 0, 1)
     return review_of(record, data, samples.missing)
 
 
-def _told(items: Iterable[Item], tell: Tell, task: str, total: int) -> Iterator[Item]:
+def _reported(items: Iterable[Item], progress: Progress, task: str, total: int) -> Iterator[Item]:
     for done, item in enumerate(items):
-        if done % EVERY == 0:
-            tell(task, min(done, total), total)
+        if done % REPORT_EVERY == 0:
+            progress(task, min(done, total), total)
         yield item
 
 
@@ -66,7 +74,7 @@ Entered = tuple[float, str, str]
 
 @dataclass(frozen=True, slots=True)
 class CoverageCounts:
-    """Cells at the end of a recording, and who counted them: "status" or "trail"."""
+    """Cells at the end of a recording, and their source: "status" or "trail", the track."""
 
     covered: int
     coverable: int
@@ -77,15 +85,15 @@ class CoverageCounts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Review:
-    """All there is to say of a recording; times are [s] since it began.
+    """All figures of a recording; times are [s] since it began.
 
     Attributes:
         record: its files, plots, states and log.
-        data: what its samples tell.
+        data: of its samples.
         lattice: over the map at the end; None without a map or a configuration.
         drive, walk: what the robot drove over it.
         first_s: float64 (n,), when each cell was first covered, ascending.
-        counts: of cells; None where nobody can tell.
+        counts: of cells; None where that is not recorded.
         replans: plans made anew.
         states: of the mission, in order.
         recorder_states: of the recorder.
@@ -115,9 +123,9 @@ class Review:
 
     @property
     def state(self) -> str:
-        """What the mission said last; "" where it said nothing."""
-        told = [span.name for span in self.states if span.name != "silent"]
-        return told[-1] if told else ""
+        """The last state of the mission; "" without any."""
+        names = [span.name for span in self.states if span.name != "silent"]
+        return names[-1] if names else ""
 
     @property
     def known_fractions(self) -> NDArray[np.float64]:
@@ -127,13 +135,24 @@ class Review:
 
     @property
     def complete(self) -> bool | None:
-        """Whether the last order came to ``done``, nothing missing; None where nobody can tell."""
+        """Whether the last order came to ``done``, nothing missing; None where not recorded."""
         if not self.state or (self.state == "done" and self.counts is None):
             return None
         if self.counts is None:
             return False
         last = self.data.statuses[-1] if self.data.statuses else None
         return is_complete(self.state, last, self.counts.covered, self.counts.coverable)
+
+    @property
+    def troubles(self) -> list[Span]:
+        """Each time the mission was not as it should be, or the recorder, in order."""
+        mission = [span for span in self.states if span.name in TROUBLES]
+        recorder = [
+            replace(span, name=f"recorder: {span.name}")
+            for span in self.recorder_states
+            if span.name not in RECORDER_IN_ORDER
+        ]
+        return sorted(mission + recorder, key=lambda span: span.begin_s)
 
     @property
     def orders(self) -> tuple[OrderChapter, ...]:
@@ -146,13 +165,13 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
 
     Args:
         record: what was read of it.
-        data: what its samples tell.
+        data: of its samples.
         missing: how many samples were lost in between.
     """
     end_s = _end_s(record, data)
     lattice = _lattice(data)
     lost_pose_s = known_settings(data.config).mission.lost_pose_s
-    drive = drive_over(lattice, data.times, data.trail, lost_pose_s) if lattice else None
+    drive = drive_over(lattice, data.times, data.track, lost_pose_s) if lattice else None
     states = spans_of(_mission_states(data, record), end_s)
     replans = Replans.of(data.paths)
     fractions = record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
@@ -204,30 +223,30 @@ def _end_s(record: RunRecord, data: RunData) -> float:
 
 def _mission_states(data: RunData, record: RunRecord) -> list[Entered]:
     """Return when the mission entered its states, by its statuses and by what was drawn."""
-    told = [(status.at_s, status.state, status.reason) for status in data.statuses]
+    published = [(status.at_s, status.state, status.reason) for status in data.statuses]
     drawn = _entered(record, entities.MISSION_STATE, entities.MISSION_LOG)
-    return sorted((*told, *drawn), key=lambda entry: entry[0])
+    return sorted((*published, *drawn), key=lambda entry: entry[0])
 
 
 def _entered(record: RunRecord, entity: str, log: str) -> list[Entered]:
-    said = record.log.get(log, ())
+    lines = record.log.get(log, ())
     return [
-        (1e-9 * (at - record.began_ns), state, _reason(said, at, state))
+        (1e-9 * (at - record.began_ns), state, _reason(lines, at, state))
         for at, state in record.states.get(entity, ())
     ]
 
 
-def _reason(said: tuple[Told, ...], at_ns: int, state: str) -> str:
-    """Return what the log gives as the reason of a state entered just then."""
+def _reason(lines: tuple[TimedText, ...], at_ns: int, state: str) -> str:
+    """Return the reason that the log gives for a state entered just then."""
     prefix = f"{state}: "
-    lines = (line for at, line in said if at == at_ns and line.startswith(prefix))
-    return next(lines, prefix).removeprefix(prefix)
+    found = (line for at, line in lines if at == at_ns and line.startswith(prefix))
+    return next(found, prefix).removeprefix(prefix)
 
 
 def _counts(
     data: RunData, drive: Drive | None, fractions: NDArray[np.float64]
 ) -> CoverageCounts | None:
-    """Return the daemon's own counts if its last status is still true, else those of the trail."""
+    """Return the daemon's counts if its last status still holds, else those of the track."""
     counted = [status for status in data.statuses if status.coverage is not None]
     if counted and is_still_true(counted[-1], fractions):
         own = counted[-1].coverage
@@ -235,7 +254,7 @@ def _counts(
         return CoverageCounts(
             own.covered, own.coverable, own.recovered, own.unreachable, source="status"
         )
-    # What was covered before the recording began, no trail tells.
+    # The track does not show what was covered before the recording began.
     if drive is None or any(status.restored_cells for status in data.statuses):
         return None
     cover = drive.coverage

@@ -1,20 +1,17 @@
-"""The figures of a review as rows of text: one table for terminal and page."""
+"""The figures of a review as rows of text: the same for terminal and page."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from msgspec.structs import astuple
 
 from fasaco_edge.review.drive import MILESTONES
-from fasaco_edge.review.run_data import TakenPath
-from fasaco_edge.review.setups import ANOTHER_PROBLEM, ANYWAY, do_compare, setup_differences
+from fasaco_edge.review.moments import Span
+from fasaco_edge.review.review import Review
 from fasaco_edge.wire.status import Rectangle
-
-Row = tuple[str, str, str, str]
-"""Name, the texts of one recording and of the other, and the difference; "" for none."""
 
 NOT_KNOWN = "not known"
 NUMBERS = (
@@ -50,26 +47,19 @@ REPLANS = ("at", "took", "steps planned", "gap", "to drive", "changed on the map
 """Columns of ``reason_rows`` and ``replan_rows``."""
 MOST_REPLANS = 8
 
-# Settings that say most about a run; the others are in the run card and in the JSON document.
-SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
+# The most important settings; the others are in the run card and in the JSON document.
+CARD_SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
 
 
-def ending(told: Mapping[str, Any]) -> str:
-    """Return in words whether the mission was completed, and where it was left."""
-    if told["complete"]:
-        return "complete: all it was to cover, and could reach, is covered"
-    if told["complete"] is None:
-        return "the recording does not tell whether it was completed"
-    ended = all(part["ended"] for part in told["files"])
-    how = "ended" if ended else "broke off"
-    return f"not complete: the recording {how} when the mission was {told['state']}"
+Document = Mapping[str, Any]
+"""A review as ``document.document`` returns it."""
 
 
-def verdicts(told: Mapping[str, Any]) -> list[tuple[bool | None, str]]:
-    """Return a verdict for each order: whether it was completed, and that in words."""
-    orders = told["orders"]
+def verdicts(document: Document) -> list[tuple[bool | None, str]]:
+    """Return for each order whether it was completed, and that in words."""
+    orders = document["orders"]
     if len(orders) < 2:
-        return [(told["complete"], ending(told))]
+        return [(document["complete"], _ending(document))]
     found = []
     for number, order in enumerate(orders, 1):
         span = f"{clock(order['at_s'])} to {clock(order['until_s'])}"
@@ -88,45 +78,60 @@ def verdicts(told: Mapping[str, Any]) -> list[tuple[bool | None, str]]:
     return found
 
 
-def card_rows(told: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return what was run: robot, map, when, how."""
-    config, grid = told["config"], told["map"]
-    size = (
-        f"{grid['cols'] * grid['resolution_m']:.1f} x {grid['rows'] * grid['resolution_m']:.1f} m, "
-        f"{grid['resolution_m']:g} m a pixel"
-        if grid
-        else "none"
-    )
-    parts = told["files"]
-    megabytes = sum(part["bytes"] for part in parts) / 1e6
-    state = "" if all(part["ended"] for part in parts) else ", not ended in order"
+def _ending(document: Document) -> str:
+    if document["complete"]:
+        return "complete: all it was to cover, and could reach, is covered"
+    if document["complete"] is None:
+        return "the recording does not tell whether it was completed"
+    how = "ended" if _is_ended(document) else "broke off"
+    return f"not complete: the recording {how} when the mission was {document['state']}"
+
+
+def _is_ended(document: Document) -> bool:
+    return all(part["ended"] for part in document["files"])
+
+
+def card_rows(document: Document) -> list[tuple[str, str]]:
+    """Return robot, map, time and settings of a run."""
+    config, grid, parts = document["config"], document["map"], document["files"]
+    size = "none"
+    if grid:
+        width, depth = (grid[side] * grid["resolution_m"] for side in ("cols", "rows"))
+        size = f"{width:.1f} x {depth:.1f} m, {grid['resolution_m']:g} m a pixel"
     settings = [
         f"{name.rpartition('.')[2] if name != 'planner.name' else 'planner'} {config[name]}"
-        for name in SETTINGS
+        for name in CARD_SETTINGS
         if name in config
     ]
+    megabytes = sum(part["bytes"] for part in parts) / 1e6
+    state = "" if _is_ended(document) else ", not ended in order"
     return [
-        ("robot", told["robot"] or "not told"),
-        ("began", _began(told["began"])),
-        ("duration", clock(told["duration_s"])),
+        ("robot", document["robot"] or "not told"),
+        ("began", _began(document["began"])),
+        ("duration", clock(document["duration_s"])),
         ("map", size),
-        ("version", told["version"] or "not told"),
+        ("version", document["version"] or "not told"),
         ("settings", ", ".join(settings) or "not told"),
         ("recording", f"{len(parts)} part{'s' * (len(parts) != 1)}, {megabytes:.1f} MB{state}"),
     ]
 
 
-def reason_rows(told: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
+def figure_rows(document: Document) -> list[tuple[str, str]]:
+    """Return name and text of all figures."""
+    return [(figure.name, figure.text) for figure in figures(document)]
+
+
+def reason_rows(document: Document) -> list[tuple[str, str, str, str]]:
     """Return each kind of reason for a replan: how many there were, the median, the slowest."""
-    took = told["replan_ms_by_reason"]
+    took = document["replan_ms_by_reason"]
     return [
         (kind, str(count), amount(took[kind]["p50"], "ms"), amount(took[kind]["max"], "ms"))
-        for kind, count in told["replans_by_reason"].items()
+        for kind, count in document["replans_by_reason"].items()
     ]
 
 
-def replan_rows(paths: Iterable[TakenPath]) -> list[tuple[str, ...]]:
-    """Return of each replan when it was, how long it took, what came of it, where and why."""
+def replan_rows(review: Review) -> list[tuple[str, ...]]:
+    """Return the slowest replans: when, how long, the plan, where the map changed, and why."""
     return [
         (
             clock(path.at_s),
@@ -137,78 +142,56 @@ def replan_rows(paths: Iterable[TakenPath]) -> list[tuple[str, ...]]:
             _place(path.changed),
             path.reason,
         )
-        for path in paths
+        for path in review.replans.slowest_first(MOST_REPLANS)
     ]
 
 
-def _place(changed: Rectangle | None) -> str:
-    if changed is None:
-        return "-"
-    x0, y0, x1, y1 = astuple(changed)
-    return f"{x1 - x0:.1f} x {y1 - y0:.1f} m at ({(x0 + x1) / 2:.1f}, {(y0 + y1) / 2:.1f})"
+def moment_rows(review: Review) -> list[tuple[str, ...]]:
+    """Return the worst moments: what, how much, when, and a note."""
+    return [(m.what, amount(m.value, m.unit), clock(m.at_s), m.note) for m in review.moments]
 
 
-def figure_rows(told: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return the figures that two runs are compared by, as text."""
-    return [(figure.name, figure.text) for figure in _figures(told)]
+def trouble_rows(troubles: list[Span]) -> list[tuple[str, ...]]:
+    """Return each trouble: the state, when, for how long, and why."""
+    return [(s.name, clock(s.begin_s), f"{s.seconds:.1f} s", s.reason) for s in troubles]
 
 
-def compared_rows(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[Row]:
-    """Return the figures of two runs side by side, and where they compare, how they differ."""
-    mine, theirs = ({figure.name: figure for figure in _figures(told)} for told in (one, other))
-    compares = do_compare(setup_differences(one, other))
-    anyway = {name for name, member, _ in NUMBERS if member in ANYWAY}
-    return [
-        _compared(mine[name], theirs[name], compares=compares or name in anyway)
-        for name in mine
-        if name in theirs
-    ]
+def fault_rows(document: Document) -> list[tuple[str, str]]:
+    """Return how many messages were refused, by code."""
+    return [(code, str(count)) for code, count in document["faults_by_code"].items()]
 
 
-def setup_words(one: Mapping[str, Any], other: Mapping[str, Any]) -> str:
-    """Return in a sentence whether two runs compare."""
-    setup = setup_differences(one, other)
-    if not setup:
-        return "Both were set up alike."
-    if do_compare(setup):
-        return "They were set up differently:"
-    another = ", ".join(name for name, _, _ in setup if name in ANOTHER_PROBLEM)
-    return (
-        f"These are not two runs of one problem: {another} differ. What hangs on that is shown, "
-        "and not compared."
-    )
+def unknown_lines(document: Document) -> Iterator[str]:
+    """Yield which samples and figures a recording does not give, and why."""
+    for topic, count in document["unreadable"].items():
+        yield f"{count} samples of {topic} cannot be read"
+    for names, why in document["not_recorded"].items():
+        yield f"not known: {names}: {why}"
 
 
 @dataclass(frozen=True, slots=True)
-class _Figure:
-    """A figure: its text, and where it is a number, that."""
+class Figure:
+    """A figure: its name, its text, and its value where it is a number."""
 
     name: str
     text: str
     value: float | None = None
 
 
-def _figures(told: Mapping[str, Any]) -> Iterator[_Figure]:
-    covered, coverable = told["covered_cells"], told["coverable_cells"]
+def figures(document: Document) -> Iterator[Figure]:
+    """Yield the figures that two runs are compared by."""
+    covered, coverable = document["covered_cells"], document["coverable_cells"]
     share = f" ({100 * covered / coverable:.1f} %)" if covered is not None and coverable else ""
-    yield _Figure("complete", {True: "yes", False: "no", None: NOT_KNOWN}[told["complete"]])
-    yield _Figure("duration", clock(told["duration_s"]), told["duration_s"])
+    yield Figure("complete", {True: "yes", False: "no", None: NOT_KNOWN}[document["complete"]])
+    yield Figure("duration", clock(document["duration_s"]), document["duration_s"])
     text = NOT_KNOWN if covered is None else f"{covered} of {coverable} cells{share}"
-    yield _Figure("covered", text, covered)
+    yield Figure("covered", text, covered)
     for percent in MILESTONES:
-        at_s = (told["reached_s"] or {}).get(str(percent))
-        text = "never" if told["reached_s"] else NOT_KNOWN
-        yield _Figure(f"{percent} % covered after", text if at_s is None else clock(at_s), at_s)
+        at_s = (document["reached_s"] or {}).get(str(percent))
+        text = "never" if document["reached_s"] else NOT_KNOWN
+        yield Figure(f"{percent} % covered after", text if at_s is None else clock(at_s), at_s)
     for name, member, unit in NUMBERS:
-        yield _Figure(name, _count(told[member], unit), told[member])
-
-
-def _compared(mine: _Figure, theirs: _Figure, *, compares: bool) -> Row:
-    if mine.value is None or theirs.value is None or not compares:
-        return mine.name, mine.text, theirs.text, ""
-    less = round(mine.value - theirs.value, 1)
-    text = f"{less:+,d}" if isinstance(less, int) else f"{less:+,.1f}"
-    return mine.name, mine.text, theirs.text, text if less else "0"
+        yield Figure(name, _count(document[member], unit), document[member])
 
 
 def clock(seconds: float) -> str:
@@ -226,14 +209,21 @@ def amount(value: float | None, unit: str) -> str:
     return f"{value:,.{digits}f} {unit}".rstrip()
 
 
-def _count(value: float | None, unit: str = "") -> str:
+def _count(value: float | None, unit: str) -> str:
     if value is None:
         return NOT_KNOWN
     text = f"{value:,}" if isinstance(value, int) else f"{value:,.1f}"
     return f"{text} {unit}".rstrip()
 
 
-def _began(told: str) -> str:
-    """Return when it began; before this program was, no clock can have been right."""
-    when = told.replace("T", " ").replace("Z", " UTC")
-    return when if told >= "2024" else f"{when}, by a clock that was not set"
+def _place(changed: Rectangle | None) -> str:
+    if changed is None:
+        return "-"
+    x0, y0, x1, y1 = astuple(changed)
+    return f"{x1 - x0:.1f} x {y1 - y0:.1f} m at ({(x0 + x1) / 2:.1f}, {(y0 + y1) / 2:.1f})"
+
+
+def _began(began: str) -> str:
+    """Return when it began; a clock that shows a time before this program was is not set."""
+    when = began.replace("T", " ").replace("Z", " UTC")
+    return when if began >= "2024" else f"{when}, by a clock that was not set"

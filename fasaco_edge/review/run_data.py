@@ -1,7 +1,4 @@
-"""Plans by the turn log: those, too, that became no path.
-
-What the samples of a recording tell: where the robot was, its map, its paths, its statuses.
-"""
+"""The data in a run's samples: poses, map, published paths, statuses, commands and plans."""
 
 from __future__ import annotations
 
@@ -33,7 +30,7 @@ from fasaco_edge.wire.status import (
 )
 from fasaco_edge.wire.turns import Turn, TurnBatch, decode_turns
 
-# As ``mission.route`` asks for better paths, and names them.
+# The reasons that the mission gives when it asks for a better path, and when it takes one.
 SPARE, BETTER = "spare time", "better further on"
 
 
@@ -58,7 +55,7 @@ class MadePlan:
 
 @dataclass(slots=True)
 class PlanLog:
-    """Puts together what was asked for and what came of it, batch by batch."""
+    """Joins the plans asked for with what became of them, batch by batch."""
 
     plans: list[MadePlan] = field(default_factory=list)
     _asked: dict[int, str] = field(default_factory=dict)
@@ -94,7 +91,7 @@ class PlanLog:
 
 
 @dataclass(frozen=True, slots=True)
-class TakenPath:
+class PublishedPath:
     """A path that was published.
 
     Attributes:
@@ -102,12 +99,12 @@ class TakenPath:
         revision: counts the paths of a daemon.
         reason: why it came.
         steps: from its first cell to its last.
-        planned_steps: of the plan as it was made, which gap and bound are of; None where not told.
+        planned_steps: of the plan as it was made, which gap and bound are of; None where not given.
         planner: what found it; "" where no plan was needed.
         plan_ms: how long planning took [ms]; None where no plan was needed.
-        gap: steps of the plan above the lower bound, as a share of it; None where not told.
-        cost_s: what driving it takes [s]; None where not told.
-        lower_bound: no plan has fewer steps; None where not told.
+        gap: steps of the plan above the lower bound, as a share of it; None where not given.
+        cost_s: what driving it takes [s]; None where not given.
+        lower_bound: no plan has fewer steps; None where not given.
         changed: rectangle of the map that led to it; None for nothing.
     """
 
@@ -125,7 +122,7 @@ class TakenPath:
 
 
 @dataclass(frozen=True, slots=True)
-class HeardStatus:
+class StatusSample:
     """What a review needs of a status.
 
     Attributes:
@@ -150,14 +147,14 @@ class HeardStatus:
 
 @dataclass(slots=True)
 class RunData:
-    """All that the samples tell; times are [s] since the recording began.
+    """All data in the samples; times are [s] since the recording began.
 
     Attributes:
         pose_s, poses: when each pose came, and x [m], y [m], yaw [rad] of it.
         map_s: when each map and each update came.
         paths, statuses: in order.
         commands: when each came, its name, and what a ``start`` was to start.
-        made: plans, by the turn log.
+        plan_log: plans, by the turn log.
         grid: the map at the end, with all updates.
         keep_out: polygons of the last order.
         config, version, robot: of the daemon, as its last status has them.
@@ -168,10 +165,10 @@ class RunData:
     pose_s: list[float] = field(default_factory=list)
     poses: list[tuple[float, float, float]] = field(default_factory=list)
     map_s: list[float] = field(default_factory=list)
-    paths: list[TakenPath] = field(default_factory=list)
-    statuses: list[HeardStatus] = field(default_factory=list)
+    paths: list[PublishedPath] = field(default_factory=list)
+    statuses: list[StatusSample] = field(default_factory=list)
     commands: list[tuple[float, str, MissionOrder]] = field(default_factory=list)
-    made: PlanLog = field(default_factory=PlanLog)
+    plan_log: PlanLog = field(default_factory=PlanLog)
     grid: OccupancyGrid | None = None
     keep_out: tuple[Polygon, ...] = ()
     config: Settings = field(default_factory=dict)
@@ -186,28 +183,28 @@ class RunData:
         return np.array(self.pose_s, np.float64)
 
     @property
-    def trail(self) -> NDArray[np.float64]:
-        """Where the robot was: x [m], y [m], yaw [rad], float64 (n, 3)."""
+    def track(self) -> NDArray[np.float64]:
+        """All poses: x [m], y [m], yaw [rad], float64 (n, 3)."""
         return np.array(self.poses, np.float64).reshape(-1, 3)
 
 
 def gather(samples: Iterable[Arrival], began_ns: int) -> RunData:
-    """Return what ``samples``, in order, tell; one that cannot be read costs itself alone."""
-    listener = _Listener(RunData(), began_ns)
+    """Return the data of ``samples``, in order; one that cannot be decoded is only counted."""
+    reader = _SampleReader(RunData(), began_ns)
     for arrival in samples:
-        listener.hear(arrival)
-    return listener.data
+        reader.read(arrival)
+    return reader.data
 
 
-class _Listener:
-    """Writes a data, sample by sample; holds one map at a time."""
+class _SampleReader:
+    """Adds the data of one sample after the other; holds one map at a time."""
 
     def __init__(self, data: RunData, began_ns: int) -> None:
         self.data = data
         self._began_ns = began_ns
         self._now = 0.0
         self._poses = PoseDecoder(POSE_STAMPED)
-        self._hear: dict[str, Callable[[Arrival], None]] = {
+        self._readers: dict[str, Callable[[Arrival], None]] = {
             "map": self._map,
             "map_update": self._map_update,
             "pose": self._pose,
@@ -218,15 +215,15 @@ class _Listener:
             PATH_DIGEST: self._path,
         }
 
-    def hear(self, arrival: Arrival) -> None:
+    def read(self, arrival: Arrival) -> None:
         # A part begins with what was in force before it.
         self._now = max(1e-9 * (arrival.wall_ns - self._began_ns), 0.0)
         self.data.last_s = max(self.data.last_s, self._now)
-        hear = self._hear.get(arrival.topic)
-        if hear is None:
+        reader = self._readers.get(arrival.topic)
+        if reader is None:
             return
         try:
-            hear(arrival)
+            reader(arrival)
         except FasacoError:
             self.data.undecodable[arrival.topic] += 1
 
@@ -267,7 +264,7 @@ class _Listener:
             self._poses.follow((frames.map, frames.robot))
         lost = status.recorder.lost if status.recorder else UNSET
         data.statuses.append(
-            HeardStatus(
+            StatusSample(
                 at_s=self._now,
                 state=status.state,
                 reason=status.reason,
@@ -280,7 +277,7 @@ class _Listener:
         )
 
     def _turns(self, arrival: Arrival) -> None:
-        self.data.made.take(decode_turns(arrival.sample.payload), self._now)
+        self.data.plan_log.take(decode_turns(arrival.sample.payload), self._now)
 
     def _path(self, arrival: Arrival) -> None:
         about = decode_tolerant(arrival.sample.attachment, PathAttachment)
@@ -289,7 +286,7 @@ class _Listener:
         if paths and paths[-1].revision == about.revision:
             return
         paths.append(
-            TakenPath(
+            PublishedPath(
                 at_s=self._now,
                 revision=about.revision,
                 reason=about.reason,

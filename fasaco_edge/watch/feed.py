@@ -1,4 +1,4 @@
-"""From the bus to whoever takes: joins as soon as it can, and stays."""
+"""The feed of samples from the bus; it joins as soon as it can, and stays."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _size_of(item: object) -> int:
 
 
 class Feed:
-    """What is said of one robot, and which robots there are; end it on every way out.
+    """The samples of one robot, and the robots there are; a context that has to be left.
 
     Attributes:
         trouble: why the bus cannot be joined yet; "" once it is.
@@ -44,7 +44,7 @@ class Feed:
         self._ended = threading.Event()
         self._bus: Bus | None = None
         self._lock = threading.Lock()
-        # A host that does not answer would keep whoever waits for it from everything else.
+        # In a thread: a host that does not answer would block the caller.
         self._joining = threading.Thread(target=self._join, name="join-bus", daemon=True)
         self._joining.start()
 

@@ -7,7 +7,7 @@ from rich.text import Text
 
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import phrases
-from fasaco_edge.watch.ink import Ink
+from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.wire.status import (
     CoverageReport,
     MissionReport,
@@ -30,30 +30,30 @@ STATE_COLOURS = {
 }
 LONGEST_BAR = 40
 LABEL_WIDTH = 9
-# From so many characters on there is room for what can be left out.
+# From so many characters on optional parts are shown.
 WIDE = 30
 
 
-def figures(status: Status, width: int, ink: Ink) -> Table:
+def figures(status: Status, width: int, glyphs: GlyphSet) -> Table:
     """Return all figures of a status as a table ``width`` characters wide."""
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(width=LABEL_WIDTH, style="cyan", no_wrap=True)
     table.add_column(overflow="fold")
     table.width = width
-    for name, value in _rows(status, width - LABEL_WIDTH - 1, ink):
+    for name, value in _rows(status, width - LABEL_WIDTH - 1, glyphs):
         table.add_row(name, value)
     return table
 
 
-def _rows(status: Status, width: int, ink: Ink) -> list[Row]:
+def _rows(status: Status, width: int, glyphs: GlyphSet) -> list[Row]:
     state = Text(one_line(status.state), f"bold {state_colour(status.state)}")
-    # A path's number is told with the path.
+    # The path's number is shown with the path.
     if status.path is None or status.reason != f"path {status.path.revision}":
         state.append(f": {one_line(status.reason)}", "not bold")
     rows: list[Row] = [("state", state)]
     if status.coverage is not None:
         rows += _coverage(
-            status.coverage, ink.bar(status.coverage.fraction, min(width, LONGEST_BAR))
+            status.coverage, glyphs.bar(status.coverage.fraction, min(width, LONGEST_BAR))
         )
     if status.path is not None:
         rows += _path(status.path, width)
@@ -95,8 +95,8 @@ def _mission(mission: MissionReport) -> list[Row]:
     rows: list[Row] = [("mission", _text(phrases.stage(*stage)))]
     for zone in mission.zones:
         at, covered = phrases.zone_progress(zone.pass_number, zone.passes, zone.covered, zone.cells)
-        told = f"pass {at}, {covered}" if zone.pass_number else at
-        rows.append((one_line(zone.name), _text(told)))
+        progress = f"pass {at}, {covered}" if zone.pass_number else at
+        rows.append((one_line(zone.name), _text(progress)))
     more = []
     if mission.keep_out:
         more.append(f"keep-out zones: {mission.keep_out}")
@@ -112,7 +112,7 @@ def _mission(mission: MissionReport) -> list[Row]:
 
 def _running(status: Status) -> list[Row]:
     latency, errors = status.latency_ms, status.errors
-    told = [
+    latencies = [
         f"{name} {milliseconds:.0f}"
         for name, milliseconds in (
             ("plan", latency.plan),
@@ -123,7 +123,7 @@ def _running(status: Status) -> list[Row]:
     ]
     counted = ", ".join(f"{count} {code}" for code, count in errors.by_code.items())
     rows: list[Row] = [
-        ("latency", _text(f"{', '.join(told)} ms" if told else "-")),
+        ("latency", _text(f"{', '.join(latencies)} ms" if latencies else "-")),
         ("errors", _text(counted, "red") if errors.total else _text("none")),
         ("ledger", _ledger(status)),
         ("recorder", _recorder(status.recorder)),
@@ -154,5 +154,5 @@ def _cells(count: int) -> str:
     return "1 cell" if count == 1 else f"{count} cells"
 
 
-def _text(told: str, style: str = "") -> Text:
-    return Text(one_line(told), style)
+def _text(text: str, style: str = "") -> Text:
+    return Text(one_line(text), style)

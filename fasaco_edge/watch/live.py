@@ -1,7 +1,4 @@
-"""The loop of a live view: take, draw, wait; and the same in plain lines.
-
-A terminal's other screen: entered, written to, and left as it was found.
-"""
+"""The loop of a live view on a terminal's alternate screen, in plain lines, or as JSON."""
 
 from __future__ import annotations
 
@@ -31,7 +28,7 @@ END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # At most ten pages a second, and only where something changed or the clock did [s].
 FRAME_S = 0.1
 LINE_EVERY_S = 1.0
-# Of what comes with the status, so much is waited for where there is none of it [s].
+# How long to wait for the rest once a status is there [s].
 REST_S = 1.0
 
 
@@ -65,20 +62,20 @@ def watch_on_screen(feed: Feed, view: RobotView, console: Console) -> None:
 
 
 def watch_in_lines(feed: Feed, view: RobotView) -> None:
-    """Print what happens, and once a second how it stands, until a signal asks for the end."""
+    """Print what happens, and once a second the state, until a signal asks for the end."""
     # What is there already comes within the first second.
-    told_entries, said, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
+    printed, last_line, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
     with stop_event(*END_SIGNALS) as stop:
         while not stop.is_set():
             take(feed, view, FRAME_S)
             now = phrases.steady_now()
-            for entry in view.events.since(told_entries):
+            for entry in view.events.since(printed):
                 _print_line(entry.at_s, entry.text)
-            told_entries = view.events.count
+            printed = view.events.count
             if now >= next_line_at:
                 next_line_at, line = now + LINE_EVERY_S, status_line(view, now)
-                if line != said:
-                    said = line
+                if line != last_line:
+                    last_line = line
                     _print_line(now, line)
 
 
@@ -106,7 +103,7 @@ def look_once(feed: Feed, view: RobotView, timeout_s: float) -> bool:
 
 
 def status_line(view: RobotView, now: float) -> str:
-    """Return how it stands, in a line."""
+    """Return the state in a line."""
     status = view.status
     if view.trouble:
         return f"waiting for the bus at {one_line(view.trouble)}"
@@ -147,7 +144,7 @@ def _print_line(at_s: float, text: str) -> None:
 
 ENTER = "\x1b[?1049h\x1b[?25l\x1b[2J"
 LEAVE = "\x1b[0m\x1b[?25h\x1b[?1049l"
-# Terminals that know it show a whole page at once, the others pass it over.
+# Terminals that know it show a whole page at once, the others ignore it.
 BEGIN_PAGE, END_PAGE = "\x1b[?2026h", "\x1b[?2026l"
 
 
@@ -157,19 +154,19 @@ class Screen:
     def __init__(self, terminal: TextIO) -> None:
         self._terminal = terminal
         self._keyboard = sys.stdin if sys.stdin is not None and sys.stdin.isatty() else None
-        self._is_heard = True
+        self._has_input = True
         self._before: list[Any] | None = None
         self._shown: list[str] = []
         self._size = (0, 0)
-        self._stop_as_ever: Any = None
+        self._old_handler: Any = None
 
     def __enter__(self) -> Self:
-        self._stop_as_ever = signal.signal(signal.SIGTSTP, self._suspend)
+        self._old_handler = signal.signal(signal.SIGTSTP, self._suspend)
         self._begin()
         return self
 
     def __exit__(self, *_: object) -> None:
-        signal.signal(signal.SIGTSTP, self._stop_as_ever)
+        signal.signal(signal.SIGTSTP, self._old_handler)
         self._end()
 
     def size(self) -> tuple[int, int]:
@@ -201,7 +198,7 @@ class Screen:
 
     def keys(self, timeout_s: float) -> str:
         """Return what was typed; wait up to ``timeout_s`` [s] for it."""
-        keyboard = [self._keyboard.fileno()] if self._keyboard and self._is_heard else []
+        keyboard = [self._keyboard.fileno()] if self._keyboard and self._has_input else []
         ready, _, _ = select.select(keyboard, [], [], timeout_s)
         if not ready:
             return ""
@@ -210,8 +207,8 @@ class Screen:
         except OSError:
             typed = b""
         if not typed:
-            # Nobody types there any more; it would be ready for ever.
-            self._is_heard = False
+            # The input has ended; it would be ready for ever.
+            self._has_input = False
         return typed.decode(errors="replace")
 
     def _begin(self) -> None:

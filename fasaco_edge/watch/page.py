@@ -1,4 +1,4 @@
-"""The whole screen: picture, figures, legend and what happened lately."""
+"""The whole screen: picture, figures, legend and the latest events."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rich.text import Text
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.figures import figures, state_colour
-from fasaco_edge.watch.ink import Ink
+from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.phrases import age, clock, percent
-from fasaco_edge.watch.picture import Picturing
+from fasaco_edge.watch.picture import MissionPicture
 from fasaco_edge.watch.robot_view import BAD, GOOD, ORDER, PLAIN, Event, RobotView
 from fasaco_edge.wire.status import Status
 
@@ -32,13 +32,13 @@ LEGEND = (
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class Layout:
     """How a screen is divided [characters]; figures of width 0 are left out.
 
     Attributes:
         columns, lines: of the picture.
         figures: width of the column beside it.
-        entries: lines of what happened lately.
+        entries: lines of events.
     """
 
     columns: int
@@ -47,7 +47,7 @@ class Plan:
     entries: int
 
     @classmethod
-    def of(cls, width: int, height: int) -> Plan:
+    def of(cls, width: int, height: int) -> Layout:
         """Return how to divide a screen."""
         figures = 0 if width < 64 else min(max(width * 2 // 5, 34), 50)
         entries = 0 if height < 14 else min(max(height // 5, 4), 14)
@@ -57,12 +57,12 @@ class Plan:
 
 
 class Page:
-    """Draws what is known as lines of text; keeps what did not change."""
+    """Draws a robot view as lines of text; keeps what did not change."""
 
     def __init__(self, console: Console) -> None:
-        self._ink = Ink.of(console)
+        self._glyphs = GlyphSet.of(console)
         self._console = console
-        self._picturing = Picturing()
+        self._picture = MissionPicture()
         self._kept: dict[str, tuple[object, list[str]]] = {}
 
     def lines(self, view: RobotView, now: float, width: int, height: int) -> list[str]:
@@ -73,51 +73,51 @@ class Page:
             now: time since the epoch [s].
             width, height: size of the screen, each at least 1 [characters].
         """
-        plan = Plan.of(width, height)
+        layout = Layout.of(width, height)
         page = self._block(headline(view, now), width, 1)
-        if plan.lines:
-            page += self._middle(view, plan)
-            whole = self._picturing.path_is_whole
+        if layout.lines:
+            page += self._middle(view, layout)
+            whole = self._picture.path_is_whole
             key: object = (width, whole)
             page += self._keep("legend", key, lambda: self._block(self._legend(whole), width, 1))
-        if plan.entries:
-            key = (view.events.count, self._picturing.pixel_m, width, plan)
-            page += self._keep("log", key, lambda: self._log(view, width, plan))
+        if layout.entries:
+            key = (view.events.count, self._picture.pixel_m, width, layout)
+            page += self._keep("log", key, lambda: self._log(view, width, layout))
         page += [" " * width] * (height - len(page))
         return page[:height]
 
-    def _middle(self, view: RobotView, plan: Plan) -> list[str]:
-        drawn = self._picturing.kinds(view, plan.columns, plan.lines)
+    def _middle(self, view: RobotView, layout: Layout) -> list[str]:
+        drawn = self._picture.kinds(view, layout.columns, layout.lines)
         if drawn is None:
-            left = self._block(Text("no map, no coverage yet", FAINT), plan.columns, plan.lines)
+            left = self._block(Text("no map, no coverage yet", FAINT), layout.columns, layout.lines)
         else:
-            left = self._ink.lines(drawn)
-        if not plan.figures:
+            left = self._glyphs.lines(drawn)
+        if not layout.figures:
             return left
         # The status is a value: a new one is another object.
-        key = (view.status, plan)
-        right = self._keep("figures", key, lambda: self._figures(view.status, plan))
+        key = (view.status, layout)
+        right = self._keep("figures", key, lambda: self._figures(view.status, layout))
         return [f"{a} {b}" for a, b in zip(left, right, strict=True)]
 
-    def _figures(self, status: Status | None, plan: Plan) -> list[str]:
-        shown = Text("") if status is None else figures(status, plan.figures, self._ink)
-        return self._block(shown, plan.figures, plan.lines)
+    def _figures(self, status: Status | None, layout: Layout) -> list[str]:
+        shown = Text("") if status is None else figures(status, layout.figures, self._glyphs)
+        return self._block(shown, layout.figures, layout.lines)
 
     def _legend(self, path_is_whole: bool) -> Text:
         legend = Text()
         for kind, name in LEGEND:
             cut = kind == picture.AHEAD and not path_is_whole
-            told = f"to {picture.NEAR_M:g} m" if cut else name
-            legend.append_text(self._ink.sample(kind)).append(f" {told} ", FAINT)
+            label = f"to {picture.NEAR_M:g} m" if cut else name
+            legend.append_text(self._glyphs.sample(kind)).append(f" {label} ", FAINT)
         return _on_a_line(legend)
 
-    def _log(self, view: RobotView, width: int, plan: Plan) -> list[str]:
-        rule, scale = "─" if self._ink.unicode else "-", ""
-        if self._picturing.pixel_m is not None:
-            scale = self._ink.scale(self._picturing.pixel_m, max(plan.columns // 4, 4))
+    def _log(self, view: RobotView, width: int, layout: Layout) -> list[str]:
+        rule, scale = "─" if self._glyphs.unicode else "-", ""
+        if self._picture.pixel_m is not None:
+            scale = self._glyphs.scale(self._picture.pixel_m, max(layout.columns // 4, 4))
         title = f" {scale}  lately " if scale else " lately "
         lines = self._block(_on_a_line(Text(f"{title}{rule * width}", FAINT)), width, 1)
-        for entry in list(view.events.entries)[-plan.entries :]:
+        for entry in list(view.events.entries)[-layout.entries :]:
             lines += self._block(_entry(entry), width, 1)
         return lines
 
@@ -125,7 +125,7 @@ class Page:
         """Return something of rich in so many lines and columns."""
         options = self._console.options.update(width=width, height=None)
         lines = self._console.render_lines(shown, options, pad=True)[:height]
-        drawn = [self._ink.drawn(line) for line in lines]
+        drawn = [self._glyphs.drawn(line) for line in lines]
         return drawn + [" " * width] * (height - len(drawn))
 
     def _keep(self, name: str, key: object, draw: Callable[[], list[str]]) -> list[str]:
@@ -136,7 +136,7 @@ class Page:
 
 
 def headline(view: RobotView, now: float) -> Text:
-    """Return the line that says how it stands."""
+    """Return the line that sums up the state."""
     line = Text().append(f" {view.robot} ", "bold reverse").append("  ")
     status, silent = view.status, view.silent_s(now)
     if view.trouble:

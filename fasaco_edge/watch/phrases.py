@@ -1,4 +1,4 @@
-"""How things are said, wherever in a terminal they are said."""
+"""The wording of states, shares and times in a terminal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import time
 
 from fasaco_edge.text import one_line
 
-# Of the wall clock to the one that nobody sets, as it was when this began [s].
+# Of the wall clock to the monotonic one, when this module was imported [s].
 _OFFSET_S = time.time() - time.monotonic()
 
 
@@ -21,19 +21,19 @@ def percent(fraction: float) -> str:
     return f"{shown:.1f} %"
 
 
-def stage(stage: str | None, zone: str | None, turn: int | None, passes: int | None) -> str:
-    """Return what a mission is at."""
+def stage(stage: str | None, zone: str | None, number: int | None, passes: int | None) -> str:
+    """Return the stage of a mission."""
     if stage is None:
         return "no order"
     if stage != "covering":
         return one_line(stage)
     what = f"zone {one_line(zone)}" if zone else "everything reachable"
-    return f"{what}, pass {turn} of {passes}"
+    return f"{what}, pass {number} of {passes}"
 
 
-def zone_progress(turn: int, passes: int, covered: int, cells: int) -> tuple[str, str]:
+def zone_progress(number: int, passes: int, covered: int, cells: int) -> tuple[str, str]:
     """Return which pass a zone is in, and how far that is."""
-    at = f"{turn} of {passes}" if turn else "to come"
+    at = f"{number} of {passes}" if number else "to come"
     return at, f"{percent(covered / cells if cells else 0.0)}: {covered} of {cells} cells"
 
 
@@ -48,12 +48,12 @@ def figures(
 
 
 def steady_now() -> float:
-    """Return the time since the epoch [s] by a clock that nobody sets while this process runs."""
+    """Return the time since the epoch [s]; it does not step while this process runs."""
     return _OFFSET_S + time.monotonic()
 
 
 def clock(at_s: float) -> str:
-    """Return a steady time as the wall clock tells it that is there by now."""
+    """Return a steady time as a text, by the wall clock as it is set now."""
     wall_s = time.time() - (steady_now() - at_s)
     return time.strftime("%H:%M:%S", time.localtime(round(wall_s, 3)))
 

@@ -1,9 +1,4 @@
-"""Which part of the map frame a picture of half blocks shows, and at what scale.
-
-What each pixel of the picture shows: ground, coverage, path and robot.
-
-The picture of what is known; ground and coverage are drawn anew only where they changed.
-"""
+"""The picture of a mission in half blocks: map, coverage, path and robot, pixel by pixel."""
 
 from __future__ import annotations
 
@@ -13,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.geometry import Bounds, Pose2D, union_bounds
+from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire import coverage as covering
 from fasaco_edge.wire.status import known_settings
@@ -22,8 +17,6 @@ from fasaco_edge.wire.status import known_settings
 LEAST_PIXEL_M = 0.01
 # Pictures grow by so much at once [m]: with every row of a growing map they would jump.
 ROUNDED_TO_M = 0.5
-
-Bounds = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +43,7 @@ class Frame:
 
         Args:
             bounds: x0, y0, x1, y1 [m].
-            columns, lines: the room there is, each at least 1.
+            columns, lines: the space there is, each at least 1.
         """
         x0, y0 = (math.floor(low / ROUNDED_TO_M) * ROUNDED_TO_M for low in bounds[:2])
         x1, y1 = (math.ceil(high / ROUNDED_TO_M) * ROUNDED_TO_M for high in bounds[2:])
@@ -96,29 +89,6 @@ class Frame:
         values = grid.cells[row.clip(0, height - 1), col.clip(0, width - 1)]
         sampled: NDArray[np.int8] = np.where(inside, values, np.int8(beyond))
         return sampled
-
-
-def known_bounds(grid: OccupancyGrid) -> Bounds | None:
-    """Return the bounds (x0, y0, x1, y1) [m] of what a grid knows; None where it knows nothing."""
-    known = grid.cells >= 0
-    rows, cols = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
-    if not len(rows):
-        return None
-    corners = [
-        grid.geometry.to_map(float(col), float(row))
-        for col in (cols[0], cols[-1] + 1)
-        for row in (rows[0], rows[-1] + 1)
-    ]
-    xs, ys = zip(*corners, strict=True)
-    return min(xs), min(ys), max(xs), max(ys)
-
-
-def joint_bounds(parts: list[Bounds]) -> Bounds | None:
-    """Return the bounds around all parts; None without any."""
-    if not parts:
-        return None
-    x0, y0, x1, y1 = zip(*parts, strict=True)
-    return min(x0), min(y0), max(x1), max(y1)
 
 
 # Where several things meet in one character without colours, the larger number is shown.
@@ -201,29 +171,20 @@ def _put(kinds: Kinds, pixels: NDArray[np.int64], kind: int) -> None:
     kinds[row[seen], col[seen]] = kind
 
 
-def _map_kinds() -> Kinds:
-    kinds = np.full(256, UNKNOWN, np.uint8)
-    kinds[: FREE_AT_MOST + 1] = FLOOR
-    kinds[OCCUPIED_AT_LEAST : 100 + 1] = WALL
-    return kinds
+# The kind of each value of a map, and of a coverage grid with and without a map below it.
+_MAP_KINDS = np.full(256, UNKNOWN, np.uint8)
+_MAP_KINDS[: FREE_AT_MOST + 1] = FLOOR
+_MAP_KINDS[OCCUPIED_AT_LEAST : 100 + 1] = WALL
+_COVERAGE_KINDS = np.full(256, UNKNOWN, np.uint8)
+_COVERAGE_KINDS[covering.TO_COVER] = TO_COVER
+_COVERAGE_KINDS[covering.COVERED] = COVERED
+_COVERAGE_KINDS[covering.RECOVERED] = RECOVERED
+_COVERAGE_AND_BLOCKED_KINDS = _COVERAGE_KINDS.copy()
+_COVERAGE_AND_BLOCKED_KINDS[covering.BLOCKED] = WALL
 
 
-def _coverage_kinds(blocked: int) -> Kinds:
-    kinds = np.full(256, UNKNOWN, np.uint8)
-    kinds[covering.TO_COVER] = TO_COVER
-    kinds[covering.COVERED] = COVERED
-    kinds[covering.RECOVERED] = RECOVERED
-    kinds[covering.BLOCKED] = blocked
-    return kinds
-
-
-_MAP_KINDS = _map_kinds()
-_COVERAGE_KINDS = _coverage_kinds(UNKNOWN)
-_COVERAGE_AND_BLOCKED_KINDS = _coverage_kinds(WALL)
-
-
-class Picturing:
-    """Keeps the ground of the last picture.
+class MissionPicture:
+    """Draws the robot's view; map and coverage anew only where they changed.
 
     Attributes:
         pixel_m: edge of a pixel of that picture [m]; None before the first.
@@ -243,25 +204,19 @@ class Picturing:
         # Grids are values: a new one is another object.
         if (key := (view.map, view.coverage)) != self._key:
             self._key, self._frame = key, None
-            grids = [grid for grid in key if grid is not None]
-            self._bounds = joint_bounds([b for grid in grids if (b := known_bounds(grid))])
-        bounds = self._with_robot(view)
-        if bounds is None:
-            return None
+            self._bounds = union_bounds(*(known_bounds(grid) for grid in key if grid is not None))
+        if self._bounds is None:
+            return None  # a robot alone is no picture
+        pose = view.pose
+        robot = None if pose is None else (pose.x, pose.y, pose.x, pose.y)
+        bounds = union_bounds(self._bounds, robot) or self._bounds
         frame = Frame.over(bounds, columns, lines)
         if frame != self._frame or self._ground is None:
             self._frame, self._ground = frame, ground(frame, view.map, view.coverage)
         kinds = self._ground.copy()
         self.pixel_m = frame.pixel_m
         self.path_is_whole = draw_path(kinds, frame, view.path_ahead)
-        if view.pose is not None:
+        if pose is not None:
             settings = known_settings(view.status.config if view.status else {})
-            draw_robot(kinds, frame, view.pose, settings.robot.radius_m)
+            draw_robot(kinds, frame, pose, settings.robot.radius_m)
         return kinds
-
-    def _with_robot(self, view: RobotView) -> Bounds | None:
-        pose, parts = view.pose, [self._bounds] if self._bounds else []
-        # A robot alone is no picture.
-        if pose is not None and parts:
-            parts.append((pose.x, pose.y, pose.x, pose.y))
-        return joint_bounds(parts)

@@ -1,4 +1,4 @@
-"""The newest state of a robot as its samples tell it, and the latest events."""
+"""A robot as its newest samples show it, and the latest events."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class EventLog:
 
 
 def differences(before: Status | None, after: Status) -> list[tuple[str, str]]:
-    """Return what a status says that the one before did not, as (text, tone)."""
+    """Return what is new in a status, as (text, tone)."""
     found: list[tuple[str, str]] = []
     if before is None or before.state != after.state:
         tone = BAD if after.state in TROUBLED else GOOD if after.state == "done" else PLAIN
@@ -76,7 +76,7 @@ def differences(before: Status | None, after: Status) -> list[tuple[str, str]]:
     return found
 
 
-# The daemon speaks once a second.
+# The daemon publishes a status once a second.
 SILENCE_S = 3.5
 # Without poses of their own on the native keys, those in the status are shown.
 POSE_LASTS_S = 2.0
@@ -91,17 +91,17 @@ class Token:
 
 
 class RobotView:
-    """The newest map, coverage, path, pose and status of one robot, and what happened lately.
+    """The newest map, coverage, path, pose and status of one robot, and the latest events.
 
     Attributes:
         map, coverage: None before the first.
-        pose: where the robot is; None as long as nobody says.
+        pose: where the robot is; None before the first pose.
         status: the newest one; None before the first.
         document: the same as it came, b"" before the first.
         walk: the path, and how far the robot is on it.
         robots: of all robots on the bus that have a daemon, the names.
         trouble: why the bus cannot be reached; "" where it can.
-        gone_since: since when the daemon is gone, since the epoch [s]; None while it is there,
+        gone_since: when the daemon went, since the epoch [s]; None while it is there,
             and before it ever was.
     """
 
@@ -113,7 +113,7 @@ class RobotView:
         self.pose: Pose2D | None = None
         self.status: Status | None = None
         self.document = b""
-        self.walk = Walk()
+        self.walk = PathProgress()
         self.robots: set[str] = set()
         self.trouble = ""
         self.gone_since: float | None = None
@@ -140,7 +140,7 @@ class RobotView:
         return self.walk.ahead(self.pose)
 
     def silent_s(self, now: float) -> float:
-        """Return for how long the daemon should have spoken and did not [s]; 0 while it does."""
+        """Return for how long a status of the daemon has been overdue [s]; 0 while none is."""
         silent = now - self._reported_at
         return silent if self.status is not None and silent > SILENCE_S else 0.0
 
@@ -156,7 +156,7 @@ class RobotView:
                 self._readers[topic](item, now)
             except FasacoError as error:
                 self._malformed += 1
-                # A publisher gone wrong is so at every message: note the 1st, 2nd, 4th, 8th ...
+                # A faulty publisher is so with every message: note the 1st, 2nd, 4th, 8th ...
                 if self._malformed & (self._malformed - 1) == 0:
                     text = f"{topic} cannot be read ({self._malformed} so far): {error}"
                     self.events.add(now, text, BAD)
@@ -169,7 +169,7 @@ class RobotView:
             self.events.add(now, "the daemon is gone; waiting for it to come back", BAD)
         elif self.is_here and not was_here:
             back = self.gone_since is not None
-            # It has not had the time to speak.
+            # It has not had the time to publish a status.
             self.gone_since, self._reported_at = None, now
             self.events.add(now, f"the daemon is {'back' if back else 'there'}", GOOD)
 
@@ -190,7 +190,7 @@ class RobotView:
 
     def _read_path(self, sample: Sample, now: float) -> None:
         about = decode_document(sample.attachment or b"{}", PathAttachment)
-        self.walk = Walk(decode_path(sample.payload).xy, about.revision)
+        self.walk = PathProgress(decode_path(sample.payload).xy, about.revision)
         steps = f"{about.steps} steps" if len(self.walk.xy) else "stop"
         self.events.add(now, f"path {about.revision}, {steps}: {about.reason}")
 
@@ -211,7 +211,7 @@ class RobotView:
         self.status, self.document, self._reported_at = status, sample.payload, now
         if status.path is None:
             # A daemon that was started anew has none of the old paths.
-            self.walk = Walk()
+            self.walk = PathProgress()
         elif status.path.revision == self.walk.revision:
             self.walk.left(status.path.remaining_steps)
         pose = status.pose
@@ -241,7 +241,7 @@ def _zones(order: object) -> list[dict[str, object]]:
 LOOK_AHEAD_STEPS = 8
 
 
-class Walk:
+class PathProgress:
     """A path, and which of its points the robot is at.
 
     Attributes:
@@ -256,7 +256,7 @@ class Walk:
         self.at = 0
 
     def left(self, steps: int) -> None:
-        """Note that the daemon says so many steps are left."""
+        """Note how many steps are left, as the daemon says."""
         self.at = max(self.at, len(self.xy) - 1 - max(steps, 0))
 
     def passed(self, pose: Pose2D) -> None:

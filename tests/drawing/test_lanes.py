@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fasaco_edge.drawing.walk import arrow_places, directions, lanes
+from fasaco_edge.drawing.pictures import arrow_places, directions, lanes
 
 
 def walk(*points):

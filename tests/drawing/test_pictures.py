@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.mission import draw_mission
+from fasaco_edge.drawing.pictures import draw_mission, draw_walk
 from fasaco_edge.drawing.view import MAX_HEIGHT, MAX_WIDTH
-from fasaco_edge.drawing.walk import draw_walk
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid

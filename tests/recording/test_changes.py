@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,7 +9,7 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.recording.scene.layers import changed_bounds, known_bounds, union
+from fasaco_edge.recording.scene.layers import changed_bounds
 
 
 def grid(cells, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> OccupancyGrid:
@@ -52,15 +50,3 @@ def test_exploration_and_noise_are_no_changes():
 )
 def test_other_rasters_are_not_compared(other):
     assert changed_bounds(grid(np.zeros((4, 4))), other) is None
-
-
-def test_known_bounds_follow_the_map_when_it_is_turned():
-    cells = np.full((4, 6), -1)
-    cells[1, 2:5] = 0
-    assert known_bounds(grid(cells, yaw=math.pi / 2)) == pytest.approx((-0.2, 0.2, -0.1, 0.5))
-    assert known_bounds(grid(np.full((4, 6), -1))) is None
-
-
-def test_union_holds_both():
-    assert union(None, (0.0, 0.0, 1.0, 1.0)) == (0.0, 0.0, 1.0, 1.0)
-    assert union((0.0, -1.0, 1.0, 1.0), (-2.0, 0.0, 0.5, 3.0)) == (-2.0, -1.0, 1.0, 3.0)

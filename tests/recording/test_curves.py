@@ -22,14 +22,14 @@ def test_what_stays_the_same_is_drawn_seldom_and_what_changes_at_once(tmp_path):
     for second in range(2 * period_s + 10):
         writer.at(second * SECOND_NS)
         curves.draw("steps", 1.0 if second < 5 else 2.0)
-        curves.draw("trembles", 100.0 + second % 2, tremble=0.05)
-        curves.draw("last", 100.0 + (second > 2 * period_s + 5), tremble=0.05)
+        curves.draw("noisy", 100.0 + second % 2, noise=0.05)
+        curves.draw("last", 100.0 + (second > 2 * period_s + 5), noise=0.05)
     curves.finish()
     assert writer.close()
     (part,) = tmp_path.glob("*.rrd")
     steps = read_column(part, "steps", SCALAR)
     assert (steps.wall_ns // SECOND_NS).tolist() == [0, 5, 5 + period_s, 5 + 2 * period_s]
     assert steps.values == [[1.0], [2.0], [2.0], [2.0]]
-    trembles = read_column(part, "trembles", SCALAR)
-    assert len(trembles.values) == 4
+    noisy = read_column(part, "noisy", SCALAR)
+    assert len(noisy.values) == 4
     assert read_column(part, "last", SCALAR).values[-1] == [101.0]

@@ -88,7 +88,7 @@ def test_everything_on_the_bus_becomes_an_entity(recorded):
     assert rows[entities.PHEROMONE] == 3 * recorded.mission.revision
     assert rows[entities.ROBOT] == FRAMES
     assert rows[entities.COVERAGE] == FRAMES // 4
-    assert {entities.MAP, entities.TRAIL, f"{entities.LATENCY}/plan"} <= set(rows)
+    assert {entities.MAP, entities.DRIVEN_PATH, f"{entities.LATENCY}/plan"} <= set(rows)
     assert rows[entities.MAP_CHANGE] == 1
     assert recorded.summary.timelines == (entities.ITER, entities.REPLAN, entities.WALL)
     assert 0.9 * FRAMES * FRAME_S < recorded.summary.duration_s < 300

@@ -61,7 +61,7 @@ def test_maps_and_transforms_are_in_the_recording(domain, tmp_path):
 
 def test_the_block_is_read_as_the_daemon_reads_it():
     config = ros_config(json.dumps({"kind": "rmw_zenoh", "domain": 3}))
-    assert config.map.rmw_key(config.domain, any_hash=True).startswith("3/map/")
+    assert config.input_key(config.inputs["map"]).startswith("3/map/")
     for text in ("{}", '{"kind": "bridge", "domain": 3}', "no json"):
         with pytest.raises(Exception, match="ros2: "):
             ros_config(text)

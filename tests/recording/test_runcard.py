@@ -56,7 +56,7 @@ def test_what_is_asked_for_first_stands_in_a_line():
 
 
 def test_the_range_of_the_pheromone_is_a_property():
-    told = RunDescription("r2", "2026-01-01", trail_range=(0.1, 0.25)).properties()
+    told = RunDescription("r2", "2026-01-01", pheromone_range=(0.1, 0.25)).properties()
     assert (told["trail_min"], told["trail_max"]) == ("0.1", "0.25")
     assert "trail_min * (trail_max / trail_min)" in told["trail"]
     assert "trail" not in RunDescription("r2", "2026-01-01").properties()

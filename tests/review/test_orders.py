@@ -8,11 +8,11 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.mission.orders.order import read_order
-from fasaco_edge.review.document import differences, side_by_side
+from fasaco_edge.review.comparison import compared_rows, differences, setup_words, side_by_side
 from fasaco_edge.review.moments import spans_of
 from fasaco_edge.review.orders import chapters
-from fasaco_edge.review.rows import compared_rows, setup_words, verdicts
-from fasaco_edge.review.run_data import HeardStatus, RunData
+from fasaco_edge.review.rows import verdicts
+from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.status import CoverageReport
 
 ALL = read_order({})
@@ -22,7 +22,7 @@ KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]
 def told(*rows, commands=()):
     """Return the chapters of a data of (time, state, covered, coverable)."""
     statuses = [
-        HeardStatus(
+        StatusSample(
             at_s,
             state,
             "",

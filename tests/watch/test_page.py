@@ -9,7 +9,7 @@ import pytest
 from rich.cells import cell_len
 from rich.color import ColorSystem
 
-from fasaco_edge.watch.ink import Ink
+from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
 from fasaco_edge.watch.robot_view import RobotView, Token
@@ -26,7 +26,7 @@ def page_of(view: RobotView, width: int = 80, height: int = 24, colours: str | N
 
 def test_two_pixels_make_a_character():
     kinds = np.array([[WALL, WALL, COVERED], [WALL, COVERED, COVERED]], np.uint8)
-    (line,) = Ink(ColorSystem.TRUECOLOR, unicode=True).lines(kinds)
+    (line,) = GlyphSet(ColorSystem.TRUECOLOR, unicode=True).lines(kinds)
     wall, covered = "214;218;226", "24;112;82"
     assert line == (
         f"\x1b[38;2;{wall};48;2;{wall}m \x1b[0m"
@@ -36,7 +36,7 @@ def test_two_pixels_make_a_character():
 
 
 def test_what_is_alike_is_written_once():
-    (line,) = Ink(ColorSystem.TRUECOLOR, unicode=True).lines(np.full((2, 50), WALL, np.uint8))
+    (line,) = GlyphSet(ColorSystem.TRUECOLOR, unicode=True).lines(np.full((2, 50), WALL, np.uint8))
     assert line.count("\x1b") == 2
     assert plain(line) == " " * 50
 
@@ -46,15 +46,15 @@ def test_what_is_alike_is_written_once():
     [(ColorSystem.EIGHT_BIT, "38;5;"), (ColorSystem.STANDARD, "97;42m")],
 )
 def test_fewer_colours_will_do(colours, code):
-    (line,) = Ink(colours, unicode=True).lines(np.array([[WALL], [COVERED]], np.uint8))
+    (line,) = GlyphSet(colours, unicode=True).lines(np.array([[WALL], [COVERED]], np.uint8))
     assert code in line
     assert "38;2" not in line
 
 
 def test_no_colours_will_do():
     kinds = np.array([[WALL, 0, TO_COVER, HEADING + 2], [WALL, COVERED, 0, 0]], np.uint8)
-    assert Ink(None, unicode=True).lines(kinds) == ["#o-↑"]
-    assert Ink(None, unicode=False).lines(kinds) == ["#o-^"]
+    assert GlyphSet(None, unicode=True).lines(kinds) == ["#o-↑"]
+    assert GlyphSet(None, unicode=False).lines(kinds) == ["#o-^"]
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)

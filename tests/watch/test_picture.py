@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.occupancy import known_bounds
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.picture import (
     AHEAD,
@@ -21,7 +22,6 @@ from fasaco_edge.watch.picture import (
     UNKNOWN,
     WALL,
     Frame,
-    known_bounds,
 )
 from tests.watch.grids import grid_of
 

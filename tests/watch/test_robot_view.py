@@ -9,7 +9,7 @@ import pytest
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch
-from fasaco_edge.watch.robot_view import KEPT, EventLog, RobotView, Walk
+from fasaco_edge.watch.robot_view import KEPT, EventLog, PathProgress, RobotView
 from fasaco_edge.wire.maps import encode_map_update
 from fasaco_edge.wire.poses import encode_pose_stamped
 from tests.watch.grids import NOW, mid_mission, status, tell
@@ -33,7 +33,7 @@ def test_the_path_ahead_begins_at_the_robot():
 
 def test_a_path_that_passes_a_place_again_is_not_cut_there():
     out = [(float(step), 0.0) for step in range(20)]
-    walk = Walk(np.array(out + out[::-1]))
+    walk = PathProgress(np.array(out + out[::-1]))
     for x, _ in out[:6]:
         walk.passed(Pose2D(x, 0.1))
     assert walk.at == 5

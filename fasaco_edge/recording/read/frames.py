@@ -1,20 +1,31 @@
-"""The chunks of a recording, read without Rerun, which believes what a file claims.
+"""The chunks of a recording, read without Rerun, which trusts what a file claims.
 
-A chunk is an Arrow message, packed, in a Protobuf message, in a frame (``recording.repair``). Each
-says how much the next one holds; that is looked at before any room is made for it. Rerun's own
-reader makes the room, and ends the process where it cannot be had, or where a message is broken.
-The footer, a table of what stands where, is not needed to read from the beginning to the end.
+A chunk is an Arrow message, packed, in a Protobuf message, in a frame (``recording.read.repair``).
+Each states the size of the next; that is checked before memory is taken for it. Rerun's own reader
+takes the memory, and ends the process where there is too little, or where a message is broken. The
+footer, an index, is not needed to read from the beginning to the end.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, BinaryIO
+from pathlib import Path
+from typing import BinaryIO
 
-from fasaco_edge.recording.read.repair import FOOTER_KIND, FRAME, HEADER_BYTES, Scan
+from fasaco_edge.errors import MalformedMessage, UnreadableRecording
+from fasaco_edge.recording.read.repair import (
+    FOOTER_KIND,
+    FRAME,
+    HEADER_BYTES,
+    Scan,
+    scan_recording,
+)
 from fasaco_edge.recording.sdk import pa
+
+HINT = "name the .rrd files that a recorder has written"
 
 CHUNK_KIND = 2
 # Of a chunk, unpacked: the largest that a recorder writes is a map of 64 million pixels.
@@ -46,19 +57,38 @@ class Chunk:
         recording_id: of the recording it is part of.
         entity: without its leading slash.
         is_static: whether it has no times.
-        batch: the rows, a ``pyarrow.RecordBatch``, valid throughout.
+        batch: the rows, validated.
         bytes: its size, unpacked.
     """
 
     recording_id: str
     entity: str
     is_static: bool
-    batch: Any
+    batch: pa.RecordBatch
     bytes: int
 
 
+@contextmanager
+def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
+    """Open a part of a recording; what goes wrong while it is read is raised with its name.
+
+    Raises:
+        UnreadableRecording: the file is missing, is no recording, or is broken.
+    """
+    try:
+        with path.open("rb") as recording:
+            scan = scan_recording(recording)
+            if scan is None:
+                raise ValueError("this is no recording")
+            yield recording, scan
+    except OSError as error:
+        raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
+    except (ValueError, MalformedMessage) as error:
+        raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error
+
+
 def chunks(recording: BinaryIO, scan: Scan) -> Iterator[Chunk | None]:
-    """Yield for each whole frame the chunk in it; None for one that is none of a recording's.
+    """Yield for each whole frame the chunk in it; None for a frame without one.
 
     Raises:
         ValueError: a frame is not what it claims to be.
@@ -78,7 +108,7 @@ def chunks(recording: BinaryIO, scan: Scan) -> Iterator[Chunk | None]:
             raise ValueError(f"frame {number} of {scan.frames}: {error or 'torn'}") from error
 
 
-def column(batch: Any, name: str, kind: Any) -> Any:  # noqa: ANN401 - pyarrow has no types
+def column(batch: pa.RecordBatch, name: str, kind: pa.DataType) -> pa.Array | None:
     """Return a column of a batch; None where there is none.
 
     Raises:
@@ -104,7 +134,7 @@ def _chunk(body: bytes) -> Chunk | None:
     return Chunk(identifier, entity, bool(_number(message, IS_STATIC, 0)), batch, len(content))
 
 
-def _unpacked(message: Fields) -> Any:  # noqa: ANN401 - a buffer of pyarrow
+def _unpacked(message: Fields) -> pa.Buffer:
     packing, packed = _number(message, PACKING, NOT_PACKED), _bytes(message, ARROW)
     if packing == NOT_PACKED:
         return pa.py_buffer(packed)
@@ -116,7 +146,7 @@ def _unpacked(message: Fields) -> Any:  # noqa: ANN401 - a buffer of pyarrow
     return pa.decompress(packed, decompressed_size=claimed, codec="lz4_raw")
 
 
-def _batch(content: Any) -> Any:  # noqa: ANN401 - pyarrow has no types
+def _batch(content: pa.Buffer) -> pa.RecordBatch:
     """Return the one batch of rows in an Arrow stream."""
     messages = pa.ipc.MessageReader.open_stream(content)
     schema = pa.ipc.read_schema(messages.read_next_message())
@@ -139,7 +169,7 @@ def _check_not_compressed(flat: bytes) -> None:
 
 
 def _slot(flat: bytes, table: int, number: int) -> int:
-    """Return where a field of a Flatbuffers table stands; 0 where it is left out."""
+    """Return the offset of a field of a Flatbuffers table; 0 where it is left out."""
     about = table - struct.unpack_from("<i", flat, table)[0]
     size = struct.unpack_from("<H", flat, about)[0]
     place = 4 + 2 * number

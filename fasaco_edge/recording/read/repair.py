@@ -162,7 +162,7 @@ def view(paths: Sequence[Path]) -> None:
 
     Raises:
         MissingExtra: rerun is not installed.
-        ProcessEnded: the viewer cannot be shown, for want of a screen, say.
+        ProcessEnded: the viewer cannot be shown, without a screen, for example.
     """
     if importlib.util.find_spec("rerun") is None:
         raise MissingExtra("the viewer comes with rerun, which is not installed")
@@ -182,7 +182,7 @@ def _whole_part(path: Path) -> Iterator[Path]:
 
     Raises:
         ValueError: it is no recording.
-        OSError: it cannot be read, or there is no room for the copy.
+        OSError: it cannot be read, or there is no space for the copy.
     """
     with path.open("rb") as recording:
         scan = scan_recording(recording)

@@ -1,4 +1,4 @@
-"""The parts of one run, read once: what was plotted, its states, its log, its samples.
+"""The parts of one run, read once: its plots, states, log and samples.
 
 Pictures are passed over chunk by chunk, so that memory does not grow with them.
 """
@@ -14,20 +14,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecording
+from fasaco_edge.errors import DifferentRuns
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.frames import Chunk, chunks, column
-from fasaco_edge.recording.read.repair import Scan, scan_recording
-from fasaco_edge.recording.read.samples import HINT, Batch, blobs, wall_ns
+from fasaco_edge.recording.read.frames import Chunk, chunks, column, open_part
+from fasaco_edge.recording.read.samples import Batch, batches_of, no_samples
 from fasaco_edge.recording.sdk import pa
-from fasaco_edge.samples.codec import place_of
 
 SCALAR, STATE, TEXT = "Scalars:scalars", "StateChange:state", "TextLog:text"
 READ = ("metrics/", "state/", "log/")
 # What is kept of a file, unpacked, is at most so many times its size, and this [bytes].
-MOST_RATIO, LEAST_ROOM_BYTES = 16, 16_000_000
+MOST_RATIO, LEAST_BYTES = 16, 16_000_000
 
-Told = tuple[int, str]
+TimedText = tuple[int, str]
 """When [ns], and what."""
 
 
@@ -51,7 +49,7 @@ class RunRecord:
         began_ns, ended_ns: first and last time on the timeline ``wall`` [ns].
         plots: float64 (n, 2) of each plotted entity: when, since ``began_ns`` [s], and its value.
         states: of each state entity when it was entered, and what it was.
-        log: of each log entity when, and what was said.
+        log: of each log entity when, and the text.
         batches: samples, for ``RecordedSamples.of``.
     """
 
@@ -60,8 +58,8 @@ class RunRecord:
     began_ns: int
     ended_ns: int
     plots: Mapping[str, NDArray[np.float64]]
-    states: Mapping[str, tuple[Told, ...]]
-    log: Mapping[str, tuple[Told, ...]]
+    states: Mapping[str, tuple[TimedText, ...]]
+    log: Mapping[str, tuple[TimedText, ...]]
     batches: tuple[Batch, ...]
 
 
@@ -71,7 +69,11 @@ def count_frames(paths: Sequence[Path]) -> int:
     Raises:
         UnreadableRecording: a file is missing, or is no recording.
     """
-    return sum(_scan(path).frames for path in paths)
+    count = 0
+    for path in paths:
+        with open_part(path) as (_, scan):
+            count += scan.frames
+    return count
 
 
 def read_run_record(paths: Sequence[Path], advance: Callable[[], None]) -> RunRecord:
@@ -85,15 +87,15 @@ def read_run_record(paths: Sequence[Path], advance: Callable[[], None]) -> RunRe
         UnreadableRecording: a file is missing or no recording, or there are no samples.
         DifferentRuns: the parts are not of one run.
     """
-    gathering = _Gathering(advance)
+    reader = _RunReader(advance)
     for path in sorted(set(paths)):
-        gathering.read(path)
-    return gathering.record()
+        reader.read(path)
+    return reader.record()
 
 
 @dataclass(slots=True)
-class _Gathering:
-    """What was read so far."""
+class _RunReader:
+    """Collects what the parts hold."""
 
     advance: Callable[[], None]
     ids: dict[str, Path] = field(default_factory=dict)
@@ -103,31 +105,25 @@ class _Gathering:
     batches: list[Batch] = field(default_factory=list)
 
     def read(self, path: Path) -> None:
-        try:
-            with path.open("rb") as recording:
-                scan = _scan(path)
-                torn = 0 if scan.has_footer else scan.torn_bytes
-                self.parts.append(PartFile(path, scan.total_bytes, torn, scan.has_footer))
-                room = MOST_RATIO * scan.total_bytes + LEAST_ROOM_BYTES
-                for chunk in chunks(recording, scan):
-                    self.advance()
-                    if chunk is not None:
-                        self.ids.setdefault(chunk.recording_id, path)
-                        room -= self._take(chunk, path)
-                        if room < 0:
-                            raise ValueError(f"unpacks to more than {MOST_RATIO} times its size")
-        except OSError as error:
-            raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
-        except (ValueError, MalformedMessage) as error:
-            raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error
+        with open_part(path) as (recording, scan):
+            torn = 0 if scan.has_footer else scan.torn_bytes
+            self.parts.append(PartFile(path, scan.total_bytes, torn, scan.has_footer))
+            left_bytes = MOST_RATIO * scan.total_bytes + LEAST_BYTES
+            for chunk in chunks(recording, scan):
+                self.advance()
+                if chunk is not None:
+                    self.ids.setdefault(chunk.recording_id, path)
+                    left_bytes -= self._take(chunk, path)
+                    if left_bytes < 0:
+                        raise ValueError(f"unpacks to more than {MOST_RATIO} times its size")
 
     def _take(self, chunk: Chunk, path: Path) -> int:
         """Take a chunk; return how many bytes of it are kept."""
         entity, batch = chunk.entity, chunk.batch
         if entity == entities.INPUTS:
-            self.batches += [Batch(place_of(body), body, path) for body in blobs(batch)]
+            self.batches += batches_of(chunk, path)
         elif entity.startswith(READ) and not chunk.is_static and batch.num_rows:
-            times = wall_ns(batch)
+            times = _wall_ns(batch)
             self.span += [min(times), max(times)]
             values = [value[0] if value else None for value in _values(batch)]
             self.rows[entity] += [
@@ -145,10 +141,7 @@ class _Gathering:
                 + ", ".join(f"{path} of {name}" for name, path in sorted(self.ids.items()))
             )
         if not self.batches:
-            where = ", ".join(str(part.path) for part in self.parts)
-            raise UnreadableRecording(
-                f"{where}: holds no samples", hint="recordings of this release and later ones do"
-            )
+            raise no_samples(part.path for part in self.parts)
         began = min(self.span, default=0)
         for rows in self.rows.values():
             rows.sort(key=lambda row: row[0])
@@ -169,7 +162,7 @@ class _Gathering:
                 seconds = [(1e-9 * (at - began), float(value)) for at, value in rows]
                 yield entity, np.array(seconds, np.float64).reshape(-1, 2)
 
-    def _texts(self, prefix: str) -> dict[str, tuple[Told, ...]]:
+    def _texts(self, prefix: str) -> dict[str, tuple[TimedText, ...]]:
         return {
             entity: tuple((at, str(value)) for at, value in rows)
             for entity, rows in self.rows.items()
@@ -177,21 +170,19 @@ class _Gathering:
         }
 
 
-def _values(batch: Any) -> list[Any]:  # noqa: ANN401 - pyarrow has no types
+def _wall_ns(batch: pa.RecordBatch) -> list[int]:
+    """Return when the rows of a record batch were logged [ns]."""
+    found = column(batch, entities.WALL, pa.timestamp("ns"))
+    if found is None:
+        raise ValueError(f"rows without the timeline {entities.WALL}")
+    times: list[int] = found.cast(pa.int64()).to_pylist()
+    return times
+
+
+def _values(batch: pa.RecordBatch) -> list[list[Any] | None]:
     for component, kind in ((SCALAR, pa.float64()), (STATE, pa.string()), (TEXT, pa.string())):
         found = column(batch, component, pa.list_(kind))
         if found is not None:
-            values: list[Any] = found.to_pylist()
+            values: list[list[Any] | None] = found.to_pylist()
             return values
     return []
-
-
-def _scan(path: Path) -> Scan:
-    try:
-        with path.open("rb") as recording:
-            scan = scan_recording(recording)
-    except OSError as error:
-        raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
-    if scan is None:
-        raise UnreadableRecording(f"{path}: this is no recording", hint=HINT)
-    return scan

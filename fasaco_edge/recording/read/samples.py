@@ -1,27 +1,24 @@
-"""What the mission heard, read back from a recording: byte for byte, in order, part by part.
+"""The samples that the mission took, read back from a recording: byte for byte, in order.
 
-The files are not touched, whoever wrote them and however that ended: of a torn one, or one
-that is still being written, the whole frames are read.
+The files are not changed: of one that is torn, or still being written, the whole frames are read.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.frames import chunks, column
-from fasaco_edge.recording.read.repair import scan_recording
+from fasaco_edge.recording.read.frames import HINT, Chunk, chunks, column, open_part
 from fasaco_edge.recording.sdk import pa
 from fasaco_edge.samples.codec import Place, SampleDecoder, place_of
 
-HINT = "name the .rrd files that a recorder has written"
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
 
 
@@ -49,10 +46,7 @@ class RecordedSamples:
         batches = [batch for path in paths for batch in _batches(path)]
         # One part alone may have none: its recorder was killed when it had just begun.
         if paths and not batches:
-            files = ", ".join(str(path) for path in paths)
-            raise UnreadableRecording(
-                f"{files}: holds no samples", hint="recordings of this release and later ones do"
-            )
+            raise no_samples(paths)
         self._take(batches)
 
     @classmethod
@@ -83,7 +77,7 @@ class RecordedSamples:
             except MalformedMessage as error:
                 raise UnreadableRecording(f"{batch.path}: {error}", hint=HINT) from error
             for numbered in samples:
-                # A part begins with samples that the one before it may have told already.
+                # A part begins with samples in force that the one before it may hold already.
                 if numbered.number < following:
                     continue
                 # What came before the first part that is given is not missed.
@@ -93,40 +87,31 @@ class RecordedSamples:
                 yield numbered.arrival
 
 
-def _batches(path: Path) -> list[Batch]:
-    try:
-        with path.open("rb") as recording:
-            scan = scan_recording(recording)
-            if scan is None:
-                raise ValueError("this is no recording")
-            bodies = [
-                body
-                for chunk in chunks(recording, scan)
-                if chunk is not None and chunk.entity == entities.INPUTS
-                for body in blobs(chunk.batch)
-            ]
-        return [Batch(place_of(body), body, path) for body in bodies]
-    except OSError as error:
-        raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
-    except (ValueError, MalformedMessage) as error:
-        raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error
-
-
-def blobs(batch: Any) -> Iterator[bytes]:  # noqa: ANN401 - pyarrow has no types
-    """Yield the batches of samples in a record batch of the entity ``inputs``."""
-    found = column(batch, COMPONENT, pa.list_(pa.uint8()))
-    for blob in found if found is not None else ():
-        yield np.asarray(blob.values, np.uint8).tobytes()
-
-
-def wall_ns(batch: Any) -> list[int]:  # noqa: ANN401 - pyarrow has no types
-    """Return when the rows of a record batch were logged [ns].
+def batches_of(chunk: Chunk, path: Path) -> list[Batch]:
+    """Return the batches of samples in a chunk of the entity ``inputs`` of the file ``path``.
 
     Raises:
-        ValueError: they have no such times.
+        ValueError: the chunk holds something else.
+        MalformedMessage: a batch is broken.
     """
-    found = column(batch, entities.WALL, pa.timestamp("ns"))
-    if found is None:
-        raise ValueError(f"rows without the timeline {entities.WALL}")
-    times: list[int] = found.cast(pa.int64()).to_pylist()
-    return times
+    found = column(chunk.batch, COMPONENT, pa.list_(pa.uint8()))
+    bodies = [np.asarray(blob.values, np.uint8).tobytes() for blob in found or ()]
+    return [Batch(place_of(body), body, path) for body in bodies]
+
+
+def no_samples(paths: Iterable[Path]) -> UnreadableRecording:
+    """Return the error of files that hold no samples."""
+    files = ", ".join(str(path) for path in paths)
+    return UnreadableRecording(
+        f"{files}: holds no samples", hint="recordings of this release and later ones do"
+    )
+
+
+def _batches(path: Path) -> list[Batch]:
+    with open_part(path) as (recording, scan):
+        return [
+            batch
+            for chunk in chunks(recording, scan)
+            if chunk is not None and chunk.entity == entities.INPUTS
+            for batch in batches_of(chunk, path)
+        ]

@@ -1,5 +1,6 @@
-"""Where a drawing's zero lies: a viewer draws in float32, which tells a UTM northing to half a
-metre. Far from 0 everything is drawn from whole kilometres near the first place that is heard of.
+"""The origin of all drawings: a viewer draws in float32, half a metre coarse at a UTM northing.
+
+Far from 0 everything is drawn relative to whole kilometres near the first place that came.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
 from fasaco_edge.wire.status import PathAttachment, Rectangle
 
-# Nearer to 0 than this float32 tells a millimetre, and nothing is moved [m].
+# Nearer to 0 than this float32 resolves a millimetre, and nothing is moved [m].
 NEAR_M = 10_000.0
 STEP_M = 1_000.0
 
@@ -54,7 +55,7 @@ class Anchor:
         return replace(message, xy=message.xy - np.array((self.x, self.y)), yaw=message.yaw)
 
     def attachment(self, about: PathAttachment) -> PathAttachment:
-        """Return what came with a path, with the rectangle of its reason where that is drawn."""
+        """Return a path's attachment, with the rectangle of its reason where that is drawn."""
         changed = about.changed
         if not self or changed is None:
             return about

@@ -3,7 +3,7 @@
 A grid's row 0 has the smallest y, an image's row 0 is its top: every grid is
 flipped here, and nowhere else.
 
-How curves and states look stands here, too: static, logged once.
+The looks of curves and states are static, logged once.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr
@@ -23,7 +23,6 @@ from fasaco_edge.wire.coverage import BLOCKED, COVERED, RECOVERED, TO_COVER
 from fasaco_edge.wire.pheromone import PheromoneMessage
 
 Colour = tuple[int, int, int]
-Bounds = tuple[float, float, float, float]
 
 ROBOT_COLOUR: Colour = (220, 38, 38)
 HEADING_COLOUR: Colour = (250, 204, 21)
@@ -32,7 +31,7 @@ RECOVERED_COLOUR: Colour = (245, 140, 40)
 BLOCKED_COLOUR: Colour = (120, 120, 130)
 LABEL_COLOUR: Colour = (255, 255, 255)
 
-# Heights [m] only say what lies on what: the eye looks down from far above.
+# Heights [m] only order the layers: the eye looks down from far above.
 ROBOT_Z, LABEL_Z = 0.06, 0.1
 MAP_ORDER, COVERAGE_ORDER = 0.0, 1.0
 
@@ -54,7 +53,7 @@ WINDOW = LineStyle((219, 39, 119), z=0.055, width=2.0)
 OLD_PATH = LineStyle((196, 181, 253), z=0.03, width=0.8)
 PATH = LineStyle((124, 58, 237), z=0.04, width=1.2)
 DIRECTION = LineStyle((226, 232, 240), z=0.03, width=1.2)
-TRAIL = LineStyle((5, 150, 105), z=0.05, width=1.6)
+DRIVEN = LineStyle((5, 150, 105), z=0.05, width=1.6)
 
 
 def map_archetype(grid: OccupancyGrid) -> rr.GridMap:
@@ -88,7 +87,7 @@ def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D
 
 
 def strip_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:
-    """Return points [m] float64 (n, 2) as a line whose looks stand apart: ``style_archetype``."""
+    """Return points [m] float64 (n, 2) as a line without its style: see ``style_archetype``."""
     points = np.column_stack((xy, np.full(len(xy), style.z)))
     return rr.LineStrips3D.from_fields(strips=[points])
 
@@ -115,7 +114,7 @@ def no_label_archetype() -> rr.Points3D:
 
 
 def style_archetype(style: LineStyle) -> rr.LineStrips3D:
-    """Return how lines look that say nothing of it themselves."""
+    """Return the style of lines that come without one."""
     return rr.LineStrips3D.from_fields(colors=[style.colour], radii=[-style.width])
 
 
@@ -136,8 +135,8 @@ def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def pose_archetype(pose: Pose2D) -> rr.Transform3D:
     """Return the robot's place."""
-    turn = rr.RotationAxisAngle([0.0, 0.0, 1.0], pose.yaw)
-    return rr.Transform3D(translation=[pose.x, pose.y, ROBOT_Z], rotation=turn)
+    rotation = rr.RotationAxisAngle([0.0, 0.0, 1.0], pose.yaw)
+    return rr.Transform3D(translation=[pose.x, pose.y, ROBOT_Z], rotation=rotation)
 
 
 def body_archetypes(radius_m: float) -> tuple[rr.Ellipsoids3D, rr.LineStrips3D]:
@@ -241,7 +240,7 @@ STATES: dict[str, dict[str, int]] = {
 def log_styles(writer: RecordingWriter) -> None:
     """Log names and colours of all curves and states."""
     writer.log_static(entities.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-    writer.log_static(entities.TRAIL, style_archetype(TRAIL))
+    writer.log_static(entities.DRIVEN_PATH, style_archetype(DRIVEN))
     for entity, name, colour in CURVES:
         line = rr.SeriesLines(names=name, colors=colour, widths=1.5, interpolation_mode="StepAfter")
         writer.log_static(entity, line)

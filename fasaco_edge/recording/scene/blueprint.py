@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
+from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
 
-Bounds = tuple[float, float, float, float]
-
 # Before there is a map [m].
 NO_MAP: Bounds = (-5.0, -5.0, 5.0, 5.0)
-# Room for the map to grow a little before the eye moves, and for a label above the field.
+# Space for the map to grow a little before the eye moves, and for a label above the field.
 MARGIN, PHEROMONE_MARGIN = 1.1, 1.3
 # Rerun's vertical field of view, and the shapes (width / height) that the spatial views have
 # in this layout at 1280 x 720.
@@ -45,14 +44,14 @@ def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
 
 def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
-        # Above it stands where the world lies in the map's frame: too far for float32, perhaps.
+        # Its parent may lie too far away for float32.
         origin=f"/{entities.WORLD}",
         name="Map, coverage and path",
         contents=["/world/**", f"- /{entities.PHEROMONE}/**", f"- /{entities.DIRECTIONS}/**"],
         eye_controls=_eye_above(bounds, MARGIN, VIEW_ASPECT),
         line_grid=False,
         background=MAP_BACKGROUND,
-        overrides={entities.TRAIL: _last(TRAIL_S), entities.MAP_CHANGE: _last(CHANGE_S)},
+        overrides={entities.DRIVEN_PATH: _last(TRAIL_S), entities.MAP_CHANGE: _last(CHANGE_S)},
     )
 
 
@@ -103,7 +102,7 @@ def _states() -> rrb.StateTimelineView:
 
 
 def _log() -> rrb.TextLogView:
-    # Of a time there is room for a digit only: the line says where in the log it is now.
+    # A column of times would be a digit wide; the cursor shows the time.
     columns = rrb.TextLogColumns(
         timeline_columns=[rrb.encodings.TimelineColumn(entities.WALL, visible=False)],
         text_log_columns=[rrb.encodings.TextLogColumn("Body")],

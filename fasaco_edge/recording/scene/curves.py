@@ -1,9 +1,7 @@
-"""Figures over time: a figure that stays what it was is not drawn again and again.
+"""Curves of figures over time: a figure is drawn only where it changes.
 
-An entity that is drawn once a second takes five megabytes an hour, whatever is drawn: the
-recording is flushed as often, and each flush begins a chunk for each entity.
-
-The numbers of statuses as curves: what changes from second to second, and no state tells.
+An entity drawn once a second takes five megabytes an hour, whatever is drawn: the recording is
+flushed as often, and each flush begins a chunk for each entity.
 """
 
 from __future__ import annotations
@@ -21,8 +19,8 @@ from fasaco_edge.wire.status import PathAttachment, Status
 # A curve goes on as a step (``styles``); at the latest after so long it is drawn anyway, so
 # that a part, and what follows a gap, soon has all of them.
 PERIOD_NS = 60_000_000_000
-# Latencies and memory tremble: by less than this share of them nothing has changed.
-TREMBLE = 0.1
+# Noise of latencies and memory, as a share of them: by less nothing has changed.
+NOISE = 0.1
 
 
 @dataclass(slots=True)
@@ -39,13 +37,13 @@ class Curves:
         self._writer = writer
         self._curves: dict[str, _Curve] = {}
 
-    def draw(self, entity: str, value: float, tremble: float = 0.0, spacing_ns: int = 0) -> None:
+    def draw(self, entity: str, value: float, noise: float = 0.0, spacing_ns: int = 0) -> None:
         """Draw ``value`` where it differs from the one drawn.
 
         Args:
             entity: what to draw it as.
             value: the figure as it is now.
-            tremble: the share of it by which it has to differ by more.
+            noise: the share of it by which it has to differ at least.
             spacing_ns: the least time from one drawn to the next [ns].
         """
         now_ns = self._writer.wall_ns
@@ -54,7 +52,7 @@ class Curves:
             curve = self._curves[entity] = _Curve(value, now_ns, value)
         else:
             curve.last = value
-            same = abs(value - curve.drawn) <= tremble * abs(curve.drawn)
+            same = abs(value - curve.drawn) <= noise * abs(curve.drawn)
             if now_ns - curve.drawn_ns < (PERIOD_NS if same else spacing_ns):
                 return
         self._draw(entity, curve)
@@ -72,9 +70,9 @@ class Curves:
 
 # Counts that go on and on are drawn no more often than this.
 COUNT_SPACING_NS = 30_000_000_000
-# Processor time is told as a share of so many seconds at least.
+# Processor time is averaged over at least so many seconds.
 LEAST_SHARE_S = 30.0
-# By the contract there are some dozens; another's may not fill the recording.
+# The contract has some dozens; those of another daemon must not fill the recording.
 MOST_CODES = 50
 _CODE = re.compile(r"[a-z_]{1,40}")
 
@@ -87,17 +85,17 @@ class StatusFigures:
 
     def __init__(self, curves: Curves) -> None:
         self._curves = curves
-        # Uptime and processor time [s] where the share under way begins.
+        # Uptime and processor time [s] at the beginning of the current average.
         self._since: tuple[float, float] | None = None
 
     def add(self, status: Status) -> None:
-        """Draw what a status says in numbers."""
+        """Draw the numbers of a status."""
         for name, milliseconds in asdict(status.latency_ms).items():
             if milliseconds is not None:
-                self._curves.draw(f"{entities.LATENCY}/{name}", milliseconds, TREMBLE)
+                self._curves.draw(f"{entities.LATENCY}/{name}", milliseconds, NOISE)
         # No process has a memory of 0, or no threads: a daemon that does not send them.
         if status.rss_mb:
-            self._curves.draw(f"{entities.MEMORY}/planner", status.rss_mb, TREMBLE)
+            self._curves.draw(f"{entities.MEMORY}/planner", status.rss_mb, NOISE)
         if status.uptime_s:
             self._add_processor(status.uptime_s, status.cpu_s)
         if status.threads:
@@ -125,7 +123,7 @@ class StatusFigures:
         elif uptime_s - since[0] >= LEAST_SHARE_S:
             percent = 100 * (cpu_s - since[1]) / (uptime_s - since[0])
             self._since = uptime_s, cpu_s
-            self._curves.draw(entities.PROCESSOR, percent, TREMBLE)
+            self._curves.draw(entities.PROCESSOR, percent, NOISE)
 
     def _draw(self, entity: str, count: int) -> None:
         self._curves.draw(entity, count, spacing_ns=COUNT_SPACING_NS)

@@ -73,7 +73,7 @@ POINT_BYTES = 2 * 12
 
 
 class PathDrawing:
-    """Draws paths into a writer, each as soon as the allowance of its layer lets it."""
+    """Draws paths, each as soon as the allowance of its layer lets it."""
 
     def __init__(self, writer: RecordingWriter, layers: Layers) -> None:
         self._writer = writer
@@ -82,7 +82,7 @@ class PathDrawing:
         self._count = 0
         self._has_window = False
         self._directions = np.zeros((0, 2, 2))
-        # Which of the paths is drawn, and its line.
+        # Number and line of the path that is drawn.
         self._drawn: tuple[int, NDArray[np.float64] | None] = (0, None)
 
     def add(self, message: PathMessage, about: PathAttachment) -> None:
@@ -116,7 +116,7 @@ class PathDrawing:
         self._writer.log(entities.DIRECTIONS, archetype, latched=True, size=lines.nbytes)
 
     def _draw_window(self, changed: Rectangle | None, reason: str) -> None:
-        """Draw which part of the map the path is because of; nothing where it is not of the map."""
+        """Draw the part of the map that led to the path; nothing where none did."""
         if changed is not None:
             bounds = changed.x_min, changed.y_min, changed.x_max, changed.y_max
             box = draw.box_archetype(bounds, draw.WINDOW)
@@ -156,7 +156,7 @@ PERIOD_NS = 2_000_000_000
 
 
 class DrivenPathDrawing:
-    """Draws the trail piece by piece into a writer, each when it is there to be seen."""
+    """Draws the driven path piece by piece."""
 
     def __init__(self, writer: RecordingWriter) -> None:
         self._writer = writer
@@ -180,23 +180,23 @@ class DrivenPathDrawing:
         if len(self._piece) < 2:
             return
         self._drawn_ns = self._writer.wall_ns
-        piece = draw.strip_archetype(np.array(self._piece), draw.TRAIL)
-        self._writer.log(entities.TRAIL, piece)
+        piece = draw.strip_archetype(np.array(self._piece), draw.DRIVEN)
+        self._writer.log(entities.DRIVEN_PATH, piece)
         # The next piece begins where this one ends.
         self._piece = self._piece[-1:]
 
 
-# How far above the field its label stands, as a share of the field's height.
+# How far above the field its label is, as a share of the field's height.
 LABEL_ABOVE = 0.1
-# A range that grows by less than this is still told as it was.
+# A range that grows by less than this factor is not updated.
 SLACK = 1.1
 
 
 class PheromoneDrawing:
-    """Draws pheromone into a writer as soon as the allowance of its layer lets it.
+    """Draws pheromone as soon as the allowance of its layer lets it.
 
     Attributes:
-        trail_range: least and greatest trail of all fields so far; None before the first.
+        pheromone_range: least and greatest pheromone of all fields so far; None before the first.
     """
 
     def __init__(self, writer: RecordingWriter, layers: Layers, curves: Curves) -> None:
@@ -204,7 +204,7 @@ class PheromoneDrawing:
         self._layers = layers
         self._curves = curves
         self._cohorts = 0
-        self.trail_range: tuple[float, float] | None = None
+        self.pheromone_range: tuple[float, float] | None = None
 
     def add(self, message: PheromoneMessage) -> None:
         """Draw the pheromone after a cohort, and plot the best walk so far."""
@@ -223,16 +223,16 @@ class PheromoneDrawing:
         self._layers.draw(entities.PHEROMONE, size, draw_pheromone, self._writer.wall_ns)
         self._curves.draw(entities.BEST_STEPS, message.best_steps)
         # The levels' scale: with it they can be turned back into trails.
-        self._curves.draw(f"{entities.TRAIL_RANGE}/min", message.trail_min)
-        self._curves.draw(f"{entities.TRAIL_RANGE}/max", message.trail_max)
+        self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
+        self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
         self._widen(message.trail_min, message.trail_max)
 
     def _widen(self, least: float, most: float) -> None:
         if most <= 0:
             return  # no cell is coverable
-        low, high = self.trail_range or (least, most)
-        if self.trail_range is None or least * SLACK < low or most > high * SLACK:
-            self.trail_range = min(least, low), max(most, high)
+        low, high = self.pheromone_range or (least, most)
+        if self.pheromone_range is None or least * SLACK < low or most > high * SLACK:
+            self.pheromone_range = min(least, low), max(most, high)
 
 
 def _cohort_line(message: PheromoneMessage) -> str:

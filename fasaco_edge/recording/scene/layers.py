@@ -1,10 +1,8 @@
-"""What a new map says otherwise than the one before it, and how far the known map reaches.
+"""Layers of a recording: what a new map changed, and how often large layers are drawn.
 
-Large things are drawn no faster than a recording may grow: a map of a million pixels, a
-path of ten thousand cells.
-
-Each layer has an allowance. As long as there is some left, what comes is drawn at once;
-else the newest waits until the allowance has grown again. What came in between is not drawn.
+Maps of a million pixels and paths of ten thousand cells are drawn no faster than a recording may
+grow. Each layer has an allowance. While some of it is left, what comes is drawn at once; else the
+newest waits until the allowance has grown again, and what came in between is not drawn.
 """
 
 from __future__ import annotations
@@ -17,23 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import GridGeometry, Window
-from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
+from fasaco_edge.grid.geometry import Bounds, GridGeometry, Window
+from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid, marked_window
 from fasaco_edge.recording import entities
-
-Bounds = tuple[float, float, float, float]
 
 # Crossing it, a pixel has become an obstacle or ceased to be one [percent].
 OCCUPIED_FROM = 50
 # Rasters further apart than this are not compared [pixels].
 RASTER_TOLERANCE_PX = 0.01
-BLOCK_PIXELS = 1_000_000
-
-
-def known_bounds(grid: OccupancyGrid) -> Bounds | None:
-    """Return (x_min, y_min, x_max, y_max) [m] of what is known; None where nothing is."""
-    window = _window_of(grid.cells.shape, lambda rows: grid.cells[rows] != UNKNOWN)
-    return _bounds(grid.geometry, window) if window else None
 
 
 def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None:
@@ -58,22 +47,10 @@ def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None
         marked: NDArray[np.bool_] = turned & (old[rows] != UNKNOWN) & (new[rows] != UNKNOWN)
         return marked
 
-    window = _window_of(new.shape, changed)
+    window = marked_window(new.shape, changed)
     if window is None:
         return None
-    row, col = common.row0, common.col0
-    moved = Window(window.row0 + row, window.col0 + col, window.row1 + row, window.col1 + col)
-    return _bounds(after.geometry, moved)
-
-
-def union(one: Bounds | None, other: Bounds) -> Bounds:
-    """Return the least rectangle around both."""
-    if one is None:
-        return other
-    least, most = map(min, one[:2], other[:2]), map(max, one[2:], other[2:])
-    x0, y0 = least
-    x1, y1 = most
-    return x0, y0, x1, y1
+    return after.geometry.bounds(window.moved(common.row0, common.col0))
 
 
 def _raster_shift(before: GridGeometry, after: GridGeometry) -> tuple[int, int] | None:
@@ -85,26 +62,6 @@ def _raster_shift(before: GridGeometry, after: GridGeometry) -> tuple[int, int] 
     if max(abs(col - round(col)), abs(row - round(row))) > RASTER_TOLERANCE_PX:
         return None
     return round(row), round(col)
-
-
-def _window_of(
-    shape: tuple[int, ...], marked: Callable[[slice], NDArray[np.bool_]]
-) -> Window | None:
-    """Return the window of what is marked, some rows at a time: a mask of all is another map."""
-    some, found = max(BLOCK_PIXELS // max(shape[1], 1), 1), None
-    for start in range(0, shape[0], some):
-        mask = marked(slice(start, start + some))
-        rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-        if len(rows):
-            here = Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
-            found = Window.around(found, here.moved(start, 0))
-    return found
-
-
-def _bounds(geometry: GridGeometry, window: Window) -> Bounds:
-    corner = geometry.to_map(window.col0, window.row0)
-    origin = type(geometry.origin)(*corner, geometry.origin.yaw)
-    return GridGeometry(window.rows, window.cols, geometry.resolution, origin).bounds()
 
 
 BURST_S = 60.0

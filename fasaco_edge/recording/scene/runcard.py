@@ -1,4 +1,4 @@
-"""The run card: what a stranger has to know before looking at the rest."""
+"""The run card: the settings of a run and a legend, for whoever opens its recording."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.status import Settings
 
-# Settings that say most about a run come first, the others by name.
+# The most important settings come first, the others by name.
 FIRST = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
 
 HEAD = (
@@ -46,7 +46,7 @@ class RunDescription:
         began: when the recording began, UTC, as text.
         version: of the planner; "" while unknown.
         config: its configuration, as its status gives it.
-        trail_range: least and greatest pheromone of all fields; None while there is none.
+        pheromone_range: least and greatest pheromone of all fields; None while there is none.
         anchor: place (x, y) [m] in the map's frame that is drawn at 0; None for 0 itself.
     """
 
@@ -54,7 +54,7 @@ class RunDescription:
     began: str
     version: str = ""
     config: Settings = field(default_factory=dict)
-    trail_range: tuple[float, float] | None = None
+    pheromone_range: tuple[float, float] | None = None
     anchor: tuple[float, float] | None = None
 
     @property
@@ -68,8 +68,8 @@ class RunDescription:
         settings = {
             name.replace(".", "_"): str(value) for name, value in flat_settings(self.config)
         }
-        if self.trail_range:
-            least, most = self.trail_range
+        if self.pheromone_range:
+            least, most = self.pheromone_range
             known |= {"trail_min": f"{least:.6g}", "trail_max": f"{most:.6g}", "trail": LEVELS}
         if self.anchor:
             x, y = self.anchor
@@ -83,8 +83,8 @@ class RunDescription:
             ("began", self.began),
             ("version", self.version or "unknown until the first status"),
         ]
-        if self.trail_range:
-            least, most = self.trail_range
+        if self.pheromone_range:
+            least, most = self.pheromone_range
             rows.append(("pheromone", f"{least:.3g} to {most:.3g}, log scale"))
         if self.anchor:
             x, y = self.anchor
@@ -94,12 +94,11 @@ class RunDescription:
         return f"{self._head()}\n\n{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"
 
     def _head(self) -> str:
-        """Return in a line what is asked for first."""
-        told = {name.rpartition(".")[2]: value for name, value in flat_settings(self.config)}
-        facts = [f"{text} {_cell(told[name])}{unit}" for name, text, unit in HEAD if name in told]
-        return ", ".join(
-            [f"**{_cell(self.robot)}**", f"version {_cell(self.version or 'unknown')}", *facts]
-        )
+        """Return the settings that matter most, in a line."""
+        settings = {name.rpartition(".")[2]: value for name, value in flat_settings(self.config)}
+        facts = [f"{text} {_cell(settings[name])}{m}" for name, text, m in HEAD if name in settings]
+        robot, version = _cell(self.robot), _cell(self.version or "unknown")
+        return ", ".join([f"**{robot}**", f"version {version}", *facts])
 
 
 def flat_settings(config: Settings, prefix: str = "") -> Iterator[tuple[str, str | float]]:

@@ -8,23 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.errors import PatchWithoutBase
-from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.grid.geometry import Bounds, Pose2D, StampedPose, union_bounds
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, known_bounds
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.anchor import Anchor
 from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
-from fasaco_edge.recording.scene.curves import TREMBLE, Curves, StatusFigures
+from fasaco_edge.recording.scene.curves import NOISE, Curves, StatusFigures
 from fasaco_edge.recording.scene.drawings import DrivenPathDrawing, PathDrawing, PheromoneDrawing
-from fasaco_edge.recording.scene.layers import (
-    Bounds,
-    Layers,
-    changed_bounds,
-    known_bounds,
-    size_in_file,
-    union,
-)
+from fasaco_edge.recording.scene.layers import Layers, changed_bounds, size_in_file
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
@@ -99,14 +92,14 @@ class Scene:
         self._draw_grid(self._map.patched(patch))
 
     def add_pose(self, stamped: StampedPose) -> None:
-        """Move the robot, and draw its trail."""
+        """Move the robot, and draw its path."""
         pose = self._anchored(stamped.pose).pose(stamped.pose)
         self._writer.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
         self._driven.add(pose.x, pose.y)
 
     def add_command(self, command: str) -> None:
         """Log the name of a command that the mission has taken."""
-        self._say(entities.MISSION_LOG, f"command: {command}")
+        self.add_line(entities.MISSION_LOG, f"command: {command}")
 
     def add_path(self, message: PathMessage, about: PathAttachment) -> None:
         """Draw the path to drive, over the one before it, and log why it came."""
@@ -138,8 +131,8 @@ class Scene:
     def add_pheromone(self, message: PheromoneMessage) -> None:
         """Draw the pheromone after a cohort, and plot the best walk so far."""
         self._pheromone.add(self._anchored(message.geometry.origin).pheromone(message))
-        if self._pheromone.trail_range != self._run.trail_range:
-            self._run = replace(self._run, trail_range=self._pheromone.trail_range)
+        if self._pheromone.pheromone_range != self._run.pheromone_range:
+            self._run = replace(self._run, pheromone_range=self._pheromone.pheromone_range)
             self._describe()
 
     def add_status(self, status: Status) -> None:
@@ -154,7 +147,7 @@ class Scene:
     def add_report(self, report: Recorder) -> None:
         """Show the recorder's own state and memory."""
         self.enter(entities.RECORDER_STATE, report.state, report.reason)
-        self._curves.draw(f"{entities.MEMORY}/recorder", report.rss_mb, TREMBLE)
+        self._curves.draw(f"{entities.MEMORY}/recorder", report.rss_mb, NOISE)
 
     def enter(self, entity: str, state: str, reason: str = "") -> None:
         """Show that ``entity`` is in ``state`` from now on; log it where there is a reason."""
@@ -165,11 +158,11 @@ class Scene:
         if reason:
             recorder = entity == entities.RECORDER_STATE
             log = entities.RECORDER_LOG if recorder else entities.MISSION_LOG
-            self._say(log, f"{state}: {reason}")
+            self.add_line(log, f"{state}: {reason}")
 
-    def complain(self, log: str, message: str) -> None:
-        """Log something that went wrong."""
-        self._say(log, message, "WARN")
+    def add_line(self, log: str, message: str, level: str = "INFO") -> None:
+        """Add a line to a log."""
+        self._writer.log(log, rr.TextLog(message, level=level))
 
     def catch_up(self) -> None:
         """Draw what had to wait; call it often."""
@@ -188,7 +181,7 @@ class Scene:
         self._layers.draw(layer, size, draw_it, self._writer.wall_ns)
 
     def _anchored(self, place: Pose2D) -> Anchor:
-        """Return where 0 is drawn; say so with the first place, where that is far away."""
+        """Return the origin of drawings, logged with the first place where that is far away."""
         if self._anchor is None:
             self._anchor = anchor = Anchor.near(place.x, place.y)
             if anchor:
@@ -199,10 +192,9 @@ class Scene:
         return self._anchor
 
     def _frame(self, grid: OccupancyGrid) -> None:
-        bounds = known_bounds(grid)
+        self._known = bounds = union_bounds(self._known, known_bounds(grid))
         if bounds is None:
             return
-        self._known = bounds = union(self._known, bounds)
         if self._framed is None or _is_far(self._framed, bounds):
             self._framed = bounds
             self._writer.show(build_blueprint(bounds))
@@ -234,17 +226,14 @@ class Scene:
     def _add_restored(self, restored: int) -> None:
         if restored != self._restored:
             self._restored = restored
-            self._say(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
+            self.add_line(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
 
     def _add_errors(self, errors: ErrorCounts) -> None:
         # Fewer than before: the planner was started again.
         if errors.total > self._errors:
             last = errors.last or "no text"
-            self._say(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")
+            self.add_line(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")
         self._errors = errors.total
-
-    def _say(self, log: str, message: str, level: str = "INFO") -> None:
-        self._writer.log(log, rr.TextLog(message, level=level))
 
 
 def _is_far(framed: Bounds, bounds: Bounds) -> bool:

@@ -1,7 +1,4 @@
-"""The time of a recording.
-
-Between Zenoh's threads and the one that writes: bounded memory, order of arrival.
-"""
+"""The queue between Zenoh's threads and the one that writes, and the clock of a recording."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ from fasaco_edge.wire.topics import NEWEST, TOPICS
 
 
 class RunClock:
-    """UTC [ns] that never steps: a clock set during a run must not tear its timeline."""
+    """UTC [ns] that never steps: a clock set during a run must not break its timeline."""
 
     def __init__(self) -> None:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
@@ -34,8 +31,7 @@ class RunClock:
 # So many samples waiting mean that the writer is behind: some ten seconds of poses.
 BEHIND_SAMPLES = 1024
 
-# What a sample makes worthless when the writer is behind. A full map also clears the updates of
-# the one before it.
+# What a sample supersedes when the writer is behind; a full map also the updates before it.
 SUPERSEDED = {
     topic.name: frozenset({topic.name}) for topic in TOPICS if topic.queues.recorder == NEWEST
 }
@@ -45,8 +41,8 @@ SUPERSEDED["map"] |= {"map_update"}
 class Inbox:
     """Samples in order of arrival, at most ``capacity_bytes`` of them.
 
-    Once the writer is behind, what is newer takes the place of the older of its kind;
-    once there is no room, samples are dropped. Both are counted as lost.
+    Once the writer is behind, a sample replaces the older ones that it supersedes; once the
+    capacity is used up, samples are dropped. Both are counted as lost.
     """
 
     def __init__(self, capacity_bytes: int, stamp: Callable[[str, Sample], Arrival]) -> None:
@@ -58,13 +54,13 @@ class Inbox:
         self._lost: Counter[str] = Counter()
 
     def post(self, topic: str, sample: Sample) -> None:
-        """Leave a sample; safe from any thread, never waits for the writer."""
+        """Add a sample; safe from any thread, never waits for the writer."""
         size = sample.size
         with self._changed:
             # Stamped here, so that of samples on several threads none is before an earlier one.
             arrival = self._stamp(topic, sample)
             if len(self._waiting) >= BEHIND_SAMPLES or 2 * (self._bytes + size) > self._capacity:
-                self._forget(SUPERSEDED.get(arrival.topic, frozenset()))
+                self._drop(SUPERSEDED.get(arrival.topic, frozenset()))
             if self._bytes + size > self._capacity:
                 self._lost[arrival.topic] += 1
                 return
@@ -88,7 +84,7 @@ class Inbox:
         with self._changed:
             return self._lost.copy()
 
-    def _forget(self, topics: frozenset[str]) -> None:
+    def _drop(self, topics: frozenset[str]) -> None:
         self._lost.update(arrival.topic for arrival in self._waiting if arrival.topic in topics)
         kept = deque(arrival for arrival in self._waiting if arrival.topic not in topics)
         self._bytes = sum(arrival.sample.size for arrival in kept)

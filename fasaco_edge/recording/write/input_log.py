@@ -1,8 +1,8 @@
-"""What the mission heard, byte for byte, beside what is drawn of it.
+"""The mission's inputs in a recording, byte for byte, beside what is drawn of them.
 
 Samples are gathered for almost a second and written as one blob, past rerun's own batches: a kill
-costs no more. Each part begins with what is in force, told as a whole, so that it can be
-read without the parts before it.
+loses no more than that. Each part begins with all that is in force, so that it can be read without
+the parts before it.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from fasaco_edge.wire.status import Status
 from fasaco_edge.wire.topics import RECORDED_INPUTS
 
 # These hold for the moment they come alone; all other inputs stay in force.
-PASSING: Final = ("pose", "command", "turns")
+TRANSIENT: Final = ("pose", "command", "turns")
 PERIOD_NS = 900_000_000
 STATUS_PERIOD_NS = 15_000_000_000
 WAITING_BYTES = 4_000_000
-# Each node that has some tells them once.
+# Each node publishes its own once.
 MOST_STATIC = 64
 # Updates since the last full map; with more of them a part begins without the map.
 IN_FORCE_BYTES = 8_000_000
@@ -36,8 +36,8 @@ IN_FORCE_BYTES = 8_000_000
 class InputLog:
     """Writes samples into a writer; for the writer's thread only.
 
-    Of paths only a digest is kept, of statuses those that tell something new, and one in
-    ``STATUS_PERIOD_NS``: how far the mission is, is known so exactly whatever comes.
+    Of paths only a digest is kept; of statuses those with news, and one in ``STATUS_PERIOD_NS``,
+    so that the progress of the mission is known at least as exactly.
     """
 
     def __init__(self, writer: RecordingWriter, run: int) -> None:
@@ -47,11 +47,11 @@ class InputLog:
         self._part = 0
         self._lost = 0
         self._next_ns = 0
-        self._told: tuple[object, ...] = ()
-        self._told_ns = 0
+        self._logged: tuple[object, ...] = ()
+        self._logged_ns = 0
 
     def add(self, arrival: Arrival) -> None:
-        """Take a sample, if it is one that matters."""
+        """Take a sample, if it is an input of the mission."""
         if arrival.topic == "path":
             arrival = _path_digest(arrival)
         elif arrival.topic not in RECORDED_INPUTS and not self._is_news(arrival):
@@ -73,7 +73,7 @@ class InputLog:
             self.write()
 
     def finish(self) -> None:
-        """Write what is left; a part begun just before the end gets a batch, too."""
+        """Write what remains; a part begun just before the end gets a batch, too."""
         part = self._writer.part_number
         self._write(in_any_case=part > 1 and part != self._part)
 
@@ -87,7 +87,7 @@ class InputLog:
             self._encoder.restart(self._in_force.samples())
         batch = self._encoder.take(in_any_case=in_any_case)
         if batch and not self._writer.write_blob(batch):
-            # What is not there, nothing can be told by.
+            # Nothing can refer to what was not written.
             self._part = 0
 
     def _is_news(self, arrival: Arrival) -> bool:
@@ -99,20 +99,20 @@ class InputLog:
             return False
         # A map in it: the mission has begun.
         has_map = status.map is not None
-        told = (
+        news = (
             *(status.state, has_map, status.version, status.config),
             sorted(status.errors.by_code),
             status.ledger.fault,
             status.recorder and status.recorder.state,
         )
-        if told == self._told and arrival.at_ns - self._told_ns < STATUS_PERIOD_NS:
+        if news == self._logged and arrival.at_ns - self._logged_ns < STATUS_PERIOD_NS:
             return False
-        self._told, self._told_ns = told, arrival.at_ns
+        self._logged, self._logged_ns = news, arrival.at_ns
         return True
 
 
 def _path_digest(arrival: Arrival) -> Arrival:
-    """Return what stands for a path: thousands of points are many bytes, and no input."""
+    """Return a digest in place of a path: its points are many bytes, and no input."""
     payload = arrival.sample.payload
     with contextlib.suppress(MalformedMessage):
         payload = decode_path(payload).xy.tobytes()
@@ -155,6 +155,6 @@ class _InForce:
             self._updates, self._updates_bytes = [], 0
 
     def samples(self) -> list[Numbered]:
-        newest = [numbered for topic, numbered in self._newest.items() if topic not in PASSING]
+        newest = [numbered for topic, numbered in self._newest.items() if topic not in TRANSIENT]
         held = (*newest, *self._static.values(), *self._updates)
         return sorted(held, key=lambda numbered: numbered.number)

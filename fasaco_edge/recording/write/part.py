@@ -1,13 +1,4 @@
-"""What holds at a moment of a recording: each part begins with it, so that it can be read alone.
-
-One file of a recording, from its first byte to its footer.
-
-What rerun's streams leave behind in a process that outlives many of them (rerun 0.41).
-
-A stream that nobody holds any more keeps two threads and half a megabyte until it is swept up.
-Of each blueprint that is sent another stream stays that holds itself: for ever, if nobody
-disconnects it.
-"""
+"""One file of a recording, from its first byte to its footer."""
 
 from __future__ import annotations
 
@@ -23,69 +14,11 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-import rerun_bindings as bindings
 
 from fasaco_edge.host.files import open_own
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import repair_recording, scan_recording
-from fasaco_edge.recording.sdk import rr, rrb
-
-
-class LatchedState:
-    """Static data, the newest of what is latched, name, properties, layout and times.
-
-    Attributes:
-        wall_ns: the time of what is logged next [ns].
-    """
-
-    def __init__(self, name: str, blueprint: rrb.Blueprint) -> None:
-        self.wall_ns = 0
-        self.blueprint = blueprint
-        self.name = name
-        self.properties: dict[str, str] = {}
-        self.static: dict[str, tuple[rr.AsComponents, ...]] = {}
-        self.sequences: dict[str, int] = {}
-        self._latched: dict[str, rr.AsComponents] = {}
-        self._missed_ns: dict[str, int] = {}
-
-    def latch(self, entity: str, archetype: rr.AsComponents, *, missed: bool) -> None:
-        """Keep what is in force from now on; ``missed``: it was not written."""
-        self._latched[entity] = archetype
-        if missed:
-            self._missed_ns[entity] = self.wall_ns
-
-    def begin(self, stream: rr.RecordingStream) -> None:
-        """Begin a part with all that holds."""
-        send_blueprint(stream, self.blueprint)
-        self.send_description(stream)
-        for entity, archetypes in self.static.items():
-            stream.log(entity, *archetypes, static=True)
-        self.send_latched(stream)
-
-    def send_description(self, stream: rr.RecordingStream) -> None:
-        """Write name and properties."""
-        stream.send_recording_name(self.name)
-        if self.properties:
-            stream.send_property(entities.APPLICATION, rr.AnyValues(**self.properties))
-
-    def send_latched(self, stream: rr.RecordingStream) -> None:
-        """Write what is latched, what was missed at the time it came."""
-        for entity, archetype in self._latched.items():
-            # What came while nothing was written is in force since then.
-            self._set_times(stream, self._missed_ns.get(entity, self.wall_ns))
-            stream.log(entity, archetype)
-        self._missed_ns.clear()
-        self.set_times(stream)
-
-    def set_times(self, stream: rr.RecordingStream) -> None:
-        """Set the times of what is logged next."""
-        self._set_times(stream, self.wall_ns)
-
-    def _set_times(self, stream: rr.RecordingStream, wall_ns: int) -> None:
-        stream.set_time(entities.WALL, timestamp=np.datetime64(wall_ns, "ns"))
-        for timeline, number in self.sequences.items():
-            stream.set_time(timeline, sequence=number)
-
+from fasaco_edge.recording.sdk import rr
 
 LOG = logging.getLogger(__name__)
 
@@ -109,7 +42,7 @@ class Flush(enum.Enum):
 class Part:
     """A file being written.
 
-    Rerun's logging calls never fail: what became of the data only ``flush`` can tell.
+    Rerun's logging calls never fail: only ``flush`` shows what became of the data.
 
     Attributes:
         refused: why the disk has not taken the first message; then only ``abandon`` is left to do.
@@ -201,7 +134,7 @@ class Part:
         os.close(self._lock)
 
     def _has_footer(self) -> bool:
-        """Tell whether the file was ended; where it could not be, rerun does not say so."""
+        """Return whether the file was ended; rerun does not report where it could not be."""
         try:
             with os.fdopen(os.dup(self._lock), "rb") as file:
                 if not stat.S_ISREG(os.fstat(self._lock).st_mode):
@@ -209,14 +142,14 @@ class Part:
                 scan = scan_recording(file, self._flushed_bytes)
         except OSError:
             return False
-        # Behind it stands where it begins.
+        # The footer is followed by its place in the file.
         return scan is not None and scan.has_footer and scan.torn_bytes > 0
 
     def abandon(self) -> None:
         """Save of a broken part what can be read: what was flushed, or nothing.
 
         Behind a frame that the disk took half of, rerun may still have written others, once there
-        was room again: nothing tells them from the rest of that frame.
+        was space again: they cannot be told from the rest of that frame.
         The stream stays: to disconnect it, or to let go of it, may hang for ever (rerun 0.41).
         """
         os.close(self._lock)
@@ -245,7 +178,7 @@ class Part:
 
 
 def _disk_error(error: RuntimeError, path: Path) -> OSError:
-    """Return what the computer said, which rerun tells in words: "... (os error 28)"."""
+    """Return the system's error, which rerun gives as text: "... (os error 28)"."""
     number = re.search(r"\(os error (\d+)\)", str(error))
     if number is None:
         return OSError(str(error))
@@ -263,24 +196,3 @@ def _locked(path: Path) -> int:
     lock = open_own(path, os.O_RDONLY | os.O_NONBLOCK)
     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     return lock
-
-
-def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None:
-    """Send a blueprint as ``rr.send_blueprint`` does, and let go of what it was written with."""
-    native = bindings.new_blueprint(
-        application_id=entities.APPLICATION,
-        make_default=False,
-        make_thread_default=False,
-        default_enabled=True,
-    )
-    written = rr.RecordingStream._from_native(native)
-    written.set_time("blueprint", sequence=0)
-    blueprint._log_to_stream(written)
-    storage = written.memory_recording().storage
-    bindings.send_blueprint(storage, True, True, recording=stream.to_native())
-    written.disconnect()
-
-
-def sweep() -> None:
-    """Free what nobody holds any more; flushes all there are, so none may hang."""
-    bindings.flush_and_cleanup_orphaned_recordings()

@@ -1,11 +1,8 @@
-"""The recordings of a folder: what the next run is called, which part is older, which ones go.
+"""Disk space for recordings: names and age of runs, deletion of old parts, free space.
 
-A run has a number one above the highest there is, before anything else in its name: clocks go
-backward, on a computer without a battery for its clock at each start, and numbers do not. Only
-parts that a recorder of this robot has named are deleted, only where no recorder writes them, and
-nothing else that lies in the folder.
-
-The room that recordings may take, on their disk and in all.
+A run's name begins with a number above the highest there is: clocks go backward, on a computer
+without a battery for its clock at each start, and numbers do not. Only parts that a recorder of
+this robot has named are deleted, only where no recorder writes them, and no other file.
 """
 
 from __future__ import annotations
@@ -23,10 +20,14 @@ from fasaco_edge.errors import BadConfiguration
 
 NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
 TIME = "%Y%m%dT%H%M%SZ"
+# Free space beyond the least before recording goes on: the disk must not fill again at once.
+RESUME_BYTES = 1_000_000
+
+LOG = logging.getLogger(__name__)
 
 
 def next_run(folder: Path, robot: str, began: datetime) -> str:
-    """Return what a run of ``robot`` that begins now is called: it is younger than all there are.
+    """Return the name of a run of ``robot`` that begins now, newer than all there are.
 
     Raises:
         BadConfiguration: the folder cannot be read.
@@ -41,7 +42,7 @@ def next_run(folder: Path, robot: str, began: datetime) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """How much the recordings of ``robot`` in a folder may take [bytes]; 0 for no limit."""
+    """How many bytes the recordings of ``robot`` in a folder may take; 0 for no limit."""
 
     robot: str
     most_bytes: int
@@ -68,15 +69,15 @@ class Quota:
 def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
     """Return the parts of a robot's recordings, each with its size [bytes], the oldest first.
 
-    Runs without a number, as they were called once, are older than those with one. Among
-    themselves they are as old as what was written to them last: by its file's time, or by the name
-    where that is later, as that of a copy may be.
+    Runs with a name of an earlier release, without a number, are older than the others. Among
+    themselves they are ordered by their last write: the file's time, or the time in the name where
+    that is later, as it may be for a copy.
 
     Raises:
         OSError: the folder cannot be read.
     """
     named = re.compile(
-        # Only where there was no number, a second run within a second was told by one behind.
+        # Without a number in front, a second run within a second has one behind.
         r"(?P<run>(?:run(?P<order>\d{5,9})-)?(?P<when>\d{8}T\d{6}Z)-"
         rf"{re.escape(robot)}(?(order)|(?:-(?P<again>\d+))?))-part(?P<number>\d+)\.rrd"
     )
@@ -112,7 +113,7 @@ def _time(when: str) -> float:
 
 
 def _delete(path: Path) -> bool:
-    """Delete a part; False where somebody writes it: they hold a lock on it."""
+    """Delete a part; return False where a recorder writes it, which holds a lock on it."""
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -124,18 +125,15 @@ def _delete(path: Path) -> bool:
     return True
 
 
-LOG = logging.getLogger(__name__)
-
-# Room beyond the floor before recording goes on: not to fill the disk again at once.
-RESUME_BYTES = 1_000_000
-
-
 @dataclass(frozen=True, slots=True)
 class DiskBudget:
-    """How much a part may take, and how much the disk must keep free [bytes].
+    """When a part ends, how much the disk must keep free, and what all recordings may take.
 
-    A part older than ``part_s`` [s] is followed by the next, too, 0 for never; ``quota`` limits
-    what all take.
+    Attributes:
+        part_bytes: a part larger than this is followed by the next.
+        least_free_bytes: what must stay free on the disk.
+        part_s: a part older than this is followed by the next [s]; 0 for never.
+        quota: of all recordings of the robot.
     """
 
     part_bytes: int
@@ -144,11 +142,11 @@ class DiskBudget:
     quota: Quota | None = None
 
     def is_full(self, folder: Path) -> bool:
-        """Tell whether less is free in ``folder`` than must be."""
+        """Return whether less is free in ``folder`` than must be."""
         return _free_bytes(folder) < self.least_free_bytes
 
     def may_begin(self, folder: Path) -> bool:
-        """Tell whether there is room enough to go on."""
+        """Return whether enough is free to go on."""
         return _free_bytes(folder) >= self.least_free_bytes + RESUME_BYTES
 
     def keep_quota(self, folder: Path) -> None:
@@ -168,5 +166,5 @@ def _free_bytes(folder: Path) -> int:
     try:
         return shutil.disk_usage(folder).free
     except OSError:
-        # The folder, or the disk it was on, is gone: no room there until it is back.
+        # The folder, or the disk it was on, is gone: nothing is free there until it is back.
         return 0

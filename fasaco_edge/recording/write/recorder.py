@@ -1,7 +1,7 @@
-"""The recorder: a process of its own that writes down what is said on the bus.
+"""The recorder: a process of its own that records the samples on the bus.
 
-Nothing it does, or fails to do, can delay the planner. Zenoh's threads only
-post; one thread decodes, draws and writes.
+Nothing it does, or fails to do, can delay the planner. Zenoh's threads only post; one thread
+decodes, draws and writes.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from fasaco_edge.bus.arrival import Arrival
@@ -26,9 +27,9 @@ from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
 from fasaco_edge.recording.write.inbox import Inbox, RunClock
 from fasaco_edge.recording.write.input_log import InputLog
-from fasaco_edge.recording.write.live import serve_live
 from fasaco_edge.recording.write.quota import DiskBudget, Quota, next_run
 from fasaco_edge.recording.write.settings import RecorderSettings
+from fasaco_edge.recording.write.streams import serve_live
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant, encode_json
@@ -41,10 +42,10 @@ from fasaco_edge.wire.status import Recorder as RecorderReport
 
 TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000
-# The planner speaks once a second.
+# The daemon publishes a status once a second.
 SILENCE_NS = 3_500_000_000
-# Of all that waits when the end comes, so much time is for writing [ns].
-LAST_WORDS_NS = 300_000_000
+# How long the samples that wait at the end may take to be written [ns].
+LAST_SAMPLES_NS = 300_000_000
 EXIT_STALLED = 1
 
 
@@ -94,17 +95,21 @@ class Recorder:
         description = RunDescription(settings.robot, f"{began:%Y-%m-%d %H:%M:%S} UTC")
         self._scene = Scene(self._writer, description)
         self._inbox = Inbox(settings.queue_bytes, self._clock.arrival)
-        self._readers: dict[str, Callable[[Sample], None]] = {
-            "map": self._read_map,
-            "map_update": self._read_map_update,
-            "pose": self._read_pose,
-            "tf_static": lambda sample: self._read_pose(sample, "tf_static"),
-            "command": self._read_command,
+        self._drawers: dict[str, Callable[[Sample], None]] = {
+            "map": lambda sample: self._scene.add_map(decode_occupancy_grid(sample.payload)),
+            "map_update": lambda sample: self._scene.add_map_update(
+                decode_map_update(sample.payload)
+            ),
+            "pose": self._draw_pose,
+            "tf_static": partial(self._draw_pose, is_static=True),
+            "command": self._draw_command,
             "turns": lambda _: None,  # for a replay, which reads the inputs
-            "path": self._read_path,
-            "coverage": self._read_coverage,
-            "pheromone": self._read_pheromone,
-            "status": self._read_status,
+            "path": self._draw_path,
+            "coverage": lambda sample: self._scene.add_coverage(
+                decode_occupancy_grid(sample.payload)
+            ),
+            "pheromone": lambda sample: self._scene.add_pheromone(decode_pheromone(sample.payload)),
+            "status": self._draw_status,
         }
         self._poses = PoseDecoder(settings.pose_schema, settings.frames)
         self._messages = 0
@@ -115,7 +120,7 @@ class Recorder:
         self._reporter: Publisher = bus.advertise(settings.keys, topics.RECORDER)
 
     def listen(self) -> None:
-        """Subscribe to everything there is to record, and say that the recorder is there."""
+        """Subscribe to everything there is to record, and declare that the recorder is there."""
         settings, keys = self._settings, self._settings.keys
         for ros in settings.ros:
             self._subscribe(ros.topic, ros.key, ros.latched, ros.depth, ros.schema)
@@ -125,7 +130,7 @@ class Recorder:
         self._bus.token(keys.of(topics.RECORDER_ALIVE))
 
     def step(self, timeout_s: float) -> None:
-        """Write what came within ``timeout_s`` [s], find out whether it is written, report."""
+        """Write what came within ``timeout_s`` [s], check that it is written, report."""
         arrivals = deque(self._inbox.take(timeout_s))
         while arrivals:  # what is written is let go
             self._write(arrivals.popleft())
@@ -135,17 +140,17 @@ class Recorder:
         self._sync()
         self._scene.catch_up()
         self._watch_planner()
-        self._tell(self._writer.state.value, self._writer.reason)
+        self._report_state(self._writer.state.value, self._writer.reason)
 
     def end(self) -> bool:
-        """Write the last words and the footer; False where the disk does not take them."""
-        deadline_ns = time.monotonic_ns() + LAST_WORDS_NS
+        """Write what waits and the footer; False where the disk does not take them."""
+        deadline_ns = time.monotonic_ns() + LAST_SAMPLES_NS
         for arrival in self._inbox.take(0.0):
             if time.monotonic_ns() < deadline_ns:
                 self._write(arrival)
         self._writer.at(self._clock.now_ns())
         self._inputs.finish()
-        self._tell("stopping", "asked to end")
+        self._report_state("stopping", "asked to end")
         self._scene.finish()
         return self._writer.close()
 
@@ -156,7 +161,7 @@ class Recorder:
 
     def note(self, line: str) -> None:
         """Log something that went wrong before the recording began."""
-        self._scene.complain(entities.RECORDER_LOG, line)
+        self._scene.add_line(entities.RECORDER_LOG, line, "WARN")
 
     def _subscribe(
         self, topic: str, key: str, latched: bool = False, depth: int = 1, schema: str = ""
@@ -177,44 +182,31 @@ class Recorder:
         self._writer.message(arrival.wall_ns)
         if arrival.topic == "status" and _is_rival(arrival.sample.payload):
             line = "another daemon of this robot's name is there, and waits: it is not recorded"
-            self._scene.complain(entities.BUS_LOG, line)
+            self._scene.add_line(entities.BUS_LOG, line, "WARN")
             return
         self._inputs.add(arrival)
         try:
-            self._readers[arrival.topic](arrival.sample)
+            self._drawers[arrival.topic](arrival.sample)
         except FasacoError as error:
             self._malformed += 1
-            # A publisher gone wrong is so at every message: log the 1st, 2nd, 4th, 8th ...
+            # A faulty publisher is so with every message: log the 1st, 2nd, 4th, 8th ...
             if self._malformed & (self._malformed - 1) == 0:
                 line = f"{self._malformed} malformed, the last on {arrival.sample.key}: {error}"
-                self._scene.complain(entities.BUS_LOG, line)
+                self._scene.add_line(entities.BUS_LOG, line, "WARN")
 
-    def _read_map(self, sample: Sample) -> None:
-        self._scene.add_map(decode_occupancy_grid(sample.payload))
-
-    def _read_map_update(self, sample: Sample) -> None:
-        self._scene.add_map_update(decode_map_update(sample.payload))
-
-    def _read_pose(self, sample: Sample, topic: str = "pose") -> None:
-        is_static = topic == "tf_static"
+    def _draw_pose(self, sample: Sample, *, is_static: bool = False) -> None:
         pose = self._poses.decode(sample.payload, sample.schema, is_static=is_static)
         if pose is not None:
             self._scene.add_pose(pose)
 
-    def _read_command(self, sample: Sample) -> None:
+    def _draw_command(self, sample: Sample) -> None:
         self._scene.add_command(str(decode_json(sample.payload).get("command", "")))
 
-    def _read_path(self, sample: Sample) -> None:
+    def _draw_path(self, sample: Sample) -> None:
         about = decode_tolerant(sample.attachment, PathAttachment)
         self._scene.add_path(decode_path(sample.payload), about)
 
-    def _read_coverage(self, sample: Sample) -> None:
-        self._scene.add_coverage(decode_occupancy_grid(sample.payload))
-
-    def _read_pheromone(self, sample: Sample) -> None:
-        self._scene.add_pheromone(decode_pheromone(sample.payload))
-
-    def _read_status(self, sample: Sample) -> None:
+    def _draw_status(self, sample: Sample) -> None:
         self._last_status_ns = time.monotonic_ns()
         self._scene.add_status(decode_tolerant(sample.payload, Status))
 
@@ -223,7 +215,7 @@ class Recorder:
         if last is not None and time.monotonic_ns() - last > SILENCE_NS:
             self._scene.enter(entities.MISSION_STATE, "silent", "the planner says nothing any more")
 
-    def _tell(self, state: str, reason: str) -> None:
+    def _report_state(self, state: str, reason: str) -> None:
         """Report on the bus and in the recording: on change, and once a second."""
         now_ns = time.monotonic_ns()
         last = self._report

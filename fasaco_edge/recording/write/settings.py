@@ -16,12 +16,12 @@ MEGABYTE = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class RosInput:
-    """A topic of ROS 2 that the mission hears.
+    """A topic of ROS 2 that the mission subscribes to.
 
     Attributes:
         topic: what it is for the mission: "map", "map_update", "pose" or "tf_static".
         key: Zenoh's; may hold wildcards.
-        schema: type of its messages, which ROS does not say.
+        schema: type of its messages, which ROS does not send.
         latched: whether who joins late gets the last samples.
         depth: how many.
     """
@@ -46,11 +46,11 @@ class RecorderSettings:
         frames: the map's and the robot's, where poses come as transforms.
         pose_schema: message type of poses that come without one, as under ROS 2.
         part_bytes: a part larger than this is followed by the next.
-        part_s: and so is one that is older [s]; 0 for never. What rerun keeps of each part until
-            its footer is written takes a megabyte a minute.
-        quota_bytes: the recordings of this robot in ``out`` take at most about so much: the
-            oldest parts are deleted, never the one being written; 0 for no limit.
-        least_free_bytes: recording pauses while the disk has less room than this.
+        part_s: and so is one that is older [s]; 0 for never. Until the footer of a part is written
+            rerun's index of it grows by a megabyte a minute.
+        quota_bytes: about the most that the recordings of this robot in ``out`` take: the oldest
+            parts are deleted, never the one being written; 0 for no limit.
+        least_free_bytes: recording pauses while less than this is free on the disk.
         serve: address and port to serve live viewers at; None for nowhere.
         queue_bytes: samples waiting to be written take at most this much memory.
 

@@ -1,8 +1,7 @@
-"""A recording over its parts: what is logged survives rotation, and a full or stalled disk.
+"""A recording over its parts: data survive rotation, and a full or stalled disk.
 
-The writer remembers static data and the newest value of what is latched. Each
-part begins with them, so that each can be read alone; all share one recording
-id, so that a viewer shows them as one run.
+The writer keeps static data and the newest value of what is latched. Each part begins with them,
+so that it can be read alone; all share one recording id, so that a viewer shows them as one run.
 """
 
 from __future__ import annotations
@@ -14,22 +13,23 @@ from pathlib import Path
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording.sdk import rr, rrb
-from fasaco_edge.recording.write.part import Flush, LatchedState, Part, send_blueprint, sweep
+from fasaco_edge.recording.write.part import Flush, Part
 from fasaco_edge.recording.write.quota import DiskBudget
+from fasaco_edge.recording.write.streams import LatchedState, send_blueprint, sweep
 
 LOG = logging.getLogger(__name__)
 
 # What a kill -9 costs, with what a flush takes. Each entity begins a chunk with each flush, and
 # a chunk takes more than a kilobyte.
 FLUSH_PERIOD_NS = 900_000_000
-# While nothing can be written, how often to look whether it can again.
+# While nothing can be written, how often to try again.
 RETRY_PERIOD_NS = 1_000_000_000
-# Each part that was given up has left threads and memory behind: the next tries take their time.
+# Each part given up leaves threads and memory behind: further tries come at longer intervals.
 MOST_DOUBLINGS = 5
-# Rerun's own queue has no bound: no more than this may wait in it between two flushes.
+# Rerun's own queue has no bound: at most this waits in it between two flushes.
 FLUSH_BYTES = 8_000_000
 FLUSH_TIMEOUT_S = 0.5
-# How long to look whether a stalled disk has come back.
+# How long to probe whether a stalled disk is back.
 PROBE_TIMEOUT_S = 0.05
 CLOSE_TIMEOUT_S = 1.2
 
@@ -80,7 +80,7 @@ class RecordingWriter:
 
     @property
     def path(self) -> Path | None:
-        """The part being written; None while there is no room for one."""
+        """The part being written; None while the disk has no space for one."""
         return self._part.path if self._part else None
 
     @property
@@ -176,7 +176,7 @@ class RecordingWriter:
         self._latched.begin(live)
 
     def sync(self, now_ns: int) -> None:
-        """Find out whether all is written, and act on it; call it often.
+        """Check whether all is written, and act on it; call it often.
 
         Args:
             now_ns: a monotonic clock [ns].
@@ -188,7 +188,7 @@ class RecordingWriter:
         if self._part is None:
             self._try_again()
         elif self._is_flushed(self._part):
-            self._keep_room(self._part, now_ns)
+            self._check_space(self._part, now_ns)
         recording = self.state is WriterState.RECORDING
         retry_ns = RETRY_PERIOD_NS << min(len(self._abandoned), MOST_DOUBLINGS)
         self._next_flush_ns = now_ns + (FLUSH_PERIOD_NS if recording else retry_ns)
@@ -231,9 +231,9 @@ class RecordingWriter:
             self._latched.send_latched(part.stream)
         return True
 
-    def _keep_room(self, part: Part, now_ns: int) -> None:
+    def _check_space(self, part: Part, now_ns: int) -> None:
         if self._part_until_ns is None:
-            # Parts grow slowly: to look once in each is enough, once before there is any other.
+            # Parts grow slowly: once in each is enough.
             self._budget.keep_quota(self._folder)
             self._part_until_ns = now_ns + round(1e9 * self._budget.part_s)
         is_old = self._budget.part_s > 0 and now_ns >= self._part_until_ns

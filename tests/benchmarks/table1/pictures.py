@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
+from fasaco_edge.drawing.pictures import plot_walk
 from fasaco_edge.drawing.plot import Plot
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet, headed
-from fasaco_edge.drawing.view import View, bounds_around
-from fasaco_edge.drawing.walk import plot_walk
+from fasaco_edge.drawing.view import View
+from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.planner import ColonySnapshot
 
@@ -116,3 +117,10 @@ def draw_pheromone(
     bar = (f"{low:.3f}", f"{high:.3f}")
     scale = plot.view.scale * lattice.cell_m
     return Sheet(title, lines, (), bar, scale, unit="cells").around(plot.finished())
+
+
+def bounds_around(centres: NDArray[np.float64], cell_m: float) -> Bounds:
+    """Return the bounds of cells, n >= 1, by their centres [m], float64 (n, 2)."""
+    x0, y0 = (centres.min(axis=0) - cell_m / 2).tolist()
+    x1, y1 = (centres.max(axis=0) + cell_m / 2).tolist()
+    return x0, y0, x1, y1

@@ -1,4 +1,4 @@
-"""What a picture is printed with: half blocks in the colours there are, or plain characters."""
+"""The glyphs of a terminal: half blocks in the colours it has, or plain characters."""
 
 from __future__ import annotations
 
@@ -18,42 +18,19 @@ from fasaco_edge.watch import picture
 HALF = "▀"
 ARROWS, PLAIN_ARROWS = "→↗↑↖←↙↓↘", ">/^\\<,v."
 
-_KINDS = (
-    picture.UNKNOWN,
-    picture.FLOOR,
-    picture.TO_COVER,
-    picture.COVERED,
-    picture.RECOVERED,
-    picture.WALL,
-    picture.AHEAD,
-    picture.NEXT,
-    picture.ROBOT,
-)
-# By kind. Dark, so that the path stands out; apart in brightness, not in hue alone.
-_RGB = (
-    (20, 22, 27),
-    (46, 50, 58),
-    (98, 104, 116),
-    (24, 112, 82),
-    (176, 122, 40),
-    (214, 218, 226),
-    (72, 128, 240),
-    (255, 240, 110),
-    (222, 36, 56),
-)
-# The nearest of sixteen would be the same grey for three of them.
-_ANSI = (
-    "black",
-    "bright_black",
-    "white",
-    "green",
-    "yellow",
-    "bright_white",
-    "bright_blue",
-    "bright_magenta",
-    "red",
-)
-_PLAIN = " .-o8#+*@"
+# By kind: its colour, the ANSI colour, the plain character. Dark, so that the path stands out;
+# apart in brightness, not in hue alone. The nearest ANSI colour would be one grey for three kinds.
+_LOOKS = {
+    picture.UNKNOWN: ((20, 22, 27), "black", " "),
+    picture.FLOOR: ((46, 50, 58), "bright_black", "."),
+    picture.TO_COVER: ((98, 104, 116), "white", "-"),
+    picture.COVERED: ((24, 112, 82), "green", "o"),
+    picture.RECOVERED: ((176, 122, 40), "yellow", "8"),
+    picture.WALL: ((214, 218, 226), "bright_white", "#"),
+    picture.AHEAD: ((72, 128, 240), "bright_blue", "+"),
+    picture.NEXT: ((255, 240, 110), "bright_magenta", "*"),
+    picture.ROBOT: ((222, 36, 56), "red", "@"),
+}
 
 _SYSTEMS = {
     "standard": ColorSystem.STANDARD,
@@ -63,7 +40,7 @@ _SYSTEMS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Ink:
+class GlyphSet:
     """What a terminal can show.
 
     Attributes:
@@ -75,8 +52,8 @@ class Ink:
     unicode: bool
 
     @classmethod
-    def of(cls, console: Console) -> Ink:
-        """Return the ink of a console, which knows NO_COLOR, TERM and COLORTERM."""
+    def of(cls, console: Console) -> GlyphSet:
+        """Return the glyphs of a console, which knows NO_COLOR, TERM and COLORTERM."""
         colours = None if console.no_color else _SYSTEMS.get(console.color_system or "")
         return cls(colours, console.encoding.startswith("utf"))
 
@@ -86,7 +63,7 @@ class Ink:
         return [_line(self, a.tobytes(), b.tobytes()) for a, b in zip(upper, lower, strict=True)]
 
     def sample(self, kind: int) -> Text:
-        """Return what stands for a kind in a legend, one character."""
+        """Return the character of a kind for a legend."""
         text, above, below = _glyph(self, kind, kind)
         return Text(text, _style(self.colours, above, below) if self.colours else "")
 
@@ -119,40 +96,41 @@ class Ink:
 
 # Most lines of a picture are those of the one before.
 @lru_cache(maxsize=512)
-def _line(ink: Ink, upper: bytes, lower: bytes) -> str:
+def _line(glyphs: GlyphSet, upper: bytes, lower: bytes) -> str:
     runs: list[str] = []
     begin = 0
     for end in range(1, len(upper) + 1):
         ends = end == len(upper)
         if ends or upper[end] != upper[begin] or lower[end] != lower[begin]:
-            runs.append(_run(ink, upper[begin], lower[begin], end - begin))
+            runs.append(_run(glyphs, upper[begin], lower[begin], end - begin))
             begin = end
     return "".join(runs)
 
 
-def _run(ink: Ink, upper: int, lower: int, length: int) -> str:
-    text, above, below = _glyph(ink, upper, lower)
-    if ink.colours is None:
+def _run(glyphs: GlyphSet, upper: int, lower: int, length: int) -> str:
+    text, above, below = _glyph(glyphs, upper, lower)
+    if glyphs.colours is None:
         return text * length
-    style = _style(ink.colours, above, below)
-    return style.render(text * length, color_system=ink.colours)
+    style = _style(glyphs.colours, above, below)
+    return style.render(text * length, color_system=glyphs.colours)
 
 
-def _glyph(ink: Ink, upper: int, lower: int) -> tuple[str, int, int]:
-    """Return a character, and the kinds its ink and its paper have the colours of."""
+def _glyph(glyphs: GlyphSet, upper: int, lower: int) -> tuple[str, int, int]:
+    """Return a character, and the kinds that its foreground and background show."""
     shown = max(upper, lower)
     if shown >= picture.HEADING:
-        arrows = ARROWS if ink.unicode else PLAIN_ARROWS
+        arrows = ARROWS if glyphs.unicode else PLAIN_ARROWS
         return arrows[shown - picture.HEADING], picture.WALL, picture.ROBOT
-    if ink.colours is None:
-        return _PLAIN[shown], shown, shown
-    if not ink.unicode:
+    if glyphs.colours is None:
+        return _LOOKS[shown][2], shown, shown
+    if not glyphs.unicode:
         return " ", shown, shown
     return (" ", upper, upper) if upper == lower else (HALF, upper, lower)
 
 
-@lru_cache(maxsize=len(_KINDS) ** 2)
+@lru_cache(maxsize=len(_LOOKS) ** 2)
 def _style(colours: ColorSystem, above: int, below: int) -> Style:
+    (rgb, ansi, _), (rgb_below, ansi_below, _) = _LOOKS[above], _LOOKS[below]
     if colours is ColorSystem.STANDARD:
-        return Style(color=_ANSI[above], bgcolor=_ANSI[below])
-    return Style(color=Color.from_rgb(*_RGB[above]), bgcolor=Color.from_rgb(*_RGB[below]))
+        return Style(color=ansi, bgcolor=ansi_below)
+    return Style(color=Color.from_rgb(*rgb), bgcolor=Color.from_rgb(*rgb_below))

@@ -1,19 +1,77 @@
-"""A picture of a walk over the lattice: a line that keeps right, so there and back are two."""
+"""Pictures of a walk over the lattice, and of a whole mission: visited cells and the way taken."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.plot import Plot
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
-from fasaco_edge.drawing.view import View, bounds_of
-from fasaco_edge.drawing.visits import draw_visits
-from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.drawing.view import MAX_HEIGHT, MAX_WIDTH, View, bounds_of
+from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.lattice.reach import reachable_from
+
+
+def draw_visits(
+    plot: Plot, lattice: CoverageLattice, visits: NDArray[np.integer], start: Cell
+) -> list[KeyEntry]:
+    """Tint the lattice's cells by number of visits; return what the tints mean.
+
+    Args:
+        plot: what to draw on.
+        lattice: the planning grid.
+        visits: shape of the lattice: how often each cell was visited.
+        start: cell (row, col) from where the others can be reached or not.
+    """
+    never = lattice.coverable & (visits == 0)
+    reachable = _reachable(lattice, start)
+    left_out, unreachable = never & reachable, never & ~reachable
+
+    tints = np.array([palette.PAPER, palette.COVERED, *palette.RECOVERED], np.uint8)
+    colours = tints[np.minimum(visits, len(tints) - 1)]
+    colours[left_out] = palette.LEFT_OUT
+    plot.tint(lattice, colours)
+    plot.hatch(lattice, unreachable, palette.UNREACHABLE)
+
+    key = _visit_key(visits)
+    if left_out.any():
+        key.append(_entry("tile", palette.LEFT_OUT, "not covered", left_out))
+    if unreachable.any():
+        key.append(_entry("hatch", palette.UNREACHABLE, "unreachable", unreachable))
+    return key
+
+
+def _reachable(lattice: CoverageLattice, start: Cell) -> NDArray[np.bool_]:
+    if not lattice.contains(start) or lattice.states[lattice.local(start)] != COVERABLE:
+        # Unknown from here: no cell is called unreachable.
+        return np.ones(lattice.states.shape, np.bool_)
+    return reachable_from(lattice.steps, *lattice.local(start)).astype(np.bool_)
+
+
+def _visit_key(visits: NDArray[np.integer]) -> list[KeyEntry]:
+    key = [
+        KeyEntry("disc", palette.START, "start"),
+        KeyEntry("square", palette.END, "end"),
+        _entry("tile", palette.COVERED, "covered once", visits == 1),
+    ]
+    most = len(palette.RECOVERED) + 1
+    for times, colour in enumerate(palette.RECOVERED, start=2):
+        cells = visits >= times if times == most else visits == times
+        if cells.any():
+            label = f"{times} times or more" if times == most else f"{times} times"
+            key.append(_entry("tile", colour, label, cells))
+    return key
+
+
+def _entry(symbol: str, colour: palette.Colour, label: str, cells: NDArray[np.bool_]) -> KeyEntry:
+    return KeyEntry(symbol, colour, f"{label} ({np.count_nonzero(cells):,})")
+
 
 Points = NDArray[np.float64]
 
@@ -35,11 +93,11 @@ def lanes(points: Points, offset: float) -> tuple[Points, Points]:
     along = directions(points)
     right = np.stack([along[:, 1], -along[:, 0]], axis=1)
     cosine = (along[:-1] * along[1:]).sum(axis=1)
-    turns, back = np.abs(cosine) < 0.5, cosine <= -0.5
+    corner, back = np.abs(cosine) < 0.5, cosine <= -0.5
     at_start, at_end = right.copy(), right.copy()
     # Where it turns, the two lanes meet beside the corner.
-    at_end[:-1][turns] += right[1:][turns]
-    at_start[1:][turns] += right[:-1][turns]
+    at_end[:-1][corner] += right[1:][corner]
+    at_start[1:][corner] += right[:-1][corner]
     # Where it turns back, they are joined a little beyond the centre.
     at_end[:-1][back] += along[:-1][back]
     at_start[1:][back] += along[:-1][back]
@@ -124,7 +182,7 @@ def _draw_line(plot: Plot, centres: NDArray[np.float64], cell_m: float) -> None:
     moves[1:] = (np.diff(centres, axis=0) != 0).any(axis=1)
     points = centres[moves]
     offset = LANE_OFFSET * cell_m
-    plot.trail(*lanes(points, offset), LINE_WIDTH * cell_m)
+    plot.track(*lanes(points, offset), LINE_WIDTH * cell_m)
 
     along = directions(points)
     right = np.stack([along[:, 1], -along[:, 0]], axis=1)
@@ -133,3 +191,43 @@ def _draw_line(plot: Plot, centres: NDArray[np.float64], cell_m: float) -> None:
     every = max(ARROW_EVERY_PX / plot.view.scale, len(along) * cell_m / MOST_ARROWS)
     for place in arrow_places(points, every).tolist():
         plot.arrow(middles[place], along[place], size)
+
+
+# In cells.
+DRIVEN_WIDTH = 0.12
+
+
+def draw_mission(
+    grid: OccupancyGrid,
+    lattice: CoverageLattice,
+    driven_xy: NDArray[np.float64],
+    visits: NDArray[np.uint16],
+    *,
+    title: str,
+    lines: Sequence[str],
+    space: tuple[int, int] = (MAX_WIDTH, MAX_HEIGHT),
+    jump_m: float = math.inf,
+) -> Image.Image:
+    """Return a picture, RGB, of a mission's result.
+
+    Args:
+        grid: the map at its end.
+        lattice: the planning grid at its end.
+        driven_xy: float64 (n, 2), n >= 1: where the robot was, (x, y) [m], in order.
+        visits: uint16, shape of the lattice: how often each cell was covered.
+        title: heading.
+        lines: caption below it.
+        space: the most the map may take (width, height) [px].
+        jump_m: two places further apart than this [m] are no drive, and not joined.
+    """
+    plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m, *space))
+    plot.ground(grid)
+    start = lattice.cell_at(*driven_xy[0].tolist())
+    key = draw_visits(plot, lattice, visits, start)
+    lengths_m = np.hypot(*np.diff(driven_xy, axis=0).T)
+    driven = lengths_m <= jump_m
+    plot.track(driven_xy[:-1][driven], driven_xy[1:][driven], DRIVEN_WIDTH * lattice.cell_m)
+    plot.end_mark(driven_xy[-1])
+    plot.start_mark(driven_xy[0])
+    bar = ("0", f"{lengths_m[driven].sum():,.0f} m driven")
+    return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())

@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.recording.write.live import serve_live
+from fasaco_edge.recording.write.streams import serve_live
 from tests.support.recordings import bus_on_free_port, recorder_process
 from tests.support.scripted_mission import Mission
 
