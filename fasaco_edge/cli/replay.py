@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fasaco_edge import __version__
 from fasaco_edge.cli.console.arguments import add_command
 from fasaco_edge.cli.console.streams import print_json
 
@@ -16,9 +17,11 @@ if TYPE_CHECKING:
     from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.recording.read.samples import RecordedSamples
-    from fasaco_edge.replay.replay import Replay, ReplayStep
-    from fasaco_edge.replay.stand_ins import RecordedRun
-    from fasaco_edge.replay.turn_replay import TurnReplay
+    from fasaco_edge.replay.cycle_record import CycleRecord
+    from fasaco_edge.replay.cycle_replay import CycleReplay, Difference
+    from fasaco_edge.replay.mission_drive import ReplayStep
+    from fasaco_edge.replay.recorded_run import RecordedRun
+    from fasaco_edge.replay.replay import Replay
 
 DESCRIPTION = """\
 Play the samples of a recording to the mission again, through the same code that the
@@ -73,20 +76,19 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.cli.console import terminal
     from fasaco_edge.config.config import load_config
     from fasaco_edge.recording.read.samples import RecordedSamples
+    from fasaco_edge.replay.cycle_record import read_turns
+    from fasaco_edge.replay.cycle_replay import CycleReplay
+    from fasaco_edge.replay.recorded_run import read_run
     from fasaco_edge.replay.replay import Replay
-    from fasaco_edge.replay.stand_ins import read_run
-    from fasaco_edge.replay.summary import turn_rows, turn_summary
-    from fasaco_edge.replay.turn_record import read_turns
-    from fasaco_edge.replay.turn_replay import TurnReplay
 
     samples = RecordedSamples(args.recordings)
     recorded = read_run(samples)
     config = load_config(args.config) if args.config else recorded.daemon_config()
     is_as_it_was = args.config is None and args.work is None
     record = read_turns(samples) if is_as_it_was else None
-    replay: Replay | TurnReplay
+    replay: Replay | CycleReplay
     if record is not None:
-        replay = TurnReplay(config, record)
+        replay = CycleReplay(config, record)
     else:
         replay = Replay(config, recorded, args.work)
     began = time.monotonic()
@@ -97,12 +99,12 @@ def run(args: argparse.Namespace) -> int:
         if step.is_news:
             steps.append(step)
     summary = _summary(replay, recorded, samples, steps, last_s)
-    summary |= turn_summary(replay, record)
+    summary |= _cycle_summary(replay, record)
     code = 0 if summary["equal"] in (True, None) else 1
     if args.json:
         print_json({"decisions": [_document(step) for step in steps], "summary": summary})
         return code
-    rows = [*_rows(summary), *turn_rows(summary)]
+    rows = [*_rows(summary), *_cycle_rows(summary)]
     console = terminal.out()
     console.print(_table(steps))
     console.print(terminal.figures((name, str(value)) for name, value in rows))
@@ -145,7 +147,7 @@ def _path(update: PathUpdate) -> dict[str, Any]:
 
 
 def _summary(
-    replay: Replay | TurnReplay,
+    replay: Replay | CycleReplay,
     recorded: RecordedRun,
     samples: RecordedSamples,
     steps: Iterable[ReplayStep],
@@ -219,3 +221,68 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, object]]:
     if summary["restarts_ignored"]:
         rows.append(("daemon restarts", f"{summary['restarts_ignored']}, played as one mission"))
     return rows
+
+
+# Of samples that are not as they were taken, so many are named.
+NAMED = 5
+
+
+def _cycle_summary(replay: Replay | CycleReplay, record: CycleRecord | None) -> dict[str, Any]:
+    """Return what a replay by turns came to; ``equal`` is None of an approximate one."""
+    from fasaco_edge.replay.cycle_replay import CycleReplay
+
+    if record is None or not isinstance(replay, CycleReplay):
+        return {"equal": None}
+    then, difference = record.beginning, replay.difference
+    return {
+        "equal": difference is None and not replay.lacking and not record.gap,
+        "turns": record.turns,
+        "turns_equal": replay.turns,
+        "plans_repeated": replay.plans,
+        "difference": None if difference is None else _difference_document(difference),
+        "samples_lacking": [_difference_document(lacking) for lacking in replay.lacking],
+        "log_ends": record.gap,
+        "version": {"recorded": then.version, "replayed": __version__},
+        "kernels": {"recorded": record.kernels, "replayed": replay.kernels},
+    }
+
+
+def _cycle_rows(summary: dict[str, Any]) -> list[tuple[str, object]]:
+    """Return the summary of a replay by turns for people."""
+    if summary["equal"] is None:
+        return [("replay", "approximate: there is no turn log from the beginning, or it is unused")]
+    turns = f"{summary['turns_equal']} of {summary['turns']} turns"
+    said = "equal bit for bit" if summary["equal"] else "equal as far as can be compared"
+    if summary["difference"] is not None:
+        said = "not equal"
+    rows: list[tuple[str, object]] = [("replay", f"{said}: {turns}")]
+    if summary["difference"] is not None:
+        rows.append(("first difference", _words(summary["difference"])))
+    lacking = summary["samples_lacking"]
+    rows.extend(("sample", _words(document)) for document in lacking[:NAMED])
+    if len(lacking) > NAMED:
+        rows.append(("samples", f"{len(lacking) - NAMED} more are not as they were taken"))
+    if summary["log_ends"]:
+        rows.append(("compared up to", f"turn {summary['turns']}: {summary['log_ends']}"))
+    for name in ("version", "kernels"):
+        was, now = summary[name]["recorded"], summary[name]["replayed"]
+        if was and was != now:
+            rows.append((name, f"recorded with {was}, replayed with {now}"))
+    return rows
+
+
+def _difference_document(difference: Difference) -> dict[str, Any]:
+    return {
+        "turn": difference.turn,
+        "at_s": round(difference.at_s, 6),
+        "what": difference.what,
+        "recorded": difference.recorded,
+        "replayed": difference.replayed,
+    }
+
+
+def _words(document: dict[str, Any]) -> str:
+    return (
+        f"turn {document['turn']} at {document['at_s']:.2f} s: {document['what']} "
+        f"was {document['recorded']}, is {document['replayed']}"
+    )

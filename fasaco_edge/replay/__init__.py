@@ -1,1 +1,1 @@
-"""Recorded missions run again through the same inbox and mission."""
+"""Recorded missions run again through the daemon's inbox and mission."""

@@ -1,67 +1,42 @@
-"""A mission once more: the samples of a recording through the very same inbox and mission.
+"""Replay by time: the samples of a recording through the daemon's inbox and mission.
 
-Time is what the samples tell, and planning is counted in work, so that the same samples give
-the same decisions, bit for bit, on any machine. When the daemon took what into which step, and
-how much work its plans had time for, a recording does not tell in full. Each sample gets a
-step of its own, and between them are steps as the daemon's clock makes them; a plan that was
-recorded gets the work it had then, and comes when it came then. So where a mission went its
-usual way, the decisions are those of then.
+Time is that of the samples, and planning is counted in work, so that the same samples give the
+same decisions, bit for bit, on any machine. A recording without a turn log does not say in which
+cycle the daemon took a sample, nor how much work each plan had time for. So samples get a cycle
+of their own, and between them are cycles as the daemon's clock makes them; a plan whose path was
+recorded gets the work it had, and comes when it came. Where a mission went its usual way, the
+decisions are those of the recording.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fasaco_edge.bus.arrival import Arrival, digest
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.ledger.writer import LedgerKeeper
-from fasaco_edge.daemon.loop.batch import Received, make_mailbox, take_batch
-from fasaco_edge.daemon.loop.inbox import Inbox
+from fasaco_edge.daemon.loop.batch import Received, take_batch
 from fasaco_edge.daemon.loop.loop import TICK_S
-from fasaco_edge.daemon.startup import Startup
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.mission.core.events import CommandReceived, Decision, Event, PathUpdate
+from fasaco_edge.mission.core.events import CommandReceived, PathUpdate, PlanReady, PlanRequest
 from fasaco_edge.mission.orders.order import read_command
-from fasaco_edge.replay.stand_ins import NoDisk, RecordedRun, ReplayPlanner, SilentBus, load_mission
+from fasaco_edge.planners.planner import CoveragePlanner, ignore
+from fasaco_edge.planners.stopping import AnyOf, SearchWork, WorkLimit
+from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
+from fasaco_edge.replay.recorded_run import RecordedPath, RecordedRun
 from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.topics import COMMAND, RECORDED_INPUTS, TURNS
 
 # How long the mission goes on after the last sample [s]: plans come, patience ends.
 TAIL_S = 3.0
-# Samples this close together are taken in one step: the daemon's loop needs about as long to
+# Samples this close together are taken in one cycle: the daemon's loop needs about as long to
 # wake up.
 TOGETHER_NS = 1_000_000
-COMMAND = "command"
-
-
-@dataclass(frozen=True, slots=True)
-class ReplayStep:
-    """A step of the mission.
-
-    Attributes:
-        at_s: when, since the first sample [s].
-        state, reason: of the mission after it.
-        changed: whether the state is another than before.
-        decision: what it decided.
-        refused: samples in it that were not what they should be.
-        as_recorded: of a path, whether it leads over the very points of the one recorded
-            under its revision; None where none was.
-    """
-
-    at_s: float
-    state: str
-    reason: str
-    changed: bool
-    decision: Decision
-    refused: tuple[FasacoError, ...] = ()
-    as_recorded: bool | None = None
-
-    @property
-    def is_news(self) -> bool:
-        """Whether anything was decided, refused, or has changed."""
-        decision = self.decision
-        asked = decision.plan is not None or decision.path is not None
-        return self.changed or asked or bool(decision.faults or self.refused)
+INPUTS = frozenset(RECORDED_INPUTS) - {TURNS.name}
+# Proposals of a plan that was not recorded: about what a small computer makes in 0.1 s.
+PROPOSALS = 200_000
+# A recorded plan came at most this long after its budget [s].
+LATE_S = 2.0
 
 
 class Replay:
@@ -69,45 +44,33 @@ class Replay:
 
     Args:
         config: of the daemon to be.
-        run: what is known of the daemon that was.
+        run: what is known of the recorded daemon.
         work: proposals of each plan; None for what was recorded.
 
     Attributes:
         mission: the mission, to be looked at between steps.
-        plans: who plans.
+        plans: the planner.
     """
 
     def __init__(
         self, config: DaemonConfig, run: RecordedRun | None = None, work: int | None = None
     ) -> None:
         self._run = run or RecordedRun()
-        self._mailbox = make_mailbox(config.map.max_pixels, map_spacing_s=0.0)
-        bus = SilentBus()
-        self._inbox = Inbox(
-            bus, config.keys(), self._mailbox, config.poses(), config.map.max_pixels
-        )
-        self._heard = {*bus.heard, COMMAND}
-        self.mission, loader, planner = load_mission(config, self._mailbox)
-        self.plans = ReplayPlanner(planner, self._run, config.planner.budget_s, work)
-        keeping = LedgerKeeper(
-            NoDisk(), config.robot.tool_width_m, autostart=config.mission.autostart
-        )
-        self._startup = Startup(keeping, lambda: loader)
-        self._is_begun = False
+        self._drive = MissionDrive(config)
+        self.mission = self._drive.mission
+        self.plans = ReplayPlanner(self._drive.planner, self._run, config.planner.budget_s, work)
         self._commands = 0
-        self._state = ""
-        self._began = self._now = 0.0
+        self._now = 0.0
         self._base_ns = 0
 
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
-        """Yield each step of the mission; samples of other topics than it hears are ignored."""
-        first: Arrival | None = None
+        """Yield each cycle; samples that are no input of the mission are ignored."""
         together: list[Arrival] = []
         for arrival in samples:
-            if first is None:
-                first, self._base_ns = arrival, arrival.at_ns - arrival.wall_ns
-                self._began = self._now = 1e-9 * arrival.at_ns
-            if arrival.topic not in self._heard:
+            if self._drive.began is None:
+                self._base_ns = arrival.at_ns - arrival.wall_ns
+                self._drive.began = self._now = 1e-9 * arrival.at_ns
+            if arrival.topic not in INPUTS:
                 continue
             if together and arrival.wall_ns - together[0].wall_ns > TOGETHER_NS:
                 yield from self._take(together)
@@ -118,52 +81,50 @@ class Replay:
         yield from self._wait(self._now + TAIL_S)
 
     def _take(self, arrivals: list[Arrival]) -> Iterator[ReplayStep]:
-        """Take samples in one step, after those that come before it."""
+        """Take samples in one cycle, after those that come before it."""
         # By the wall clock, which goes on where the machine was started again.
         now = max(1e-9 * (arrivals[0].wall_ns + self._base_ns), self._now)
         yield from self._wait(now)
-        yield from self._turn(now, arrivals)
+        yield self._cycle(now, arrivals)
 
     def _wait(self, until: float) -> Iterator[ReplayStep]:
-        """Take the steps that come without a sample."""
+        """Make the cycles that come without a sample."""
         while True:
             due = self.plans.due
             tick = self._now + TICK_S
             now = tick if due is None else min(tick, max(due, self._now))
             if now >= until:
                 return
-            yield from self._turn(now)
+            yield self._cycle(now)
 
-    def _turn(self, now: float, arrivals: Sequence[Arrival] = ()) -> Iterator[ReplayStep]:
+    def _cycle(self, now: float, arrivals: Sequence[Arrival] = ()) -> ReplayStep:
         self._now = now
+        drive, mailbox = self._drive, self._drive.mailbox
         for arrival in arrivals:
-            if arrival.topic != COMMAND:
-                self._mailbox.post(arrival.topic, Received(arrival.topic, arrival.sample, now))
-        events, refused = self._inbox.decode(take_batch(self._mailbox, 0.0))
-        commands = self._read_commands(arrivals, refused)
-        if not self._is_begun:
-            refused += self._startup.take(events)
-            self._is_begun = self._is_ready() and self._startup.loaded() is not None
-            events = self._startup.held
-        if self._is_begun:
-            yield self._step([*events, *commands, *self.plans.take(now)], tuple(refused))
-            return
-        self._startup.answer(commands)
-        if refused:
-            yield ReplayStep(now - self._began, "loading", "", False, Decision(), tuple(refused))
-
-    def _is_ready(self) -> bool:
-        """Tell whether the recorded daemon had begun its mission by now."""
+            if arrival.topic != COMMAND.name:
+                mailbox.post(arrival.topic, Received(arrival.topic, arrival.sample, now))
+        commands, refused = self._read_commands(arrivals)
+        batch = take_batch(mailbox, 0.0)
         ready_ns = self._run.ready_ns
-        return ready_ns is None or self._now >= 1e-9 * ready_ns
+        may_begin = ready_ns is None or now >= 1e-9 * ready_ns
+        plans = self.plans.take(now)
+        step = drive.cycle(now, batch, commands, plans, may_begin=may_begin)
+        decision = step.decision
+        if decision.plan is not None:
+            self.plans.ask(decision.plan, self.mission.route.revision + 1, now)
+        return replace(
+            step,
+            refused=(*step.refused, *refused),
+            as_recorded=None if decision.path is None else self._as_recorded(decision.path),
+        )
 
     def _read_commands(
-        self, arrivals: Sequence[Arrival], refused: list[FasacoError]
-    ) -> list[CommandReceived]:
-        """Return the commands that the recorded daemon had taken; what is none is refused."""
-        commands = []
+        self, arrivals: Sequence[Arrival]
+    ) -> tuple[list[CommandReceived], list[FasacoError]]:
+        """Return the commands that the recorded daemon took, and the errors of malformed ones."""
+        commands, refused = list[CommandReceived](), list[FasacoError]()
         for arrival in arrivals:
-            if arrival.topic != COMMAND:
+            if arrival.topic != COMMAND.name:
                 continue
             try:
                 name, order = read_command(decode_json(arrival.sample.payload))
@@ -172,23 +133,7 @@ class Replay:
                 continue
             self._commands += 1
             commands.append(CommandReceived(self._commands, name, order))
-        return commands
-
-    def _step(self, events: list[Event], refused: tuple[FasacoError, ...]) -> ReplayStep:
-        mission = self.mission
-        decision = mission.step(events, self._now)
-        if decision.plan is not None:
-            self.plans.ask(decision.plan, mission.route.revision + 1, self._now)
-        before, self._state = self._state, str(mission.state)
-        return ReplayStep(
-            at_s=self._now - self._began,
-            state=self._state,
-            reason=mission.reason,
-            changed=self._state != before,
-            decision=decision,
-            refused=refused,
-            as_recorded=None if decision.path is None else self._as_recorded(decision.path),
-        )
+        return commands, refused
 
     def _as_recorded(self, update: PathUpdate) -> bool | None:
         recorded = self._run.paths.get(update.revision)
@@ -196,3 +141,68 @@ class Replay:
         if recorded is None or mission.lattice is None:
             return None
         return digest(mission.lattice.centres(update.cells).tobytes()) == recorded.digest
+
+
+@dataclass(frozen=True, slots=True)
+class _UnderWay:
+    ready: PlanReady
+    due: float
+
+
+class ReplayPlanner:
+    """Takes the place of the daemon's planning thread.
+
+    Args:
+        planner: the daemon's.
+        run: what was recorded.
+        budget_s: the time its plans had [s].
+        work: proposals of each plan; None for what was recorded.
+    """
+
+    def __init__(
+        self, planner: CoveragePlanner, run: RecordedRun, budget_s: float, work: int | None
+    ) -> None:
+        self._planner = planner
+        self._run = run
+        self._budget_s = budget_s
+        self._work = work
+        self._under_way: _UnderWay | None = None
+
+    @property
+    def due(self) -> float | None:
+        """When the plan under way will be there; None where there is none."""
+        return self._under_way.due if self._under_way else None
+
+    def ask(self, request: PlanRequest, revision: int, now: float) -> None:
+        """Make a plan that would be published as path ``revision``."""
+        recorded = self._recorded(request, revision, now)
+        due = now + self._budget_s
+        if recorded is not None:
+            due = max(1e-9 * recorded.at_ns, now)
+        limit = self._limit(recorded)
+        path = self._planner.plan(request.problem, limit, ignore)
+        self._under_way = _UnderWay(PlanReady(request.number, path, due - now), due)
+
+    def take(self, now: float) -> list[PlanReady]:
+        """Return the plan that is there by ``now``, if any."""
+        if self._under_way is None or self._under_way.due > now:
+            return []
+        ready, self._under_way = self._under_way.ready, None
+        return [ready]
+
+    def _recorded(self, request: PlanRequest, revision: int, now: float) -> RecordedPath | None:
+        """Return the recorded path that comes of the same request, as far as one can tell."""
+        path = self._run.paths.get(revision)
+        if path is None or path.work is None or path.reason != request.reason:
+            return None
+        after = 1e-9 * path.at_ns - now
+        return path if abs(after) <= self._budget_s + LATE_S else None
+
+    def _limit(self, recorded: RecordedPath | None) -> AnyOf:
+        if self._work is not None:
+            return AnyOf(WorkLimit(SearchWork(proposals=self._work)))
+        if recorded is None or recorded.work is None:
+            return AnyOf(WorkLimit(SearchWork(proposals=PROPOSALS)))
+        # On another ground the same counts may never be met.
+        most = SearchWork(proposals=2 * recorded.work.proposals + PROPOSALS)
+        return AnyOf(WorkLimit(recorded.work), WorkLimit(most))

@@ -404,11 +404,20 @@ _ROS_ROWS = (
 ROS_TOPICS = {row.name: row for row in _ROS_ROWS}
 """By their key under ``ros2.topics`` of the configuration."""
 
-# How many samples wait for the daemon's loop where it queues them; static transforms come by
-# ROS 2 alone, and commands as queries.
-QUEUE_LENGTHS = {TF_STATIC: 256, "command": 16} | {
-    topic.name: length
-    for topic in TOPICS
-    if (length := topic.queues.daemon) is not None and length > NEWEST
-}
+
+def _queue_lengths() -> dict[str, int]:
+    lengths = dict[str, int]()
+    for topic in TOPICS:
+        if topic is POSE:
+            # By ROS 2 alone; taken before the poses that need them.
+            lengths[TF_STATIC] = 256
+        if topic.queues.daemon is not None and topic.queues.daemon > NEWEST:
+            lengths[topic.name] = topic.queues.daemon
+    return lengths | {COMMAND.name: 16}
+
+
+QUEUE_LENGTHS = _queue_lengths()
+"""How many samples wait for the daemon's loop where it queues them, in the order in which it takes
+them; commands come as queries."""
+
 RECORDED_INPUTS = (*(topic.name for topic in TOPICS if topic.is_input), TF_STATIC)

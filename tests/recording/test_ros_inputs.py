@@ -14,6 +14,8 @@ from fasaco_edge.cli.record import ros_config
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.replay.recorded_run import read_run
+from fasaco_edge.replay.replay import Replay
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, TF_MESSAGE
 from tests.support.outsider import Outsider
@@ -57,6 +59,12 @@ def test_maps_and_transforms_are_in_the_recording(domain, tmp_path):
     assert story.grid is not None
     assert np.allclose([pose[:2] for pose in story.poses], WAY)
     assert not story.undecodable
+    # A replay without the turn log finds the pose, too: by static transforms.
+    run = read_run(samples)
+    replay = Replay(run.daemon_config(), run, work=0)
+    assert [step for step in replay.steps(samples) if step.refused] == []
+    assert replay.mission.pose is not None
+    assert np.allclose((replay.mission.pose.pose.x, replay.mission.pose.pose.y), WAY[-1])
 
 
 def test_the_block_is_read_as_the_daemon_reads_it():

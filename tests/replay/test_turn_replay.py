@@ -12,14 +12,15 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
 from fasaco_edge.recording.read.samples import RecordedSamples
-from fasaco_edge.replay.stand_ins import read_run
-from fasaco_edge.replay.turn_record import TURNS, read_turns
-from fasaco_edge.replay.turn_replay import TurnReplay
+from fasaco_edge.replay.cycle_record import read_turns
+from fasaco_edge.replay.cycle_replay import CycleReplay
+from fasaco_edge.replay.recorded_run import read_run
 from fasaco_edge.wire.turns import decode_turns, encode_turns
 from tests.replay.scenarios import changed, places, without
 from tests.support.recorded_mission import record_mission
 from tests.wire.schemas import check
 
+TURNS = "turns"
 # What stands before the pixels of a map update is shorter.
 HEADER_BYTES = 100
 
@@ -49,7 +50,7 @@ def samples(recording):
 def played(samples):
     record = read_turns(samples)
     assert record is not None
-    replay = TurnReplay(read_run(samples).daemon_config(), record)
+    replay = CycleReplay(read_run(samples).daemon_config(), record)
     steps = [step for step in replay.steps(samples) if step.is_news]
     return replay, record, steps
 

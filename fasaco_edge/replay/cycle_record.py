@@ -1,4 +1,4 @@
-"""What a recording tells of each turn of the daemon that ran then, and of the samples it took."""
+"""Record of each cycle of a daemon's loop, from its turn log, and the samples it took."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from dataclasses import dataclass, field
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.wire.topics import TURNS
 from fasaco_edge.wire.turns import Beginning, Taken, Told, decode_turns
 
-TURNS = "turns"
 # A sample that waits longer than this was taken by nobody [ns].
 KEPT_NS = 60_000_000_000
-# The log is told twice a second: so long after it nothing else should come [ns].
+# The log comes twice a second: for so long after it nothing else should come [ns].
 SILENT_NS = 5_000_000_000
 # Of samples that nobody took so many are kept, of each topic.
 STRANGE = 4
 
 
 @dataclass(frozen=True, slots=True)
-class TurnRecord:
+class CycleRecord:
     """What the turn log of a recording holds in all.
 
     Attributes:
@@ -40,14 +40,14 @@ class TurnRecord:
     taken: frozenset[tuple[str, int]] = field(default_factory=frozenset)
 
 
-def read_turns(samples: Iterable[Arrival]) -> TurnRecord | None:
+def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
     """Return what the turn log says; None where there is none, or not from the beginning."""
     beginning: Beginning | None = None
     kernels, turns, gap = "", 0, ""
     taken: set[tuple[str, int]] = set()
     told_ns = heard_ns = 0
     for arrival in samples:
-        if arrival.topic != TURNS:
+        if arrival.topic != TURNS.name:
             heard_ns = arrival.wall_ns
             continue
         told_ns = arrival.wall_ns
@@ -73,16 +73,16 @@ def read_turns(samples: Iterable[Arrival]) -> TurnRecord | None:
         return None
     if heard_ns - told_ns > SILENT_NS:
         gap = gap or f"the log ends {1e-9 * (heard_ns - told_ns):.1f} s before the recording"
-    return TurnRecord(beginning, kernels, turns, gap, frozenset(taken))
+    return CycleRecord(beginning, kernels, turns, gap, frozenset(taken))
 
 
-class Waiting:
-    """Recorded samples until the turn that took them."""
+class UntakenSamples:
+    """Recorded samples until the cycle that took them."""
 
     def __init__(self, taken: frozenset[tuple[str, int]]) -> None:
         self._taken = taken
         self._samples: dict[tuple[str, int], Arrival] = {}
-        # Those that no turn took as they are.
+        # Those that no cycle took as they are.
         self._strange: dict[str, deque[Sample]] = defaultdict(lambda: deque(maxlen=STRANGE))
 
     def add(self, arrival: Arrival) -> None:
@@ -111,8 +111,8 @@ class Waiting:
         return (strange.popleft() if strange else None), False
 
 
-def told_sample(told: Told) -> Sample:
-    """Return a sample that is in the log itself.
+def inflated_sample(told: Told) -> Sample:
+    """Return a sample that is in the turn log itself.
 
     Raises:
         MalformedMessage: it cannot be inflated.

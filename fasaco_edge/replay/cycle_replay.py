@@ -1,45 +1,34 @@
-"""A mission once more, turn by turn as the recorded daemon took them: the same bit for bit.
+"""Replay by cycles of the recorded daemon's loop: the same decisions bit for bit.
 
-The turn log says what the daemon took in in each turn, and when that was; plans are stopped
-where they were stopped then. The first turn that ends otherwise is the end of the replay.
+The turn log says what the daemon took in each cycle of its loop, and when; plans are stopped where
+they were stopped then. The replay ends at the first cycle with another decision.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger
-from fasaco_edge.daemon.ledger.writer import LedgerKeeper
-from fasaco_edge.daemon.loop.batch import Batch, Received, make_mailbox
-from fasaco_edge.daemon.loop.inbox import Inbox
+from fasaco_edge.daemon.loop.batch import Batch, Received
 from fasaco_edge.daemon.loop.turn_log import (
-    POSE,
     POSE_BYTES,
     DecisionFilter,
     cells_checksum,
     kernels_name,
 )
-from fasaco_edge.daemon.startup import Startup
-from fasaco_edge.errors import FasacoError
-from fasaco_edge.mission.core.events import (
-    CommandReceived,
-    Decision,
-    Event,
-    PlanReady,
-    PlanRequest,
-)
+from fasaco_edge.mission.core.events import CommandReceived, PlanReady, PlanRequest
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.planners.planner import ignore
 from fasaco_edge.planners.stopping import StopAt
-from fasaco_edge.replay.replay import ReplayStep
-from fasaco_edge.replay.stand_ins import NoDisk, SilentBus, load_mission
-from fasaco_edge.replay.turn_record import TURNS, TurnRecord, Waiting, told_sample
+from fasaco_edge.replay.cycle_record import CycleRecord, UntakenSamples, inflated_sample
+from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
 from fasaco_edge.samples.codec import SampleDecoder
+from fasaco_edge.wire.topics import POSE, TURNS
 from fasaco_edge.wire.turns import Decided, PlanTaken, Taken, Turn, TurnBatch, decode_turns
 
 
@@ -48,8 +37,8 @@ class Difference:
     """Something that is not as it was recorded.
 
     Attributes:
-        turn: number of the turn.
-        at_s: when, since the first turn [s].
+        turn: number of the cycle.
+        at_s: when, since the first cycle [s].
         what: what it is.
         recorded, replayed: what it was and is.
     """
@@ -61,55 +50,48 @@ class Difference:
     replayed: object
 
 
-class TurnReplay:
-    """Plays the turns of a recording to a mission.
+class CycleReplay:
+    """Plays the cycles of a recording to a mission.
 
     Args:
-        config: of the daemon that was.
+        config: of the recorded daemon.
         record: what its turn log holds.
 
     Attributes:
         mission: the mission, to be looked at between steps.
-        turns: how many were played and ended as recorded.
+        turns: how many cycles were played and ended as recorded.
         plans: how many plans were made, those in spare time among them.
         difference: the first decision that is another one; None as long as there is none.
-        kernels: names the compiled kernels in use.
+        kernels: name of the compiled kernels in use.
         lacking: samples that are not in the recording, or not as the daemon took them.
     """
 
-    def __init__(self, config: DaemonConfig, record: TurnRecord) -> None:
+    def __init__(self, config: DaemonConfig, record: CycleRecord) -> None:
         self._record = record
-        max_pixels = config.map.max_pixels
-        mailbox = make_mailbox(max_pixels)
-        self._inbox = Inbox(SilentBus(), config.keys(), mailbox, config.poses(), max_pixels)
-        self.mission, loader, self._planner = load_mission(config, mailbox)
-        cell_m, ledger = config.robot.tool_width_m, record.beginning.ledger
-        disk = NoDisk(decode_ledger(ledger, cell_m) if ledger else None)
-        keeping = LedgerKeeper(disk, cell_m, autostart=config.mission.autostart)
-        self._startup = Startup(keeping, lambda: loader)
-        self._is_begun = False
-        self._waiting = Waiting(record.taken)
+        ledger = record.beginning.ledger
+        restored = decode_ledger(ledger, config.robot.tool_width_m) if ledger else None
+        self._drive = MissionDrive(config, restored)
+        self.mission = self._drive.mission
+        self._untaken = UntakenSamples(record.taken)
         self._decoder = SampleDecoder()
-        self._told: dict[str, deque[Sample]] = defaultdict(deque)
-        self._news = DecisionFilter()
+        self._logged: dict[str, deque[Sample]] = defaultdict(deque)
+        self._filter = DecisionFilter()
         self._request: PlanRequest | None = None
-        self._began: float | None = None
         self._at_s = 0.0
-        self._state = ""
         self.turns = self.plans = 0
         self.kernels = kernels_name()
         self.difference: Difference | None = None
         self.lacking: list[Difference] = []
 
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
-        """Yield each step of the mission, up to the first that ends otherwise than recorded."""
+        """Yield each cycle, up to the first that ends otherwise than recorded."""
         # A batch is played when the next has come: its samples are all there by then.
         batch: TurnBatch | None = None
         for arrival in samples:
-            if arrival.topic == POSE and len(arrival.sample.payload) <= POSE_BYTES:
+            if arrival.topic == POSE.name and len(arrival.sample.payload) <= POSE_BYTES:
                 continue  # they are in the log
-            if arrival.topic != TURNS:
-                self._waiting.add(arrival)
+            if arrival.topic != TURNS.name:
+                self._untaken.add(arrival)
                 continue
             if batch is not None:
                 yield from self._play(batch)
@@ -120,63 +102,36 @@ class TurnReplay:
             yield from self._play(batch)
 
     def _play(self, batch: TurnBatch) -> Iterator[ReplayStep]:
+        drive = self._drive
         told = {turn.number: turn for turn in batch.turns}
         for numbered in self._decoder.samples(batch.told) if batch.told else []:
-            self._told[numbered.arrival.topic].append(numbered.arrival.sample)
+            self._logged[numbered.arrival.topic].append(numbered.arrival.sample)
         for number, now in enumerate(batch.times, batch.first):
             if self.difference is not None or number > self._record.turns:
                 return
-            self._began = now if self._began is None else self._began
-            self._at_s = now - self._began
-            turn = told.get(number) or Turn(number, self._is_begun)
-            step = self._turn(turn, now)
+            self._at_s = 0.0 if drive.began is None else now - drive.began
+            step = self._cycle(told.get(number) or Turn(number, drive.is_begun), now)
             self.turns += self.difference is None
-            if step is not None:
-                yield step
+            yield step
 
-    def _turn(self, turn: Turn, now: float) -> ReplayStep | None:
-        batch = Batch(samples=self._received(turn), updates_lost=turn.patches_lost)
-        events, refused = self._inbox.decode(batch)
+    def _cycle(self, turn: Turn, now: float) -> ReplayStep:
+        drive = self._drive
         commands = [
             CommandReceived(number, *read_command(document)) for number, document in turn.commands
         ]
-        if not self._is_begun:
-            refused += self._startup.take(events)
-            self._is_begun = turn.is_begun and self._startup.loaded() is not None
-            events = self._startup.held
-        if not self._is_begun:
-            decision = Decision(answers=tuple(self._startup.answer(commands)))
-            self._compare(turn, self._news.of(decision, None))
-            if refused:
-                return ReplayStep(self._at_s, "loading", "", False, decision, tuple(refused))
-            return None
-        return self._step(turn, now, [*events, *commands, *self._plans(turn)], refused)
-
-    def _step(
-        self, turn: Turn, now: float, events: list[Event], refused: list[FasacoError]
-    ) -> ReplayStep:
-        mission = self.mission
-        decision = mission.step(events, now)
-        if decision.plan is not None:
-            self._request = decision.plan
-        decided = self._news.of(decision, mission)
-        self._compare(turn, decided)
-        before, self._state = self._state, str(mission.state)
-        path = decided.path if decided else None
-        return ReplayStep(
-            at_s=self._at_s,
-            state=self._state,
-            reason=mission.reason,
-            changed=self._state != before,
-            decision=decision,
-            refused=tuple(refused),
-            as_recorded=None
-            if path is None
-            else _facts(turn.decided)["path"] == _facts(decided)["path"],
-        )
+        batch = Batch(samples=self._received(turn), updates_lost=turn.patches_lost)
+        plans, before = self._plans(turn), drive.state
+        step = drive.cycle(now, batch, commands, plans, may_begin=turn.is_begun)
+        if step.decision.plan is not None:
+            self._request = step.decision.plan
+        decided = self._filter.of(step.decision, self.mission if drive.is_begun else None)
+        self._compare(turn, decided, before)
+        if step.decision.path is None:
+            return step
+        return replace(step, as_recorded=_facts(turn.decided)["path"] == _facts(decided)["path"])
 
     def _received(self, turn: Turn) -> list[Received]:
-        """Return what the daemon took in, as far as it was recorded."""
+        """Return the samples that the daemon took, as far as they were recorded."""
         found = [(taken, self._find(turn, taken)) for taken in turn.samples]
         return [
             Received(taken.topic, sample, taken.at) for taken, sample in found if sample is not None
@@ -184,10 +139,10 @@ class TurnReplay:
 
     def _find(self, turn: Turn, taken: Taken) -> Sample | None:
         if taken.told is not None:
-            return told_sample(taken.told)
-        if not taken.checksum and self._told[taken.topic]:
-            return self._told[taken.topic].popleft()
-        sample, is_it = self._waiting.find(taken)
+            return inflated_sample(taken.told)
+        if not taken.checksum and self._logged[taken.topic]:
+            return self._logged[taken.topic].popleft()
+        sample, is_it = self._untaken.find(taken)
         if not is_it:
             recorded = "another one" if sample is not None else "missing in the recording"
             what = f"{taken.topic} with checksum {taken.checksum:08x}"
@@ -195,7 +150,7 @@ class TurnReplay:
         return sample
 
     def _plans(self, turn: Turn) -> list[PlanReady]:
-        """Return the plan that came back in this turn, made once more."""
+        """Return the plan that came back in this cycle, made once more."""
         taken, request = turn.plan, self._request
         if taken is None:
             return []
@@ -204,7 +159,7 @@ class TurnReplay:
             self._differ(turn, "plan under way", taken.number, asked)
             return []
         self.plans += 1
-        path = self._planner.plan(request.problem, StopAt(taken.stops), ignore)
+        path = self._drive.planner.plan(request.problem, StopAt(taken.stops), ignore)
         work = (path.work.ants, path.work.kicks, path.work.proposals)
         again = PlanTaken(
             taken.number, taken.seconds, taken.stops, work, cells_checksum(path.cells)
@@ -213,9 +168,9 @@ class TurnReplay:
             self._differ(turn, f"plan {taken.number}", _plan_words(taken), _plan_words(again))
         return [PlanReady(taken.number, path, taken.seconds, tuple(taken.stops))]
 
-    def _compare(self, turn: Turn, decided: Decided | None) -> None:
-        # A turn without a decision leaves the state as it is.
-        then, now = (_facts(one or Decided(self._state, "")) for one in (turn.decided, decided))
+    def _compare(self, turn: Turn, decided: Decided | None, before: str) -> None:
+        # A cycle without a decision leaves the state as it was before.
+        then, now = (_facts(one or Decided(before, "")) for one in (turn.decided, decided))
         for name, was in then.items():
             if was != now[name]:
                 self._differ(turn, name, was, now[name])

@@ -1,0 +1,162 @@
+"""Inbox, startup and mission of a daemon without its bus, disk and planning thread."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fasaco_edge.bus.latched import Subscription
+from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.daemon.claim import ClaimState
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
+from fasaco_edge.daemon.loop.batch import Batch, make_mailbox
+from fasaco_edge.daemon.loop.inbox import Inbox
+from fasaco_edge.daemon.loop.mission_runner import MissionRunner
+from fasaco_edge.daemon.startup import Loader
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanReady
+from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
+from fasaco_edge.planners.registry import planner_of
+
+LOAD_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayStep:
+    """A cycle of the daemon's loop, repeated.
+
+    Attributes:
+        at_s: when, since the first one [s].
+        state, reason: of the mission after it; "loading" before there is one.
+        changed: whether the state is another than before.
+        decision: what was decided.
+        refused: samples in it that were not what they should be.
+        as_recorded: of a path, whether it leads over the very points of the one recorded
+            under its revision; None where none was.
+    """
+
+    at_s: float
+    state: str
+    reason: str
+    changed: bool
+    decision: Decision
+    refused: tuple[FasacoError, ...] = ()
+    as_recorded: bool | None = None
+
+    @property
+    def is_news(self) -> bool:
+        """Whether anything was decided, refused, or has changed."""
+        decision = self.decision
+        asked = decision.plan is not None or decision.path is not None
+        return self.changed or asked or bool(decision.faults or self.refused)
+
+
+class MissionDrive:
+    """Feeds samples, commands and plans to a mission as the daemon's loop does.
+
+    Args:
+        config: of the daemon.
+        ledger: the ledger that the mission begins with; None for nothing covered.
+
+    Attributes:
+        mission: the mission, to be looked at between cycles.
+        planner: the planner that the daemon would use.
+        mailbox: where samples wait, spaced by no clock.
+        began: time of the first cycle [s].
+        state: state of the mission after the last cycle; "" before it has begun.
+    """
+
+    def __init__(self, config: DaemonConfig, ledger: LedgerSnapshot | None = None) -> None:
+        max_pixels, planner = config.map.max_pixels, config.planner
+        self.mailbox = make_mailbox(max_pixels, map_spacing_s=0.0)
+        self._inbox = Inbox(_NoBus(), config.keys(), self.mailbox, config.poses(), max_pixels)
+        loader = Loader(config, self.mailbox)
+        while (loaded := loader.poll()) is None:
+            self.mailbox.take(LOAD_S)
+        self.mission, worker = loaded
+        worker.close(LOAD_S)
+        self.planner = planner_of(
+            planner.name, planner.colony(), planner.threads, planner.local_search
+        )
+        keeper = LedgerKeeper(
+            _NoDisk(ledger), config.robot.tool_width_m, autostart=config.mission.autostart
+        )
+        self._runner = _LoadedRunner(config, keeper, self.mailbox, loader)
+        self.began: float | None = None
+        self.state = ""
+
+    @property
+    def is_begun(self) -> bool:
+        """Whether the mission has begun; events are held until then."""
+        return self._runner.mission is not None
+
+    def cycle(
+        self,
+        now: float,
+        batch: Batch,
+        commands: Sequence[CommandReceived],
+        plans: Sequence[PlanReady],
+        *,
+        may_begin: bool,
+    ) -> ReplayStep:
+        """Make one cycle.
+
+        Args:
+            now: time of the daemon's steady clock [s].
+            batch: samples that the loop takes from its mailbox.
+            commands, plans: what comes beside samples.
+            may_begin: whether the mission may begin, once there is a map.
+        """
+        self.began = now if self.began is None else self.began
+        events, malformed = self._inbox.decode(batch)
+        claim = ClaimState.PLANS if may_begin else ClaimState.WAITS
+        mission, events, useless = self._runner.start(events, claim)
+        refused = (*malformed, *useless)
+        at_s = now - self.began
+        if mission is None:
+            decision = Decision(answers=self._runner.answer(commands, ""))
+            return ReplayStep(at_s, "loading", "", False, decision, refused)
+        decision = mission.step([*events, *commands, *plans], now)
+        before, self.state = self.state, str(mission.state)
+        changed = self.state != before
+        return ReplayStep(at_s, self.state, mission.reason, changed, decision, refused)
+
+
+class _LoadedRunner(MissionRunner):
+    """A mission runner whose mission is loaded before its first map."""
+
+    def __init__(
+        self, config: DaemonConfig, keeper: LedgerKeeper, mailbox: Mailbox[object], loader: Loader
+    ) -> None:
+        self._loader = loader
+        super().__init__(config, keeper, mailbox)
+
+    def _load(self) -> Loader:
+        return self._loader
+
+
+class _NoBus(Bus):
+    """A bus without a session: nothing is received."""
+
+    def __init__(self) -> None:
+        pass
+
+    def subscribe(
+        self, key: str, callback: object, latched: bool = False, history: int = 1
+    ) -> Subscription:
+        return Subscription(None)
+
+
+class _NoDisk(LedgerWriter):
+    """A ledger that is never written: a replay leaves no trace."""
+
+    def __init__(self, restored: LedgerSnapshot | None) -> None:
+        self.restored = restored
+
+    def put(self, ledger: LedgerSnapshot) -> None:
+        pass
+
+    def begin_anew(self, fault: FasacoError | None, why: str) -> None:
+        pass
