@@ -13,7 +13,6 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived
 from tests.benchmarks.__main__ import main
-from tests.benchmarks.online.benchmark import CASE_NAMES
 from tests.benchmarks.online.buildings import BUILDING, MAZE, BuildingChoice, maze, of_grid
 from tests.benchmarks.online.cases import CASES
 from tests.benchmarks.online.figures import Summary, goals
@@ -293,10 +292,6 @@ def test_a_robot_that_is_walled_in_gives_up():
     assert judged(mission).missed == CELLS - 1
 
 
-def test_names_of_cases():
-    assert tuple(CASES) == CASE_NAMES
-
-
 def plan_of(**given):
     nothing = BuildingChoice((), 0, 0, 0)
     usual = {
@@ -307,7 +302,7 @@ def plan_of(**given):
     return OnlinePlan(**{**usual, **given})
 
 
-@pytest.mark.parametrize("name", CASE_NAMES)
+@pytest.mark.parametrize("name", CASES)
 def test_cases_happen_and_end(name):
     (run,) = measure(plan_of(cases=(name,)), lambda _: None)
     assert (run.building, run.kind) == (name, "case")

@@ -15,12 +15,19 @@ from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.stopping import NO_WORK
 from tests.benchmarks.__main__ import main
-from tests.benchmarks.planner import WrongWalkError, judged, planner_for
+from tests.benchmarks.harness import WrongWalkError, judged, planner_for
+from tests.benchmarks.quality.benchmark import report
 from tests.benchmarks.quality.figures import by_grid
 from tests.benchmarks.quality.plot import draw
-from tests.benchmarks.quality.reference import Known, OtherWalk, read_references
-from tests.benchmarks.quality.report import report
-from tests.benchmarks.quality.runs import QualityPlan, QualityRun, Setting, measure
+from tests.benchmarks.quality.runs import (
+    Known,
+    OtherWalk,
+    QualityPlan,
+    QualityRun,
+    Setting,
+    measure,
+    read_references,
+)
 
 OPEN = Setting("anywhere", "steps", "ants")
 CLOSED = Setting("home", "steps", "ants")

@@ -10,10 +10,9 @@ from fasaco_edge.bench.benchmark import Goal
 from fasaco_edge.errors import BadConfiguration, ProcessEnded
 from fasaco_edge.planners.stopping import NO_WORK, SearchProgress
 from tests.benchmarks.__main__ import main
-from tests.benchmarks.scale.plot import draw
-from tests.benchmarks.scale.process import GapWatch, ScaleRun, ScaleTask
-from tests.benchmarks.scale.report import exponent, growth, report
-from tests.benchmarks.scale.runs import SizedRun, budgets, planned
+from tests.benchmarks.scale.benchmark import budgets, planned
+from tests.benchmarks.scale.process import GapWatch, ScaleRun, ScaleTask, SizedRun
+from tests.benchmarks.scale.report import draw, exponent, growth, report
 
 
 def run_of(cells, seed=0, **given):

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Generator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 from fasaco_edge.bench.benchmark import (
     Benchmark,
     Report,
-    Say,
     add_grid_options,
     grid_names,
     positive,
     seconds,
 )
-
-if TYPE_CHECKING:
-    from tests.benchmarks.online.run import MissionRun
-    from tests.benchmarks.online.runs import OnlinePlan
+from tests.benchmarks.online.buildings import BuildingChoice
+from tests.benchmarks.online.cases import CASES
+from tests.benchmarks.online.judge import MissionRun
+from tests.benchmarks.online.report import report
+from tests.benchmarks.online.robot import Pace
+from tests.benchmarks.online.runs import OnlinePlan, count, measure
 
 DEFAULT_MAPS = ("office", "flat", "walled_grid", "basement", "warehouse")
-CASE_NAMES = (
-    "door-closes-ahead", "door-closes-behind", "room-appears-late", "loop-closure", "person",
-)  # fmt: skip
 # As the buildings are made; a mission over many more takes days.
 FEWEST_CELLS, MOST_CELLS = 1_000, 1_000_000
 # Options that figures say of themselves.
@@ -77,10 +74,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cases",
         nargs="*",
-        choices=CASE_NAMES,
-        default=list(CASE_NAMES),
+        choices=CASES,
+        default=list(CASES),
         metavar="CASE",
-        help=f"beside, missions in which something happens: {', '.join(CASE_NAMES)} (default: "
+        help=f"beside, missions in which something happens: {', '.join(CASES)} (default: "
         "all; no name for none)",
     )
     _add_robot_options(parser)
@@ -153,11 +150,6 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _plan(args: argparse.Namespace) -> OnlinePlan:
-    # Here and below, so that to list the benchmarks does not load the compiler.
-    from tests.benchmarks.online.buildings import BuildingChoice
-    from tests.benchmarks.online.robot import Pace
-    from tests.benchmarks.online.runs import OnlinePlan
-
     names = grid_names(args, () if args.generated else DEFAULT_MAPS)
     return OnlinePlan(
         choice=BuildingChoice(names, args.generated, args.cells, args.mazes),
@@ -173,21 +165,7 @@ def _plan(args: argparse.Namespace) -> OnlinePlan:
     )
 
 
-def _count(args: argparse.Namespace) -> int:
-    from tests.benchmarks.online.runs import count
-
-    return count(_plan(args))
-
-
-def _measure(args: argparse.Namespace, say: Say) -> Generator[MissionRun, None, None]:
-    from tests.benchmarks.online.runs import measure
-
-    return measure(_plan(args), say)
-
-
 def _report(args: argparse.Namespace, runs: Sequence[MissionRun]) -> Report:
-    from tests.benchmarks.online.report import report
-
     about = {name: getattr(args, name) for name in CONDITIONS}
     return report(args.misread, with_turns=args.cost == "turns", about=about, runs=runs)
 
@@ -203,8 +181,8 @@ ONLINE = Benchmark(
     "walk of a robot that knew the building. A ratio of 1.015 is 1.5 % more. Mazes, and cases "
     "in which something happens on the way, are reported beside.",
     add_options=_add_options,
-    count=_count,
-    measure=_measure,
+    count=lambda args: count(_plan(args)),
+    measure=lambda args, say: measure(_plan(args), say),
     report=_report,
     epilog="""\
 examples:

@@ -23,8 +23,8 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid
 from tests.benchmarks.buildings import building
+from tests.benchmarks.harness import check_names, grid_name
 from tests.benchmarks.judge import reachable
-from tests.benchmarks.table1.runs import check_names, grid_name
 
 BUILDING, MAZE, CASE = KINDS = ("building", "maze", "case")
 

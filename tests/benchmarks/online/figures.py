@@ -12,9 +12,8 @@ from typing import Any
 
 from fasaco_edge.bench.benchmark import Goal
 from fasaco_edge.drawing.spread import percentile
-from tests.benchmarks.online.judge import MILESTONES
+from tests.benchmarks.online.judge import MILESTONES, MissionRun
 from tests.benchmarks.online.mission import Elapsed
-from tests.benchmarks.online.run import MissionRun
 
 # From so many cells on, the worst of all missions has a stricter goal.
 LARGE_CELLS = 900

@@ -37,11 +37,11 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.stopping import SearchWork, WorkLimit
+from tests.benchmarks.harness import planner_for
 from tests.benchmarks.judge import MOVES
 from tests.benchmarks.online.buildings import Building
 from tests.benchmarks.online.robot import Pace, Robot
 from tests.benchmarks.online.sight import Senses, Sight
-from tests.benchmarks.planner import planner_for
 
 # How far ahead of the robot a path is to hold still [m].
 NEXT_M = 5.0

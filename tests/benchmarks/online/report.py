@@ -9,8 +9,7 @@ from fasaco_edge.bench.benchmark import Report, ResultTable
 from fasaco_edge.bench.machine import machine, peak_mb
 from tests.benchmarks.online.buildings import BUILDING, CASE, KINDS, MAZE
 from tests.benchmarks.online.figures import Summary, goals, steps_ratio, time_ratio
-from tests.benchmarks.online.judge import MILESTONES
-from tests.benchmarks.online.run import MissionRun
+from tests.benchmarks.online.judge import MILESTONES, MissionRun
 
 HEADER = (
     "", "missions,\ncells", "steps\nto known", "time\nto known", "overlap,\nturns",

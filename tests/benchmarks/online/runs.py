@@ -14,14 +14,13 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.warmup import warm_up
+from tests.benchmarks.harness import judged as judged_plan
 from tests.benchmarks.online.buildings import Building, BuildingChoice, of_grid
 from tests.benchmarks.online.cases import CASES, Act
-from tests.benchmarks.online.judge import judged
+from tests.benchmarks.online.judge import MissionRun, Reference, judged
 from tests.benchmarks.online.mission import Conditions, CountedPlanning, OnlineMission, near_optimal
 from tests.benchmarks.online.robot import Pace
-from tests.benchmarks.online.run import MissionRun, Reference
 from tests.benchmarks.online.sight import Senses
-from tests.benchmarks.planner import judged as judged_plan
 
 # Full plans that are timed for each start.
 FULL_PLANS = 3

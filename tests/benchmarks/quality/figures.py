@@ -13,9 +13,15 @@ from typing import Any
 
 from fasaco_edge.bench.benchmark import Goal
 from fasaco_edge.drawing.spread import Spread
-from tests.benchmarks.quality.reference import Known
-from tests.benchmarks.quality.runs import QualityRun, Setting
+from tests.benchmarks.quality.runs import Known, QualityRun, Setting
 from tests.benchmarks.table1.paper import paper_map
+
+# What the search goes on from, as the tables have it.
+VARIANTS = {
+    "ants": "with ants",
+    "flat": "restarts without pheromone",
+    "never": "without ants",
+}
 
 
 @dataclass(frozen=True)

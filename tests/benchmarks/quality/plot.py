@@ -12,10 +12,10 @@ from tests.benchmarks.quality.figures import (
     MISSION_TURN_S,
     MOST_STEPS,
     MOST_TIME,
+    VARIANTS,
     GridFigures,
     by_grid,
 )
-from tests.benchmarks.quality.report import VARIANTS
 from tests.benchmarks.quality.runs import QualityRun
 
 COLUMNS = 3

@@ -1,17 +1,27 @@
-"""``benchmarks scale``: how time, memory and quality grow with the size of the building."""
+"""``benchmarks scale``: how time, memory and quality grow with the size of the building.
+
+Each building is planned on in a process of its own.
+"""
 
 from __future__ import annotations
 
 import argparse
+import json
+import subprocess
+import tempfile
 from collections.abc import Generator, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from fasaco_edge.bench.benchmark import Benchmark, Report, Say, positive, seconds_above_zero
-from fasaco_edge.errors import BadConfiguration
+import numpy as np
 
-if TYPE_CHECKING:
-    from tests.benchmarks.scale.runs import SizedRun
+from fasaco_edge.bench.benchmark import Benchmark, Say, positive, seconds_above_zero
+from fasaco_edge.errors import BadConfiguration, ProcessEnded
+from fasaco_edge.host.processes import python_program
+from tests.benchmarks.buildings import building
+from tests.benchmarks.harness import check_writable
+from tests.benchmarks.scale.process import ScaleRun, ScaleTask, SizedRun
+from tests.benchmarks.scale.report import draw, report
 
 DEFAULT_SIZES = (1_000, 5_000, 20_000, 100_000)
 FEWEST_CELLS, MOST_CELLS = 1_000, 2_000_000
@@ -60,28 +70,77 @@ def _sizes(args: argparse.Namespace) -> list[int]:
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[SizedRun, None, None]:
-    # Here and below, so that to list the benchmarks does not load the compiler.
-    from tests.benchmarks.scale.runs import budgets, measure
-
-    if args.plot is not None and not args.plot.parent.is_dir():
-        raise BadConfiguration(f"cannot write {args.plot}: there is no such folder")
+    check_writable(args.plot)
     sizes = _sizes(args)
     return measure(sizes, budgets(sizes, args.budget_s), args.seeds, say)
 
 
-def _report(args: argparse.Namespace, runs: Sequence[SizedRun]) -> Report:
-    from tests.benchmarks.scale.report import report
-
-    return report(args.seeds, runs)
-
-
 def _write(args: argparse.Namespace, runs: Sequence[SizedRun]) -> tuple[Path, ...]:
-    from tests.benchmarks.scale.plot import draw
-
     if args.plot is None or not runs:
         return ()
     draw(runs).save(args.plot)
     return (args.plot,)
+
+
+PROGRAM = python_program("tests.benchmarks.scale.process")
+WARM_S = 0.1
+
+
+def budgets(sizes: Sequence[int], given: Sequence[float]) -> tuple[float, ...]:
+    """Return for how long to plan on each size [s]: as given, or a minute a million cells.
+
+    Raises:
+        BadConfiguration: neither one budget is given nor one for each size.
+    """
+    if not given:
+        return tuple(max(1.0, size * 60e-6) for size in sizes)
+    if len(given) not in (1, len(sizes)):
+        raise BadConfiguration(
+            f"--budget-s must be one time, or one for each of {len(sizes)} sizes, got {len(given)}"
+        )
+    return tuple(given) * (len(sizes) if len(given) == 1 else 1)
+
+
+def measure(
+    sizes: Sequence[int], budgets_s: Sequence[float], seeds: int, say: Say
+) -> Generator[SizedRun, None, None]:
+    """Yield every run; each seed goes over all sizes before the next one does.
+
+    Raises:
+        ProcessEnded: a process failed; its message says why, such as a walk that is wrong.
+    """
+    with tempfile.TemporaryDirectory(prefix="fasaco-bench-") as folder:
+        file = Path(folder) / "building.npy"
+        say("warming the kernels' cache")
+        _write_building(file, min(sizes), 0)
+        planned(ScaleTask(str(file), 0, WARM_S))
+        for seed in range(seeds):
+            for size, budget_s in zip(sizes, budgets_s, strict=True):
+                say(f"seed {seed}: {size:,} cells")
+                _write_building(file, size, seed)
+                yield SizedRun(size, planned(ScaleTask(str(file), seed, budget_s)))
+
+
+def _write_building(file: Path, cells: int, seed: int) -> None:
+    grid = building(cells, seed)
+    np.save(file, grid.lattice.coverable)
+    start = json.dumps({"start": list(grid.start)})
+    file.with_suffix(".json").write_text(start, encoding="utf-8")
+
+
+def planned(task: ScaleTask) -> ScaleRun:
+    """Return what a process of its own measured.
+
+    Raises:
+        ProcessEnded: it failed.
+    """
+    try:
+        ended = subprocess.run(
+            PROGRAM, input=json.dumps(asdict(task)), check=True, capture_output=True, text=True
+        )
+    except subprocess.CalledProcessError as error:
+        raise ProcessEnded(f"planning ended with {error.returncode}:\n{error.stderr}") from error
+    return ScaleRun.of(json.loads(ended.stdout))
 
 
 SCALE = Benchmark(
@@ -96,7 +155,7 @@ SCALE = Benchmark(
     add_options=_add_options,
     count=lambda args: len(_sizes(args)) * int(args.seeds),
     measure=_measure,
-    report=_report,
+    report=lambda args, runs: report(args.seeds, runs),
     write=_write,
     epilog="""\
 examples:

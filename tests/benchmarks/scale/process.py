@@ -20,7 +20,7 @@ from fasaco_edge.host.processes import peak_mb, resident_mb
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.stopping import SearchProgress
 from fasaco_edge.planners.warmup import warm_up
-from tests.benchmarks.planner import judged, planner_for
+from tests.benchmarks.harness import judged, planner_for
 
 # A gap is noted when it has fallen by so much of itself; and when it comes to one of these.
 NOTED_FALL = 0.01
@@ -82,6 +82,14 @@ class ScaleRun:
         """Return the run that ``asdict`` and JSON made ``document`` of."""
         pairs = {name: tuple(map(tuple, document[name])) for name in ("target_s", "noted")}
         return cls(**{**document, **pairs})
+
+
+@dataclass(frozen=True, slots=True)
+class SizedRun:
+    """A run, and the number of cells that was asked for."""
+
+    size: int
+    run: ScaleRun
 
 
 @dataclass(slots=True)

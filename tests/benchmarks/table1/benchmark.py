@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Generator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from fasaco_edge.bench.benchmark import (
     Benchmark,
@@ -15,9 +14,9 @@ from fasaco_edge.bench.benchmark import (
     grid_names,
     positive,
 )
-
-if TYPE_CHECKING:
-    from tests.benchmarks.table1.runs import Run
+from tests.benchmarks.table1.page import draw, write_page
+from tests.benchmarks.table1.report import report
+from tests.benchmarks.table1.runs import VARIANTS, Run, check_drawn, measure
 
 DEFAULT_MAPS = ("office", "flat", "walled_grid", "basement")
 
@@ -40,32 +39,20 @@ def _names(args: argparse.Namespace) -> tuple[str, ...]:
 
 
 def _count(args: argparse.Namespace) -> int:
-    # Here and below, so that to list the benchmarks does not load the compiler.
-    from tests.benchmarks.table1.runs import VARIANTS
-
     seeds: int = args.seeds
     return len(_names(args)) * seeds * len(VARIANTS)
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[Run, None, None]:
-    from tests.benchmarks.table1.runs import check_drawn, measure
-
     check_drawn(args.png_of, _names(args))
     return measure(_names(args), args.ants, args.seeds, say)
 
 
 def _report(args: argparse.Namespace, runs: Sequence[Run]) -> Report:
-    from tests.benchmarks.table1.report import report
-
     return report(args.ants, args.seeds, runs)
 
 
 def _write(args: argparse.Namespace, runs: Sequence[Run]) -> tuple[Path, ...]:
-    from tests.benchmarks.table1.page import (
-        draw,
-        write_page,
-    )
-
     measured = {run.grid for run in runs}
     pictures = draw(args.png, _names(args), args.png_of, measured, args.ants) if args.png else ()
     files = tuple(file for picture in pictures for file in (picture.walks, picture.pheromone))

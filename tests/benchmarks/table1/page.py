@@ -17,8 +17,9 @@ from fasaco_edge.bench.grids import NamedGrid, read_grid
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.planners.problem import CoverageProblem
+from tests.benchmarks.harness import grid_name
 from tests.benchmarks.table1.pictures import LabelledWalk, draw_pheromone, draw_walks
-from tests.benchmarks.table1.runs import VARIANTS, grid_name, pose
+from tests.benchmarks.table1.runs import VARIANTS, pose
 
 DRAWN = {
     "falling": "FaSACO, 8 -> 1",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from fasaco_edge.bench.benchmark import Say
 from fasaco_edge.bench.grids import NamedGrid, read_grid
@@ -17,6 +16,7 @@ from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
 from fasaco_edge.planners.stopping import never
 from fasaco_edge.planners.warmup import warm_up
+from tests.benchmarks.harness import check_names, grid_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,23 +94,6 @@ class Run:
     seed: int
     walk: WalkFigures
     cpu_s: float
-
-
-def grid_name(name_or_path: str) -> str:
-    """Return what a grid is called in results: where its file lies is nobody's business."""
-    return Path(name_or_path).stem
-
-
-def check_names(grids: Sequence[str]) -> None:
-    """Make sure that names tell grids apart.
-
-    Raises:
-        BadConfiguration: two grids have the same name.
-    """
-    names = [grid_name(grid) for grid in grids]
-    for name in names:
-        if names.count(name) > 1:
-            raise BadConfiguration(f"grids must have different names, got {name!r} twice")
 
 
 def check_drawn(drawn: Sequence[str], grids: Sequence[str]) -> None:

@@ -1,9 +1,13 @@
-"""The planner that ``quality`` and ``scale`` measure, and how its walks are judged."""
+"""The harness of all benchmarks: grids by name, the planner that is measured, judged walks."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import CoveragePath
@@ -50,3 +54,30 @@ def judged(problem: CoverageProblem, path: CoveragePath) -> WalkVerdict:
             f"{path.planner}, seed {path.seed}, from {problem.start}: {'; '.join(wrong)}"
         )
     return verdict
+
+
+def grid_name(name_or_path: str) -> str:
+    """Return what a grid is called in results: where its file lies is nobody's business."""
+    return Path(name_or_path).stem
+
+
+def check_names(grids: Sequence[str]) -> None:
+    """Make sure that names tell grids apart.
+
+    Raises:
+        BadConfiguration: two grids have the same name.
+    """
+    names = [grid_name(grid) for grid in grids]
+    for name in names:
+        if names.count(name) > 1:
+            raise BadConfiguration(f"grids must have different names, got {name!r} twice")
+
+
+def check_writable(picture: Path | None) -> None:
+    """Make sure that a picture can be written after minutes of measuring.
+
+    Raises:
+        BadConfiguration: its folder does not exist.
+    """
+    if picture is not None and not picture.parent.is_dir():
+        raise BadConfiguration(f"cannot write {picture}: there is no such folder")
