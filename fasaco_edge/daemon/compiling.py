@@ -1,9 +1,8 @@
-"""Before a service is ready its kernels are compiled: a first map must not wait a minute.
+"""The kernel compiler: a process that compiles missing kernels before a service is ready.
 
-They are loaded with the first map, for an idle daemon has to be small. So a process of its own
-finds out whether all of them are there, compiles them where they are not, and ends. Kernels that
-are damaged, or that others could have written, are not there; where none can be kept, none are
-compiled before they are needed.
+A first map must not wait a minute for them. They are loaded with that map, to keep an idle daemon
+small: so a process of its own does this, and ends. Kernels that are damaged, or that others could
+have written, count as missing; where none can be kept, they are compiled when they are needed.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ REASON, STAGE, WARNING = "reason", "stage", "warning"
 
 
 class KernelCompiler:
-    """Begins at once, beside whatever else a start has to do."""
+    """Starts the process at once, beside whatever else a start has to do."""
 
     def __init__(self, manager: ServiceManager) -> None:
         self._manager = manager
@@ -43,7 +42,7 @@ class KernelCompiler:
         self._process: subprocess.Popen[str] | None = None
         folder = cache_folder()
         if folder is None:
-            return  # which has been said; what it compiled would be lost
+            return  # that is logged already; what it compiled would be lost
         self._process = subprocess.Popen(
             python_program(MODULE),
             env=os.environ | {"NUMBA_CACHE_DIR": str(folder)},
@@ -75,7 +74,7 @@ class KernelCompiler:
             LOG.info("kernels compiled in %.0f s", time.monotonic() - self._started)
 
     def close(self) -> None:
-        """End it: what is in a cache that is not complete, is whole."""
+        """End the process; what it has cached so far is whole."""
         if self._process is not None:
             self._process.kill()
             self._process.wait()
@@ -104,7 +103,7 @@ def _ended(code: int) -> str:
 
 
 def main() -> None:
-    """Compile what is not there, and say so and why; say nothing if all is there."""
+    """Compile missing kernels and say why; say nothing if none is missing."""
     logging.basicConfig(level=logging.WARNING, handlers=[_ToDaemon()])
     folder = cache_folder()
     if folder is None:
@@ -118,7 +117,7 @@ def main() -> None:
 
 
 class _ToDaemon(logging.Handler):
-    """Says to the daemon what is logged here."""
+    """Passes log messages on to the daemon."""
 
     def emit(self, record: logging.LogRecord) -> None:
         _say(WARNING, record.getMessage())
@@ -129,9 +128,9 @@ def _say(word: str, text: str) -> None:
 
 
 def _begin_stage(stage: str) -> None:
-    """Tell which stage begins; where those before have left much behind, begin it afresh.
+    """Report a stage; restart the process for it where memory has grown too much.
 
-    The compiler keeps 570 MB in the end; what it has compiled is loaded in a second.
+    The compiler would keep 570 MB in the end; what it has compiled is loaded in a second.
     """
     from fasaco_edge.kernels.jit import KEPT  # noqa: PLC0415
 

@@ -1,4 +1,4 @@
-"""The memory contract: what may wait, what the largest map may take, and the limit that follows.
+"""The memory contract: limits of queues and maps, and the memory limit that follows from them.
 
 A daemon whose maps have at most P pixels, on a lattice of at most C cells, takes at most
 
@@ -13,10 +13,10 @@ A pixel is a byte, and lies at worst ten times in memory, with updates as large 
 * in Zenoh, while a message is put together, once, once as it is handed over, and once on its way
   to a recorder;
 * in the mailbox, where of maps and of updates no more waits than the largest takes, twice;
-* in the turn, as a map and an update taken, twice, and a moment longer in Zenoh's buffers, once;
+* in the cycle, as a map and an update taken, twice, and a moment longer in Zenoh's buffers, once;
 * as the mission's map, while another is compared with it and patched, twice.
 
-What comes in larger pieces is let go as it comes, by its size alone. Nothing else grows with the
+Larger messages are dropped on arrival, by their size alone. Nothing else grows with the
 pixels: kernels look at a map tile by tile, and a tile has a bound, see ``grid.lattice``. Of a
 lattice's cells it is the path that takes most: some 80 bytes a pose, twice while it is sent.
 
@@ -54,17 +54,17 @@ QUEUED_BYTES = 8 * MAX_POSE_BYTES
 
 
 def map_bytes(max_pixels: int) -> int:
-    """Return how long a map or an update may be that has ``max_pixels`` at most [bytes]."""
+    """Return the largest size of a map or an update of ``max_pixels`` [bytes]."""
     return max_pixels + HEADER_BYTES
 
 
 def most_bytes(kind: str, max_pixels: int) -> int:
-    """Return how long one sample of a kind may be [bytes]."""
+    """Return the largest size of a sample of a kind [bytes]."""
     return map_bytes(max_pixels) if kind in ("map", "map_update") else MAX_POSE_BYTES
 
 
 def queues(max_pixels: int) -> dict[str, Queue]:
-    """Return what may wait of each kind."""
+    """Return the queue of each kind."""
     sizes = dict.fromkeys(("map", "map_update"), map_bytes(max_pixels))
     rooms = {
         kind: Queue(length, sizes.get(kind, QUEUED_BYTES)) for kind, length in QUEUE_LENGTHS.items()
@@ -73,7 +73,7 @@ def queues(max_pixels: int) -> dict[str, Queue]:
 
 
 def needed_bytes(config: DaemonConfig) -> int:
-    """Return what a daemon of this configuration takes at most [bytes]."""
+    """Return the most memory that a daemon of this configuration takes [bytes]."""
     return BASE_BYTES + MAPS * config.map.max_pixels + CELL_BYTES * config.map.max_lattice_cells
 
 

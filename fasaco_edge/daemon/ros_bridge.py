@@ -1,4 +1,4 @@
-"""The daemon in a ROS 2 graph, without ROS: the same samples under the keys ROS has for them.
+"""The ROS 2 bridge: the daemon's samples under the keys of a ROS 2 graph, without ROS.
 
 What comes in goes into the mailbox with what comes by the native keys, and is decoded there;
 what goes out is encoded once. Whether rmw_zenoh or zenoh-bridge-ros2dds is on the other side

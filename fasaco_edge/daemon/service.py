@@ -1,4 +1,4 @@
-"""The daemon's life: open everything, run the loop, close everything."""
+"""The daemon as a service: open everything, run the loop, close everything."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ LOG = logging.getLogger(__name__)
 # SIGTERM to exit takes at most two seconds; the recorder's footer comes first.
 RECORDER_STOP_S = 1.2
 WORKER_STOP_S = 0.4
-# The ledger is written while those end; its disk is waited for so long in all, and at least
-# so long once they have.
+# The ledger is written meanwhile: its disk gets this long in all, and at least the second figure
+# once they have ended.
 LEDGER_STOP_S, LEDGER_LEAST_S = 0.5, 0.2
 
 
@@ -55,25 +55,24 @@ def run_daemon(
         config: the configuration.
         record_to: folder for recordings; without it there are none.
         state: folder of the coverage ledger, in place of the configuration's.
-        fresh: keep aside the ledger there is, and cover everything anew.
+        fresh: set aside the ledger, and cover everything anew.
         read: reads the configuration again, when a service manager sends SIGHUP.
 
     Raises:
         BusUnavailable: no session could be opened.
-        LedgerFileError: another process keeps this robot's ledger.
-        BadConfiguration: there is no place to keep it, or a file of bus.security is missing.
+        LedgerFileError: another process writes this robot's ledger.
+        BadConfiguration: there is no folder for it, or a file of bus.security is missing.
         ProcessEnded: a service's kernels could not be compiled.
     """
     started = time.monotonic()
-    # Without it every thread keeps what its largest map took: 430 MB resident in place of 250.
+    # Otherwise every thread keeps what its largest map took: 430 MB resident in place of 250.
     return_soon()
     stop = threading.Event()
     call_on(signal.SIGTERM, signal.SIGINT, call=stop.set)
     manager = ServiceManager()
-    # Others are ready to answer; a service is ready to plan, see sd_notify(3).
     reload = Reload(read or (lambda: config), manager)
     if manager.is_there:
-        # Elsewhere it is what a terminal sends that is closed.
+        # Without one it is the signal of a closed terminal, which ends the process.
         call_on(signal.SIGHUP, call=reload.asked.set)
     config = _afforded(config)
     compiler = KernelCompiler(manager) if manager.is_there else None
@@ -93,7 +92,7 @@ def run_daemon(
 
 
 def _afforded(config: DaemonConfig) -> DaemonConfig:
-    """Return the configuration with maps no larger than the memory affords that there may be."""
+    """Return the configuration, with smaller maps where memory is limited; log that."""
     limit = memory_limit()
     smaller = afforded(config, limit)
     if limit is not None and smaller is not config:

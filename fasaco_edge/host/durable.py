@@ -1,4 +1,4 @@
-"""Bytes and names on the disk itself, where a loss of power does not reach them."""
+"""Durable writes: bytes and names that outlive a loss of power."""
 
 from __future__ import annotations
 

@@ -1,13 +1,10 @@
-"""Files and folders of this process: its own, never what somebody else put in their place.
+"""Files and folders that other users of this computer cannot have put in place.
 
-Whose hands could have put a file in place: what only root and one user could have is trusted.
-
-Code that is read from a disk is run with all that its reader may do. So the folder it lies in, and
-each one above, belongs to root or to that user, and nobody else may write there: somebody who may
-write to a folder can put another one in place of any that lies in it. Two things that look wrong
-are not: a sticky folder (``/tmp``) keeps what lies in it from everybody but its owner, and a link
-is as good as who made it and where it lies (systemd's ``/var/cache/NAME`` of a DynamicUser= is one
-of root's).
+Own files belong to this process's user or to root. Trusted ones, whose content is run as code, lie
+besides in folders that only root and one user may write to, each one above included: who may write
+to a folder can replace what lies in it. Two things that look wrong are not: a sticky folder
+(``/tmp``) keeps what lies in it from all but its owner, and a link is as good as who made it and
+where it lies (systemd's ``/var/cache/NAME`` of a DynamicUser= is one of root's).
 """
 
 from __future__ import annotations
@@ -16,7 +13,10 @@ import errno
 import os
 import pwd
 import stat
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import BinaryIO
 
 
 def open_own(path: str | Path, flags: int, mode: int = 0o644) -> int:
@@ -49,18 +49,27 @@ def read_own(path: str | Path, most: int = -1) -> bytes:
     Raises:
         OSError: that failed, or it is somebody else's.
     """
-    # Where it is no plain file, to open it may wait, or do something.
-    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-    with open(descriptor, "rb") as file:
-        status = os.fstat(descriptor)
-        _check_owner(path, status)
-        if not stat.S_ISREG(status.st_mode):
-            raise OSError(errno.EINVAL, "no plain file", str(path))
+    with _open_plain(path, partial(_check_owner, path)) as file:
         return file.read(most)
 
 
+def _open_plain(path: str | Path, check: Callable[[os.stat_result], None]) -> BinaryIO:
+    """Open a plain file to read it, no link; ``check`` looks at what was opened."""
+    # To open anything but a plain file may wait, or have an effect.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        status = os.fstat(descriptor)
+        check(status)
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EINVAL, "no plain file", str(path))
+        return open(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
 def make_own_folder(folder: Path) -> None:
-    """Make a folder, or take the one there is, if it is ours: nor is a link of somebody's taken.
+    """Make a folder, or take the one there is, if it is ours, and no link of somebody's.
 
     Raises:
         OSError: that failed, or it is somebody else's.
@@ -107,17 +116,14 @@ def read_trusted(file: Path, user: int | None = None) -> bytes:
         UntrustedFileError: others could have written it, or it is no plain file.
         OSError: it is not there, or cannot be read.
     """
-    # What was opened is what is looked at; a pipe would be waited for.
-    descriptor = os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-    try:
-        status = os.fstat(descriptor)
+
+    def check(status: os.stat_result) -> None:
         if not stat.S_ISREG(status.st_mode):
             raise UntrustedFileError(f"{file} is no plain file")
         _look_at(file, status, _trusted(user))
-        with open(descriptor, "rb", closefd=False) as opened:
-            return opened.read()
-    finally:
-        os.close(descriptor)
+
+    with _open_plain(file, check) as opened:
+        return opened.read()
 
 
 def _trusted(user: int | None) -> frozenset[int]:

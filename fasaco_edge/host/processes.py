@@ -1,7 +1,4 @@
-"""Python processes that this one starts, and what they take over from it.
-
-What a process is resident with, its threads and what it has loaded, by proc(5).
-"""
+"""Processes: how to start this interpreter again; memory, threads and libraries by proc(5)."""
 
 from __future__ import annotations
 
@@ -14,8 +11,8 @@ from pathlib import Path, PurePath
 def python_program(module: str, *words: str) -> list[str]:
     """Return the command line that runs a module with this interpreter.
 
-    ``-m`` alone would search the working folder first, which may be anybody's. What was started in
-    isolation goes on so: neither the environment nor a home folder says what is imported.
+    ``-m`` alone would search the working folder first, which may be anybody's. An isolated
+    interpreter starts an isolated one: neither environment nor home say what is imported.
     """
     shut = "-I" if sys.flags.isolated else "-P"
     return [sys.executable, shut, "-m", module, *words]

@@ -2,9 +2,9 @@
 
 ``<robot>.ledger`` is the newest, ``<robot>.ledger.previous`` the one before. A new one is
 written to ``<robot>.ledger.new`` and on to the disk itself; only then the names move on: at
-every moment a whole ledger stands under one of them, and ``load`` finds the newest. What
-cannot be used is kept aside under another name, which says why: of each kind the newest few, and
-the largest. What has no covered cell is not worth keeping.
+every moment a whole ledger stands under one of them, and ``load`` finds the newest. Files
+that cannot be used are set aside under a name that says why: of each kind the newest few and the
+largest, unless they have no covered cell.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Commands to the mission: taken off the bus, and answered once the mission has decided."""
+"""Commands to the mission: queries that are answered once the mission has decided."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Commands:
 
     def __init__(self, bus: Bus, keys: Keys, mailbox: Mailbox[object]) -> None:
         self._count = 0
-        # Those the mission has to decide on, by number, and those who only want to know.
+        # Questions that the mission decides on, by number, and those for the status alone.
         self._open: dict[int, Question] = {}
         self._status_questions: list[Question] = []
         self._decided: list[Answer] = []
@@ -66,7 +66,7 @@ class Commands:
         if question.key == self._replan_key:
             check(request)
             if request.key.endswith("*"):
-                # Who asks for all there is does not mean to change anything.
+                # A wildcard query means to change nothing.
                 raise BadQuery("replan has to be asked for by its name")
             command: tuple[CommandName, MissionOrder] = ("replan", EVERYTHING_ONCE)
         else:
@@ -93,7 +93,7 @@ class Commands:
             self._replanned_at = now
 
     def answer(self, report: replies.Reply, *, is_kept: bool) -> None:
-        """Answer who wants to know how it is; and who commanded, once that outlives the daemon."""
+        """Answer questions for the status; and commands, once the ledger has them on disk."""
         payload = encode_json(report)
         for question in self._status_questions:
             question.answer(Reply(payload))

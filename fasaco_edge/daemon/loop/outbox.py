@@ -1,7 +1,4 @@
-"""What goes out: path, coverage, pheromone, status; each through the gate, which may refuse it.
-
-The coverage grid: published when it has changed, and no more often than anybody could look.
-"""
+"""The outbox: publishers of path, coverage, pheromone, status and commands."""
 
 from __future__ import annotations
 
@@ -39,7 +36,7 @@ PERIOD_S = 0.5
 
 
 class Outbox:
-    """The publishers of a daemon; what they have said last is kept for who asks later.
+    """The publishers of a daemon; the last sample of each is kept to answer queries.
 
     Attributes:
         guard: publishes all of it.
@@ -64,7 +61,7 @@ class Outbox:
     ) -> None:
         """Publish a path through ``xy`` [m], float64 (n, 2), facing along the way.
 
-        Where it cannot be told an empty one is: the robot must not go on along the one before.
+        Where that fails an empty one is published: the robot must not follow the former path.
         """
         if not self.guard.attempt("path", lambda: self._say_path(xy, frame, stamp_ns, about)):
             nothing = replace(about, steps=0)
@@ -81,7 +78,7 @@ class Outbox:
             self._ros.path.put(path)
 
     def forget(self) -> None:
-        """Keep no path and no coverage for those who join late: another daemon has them."""
+        """Drop path and coverage cached for late joiners: another daemon publishes them."""
         for publisher in (self._path, self._coverage):
             publisher.forget()
         if self._ros is not None:
@@ -98,7 +95,7 @@ class Outbox:
         self._status.put(payload)
 
     def commands(self, commands: Sequence[CommandReceived], answers: Sequence[Answer]) -> None:
-        """Tell everybody what was taken: a question is heard by who is asked alone."""
+        """Publish the commands that were taken, for all who did not see the query."""
         refused = {answer.number for answer in answers if answer.error is not None}
         for asked in commands:
             if asked.number not in refused:
@@ -140,7 +137,7 @@ def headings(xy: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class CoveragePublisher:
-    """Knows what was published last."""
+    """Publishes the coverage grid when it has changed, but no more than twice a second."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
@@ -148,7 +145,7 @@ class CoveragePublisher:
         self._key: tuple[object, ...] = ()
 
     def forget(self) -> None:
-        """Take what comes next for news, whatever it is."""
+        """Publish the next grid even if it has not changed."""
         self._key = ()
 
     def publish(self, mission: Mission, now: float) -> None:

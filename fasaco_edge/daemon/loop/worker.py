@@ -1,4 +1,4 @@
-"""The thread that plans. Its kernels run without the interpreter lock, so the loop stays awake."""
+"""The planning thread. Its kernels run without the interpreter lock, so the loop keeps running."""
 
 from __future__ import annotations
 
