@@ -1,15 +1,15 @@
-"""Who may speak: Zenoh's own access control, sizes and rates, made from roles.
+"""Access rules, limits of size and rates for Zenoh, made from roles and the table of topics.
 
-All of it is configuration of the session that listens (or of a router): Zenoh itself refuses what
-is not allowed, before a byte of it reaches this program. Roles are named by what the *other* side
-does, as ``protocol/README.md`` lists them.
+All of it is configuration of the session that listens (or of a router): Zenoh refuses what is not
+allowed before it reaches this program. Roles are named by what the *other* side does, as
+``protocol/README.md`` lists them.
 
-* Nothing is allowed that is not named. ``**`` does not match a chunk that begins with ``@``, so
+* Everything is denied that is not named. ``**`` does not match a chunk that begins with ``@``, so
   every key is named, and beside it what Zenoh's advanced publishers and subscribers use to serve
   late joiners: ``<key>/@adv/**``.
-* Who speaks on a key may publish it, answer for it, and say by a liveliness token that it is
-  there; who listens may subscribe to it, ask it, and look for tokens. Neither may delete.
-* Rules hold in both directions: what a role may not hear is not sent to it either.
+* A role that speaks on a key may publish, answer queries and declare a liveliness token there; one
+  that listens may subscribe, query and look for tokens. Neither may delete.
+* Rules hold in both directions: what a role may not receive is not sent to it either.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ class Role:
     """What the other side may do, by topics: what its keys end with.
 
     Attributes:
-        told: the same for people.
+        description: the same for people.
         speaks: topics it may publish and answer for.
         listens: topics it may subscribe to and ask.
         includes: another role whose rights it has too; "" for none.
     """
 
-    told: str
+    description: str
     speaks: tuple[str, ...] = ()
     listens: tuple[str, ...] = ()
     includes: str = ""
 
 
-def _role(name: str, told: str, includes: str = "") -> Role:
+def _role(name: str, description: str, includes: str = "") -> Role:
     return Role(
-        told,
+        description,
         speaks=tuple(entry.suffix for entry in ENTRIES if entry.speaker == name),
         listens=tuple(entry.suffix for entry in ENTRIES if name in entry.listeners),
         includes=includes,
@@ -57,29 +57,29 @@ def _role(name: str, told: str, includes: str = "") -> Role:
 EVERYTHING = tuple(entry.suffix for entry in ENTRIES)
 
 ROLES: Mapping[str, Role] = {
-    "mapper": _role("mapper", "gives maps, map updates and poses"),
+    "mapper": _role("mapper", "publishes maps, map updates and poses"),
     "viewer": _role("viewer", "sees path, status, coverage and pheromone"),
     "operator": _role("operator", "commands the mission, and views", includes="viewer"),
-    "recorder": _role("recorder", "hears everything, and says how it is itself", includes="viewer"),
+    "recorder": _role("recorder", "receives everything, publishes its status", includes="viewer"),
     # Topics that the configuration names: see ``ros_rights``.
-    "ros": Role("gives maps, updates and poses on ROS 2 topics, sees path and coverage there"),
+    "ros": Role("publishes maps, updates and poses on ROS 2 topics, sees path and coverage"),
     # A daemon connects to it: what others may do there, the router itself has to restrict.
-    "router": Role("passes everything on, both ways", speaks=EVERYTHING, listens=EVERYTHING),
+    "router": Role("forwards everything, both ways", speaks=EVERYTHING, listens=EVERYTHING),
     # The daemon itself, as a router sees it.
-    "robot": _role("robot", "plans: hears maps, says paths"),
+    "robot": _role("robot", "plans: receives maps, publishes paths"),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """Who has a role, and for which robot.
+    """A role given to names, for one robot or all.
 
     Attributes:
         role: one of ROLES.
-        names: common names of certificates, or user names; who has several roles, may do all.
+        names: common names of certificates, or user names; one may have several roles.
         prefix: what the keys begin with: ``fasaco/@v1/robot``, ``fasaco/@v1/*`` for all robots;
             "" where topics are whole keys.
-        of: tells grants of one role with several prefixes apart; "" where there is one.
+        of: distinguishes grants of one role with several prefixes; "" where there is one.
         rights: what the role may do; None for what ROLES says.
     """
 
@@ -97,7 +97,7 @@ class Grant:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How large [bytes] and how frequent [1/s] what comes in may be, for each who sends it.
+    """Largest size [bytes] and rate [1/s] of what each sender may send.
 
     Zenoh drops what is larger; of what is more frequent it passes the first of each period and
     drops the others. Map updates have no rate: a lost one would spoil the map unnoticed.
@@ -115,8 +115,8 @@ def access_control(grants: Sequence[Grant], attribute: str) -> dict[str, Any]:
     """Return Zenoh's ``access_control``: everything is denied but what is granted.
 
     Args:
-        grants: who may do what. One without a name is left out: to Zenoh, no name is everybody.
-        attribute: what names are: "cert_common_names" or "usernames".
+        grants: the roles given. One without a name is left out: to Zenoh, no name is everybody.
+        attribute: kind of the names: "cert_common_names" or "usernames".
     """
     rules: dict[str, dict[str, Any]] = {}
     subjects: list[dict[str, Any]] = []
@@ -186,9 +186,9 @@ def ros_rights(heard: Sequence[str], said: Sequence[str], graph: Sequence[str]) 
 
     Args:
         heard, said: keys the daemon subscribes to, and publishes on.
-        graph: keys of the tokens by which nodes see each other.
+        graph: keys of the liveliness tokens of nodes.
     """
-    return Role(ROLES["ros"].told, speaks=(*heard, *graph), listens=(*said, *graph))
+    return Role(ROLES["ros"].description, speaks=(*heard, *graph), listens=(*said, *graph))
 
 
 def mutual_tls(root_ca: str, certificate: str, private_key: str) -> dict[str, Any]:
@@ -207,7 +207,7 @@ def mutual_tls(root_ca: str, certificate: str, private_key: str) -> dict[str, An
 
 
 def user_password(user: str, password: str, dictionary_file: str = "") -> dict[str, Any]:
-    """Return Zenoh's ``transport`` where both sides know a password.
+    """Return Zenoh's ``transport`` with authentication by user and password.
 
     Args:
         user, password: of this session.

@@ -1,4 +1,4 @@
-"""A sample that came off the bus, with the time it came at."""
+"""Arrival: a sample from the bus, with the time at which it came."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from dataclasses import dataclass
 from fasaco_edge.bus.session import Sample
 
 PATH_DIGEST = "path_digest"
-"""Topic of what stands for a path in a recording: its attachment; for payload, the ``digest``
+"""Topic that stands for a path in a recording: with its attachment and, as payload, the ``digest``
 of its points, float64 x, y [m]."""
 DIGEST_BYTES = 16
 
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """A sample, what it is about, and when it came.
+    """A sample, its topic, and when it came.
 
     Attributes:
-        topic: what its key ends with by the contract: "map", "pose" ...
-        sample: what came.
+        topic: name of its row in ``wire.topics``: "map", "pose" ...
+        sample: the sample.
         at_ns: when, by a clock that never steps [ns].
         wall_ns: when, since the epoch [ns].
     """

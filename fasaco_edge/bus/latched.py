@@ -1,13 +1,13 @@
-"""A subscriber of a latched key: the newest samples first, and the last one even if it was lost.
+"""Subscriber of a latched key: the newest samples first, and the last one even if it was lost.
 
-Zenoh's advanced subscriber (1.10) does that, too, but asks whoever ever published there once a
-second, for as long as the session lives: publishers that are gone, and on behalf of subscribers
-that were undeclared. This one asks those publishers that are there, which it knows by their
-tokens, each at most once a second, and no more than so many of them: the questions that are open,
-and what is remembered, have a bound, whoever comes and goes.
+Zenoh's advanced subscriber (1.10) does that, too, but once a second, for as long as the session
+lives, it queries every publisher that there ever was, even for subscribers that were undeclared.
+This one queries the publishers that exist, which it knows by their liveliness tokens: each at most
+once a second, and a bounded number of them. So open queries and memory are bounded, whatever
+publishers come and go.
 
-For the same reason it asks for the tokens, too, and does not subscribe to them: each key that was
-ever told to a subscriber stays in the memory of its session, and of the router before it.
+For the same reason it queries the tokens and does not subscribe to them: each key that a subscriber
+has ever received stays in the memory of its session, and of the router before it.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from typing import Any
 
 import zenoh
 
-# So often a publisher is asked whether its last sample was lost [s].
+# Period of queries to a publisher for a lost last sample [s].
 ASK_PERIOD_S = 1.0
-# A large map on a slow link takes its time [s]; nobody is asked anew meanwhile.
+# Timeout of an answer [s]: a large map on a slow link takes long. No query is repeated meanwhile.
 ANSWER_S = 10.0
-# Who is there is told by routers [s].
+# Timeout of a query for tokens, which routers answer [s].
 TOKENS_S = 2.0
-# Of a flood of tokens no more are looked at.
+# Most tokens that are looked at.
 MOST_TOKENS = 1024
-# Publishers of one key that are asked; what more of them publish is heard all the same.
+# Most publishers of a key that are queried; what others publish is received all the same.
 MOST_PUBLISHERS = 16
-# Of so many publishers it is remembered what they said last.
+# Most publishers whose last sample is remembered.
 MOST_REMEMBERED = 64
-# What waits for the samples before it waits no longer where it is more than that [bytes]: who does
-# not answer must not fill the memory.
+# Most bytes of samples that wait for those before them: a publisher that does not answer must not
+# fill the memory.
 HELD_BYTES = 8_000_000
 _SEQUENCE_NUMBERS = 1 << 32
 
@@ -43,26 +43,26 @@ Receive = Callable[[zenoh.Sample], None]
 
 
 class Subscription:
-    """A subscriber; of what was said before it, it knows nothing."""
+    """A subscriber that receives no earlier samples."""
 
     def __init__(self, subscriber: object) -> None:
         self._subscriber = subscriber
 
     def ask(self) -> None:
-        """Ask for what is kept for late joiners: nothing here."""
+        """Query the samples kept for late joiners: none here."""
 
     def release(self) -> None:
-        """Let go of what Zenoh has given."""
+        """Release the objects of Zenoh."""
         del self._subscriber
 
 
 @dataclass(slots=True)
 class _Publisher:
-    """A publisher that is there.
+    """A publisher that exists.
 
     Attributes:
-        key: where its cache is asked.
-        ask_at: when to ask it next, by the monotonic clock [s].
+        key: key of its cache.
+        ask_at: time of the next query, by the monotonic clock [s].
         is_asked: whether an answer may still come.
     """
 
@@ -72,9 +72,9 @@ class _Publisher:
 
 
 class LatchedSubscription(Subscription):
-    """A subscriber that hears the last ``depth`` samples of each publisher, also of later ones.
+    """A subscriber that receives the last ``depth`` samples of each publisher, also of later ones.
 
-    Of one publisher the samples come in order, none twice, save where ``ask`` asks for them again.
+    Samples of one publisher come in order, none twice, unless ``ask`` queries them again.
     """
 
     def __init__(

@@ -1,8 +1,7 @@
-"""Between Zenoh's threads and a loop: a post costs O(1) and never blocks.
+"""Mailbox and slot between Zenoh's threads and a loop: a post costs O(1) and never blocks.
 
-What is newer makes the older of its kind worthless, except where each item
-counts: a map update patches the map before it, a pose tells what the tool
-passed over. Those stay in order.
+A newer item replaces the older of its kind, except where each item counts: a map update changes
+the map before it, each pose adds to what the tool has passed over. Those are queued in order.
 """
 
 from __future__ import annotations
@@ -42,12 +41,12 @@ class LatestSlot(Generic[Item]):
 
 @dataclass(frozen=True, slots=True)
 class Spacing:
-    """How often a kind may be taken, whatever comes in: a flood costs no more than that.
+    """Least time between two takes of a kind, so that a flood of it costs no more than that.
 
     Attributes:
         kind: what is held back, the newest kept; a queued kind.
         seconds: from one take of it to the next, at least [s].
-        followers: kinds that are of no use before it, and wait where it waits.
+        followers: kinds that depend on it, and wait where it waits.
     """
 
     kind: str
@@ -57,7 +56,7 @@ class Spacing:
 
 @dataclass(frozen=True, slots=True)
 class Queue:
-    """How much of a kind may wait: a full queue loses its oldest, never its newest.
+    """Bounds of the queue of a kind; a full queue drops its oldest, never its newest.
 
     Attributes:
         length: items at most.
@@ -68,27 +67,27 @@ class Queue:
     size: float = math.inf
 
 
-def _weightless(_: object) -> int:
+def _no_size(_: object) -> int:
     return 0
 
 
 class Mailbox(Generic[Item]):
     """Collects items of several kinds until the loop takes them all.
 
-    Of a kind only the newest is kept, unless it was declared ``queued`` with the
-    room of its queue; ``size_of`` tells what an item takes of that [bytes].
+    Of a kind only the newest is kept, unless it has a queue in ``queued``; ``size_of`` returns
+    the size of an item [bytes].
     """
 
     def __init__(
         self,
         queued: Mapping[str, Queue],
         spacing: Spacing | None = None,
-        size_of: Callable[[Item], int] = _weightless,
+        size_of: Callable[[Item], int] = _no_size,
     ) -> None:
         self._changed = threading.Condition()
         self._newest: dict[str, Item] = {}
         self._queued = {kind: deque[Item]() for kind in queued}
-        self._rooms = dict(queued)
+        self._bounds = dict(queued)
         self._sizes = dict.fromkeys(queued, 0)
         self._size_of = size_of
         self._lost = dict.fromkeys(queued, 0)
@@ -103,13 +102,15 @@ class Mailbox(Generic[Item]):
                 self._changed.notify()
                 return
             queue = self._queued[kind]
-            # Who waits learns of the first that is held back; the others need not wake it.
+            # The first item that is held back wakes a waiting reader; the others need not.
             if not queue or kind not in self._held(time.monotonic()):
                 self._changed.notify()
             queue.append(item)
             self._sizes[kind] += self._size_of(item)
-            room = self._rooms[kind]
-            while len(queue) > room.length or (len(queue) > 1 and self._sizes[kind] > room.size):
+            bounds = self._bounds[kind]
+            while len(queue) > bounds.length or (
+                len(queue) > 1 and self._sizes[kind] > bounds.size
+            ):
                 self._sizes[kind] -= self._size_of(queue.popleft())
                 self._lost[kind] += 1
 

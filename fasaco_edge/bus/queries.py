@@ -1,9 +1,8 @@
-"""The roll: who is there, by their liveliness tokens.
+"""Queries, their replies, and the roll of liveliness tokens.
 
-They are asked for, not subscribed to. A subscriber of Zenoh's (1.10) keeps each key it was ever
-told; after a flood it keeps tokens that nobody has; and beside one, an answer may be empty.
-
-Questions and answers: what is asked on the bus, and what is replied.
+Tokens are queried and not subscribed to. A subscriber of Zenoh's (1.10) keeps each key that it has
+ever received; after a flood it keeps tokens that no longer exist; and beside a subscriber, the
+answer to a query may be empty.
 """
 
 from __future__ import annotations
@@ -86,9 +85,9 @@ class Reply:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """What is published, and kept to answer with: its payload lies in Zenoh's memory, once.
+    """A message that is published and kept for queries: its payload lies in Zenoh's memory, once.
 
-    Of a path of half a million poses that is 40 MB; each put of bytes would copy them.
+    A path of half a million poses has 40 MB; each put of bytes would copy them.
     """
 
     payload: zenoh.ZBytes
@@ -97,19 +96,18 @@ class Shared:
 
     @classmethod
     def of(cls, payload: bytes, schema: str = "", attachment: bytes = b"") -> Shared:
-        """Return it with a payload that is copied here and no more."""
+        """Return the message; its payload is copied here and not again."""
         return cls(zenoh.ZBytes(payload), schema, attachment)
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is asked.
+    """Content of a query.
 
     Attributes:
         key: the key expression asked for; it may have wildcards.
-        parameters: what stood behind ``?``, without those that begin with ``_``: they are
-            Zenoh's own.
-        payload: what came with it, b"" for nothing.
+        parameters: those behind ``?``, without Zenoh's own, which begin with ``_``.
+        payload: of the query, b"" for none.
     """
 
     key: str
@@ -118,11 +116,11 @@ class Request:
 
 
 class Question:
-    """A query that somebody waits for an answer to; to be answered once, on any thread.
+    """A query that waits for its answer; to be answered once, on any thread.
 
     Attributes:
-        key: what is being served.
-        request: what is asked.
+        key: key of the queryable.
+        request: its content.
     """
 
     def __init__(self, query: zenoh.Query, key: str) -> None:
@@ -131,7 +129,7 @@ class Question:
         self._query = query
 
     def answer(self, reply: Reply) -> None:
-        """Answer; who asked may be gone by now."""
+        """Answer; the other side may be gone by now."""
         with contextlib.suppress(zenoh.ZError):
             send(self._query, self.key, reply)
         query: Any = self._query  # drop() has no annotation
@@ -144,7 +142,7 @@ def matches(key: str, other: str) -> bool:
 
 
 def request_of(query: zenoh.Query) -> Request:
-    """Return what a query asks."""
+    """Return the content of a query."""
     listed: Any = query.parameters  # no mapping by the stubs
     parameters = {str(name): str(value) for name, value in listed}
     own = {name: value for name, value in parameters.items() if not name.startswith("_")}
@@ -153,13 +151,13 @@ def request_of(query: zenoh.Query) -> Request:
 
 
 def size_of(query: zenoh.Query) -> int:
-    """Return how much came with a query [bytes]."""
+    """Return the size of a query [bytes]."""
     beside = sum(len(part) for part in (query.payload, query.attachment) if part is not None)
     return len(str(query.selector)) + beside
 
 
 def send(query: zenoh.Query, key: str, reply: Reply | Shared) -> None:
-    """Answer a query on ``key``; by Zenoh's rule with the quality of service it came with."""
+    """Answer a query on ``key``; Zenoh gives the answer the quality of service of the query."""
     encoding = encoding_of(reply.schema)
     if isinstance(reply, Reply) and reply.is_error:
         query.reply_err(reply.payload, encoding=encoding)
@@ -169,7 +167,7 @@ def send(query: zenoh.Query, key: str, reply: Reply | Shared) -> None:
 
 
 def reply_of(reply: zenoh.Reply) -> Reply:
-    """Return an answer that came in."""
+    """Return an answer that Zenoh received."""
     if reply.ok is not None:
         sample = reply.ok
         attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""

@@ -1,13 +1,13 @@
-"""One session on the Zenoh bus: publish, subscribe, serve, ask.
+"""Session on the Zenoh bus: publishers, subscribers, queryables, queries.
 
 Choices that hold for every process, and why:
 
-* no multicast scouting and no shared memory: what is reachable is what was
-  configured, and the idle session stays small;
-* each key has its quality of service, see ``bus.qos``: whatever a planner publishes
-  drops on congestion, so that a frozen subscriber never holds it;
-* latched keys are advanced publishers with a cache of one sample, so a late
-  joiner has the newest path at once (ROS calls this transient local);
+* no multicast scouting and no shared memory: only what is configured can be reached, and the idle
+  session stays small;
+* each topic has its quality of service, see ``wire.topics``: what a planner publishes is dropped on
+  congestion, so that a frozen subscriber never blocks it;
+* latched topics have advanced publishers with a cache of one sample, so that a late joiner has the
+  newest path at once (ROS calls this transient local);
 * callbacks run on Zenoh's threads and only hand the sample on.
 """
 
@@ -51,8 +51,8 @@ class BusSettings:
         connect: endpoints to connect to.
         listen: endpoints to listen on. Where another process listens there
             already, the session joins that one instead, unless it is secured.
-        secured: who may take part, as ``bus.access`` says it: a part of Zenoh's configuration.
-            It may hold a password, and is never shown.
+        secured: authentication and access rules, a part of Zenoh's configuration, see
+            ``bus.access``. It may hold a password, and is never shown.
     """
 
     mode: str = "client"
@@ -62,14 +62,14 @@ class BusSettings:
 
 
 class Sample:
-    """A message as it came off the bus.
+    """A message from the bus.
 
-    Payload and attachment stay in Zenoh's buffers until they are asked for: of a message that a
-    newer one makes worthless before, nothing is copied.
+    Payload and attachment stay in Zenoh's buffers until they are read: a message that a newer one
+    replaces before is never copied.
 
     Attributes:
-        key: what it was published on.
-        schema: the type its publisher names; "" for none.
+        key: its key.
+        schema: message type in its encoding; "" for none.
         size: of payload and attachment together [bytes].
     """
 
@@ -137,8 +137,8 @@ class Bus:
         self._listens = listens
         self._declared: list[Any] = []
         self._served: list[_Served] = []
-        # What others hold, too: nothing of Zenoh's may be left to the last garbage collection,
-        # in which its threads and the interpreter may wait for each other for ever.
+        # Callers hold these, too. No object of Zenoh may be left to the last garbage collection, in
+        # which its threads and the interpreter may wait for each other for ever.
         self._lent: list[Publisher | Subscription] = []
         self._asker = Asker()
 
@@ -150,11 +150,11 @@ class Bus:
 
     @property
     def id(self) -> str:
-        """Id of the session, which no other has."""
+        """Unique id of the session."""
         return str(self._session.zid())
 
     def met(self) -> list[str]:
-        """Return what sessions this one speaks with, like "a router" or "3 peers"."""
+        """Return the sessions that this one is connected to, like "a router" or "3 peers"."""
         info = self._session.info
         met = (("router", info.routers_zid()), ("peer", info.peers_zid()))
         counts = [(kind, len(ids)) for kind, ids in met if ids]
@@ -201,9 +201,9 @@ class Bus:
     def serve(
         self, key: str, answer: Callable[[Request], Reply | Shared | None], complete: bool = True
     ) -> None:
-        """Answer queries on ``key``, on a Zenoh thread; None leaves one to others.
+        """Answer queries on ``key``, on a Zenoh thread; None leaves one to other queryables.
 
-        ``complete``: nobody else has to be asked.
+        ``complete``: no other queryable has to be asked.
         """
 
         def receive(query: zenoh.Query) -> None:
@@ -218,7 +218,8 @@ class Bus:
     ) -> None:
         """Call ``receive`` with each query on ``key``, on a Zenoh thread; to be answered later.
 
-        One of more than ``most_bytes`` has ``too_long`` for an answer at once: what waits is held.
+        One of more than ``most_bytes`` is answered with ``too_long`` at once, because a query is
+        held in memory until then.
         """
 
         def take(query: zenoh.Query) -> None:
@@ -234,7 +235,7 @@ class Bus:
         self._served.append(_Served(key, receive, complete, declared))
 
     def let_others_answer(self, yes: bool) -> None:
-        """Answer only who asks everybody, as long as another session serves the same; or all."""
+        """Answer only queries to all, while another session serves the same keys; or any query."""
         for served in self._served:
             if served.complete:
                 served.declared.undeclare()
@@ -273,7 +274,7 @@ class Bus:
         return Roll(self._session, key)
 
     def is_in_touch(self) -> bool:
-        """Tell whether others can be heard: somebody is connected, or could be at any time."""
+        """Tell whether samples can arrive: a session is connected, or could be at any time."""
         info = self._session.info
         return self._listens or bool(info.routers_zid() or info.peers_zid())
 
@@ -314,11 +315,11 @@ def open_bus(settings: BusSettings) -> Bus:
     try:
         return Bus(zenoh.open(_config(settings)), bool(settings.listen))
     except zenoh.ZError as error:
-        # A secured session joins nobody it was not told to.
+        # A secured session connects only to what is configured.
         taken = settings.listen and "Address already in use" in str(error)
         if not taken or settings.secured:
             raise BusUnavailable(_first_line(error)) from error
-    # Someone listens there: join them, as one more client.
+    # Another process listens there: connect to it as a client.
     joining = replace(
         settings, mode="client", connect=settings.connect + settings.listen, listen=()
     )
@@ -329,7 +330,7 @@ def open_bus(settings: BusSettings) -> Bus:
 
 
 def check_settings(settings: BusSettings) -> None:
-    """Check what a session would be opened with, and open none.
+    """Check the configuration of a session without opening it.
 
     Raises:
         BusUnavailable: Zenoh does not take it.

@@ -1,4 +1,4 @@
-"""The configuration that all our sessions share, and what secures one of them."""
+"""Zenoh configuration of a session: what all have in common, and what secures one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import zenoh
 
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 
-# How long who connects may take to say who it is, and how many may do so at a time.
+# Timeout of the handshake of an incoming connection [ms], and how many may be pending.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
 # A map or a path is many packets of 64 kB. Where two of them fill the queue, as by default, a
 # computer that is busy for 50 ms drops the map; these take a megabyte, and only when there is one.
@@ -44,8 +44,8 @@ def session_config(
         "timestamping": {"enabled": True},
         "transport": {
             "shared_memory": {"enabled": False},
-            # Who connects and says nothing must not keep others out: by default a hundred of
-            # those do, for twelve seconds.
+            # Connections without a handshake must not keep others out: by default a hundred of
+            # them do, for twelve seconds.
             "unicast": {"accept_timeout": ACCEPT_TIMEOUT_MS, "accept_pending": ACCEPT_PENDING},
             "link": {
                 "rx": {"max_message_size": MAX_MESSAGE_BYTES},

@@ -148,7 +148,7 @@ class SecurityConfig(Section, frozen=True):
         if ros is not None:
             grants.append(access.Grant("ros", self.roles.ros, "", rights=ros))
             # A recorder receives what the daemon receives.
-            inputs = access.Role(ros.told, listens=ros.speaks)
+            inputs = access.Role(ros.description, listens=ros.speaks)
             grants.append(
                 access.Grant("ros", self.roles.recorder, "", of="recorder", rights=inputs)
             )

@@ -54,7 +54,8 @@ def roles(context: CheckContext) -> Finding:
         return ok("no roles: whoever reaches the daemon may do everything")
     names = security.names()
     details = [
-        f"{role} ({', '.join(who) or 'nobody'}): {ROLES[role].told}" for role, who in names.items()
+        f"{role} ({', '.join(who) or 'nobody'}): {ROLES[role].description}"
+        for role, who in names.items()
     ]
     if names["router"] or not context.config.bus.listen:
         missing = [] if names["router"] else ["router"]

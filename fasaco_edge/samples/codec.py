@@ -1,9 +1,8 @@
-"""Samples as bytes: many at a time, without loss, and small.
+"""Codec of recorded samples: lossless batches of many samples.
 
-Successive payloads of a key are much alike, so a payload is told by what it differs in from
-the one before it of the same key and length (``bus.residuals``), and a batch of them is
-deflated. The first of a key is told as a whole, and each first one after
-``SampleEncoder.restart``.
+Successive payloads of a key are similar, so a payload is stored as its difference from the one
+before it of the same key and length (``samples.residuals``), and a batch is deflated. The first
+payload of a key is stored as a whole, also after ``SampleEncoder.restart``.
 
 A batch is ``_HEAD`` and the deflated MessagePack of a list of lanes, which hold samples that
 share topic, key, schema and length. Large payloads have a lane for themselves.
@@ -27,15 +26,15 @@ from fasaco_edge.samples.residuals import Residual, payloads_of, residual_of
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 
 FORMAT = 1
-# Format, run, number of the first sample not told before.
+# Format, run, number of the first sample that is in no earlier batch.
 _HEAD = struct.Struct("<BQQ")
 LARGE_BYTES = 16_384
 DEFLATE_LEVEL = 6
-# What a batch may claim to hold, before any of it is believed: a map in force, a new one and what
-# gathers meanwhile, payloads and all (``recording.input_log``).
+# Largest content that a batch may claim, checked before it is inflated: a map in force, a new one
+# and what gathers meanwhile (``recording.write.input_log``).
 MOST_BATCH_BYTES = 3 * MAX_MESSAGE_BYTES
 MOST_SAMPLES = 200_000
-# What ``_Lane.against`` says where the first payload is told as a whole.
+# Value of ``_Lane.against`` where the first payload is stored as a whole.
 WHOLE = -1
 
 
@@ -52,7 +51,7 @@ class Numbered:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a batch belongs: its run, and the number of its first sample not told before."""
+    """Position of a batch: its run, and the number of its first sample in no earlier batch."""
 
     run: int
     first: int
@@ -65,7 +64,7 @@ class _Lane(msgspec.Struct, array_like=True):
         numbers, at_ns, ahead_ns: of each sample its number, its time, and how far the wall clock
             was ahead of that; each but the first as the difference from the one before.
         attachments: of each sample; empty if none has any.
-        against: number of the sample that the first one is told by the difference from.
+        against: number of the sample that the first one is stored as the difference from.
         checksum: CRC-32 of all payloads in order.
         sparse, body: the residual.
     """
@@ -85,10 +84,10 @@ class _Lane(msgspec.Struct, array_like=True):
 
 
 class SampleEncoder:
-    """Turns samples into batches; a batch needs those before it, back to the last restart.
+    """Encodes samples into batches; a batch needs those before it, back to the last restart.
 
     Args:
-        run: tells these samples from those of other runs; when it began [ns], say.
+        run: identifies the run, such as by its start [ns].
     """
 
     def __init__(self, run: int) -> None:
@@ -112,7 +111,7 @@ class SampleEncoder:
         self._next += count
 
     def restart(self, again: Sequence[Numbered] = ()) -> None:
-        """Let the next batch need none before it, and begin with samples told before."""
+        """Let the next batch need none before it, and begin with samples of earlier batches."""
         self._last.clear()
         first = self._waiting[0].number if self._waiting else self._next
         self._again = [numbered for numbered in again if numbered.number < first]
@@ -120,7 +119,7 @@ class SampleEncoder:
     def take(self, *, in_any_case: bool = False) -> bytes:
         """Return all samples added since the last batch; b"" if there are none.
 
-        ``in_any_case``: then a batch of what was told before, if anything; nothing may follow it.
+        ``in_any_case``: then a batch of samples of earlier batches, if any; it must be the last.
         """
         if not self._waiting and not in_any_case:
             return b""
@@ -156,7 +155,7 @@ class SampleEncoder:
 
 
 class SampleDecoder:
-    """Turns the batches of one run, in order, back into samples."""
+    """Decodes the batches of one run, in order."""
 
     def __init__(self) -> None:
         self._last: dict[str, Numbered] = {}
@@ -184,7 +183,7 @@ class SampleDecoder:
             last = self._last.get(lane.topic)
             if last is None or last.number != lane.against:
                 raise MalformedMessage(
-                    f"sample {numbers[0]} is told by its difference from sample {lane.against}, "
+                    f"sample {numbers[0]} is stored as its difference from sample {lane.against}, "
                     "which is missing"
                 )
             before = last.arrival.sample.payload
@@ -213,7 +212,7 @@ class SampleDecoder:
 
 
 def place_of(batch: bytes) -> Place:
-    """Return where a batch belongs.
+    """Return the position of a batch.
 
     Raises:
         MalformedMessage: it is no batch, or of another release.

@@ -1,8 +1,8 @@
-"""Payloads of one length, each told by what it differs in from the one before it.
+"""Residuals: payloads of one length, each stored as its difference from the one before it.
 
-The difference is the exclusive or: zero where nothing changed. Of several payloads all first
-bytes stand together, then all second bytes: what seldom changes makes long runs of zeros. Where
-nearly all is zero, only the lengths of the runs are told, and the bytes that are not zero: a
+The difference is the exclusive or: zero where nothing changed. All first bytes of several payloads
+come first, then all second bytes, so that what seldom changes makes long runs of zeros. Where
+nearly all is zero, only the lengths of the runs are stored, and the bytes that are not zero: a
 map of a million pixels of which some hundred have changed takes some hundred bytes.
 """
 
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# Runs are told if at most one byte in so many is not zero.
+# Runs are stored if at most one byte in so many is not zero.
 SPARSE = 8
 _COUNT = struct.Struct("<I")
 
@@ -24,21 +24,21 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """What payloads differ in; ``sparse``: told by its runs."""
+    """Differences of payloads; ``sparse``: stored as runs."""
 
     body: bytes
     sparse: bool
 
 
 def residual_of(payloads: Sequence[bytes], before: bytes) -> Residual:
-    """Return what payloads, at least one, all of one length, differ in.
+    """Return the differences of payloads, at least one, all of one length.
 
     Args:
         payloads: in order.
-        before: what the first is told by; b"" for nothing, else as long as they are.
+        before: the payload before the first, of the same length; b"" for none.
     """
     if len(payloads) == 1:
-        # As a rule a large one: what it takes is told in copies of it.
+        # Usually a large one: memory counts.
         flat = np.frombuffer(payloads[0], np.uint8)
         flat = flat ^ np.frombuffer(before, np.uint8) if before else flat
     else:
