@@ -115,8 +115,8 @@ def _round_trip(
     arrival = source.wait_path(stamp_ns)
     return RoundTrip(
         total_ms=1e3 * (arrival.at - put_at),
-        plan_ms=arrival.about["plan_ms"],
-        steps=arrival.about["steps"],
+        plan_ms=arrival.about.plan_ms,
+        steps=arrival.about.steps,
         daemon_peak_mb=peak_mb_of(daemon.pid),
     )
 

@@ -11,7 +11,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +22,11 @@ from fasaco_edge.errors import BusUnavailable, NotYet
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.json_text import decode_tolerant
 from fasaco_edge.wire.maps import encode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.status import PathAttachment
 
 RESOLUTION_M = 0.05
 HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
@@ -81,7 +81,7 @@ class PathArrival:
     """A path as it came in: when [s, monotonic], and what its attachment says of it."""
 
     at: float
-    about: dict[str, Any]
+    about: PathAttachment
 
 
 class MapSource:
@@ -126,8 +126,8 @@ class MapSource:
             except queue.Empty:
                 self._daemon.check()
                 continue
-            about = decode_json(sample.attachment)
-            if about["map_stamp_ns"] == map_stamp_ns and about["planner"] is not None:
+            about = decode_tolerant(sample.attachment, PathAttachment)
+            if about.map_stamp_ns == map_stamp_ns and about.planner is not None:
                 return PathArrival(at, about)
         raise NotYet(
             f"no path for a map after {PATH_TIMEOUT_S:.0f} s", hint="is the machine overloaded?"

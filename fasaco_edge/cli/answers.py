@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,56 +14,56 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import figures, out
 from fasaco_edge.watch import phrases
 from fasaco_edge.wire import coverage, schemas
-from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
+from fasaco_edge.wire.replies import Reply as MissionReply
+from fasaco_edge.wire.replies import UnreachedReport, ZoneReport
 
 
-def show_mission(report: dict[str, Any]) -> None:
-    """Print a daemon's answer."""
-    mission = report["mission"]
-    console = out()
-    console.print(figures(_rows(report, mission)))
-    if mission["zones"]:
-        console.print(_zones(mission["zones"]))
-    if mission["unreached"]["areas"]:
-        console.print(_unreached(mission["unreached"]))
+def show_mission(reply: Reply) -> None:
+    """Print the state and the mission in a status, or in the answer to a command."""
+    told = decode_tolerant(reply.payload, MissionReply)
+    mission, console = told.mission, out()
+    console.print(figures(_rows(told)))
+    if mission.zones:
+        console.print(_zones(mission.zones))
+    if mission.unreached.areas:
+        console.print(_unreached(mission.unreached))
 
 
-def _rows(report: dict[str, Any], mission: dict[str, Any]) -> list[tuple[str, str]]:
-    rows = [(name, str(report[name])) for name in ("robot", "state", "reason")]
-    if mission["ordered"] is not None:
-        began = "begun by itself" if mission["ordered"] == "itself" else "as ordered"
-        stage = phrases.stage(*(mission[name] for name in ("stage", "zone", "pass", "passes")))
+def _rows(told: MissionReply) -> list[tuple[str, str]]:
+    mission = told.mission
+    rows = [("robot", told.robot), ("state", told.state), ("reason", told.reason)]
+    if mission.ordered is not None:
+        began = "begun by itself" if mission.ordered == "itself" else "as ordered"
+        stage = phrases.stage(mission)
         rows.append(("mission", f"{stage}, {began}"))
-    if coverage := report["coverage"]:
-        cells = coverage["covered"], coverage["coverable"]
-        told = phrases.covered(coverage["fraction"], *cells, coverage["covered_m2"])
-        rows.append(("covered", told))
-    if mission["keep_out"]:
-        rows.append(("keep-out zones", str(mission["keep_out"])))
-    if mission["return_home"]:
-        home = mission["home"]
-        rows.append(("home", f"({home['x']:.2f}, {home['y']:.2f}) m" if home else "not known yet"))
+    if told.coverage is not None:
+        rows.append(("covered", phrases.covered(told.coverage)))
+    if mission.keep_out:
+        rows.append(("keep-out zones", str(mission.keep_out)))
+    if mission.return_home:
+        home = mission.home
+        rows.append(("home", f"({home.x:.2f}, {home.y:.2f}) m" if home else "not known yet"))
     return rows
 
 
-def _zones(zones: list[dict[str, Any]]) -> Table:
+def _zones(zones: Sequence[ZoneReport]) -> Table:
     table = Table("zone", "pass", "covered", title="Zones", title_justify="left")
     for zone in zones:
-        counts = (zone[name] for name in ("pass", "passes", "covered", "cells"))
-        table.add_row(str(zone["name"]), *phrases.zone_progress(*counts))
+        table.add_row(zone.name, *phrases.zone_progress(zone))
     return table
 
 
-def _unreached(unreached: dict[str, Any]) -> Table:
+def _unreached(unreached: UnreachedReport) -> Table:
     table = Table("cells", "m2", "at", "why", title="Not reached", title_justify="left")
-    for area in unreached["areas"]:
-        place = f"({area['x']:.2f}, {area['y']:.2f}) m"
-        table.add_row(str(area["cells"]), f"{area['m2']:.2f}", place, str(area["reason"]))
-    if unreached["areas_left_out"]:
-        table.caption = f"and {unreached['areas_left_out']} smaller areas"
+    for area in unreached.areas:
+        place = f"({area.x:.2f}, {area.y:.2f}) m"
+        table.add_row(str(area.cells), f"{area.m2:.2f}", place, area.reason)
+    if unreached.areas_left_out:
+        table.caption = f"and {unreached.areas_left_out} smaller areas"
     return table
 
 
@@ -77,7 +78,7 @@ def show(name: str, reply: Reply) -> None:
         rows = [(title, str(value)) for title, value in _figures(reply).items()]
         out().print(figures(rows))
     elif name in ("status", "mission"):
-        show_mission(decode_json(reply.payload))
+        show_mission(reply)
     else:
         document = decode_json(reply.payload)
         print(yaml.safe_dump(document, sort_keys=False), end="")

@@ -25,8 +25,9 @@ from fasaco_edge.grid.map_files import find_map
 from fasaco_edge.host.processes import python_program
 from fasaco_edge.watch import phrases
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.json_text import decode_tolerant
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.status import Status
 
 PLAIN_LINE_EVERY_S = 5.0
 START_TIMEOUT_S = 20.0
@@ -65,29 +66,16 @@ class DemoView:
     ) -> None:
         self._bar.stop()
 
-    def show(self, status: dict[str, Any], elapsed_s: float) -> None:
+    def show(self, status: Status, elapsed_s: float) -> None:
         """Show one status."""
-        coverage = status.get("coverage") or {}
-        fraction, text = coverage.get("fraction", 0.0), _figures(status, coverage)
+        fraction = status.coverage.fraction if status.coverage else 0.0
+        text = phrases.figures(status)
         self._bar.update(self._task, completed=fraction, figures=text)
         now = time.monotonic()
         if not self._console.is_terminal and now - self._printed_at >= PLAIN_LINE_EVERY_S:
             self._printed_at = now
             line = f"{elapsed_s:6.1f} s  {100 * fraction:5.1f} %  {text}"
             self._console.print(line, soft_wrap=True)
-
-
-def _figures(status: dict[str, Any], coverage: dict[str, Any]) -> str:
-    path = status.get("path") or {}
-    return phrases.figures(
-        status["state"],
-        coverage.get("covered", 0),
-        coverage.get("coverable", 0),
-        path.get("revision", 0),
-        path.get("remaining_steps", 0),
-        status["plan"]["plans"],
-        status["latency_ms"]["plan"] or 0.0,
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +89,7 @@ class Ending:
         timed_out: whether time ran out first.
     """
 
-    status: dict[str, Any]
+    status: Status
     wall_s: float
     replan_ms: tuple[float, ...]
     timed_out: bool
@@ -140,7 +128,7 @@ class DemoMission:
         """Show the mission until all is covered; return how it ended."""
         started = time.monotonic()
         done_since: float | None = None
-        status: dict[str, Any] = {}
+        status = Status()
         plans: dict[int, float] = {}
         settle_s = max(SETTLE_SIM_S / self._args.speed, 1.5)
         with DemoView(str(self._args.map)) as view:
@@ -148,14 +136,14 @@ class DemoMission:
                 self._check_processes()
                 sample = self._newest.take(timeout_s=0.25)
                 if sample is not None:
-                    status = decode_json(sample.payload)
+                    status = decode_tolerant(sample.payload, Status)
                     _note_plan(plans, status)
                     view.show(status, now - started)
-                done = status.get("state") == "done"
+                done = status.state == "done"
                 done_since = (done_since or now) if done else None
                 if done_since is not None and now - done_since >= settle_s:
                     break
-        timed_out = status.get("state") != "done"
+        timed_out = status.state != "done"
         return Ending(status, time.monotonic() - started, tuple(plans.values()), timed_out)
 
     def _start(self) -> None:
@@ -222,10 +210,9 @@ class DemoMission:
             self._bus.close()
 
 
-def _note_plan(plans: dict[int, float], status: dict[str, Any]) -> None:
-    number, milliseconds = status["plan"]["plans"], status["latency_ms"]["plan"]
-    if milliseconds is not None:
-        plans[number] = milliseconds
+def _note_plan(plans: dict[int, float], status: Status) -> None:
+    if status.latency_ms.plan is not None:
+        plans[status.plan.plans] = status.latency_ms.plan
 
 
 def _free_port() -> int:

@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print_json(decode_json(reply.payload))
     else:
-        show_mission(decode_json(reply.payload))
+        show_mission(reply)
     return exits.OK
 
 

@@ -13,7 +13,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, check_settings, open_bus
 from fasaco_edge.config.endpoints import from_here, host_of, protocol_of
@@ -21,8 +20,9 @@ from fasaco_edge.daemon.claim import claims_in
 from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 from fasaco_edge.errors import BadConfiguration, BusUnavailable, MalformedMessage
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.json_text import decode_tolerant
 from fasaco_edge.wire.keys import VERSION
+from fasaco_edge.wire.status import Status
 
 ANSWER_S = 0.5
 LISTENING = "0A"  # proc(5), /proc/net/tcp
@@ -174,15 +174,16 @@ def _seen(context: CheckContext, bus: Bus) -> Finding:
         found = "the daemon runs, and does not tell us how it is"
         to_do = "ask under a name with the role viewer (bus.security.roles)"
         return warn(found, to_do, details)
-    found = f"the daemon runs: {status['state']}, {status['reason']}"
+    found = f"the daemon runs: {status.state}, {status.reason}"
     if len(claims) > 1:
         found = f"{len(claims)} daemons have the name {keys.robot!r}, of which one plans; {found}"
         to_do = "end those that wait, or give them names of their own (robot.name)"
         return warn(found, to_do, details)
-    if status["map"] is None or status["pose"] is None:
-        lacking = " and ".join(kind for kind in ("map", "pose") if status[kind] is None)
-        missing = [key for kind in wanted if status[kind] is None for key in wanted[kind]]
-        return warn(f"{found}; it has no {lacking}", f"publish on {', '.join(missing)}", details)
+    lacking = [kind for kind in ("map", "pose") if getattr(status, kind) is None]
+    if lacking:
+        keys_lacking = ", ".join(key for kind in lacking for key in wanted[kind])
+        found = f"{found}; it has no {' and '.join(lacking)}"
+        return warn(found, f"publish on {keys_lacking}", details)
     return ok(found, details)
 
 
@@ -210,11 +211,11 @@ def _in_words(heard: dict[str, int]) -> str:
     return f"{' and '.join(there)} come in" if there else "neither map nor pose comes in"
 
 
-def _status(bus: Bus, key: str) -> dict[str, Any] | None:
+def _status(bus: Bus, key: str) -> Status | None:
     for reply in bus.get(key, ASK_S):
         if not reply.is_error:
             try:
-                return decode_json(reply.payload)
+                return decode_tolerant(reply.payload, Status)
             except MalformedMessage:
                 return None
     return None

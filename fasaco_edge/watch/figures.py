@@ -8,13 +8,8 @@ from rich.text import Text
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import phrases
 from fasaco_edge.watch.glyphs import GlyphSet
-from fasaco_edge.wire.status import (
-    CoverageReport,
-    MissionReport,
-    PathReport,
-    Status,
-    SupervisedRecorder,
-)
+from fasaco_edge.wire.replies import CoverageReport, MissionReport
+from fasaco_edge.wire.status import PathReport, Status, SupervisedRecorder
 
 Row = tuple[str, Text]
 
@@ -91,10 +86,9 @@ def _path(path: PathReport, width: int) -> list[Row]:
 
 
 def _mission(mission: MissionReport) -> list[Row]:
-    stage = (mission.stage, mission.zone, mission.pass_number, mission.passes)
-    rows: list[Row] = [("mission", _text(phrases.stage(*stage)))]
+    rows: list[Row] = [("mission", _text(phrases.stage(mission)))]
     for zone in mission.zones:
-        at, covered = phrases.zone_progress(zone.pass_number, zone.passes, zone.covered, zone.cells)
+        at, covered = phrases.zone_progress(zone)
         progress = f"pass {at}, {covered}" if zone.pass_number else at
         rows.append((one_line(zone.name), _text(progress)))
     more = []

@@ -115,17 +115,8 @@ def status_line(view: RobotView, now: float) -> str:
         return "the daemon has said nothing yet"
     if view.silent_s(now):
         return "the daemon is silent"
-    coverage, path = status.coverage, status.path
-    line = phrases.figures(
-        status.state,
-        coverage.covered if coverage else 0,
-        coverage.coverable if coverage else 0,
-        path.revision if path else 0,
-        path.remaining_steps if path else 0,
-        status.plan.plans,
-        status.latency_ms.plan or 0.0,
-    )
-    return f"{phrases.percent(coverage.fraction if coverage else 0.0)}  {line}"
+    fraction = status.coverage.fraction if status.coverage else 0.0
+    return f"{phrases.percent(fraction)}  {phrases.figures(status)}"
 
 
 def print_json(payload: bytes) -> None:

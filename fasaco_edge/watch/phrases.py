@@ -5,14 +5,17 @@ from __future__ import annotations
 import time
 
 from fasaco_edge.text import one_line
+from fasaco_edge.wire.replies import CoverageReport, MissionReport, ZoneReport
+from fasaco_edge.wire.status import Status
 
 # Of the wall clock to the monotonic one, when this module was imported [s].
 _OFFSET_S = time.time() - time.monotonic()
 
 
-def covered(fraction: float, covered: int, coverable: int, covered_m2: float) -> str:
+def covered(coverage: CoverageReport) -> str:
     """Return how much is covered."""
-    return f"{percent(fraction)}: {covered} of {coverable} cells, {covered_m2:.1f} m2"
+    cells = f"{coverage.covered} of {coverage.coverable} cells"
+    return f"{percent(coverage.fraction)}: {cells}, {coverage.covered_m2:.1f} m2"
 
 
 def percent(fraction: float) -> str:
@@ -21,29 +24,31 @@ def percent(fraction: float) -> str:
     return f"{shown:.1f} %"
 
 
-def stage(stage: str | None, zone: str | None, number: int | None, passes: int | None) -> str:
+def stage(mission: MissionReport) -> str:
     """Return the stage of a mission."""
-    if stage is None:
+    if mission.stage is None:
         return "no order"
-    if stage != "covering":
-        return one_line(stage)
-    what = f"zone {one_line(zone)}" if zone else "everything reachable"
-    return f"{what}, pass {number} of {passes}"
+    if mission.stage != "covering":
+        return one_line(mission.stage)
+    what = f"zone {one_line(mission.zone)}" if mission.zone else "everything reachable"
+    return f"{what}, pass {mission.pass_number} of {mission.passes}"
 
 
-def zone_progress(number: int, passes: int, covered: int, cells: int) -> tuple[str, str]:
+def zone_progress(zone: ZoneReport) -> tuple[str, str]:
     """Return which pass a zone is in, and how far that is."""
-    at = f"{number} of {passes}" if number else "to come"
-    return at, f"{percent(covered / cells if cells else 0.0)}: {covered} of {cells} cells"
+    at = f"{zone.pass_number} of {zone.passes}" if zone.pass_number else "to come"
+    share = percent(zone.covered / zone.cells if zone.cells else 0.0)
+    return at, f"{share}: {zone.covered} of {zone.cells} cells"
 
 
-def figures(
-    state: str, covered: int, coverable: int, revision: int, steps: int, plans: int, plan_ms: float
-) -> str:
+def figures(status: Status) -> str:
     """Return state and progress in a line."""
+    coverage, path = status.coverage or CoverageReport(), status.path
+    revision, steps = (path.revision, path.remaining_steps) if path else (0, 0)
     return (
-        f"{one_line(state)}: {covered}/{coverable} cells, path {revision} ({steps} steps to go), "
-        f"{plans} plans, last {plan_ms:.0f} ms"
+        f"{one_line(status.state)}: {coverage.covered}/{coverage.coverable} cells, "
+        f"path {revision} ({steps} steps to go), {status.plan.plans} plans, "
+        f"last {status.latency_ms.plan or 0.0:.0f} ms"
     )
 
 

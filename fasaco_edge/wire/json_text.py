@@ -12,7 +12,7 @@ from types import UnionType
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 import msgspec
-from msgspec import UNSET
+from msgspec import UNSET, Meta
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
@@ -23,6 +23,21 @@ MAX_NUMBER = 1e300
 MAX_TEXT = 500
 
 Struct = TypeVar("Struct", bound=msgspec.Struct)
+
+
+def allowed(**schema: object) -> Meta:
+    """Return a limit that a schema states and writers keep; readers do not check it."""
+    return Meta(extra_json_schema=schema)
+
+
+Count = Annotated[int, allowed(minimum=0)]
+Ordinal = Annotated[int, allowed(minimum=1)]
+Amount = Annotated[float, allowed(minimum=0)]
+Name = Annotated[str, allowed(minLength=1)]
+
+
+class Document(msgspec.Struct, frozen=True):
+    """A JSON object whose writer sends all members."""
 
 
 def encode_json(message: object) -> bytes:

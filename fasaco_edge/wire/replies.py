@@ -1,31 +1,133 @@
-"""Replies: what a daemon answers to commands and queries, beside the status."""
+"""Replies: what a daemon answers to commands and queries, and how far its mission is."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Final
 
-from msgspec import Meta
+import msgspec
 
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.wire.json_text import encode_json
-from fasaco_edge.wire.status import (
-    CoverageReport,
-    Document,
-    MissionReport,
-    Name,
-    Ordinal,
-    State,
+from fasaco_edge.wire.json_text import Amount, Count, Document, Name, Ordinal, allowed, encode_json
+
+STATES: Final = (
+    *("idle", "waiting for map", "waiting for pose", "loading", "planning", "covering"),
+    *("returning", "paused", "blocked", "degraded", "done"),
 )
+State = Annotated[str, allowed(enum=STATES)]
+
+
+class Point(Document, frozen=True):
+    """A place.
+
+    Attributes:
+        x, y: [m] in the frame of the map.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+
+
+class CoverageReport(Document, frozen=True):
+    """How many cells are covered.
+
+    Attributes:
+        coverable: cells that are coverable and that the robot can reach.
+        covered: of those.
+        recovered: of those, covered more than once.
+        remaining: of those, still to cover.
+        unreachable: cells where the robot would fit, but cannot come to.
+        free_out_of_reach_m2: area the map knows to be free, but in no reachable cell.
+        fraction: covered share of coverable.
+    """
+
+    coverable: Count = 0
+    covered: Count = 0
+    recovered: Count = 0
+    remaining: Count = 0
+    unreachable: Count = 0
+    covered_m2: Amount = 0.0
+    to_cover_m2: Amount = 0.0
+    free_out_of_reach_m2: Amount = 0.0
+    fraction: Annotated[float, allowed(minimum=0, maximum=1)] = 0.0
+
+
+class ZoneReport(Document, frozen=True):
+    """How far a zone is.
+
+    Attributes:
+        pass: its newest pass; 0: to come.
+        cells: that can be reached.
+        covered: in that pass.
+    """
+
+    name: str = ""
+    passes: Ordinal = 1
+    pass_number: Count = msgspec.field(name="pass", default=0)
+    cells: Count = 0
+    covered: Count = 0
+
+
+class UnreachedArea(Document, frozen=True):
+    """An area of the order that stays uncovered.
+
+    Attributes:
+        x, y: [m] in the frame of the map.
+    """
+
+    cells: Ordinal = 1
+    m2: Amount = 0.0
+    x: float = 0.0
+    y: float = 0.0
+    reason: str = ""
+
+
+class UnreachedReport(Document, frozen=True):
+    """What of the order stays uncovered as things are."""
+
+    cells: Count = 0
+    m2: Amount = 0.0
+    areas: Annotated[tuple[UnreachedArea, ...], allowed(maxItems=20)] = ()
+    areas_left_out: Count = 0
+
+
+class MissionReport(Document, frozen=True):
+    """The order, and how far it is.
+
+    Attributes:
+        paused: whether the robot is to stand.
+        zone: what is being covered; null for everything reachable.
+        pass: which pass that is; null without an order.
+        passes: of how many.
+        keep_out: how many keep-out zones there are.
+        home: where the mission began.
+        tries: how often what was left over was tried again.
+        unreached: what of the order stays uncovered as things are.
+    """
+
+    ordered: Annotated[str | None, allowed(enum=("command", "itself", None))] = None
+    stage: Annotated[
+        str | None, allowed(enum=("covering", "retrying", "returning", "over", None))
+    ] = None
+    paused: bool = False
+    zone: str | None = None
+    pass_number: Ordinal | None = msgspec.field(name="pass", default=None)
+    passes: Ordinal | None = None
+    zones: tuple[ZoneReport, ...] = ()
+    keep_out: Count = 0
+    return_home: bool = False
+    home: Point | None = None
+    tries: Count = 0
+    unreached: UnreachedReport = UnreachedReport()
 
 
 class Reply(Document, frozen=True):
     """The answer to a command that was taken."""
 
-    robot: Name
-    state: State
-    reason: str
-    coverage: CoverageReport | None
-    mission: MissionReport
+    robot: Name = ""
+    state: State = ""
+    reason: str = ""
+    coverage: CoverageReport | None = None
+    mission: MissionReport = MissionReport()
 
 
 class Replan(Document, frozen=True):
@@ -37,7 +139,7 @@ class Replan(Document, frozen=True):
 
     robot: Name
     plan: Ordinal
-    accepted: Annotated[bool, Meta(extra_json_schema={"const": True})] = True
+    accepted: Annotated[bool, allowed(const=True)] = True
 
 
 class Version(Document, frozen=True):
@@ -50,9 +152,9 @@ class Version(Document, frozen=True):
     """
 
     version: str
-    protocol: Annotated[str, Meta(extra_json_schema={"pattern": "^v[0-9]+$"})]
+    protocol: Annotated[str, allowed(pattern="^v[0-9]+$")]
     zenoh: str
-    package: Annotated[str, Meta(extra_json_schema={"const": "fasaco-edge"})] = "fasaco-edge"
+    package: Annotated[str, allowed(const="fasaco-edge")] = "fasaco-edge"
 
 
 class Error(Document, frozen=True, forbid_unknown_fields=True):
@@ -64,9 +166,9 @@ class Error(Document, frozen=True, forbid_unknown_fields=True):
         hint: what to do about it; may be empty.
     """
 
-    code: Annotated[str, Meta(extra_json_schema={"pattern": "^[a-z_]+$"})]
-    message: Name
-    hint: str
+    code: Annotated[str, allowed(pattern="^[a-z_]+$")] = ""
+    message: Name = ""
+    hint: str = ""
 
 
 def encode_error(error: FasacoError) -> bytes:

@@ -9,35 +9,18 @@ from __future__ import annotations
 from typing import Annotated, Final
 
 import msgspec
-from msgspec import UNSET, Meta, UnsetType
+from msgspec import UNSET, UnsetType
 
-from fasaco_edge.wire.json_text import tolerant
+from fasaco_edge.wire.json_text import Amount, Count, Document, Name, Ordinal, allowed, tolerant
+from fasaco_edge.wire.replies import CoverageReport, MissionReport, Point, State
 
-STATES: Final = (
-    *("idle", "waiting for map", "waiting for pose", "loading", "planning", "covering"),
-    *("returning", "paused", "blocked", "degraded", "done"),
-)
 RECORDER_STATES: Final = ("recording", "disk full", "stalled", "stopping")
 SUPERVISED_STATES: Final = ("starting", *RECORDER_STATES, "silent", "restarting")
 CLAIMS: Final = ("looks", "waits", "yields", "plans")
 
 
-def _allowed(**schema: object) -> Meta:
-    """Return what a schema says of a member beyond its type; readers do not insist on it."""
-    return Meta(extra_json_schema=schema)
-
-
-Count = Annotated[int, _allowed(minimum=0)]
-Ordinal = Annotated[int, _allowed(minimum=1)]
-Amount = Annotated[float, _allowed(minimum=0)]
-Name = Annotated[str, _allowed(minLength=1)]
-State = Annotated[str, _allowed(enum=STATES)]
 Settings = dict[str, object]
 """The configuration in force, without secrets, by sections."""
-
-
-class Document(msgspec.Struct, frozen=True):
-    """A JSON object whose writer sends all members."""
 
 
 class ClaimReport(Document, frozen=True):
@@ -49,8 +32,8 @@ class ClaimReport(Document, frozen=True):
             before.
     """
 
-    id: Annotated[str, _allowed(pattern="^[0-9a-f]{1,32}$")] = ""
-    stand: Annotated[str, _allowed(enum=CLAIMS)] = "plans"
+    id: Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")] = ""
+    stand: Annotated[str, allowed(enum=CLAIMS)] = "plans"
 
 
 class MapReport(Document, frozen=True):
@@ -64,21 +47,10 @@ class MapReport(Document, frozen=True):
 
     rows: Ordinal = 1
     cols: Ordinal = 1
-    resolution_m: Annotated[float, _allowed(exclusiveMinimum=0)] = 1.0
+    resolution_m: Annotated[float, allowed(exclusiveMinimum=0)] = 1.0
     revision: Ordinal = 1
     stamp_ns: int = 0
     frame: str = ""
-
-
-class Point(Document, frozen=True):
-    """A place.
-
-    Attributes:
-        x, y: [m] in the frame of the map.
-    """
-
-    x: float = 0.0
-    y: float = 0.0
 
 
 class PoseReport(Point, frozen=True):
@@ -90,30 +62,6 @@ class PoseReport(Point, frozen=True):
     """
 
     yaw: float = 0.0
-
-
-class CoverageReport(Document, frozen=True):
-    """How many cells are covered.
-
-    Attributes:
-        coverable: cells that are coverable and that the robot can reach.
-        covered: of those.
-        recovered: of those, covered more than once.
-        remaining: of those, still to cover.
-        unreachable: cells where the robot would fit, but cannot come to.
-        free_out_of_reach_m2: area the map knows to be free, but in no reachable cell.
-        fraction: covered share of coverable.
-    """
-
-    coverable: Count = 0
-    covered: Count = 0
-    recovered: Count = 0
-    remaining: Count = 0
-    unreachable: Count = 0
-    covered_m2: Amount = 0.0
-    to_cover_m2: Amount = 0.0
-    free_out_of_reach_m2: Amount = 0.0
-    fraction: Annotated[float, _allowed(minimum=0, maximum=1)] = 0.0
 
 
 class PlanFigures(Document, frozen=True):
@@ -257,8 +205,8 @@ class ErrorCounts(Document, frozen=True):
     total: Count = 0
     last: str = ""
     by_code: Annotated[
-        dict[str, Ordinal], _allowed(propertyNames={"type": "string", "pattern": "^[a-z_]+$"})
-    ] = {}
+        dict[str, Ordinal], allowed(propertyNames={"type": "string", "pattern": "^[a-z_]+$"})
+    ] = msgspec.field(default_factory=dict)
 
 
 class LedgerReport(Document, frozen=True):
@@ -290,7 +238,7 @@ class Recorder(Document, frozen=True):
         rss_mb: memory of the process [MB].
     """
 
-    state: Annotated[str, _allowed(enum=RECORDER_STATES)] = ""
+    state: Annotated[str, allowed(enum=RECORDER_STATES)] = ""
     reason: str = ""
     file: str = ""
     bytes: Count = 0
@@ -315,7 +263,7 @@ class SupervisedRecorder(Document, frozen=True):
         rss_mb: memory of the process [MB].
     """
 
-    state: Annotated[str, _allowed(enum=SUPERVISED_STATES)] = ""
+    state: Annotated[str, allowed(enum=SUPERVISED_STATES)] = ""
     restarts: Count = 0
     reason: str | UnsetType = UNSET
     file: str | UnsetType = UNSET
@@ -325,75 +273,6 @@ class SupervisedRecorder(Document, frozen=True):
     malformed: Count | UnsetType = UNSET
     rss_mb: Amount | UnsetType = UNSET
     pid: Ordinal | UnsetType = UNSET
-
-
-class ZoneReport(Document, frozen=True):
-    """How far a zone is.
-
-    Attributes:
-        pass: its newest pass; 0: to come.
-        cells: that can be reached.
-        covered: in that pass.
-    """
-
-    name: str = ""
-    passes: Ordinal = 1
-    pass_number: Count = msgspec.field(name="pass", default=0)
-    cells: Count = 0
-    covered: Count = 0
-
-
-class UnreachedArea(Document, frozen=True):
-    """An area of the order that stays uncovered.
-
-    Attributes:
-        x, y: [m] in the frame of the map.
-    """
-
-    cells: Ordinal = 1
-    m2: Amount = 0.0
-    x: float = 0.0
-    y: float = 0.0
-    reason: str = ""
-
-
-class UnreachedReport(Document, frozen=True):
-    """What of the order stays uncovered as things are."""
-
-    cells: Count = 0
-    m2: Amount = 0.0
-    areas: Annotated[tuple[UnreachedArea, ...], _allowed(maxItems=20)] = ()
-    areas_left_out: Count = 0
-
-
-class MissionReport(Document, frozen=True):
-    """The order, and how far it is.
-
-    Attributes:
-        paused: whether the robot is to stand.
-        zone: what is being covered; null for everything reachable.
-        pass: which pass that is; null without an order.
-        passes: of how many.
-        keep_out: how many keep-out zones there are.
-        home: where the mission began.
-        tries: how often what was left over was tried again.
-        unreached: what of the order stays uncovered as things are.
-    """
-
-    ordered: Annotated[str | None, _allowed(enum=("command", "itself", None))] = None
-    stage: Annotated[
-        str | None, _allowed(enum=("covering", "retrying", "returning", "over", None))
-    ] = None
-    paused: bool = False
-    zone: str | None = None
-    pass_number: Ordinal | None = msgspec.field(name="pass", default=None)
-    passes: Ordinal | None = None
-    zones: tuple[ZoneReport, ...] = ()
-    keep_out: Count = 0
-    return_home: bool = False
-    home: Point | None = None
-    tries: Count = 0
-    unreached: UnreachedReport = UnreachedReport()
 
 
 class Status(Document, frozen=True):
@@ -426,7 +305,9 @@ class Status(Document, frozen=True):
     rss_mb: Amount = 0.0
     cpu_s: Amount = 0.0
     threads: Ordinal = 0
-    config: Annotated[Settings, _allowed(**{"$ref": "config.json"})] = {}
+    config: Annotated[Settings, allowed(**{"$ref": "config.json"})] = msgspec.field(
+        default_factory=dict
+    )
     mission: MissionReport = MissionReport()
 
 

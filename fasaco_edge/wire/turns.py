@@ -6,12 +6,11 @@ float64, which come back as they were; bytes are base64.
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.status import Settings
 
 
 class Beginning(msgspec.Struct, frozen=True):
@@ -24,7 +23,7 @@ class Beginning(msgspec.Struct, frozen=True):
     """
 
     version: str
-    config: dict[str, Any]
+    config: Settings
     ledger: bytes = b""
 
 
@@ -107,7 +106,7 @@ class Turn(msgspec.Struct, frozen=True, omit_defaults=True):
     is_begun: bool = True
     samples: list[Taken] = []
     patches_lost: int = 0
-    commands: list[tuple[int, dict[str, Any]]] = []
+    commands: list[tuple[int, dict[str, object]]] = []
     plan: PlanTaken | None = None
     decided: Decided | None = None
 

@@ -16,7 +16,8 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import PlanRequest
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.wire.status import CoverageReport, LedgerReport, LoopTimes, PathReport, Status
+from fasaco_edge.wire.replies import CoverageReport
+from fasaco_edge.wire.status import LedgerReport, LoopTimes, PathReport, Status
 
 
 class Told:

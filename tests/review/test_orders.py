@@ -13,7 +13,7 @@ from fasaco_edge.review.moments import spans_of
 from fasaco_edge.review.orders import chapters
 from fasaco_edge.review.rows import verdicts
 from fasaco_edge.review.run_data import RunData, StatusSample
-from fasaco_edge.wire.status import CoverageReport
+from fasaco_edge.wire.replies import CoverageReport
 
 ALL = read_order({})
 KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]], "passes": 1}]})

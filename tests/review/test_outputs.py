@@ -24,7 +24,7 @@ from fasaco_edge.review.moments import Span
 from fasaco_edge.review.page import page_of
 from fasaco_edge.review.picture import SIZE, draw_review
 from fasaco_edge.review.review import CoverageCounts, read_review, review_of
-from fasaco_edge.wire.status import ZoneReport
+from fasaco_edge.wire.replies import ZoneReport
 from tests.review.test_parts import run_told
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge
 

@@ -17,14 +17,12 @@ from fasaco_edge.wire.json_text import (
     encode_json,
     tolerant,
 )
+from fasaco_edge.wire.replies import STATES, CoverageReport, ZoneReport
 from fasaco_edge.wire.status import (
-    STATES,
-    CoverageReport,
     PathAttachment,
     Rectangle,
     Status,
     SupervisedRecorder,
-    ZoneReport,
     known_settings,
 )
 

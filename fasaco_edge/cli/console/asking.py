@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console.arguments import add_robot_on_bus, client_settings, seconds
 from fasaco_edge.cli.console.streams import print_json
@@ -13,6 +13,7 @@ from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.queries import Reply
+    from fasaco_edge.wire.replies import Error
 
 TIMEOUT_S = 5.0
 
@@ -30,11 +31,9 @@ def nobody_answers(prefix: str, robots: Collection[str]) -> NobodyAnswersError:
 class RefusedError(FasacoError):
     """The daemon's answer is an error."""
 
-    def __init__(self, answer: dict[str, Any]) -> None:
-        super().__init__(
-            one_line(str(answer.get("message"))), hint=one_line(str(answer.get("hint", "")))
-        )
-        self.code = str(answer.get("code"))
+    def __init__(self, answer: Error) -> None:
+        super().__init__(one_line(answer.message), hint=one_line(answer.hint))
+        self.code = answer.code
 
 
 def add_question(parser: argparse.ArgumentParser) -> None:
@@ -59,8 +58,9 @@ def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: byte
         BusUnavailable: nobody listens at the endpoint.
     """
     from fasaco_edge.bus.session import open_bus
-    from fasaco_edge.wire.json_text import decode_json
+    from fasaco_edge.wire.json_text import decode_json, decode_tolerant
     from fasaco_edge.wire.keys import Keys
+    from fasaco_edge.wire.replies import Error
 
     keys = Keys(args.robot, args.base)
     selector = keys.rpc(name) + (f"?{parameters}" if parameters else "")
@@ -73,5 +73,5 @@ def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: byte
     if reply.is_error:
         if args.json:
             print_json(decode_json(reply.payload))
-        raise RefusedError(decode_json(reply.payload))
+        raise RefusedError(decode_tolerant(reply.payload, Error))
     return reply

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fasaco_edge.mission.orders.order_state import OrderState
-from fasaco_edge.wire.status import (
+from fasaco_edge.wire.replies import (
     MissionReport,
     Point,
     UnreachedArea,

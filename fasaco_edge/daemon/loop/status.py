@@ -19,10 +19,9 @@ from fasaco_edge.daemon.loop.watchdog import CycleTimes
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.host.processes import resident_mb, thread_count
 from fasaco_edge.mission.orders.order_state import OrderState
-from fasaco_edge.wire.replies import Reply
+from fasaco_edge.wire.replies import CoverageReport, Reply
 from fasaco_edge.wire.status import (
     ClaimReport,
-    CoverageReport,
     ErrorCounts,
     Latencies,
     LedgerReport,

@@ -180,7 +180,7 @@ def read_command(document: object) -> tuple[CommandName, MissionOrder]:
     return asked.command, order_of(asked.order or OrderDocument())
 
 
-def order_document(order: MissionOrder) -> dict[str, Any]:
+def order_document(order: MissionOrder) -> dict[str, object]:
     """Return ``order`` as ``read_order`` reads it."""
     rest = {
         "keep_out": order.keep_out,
@@ -196,7 +196,7 @@ def order_document(order: MissionOrder) -> dict[str, Any]:
     return {"zones": zones, **rest}
 
 
-def command_document(command: CommandName, order: MissionOrder) -> dict[str, Any]:
+def command_document(command: CommandName, order: MissionOrder) -> dict[str, object]:
     """Return a command as ``read_command`` reads it."""
     if command != "start":
         return {"command": command}

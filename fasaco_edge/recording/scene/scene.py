@@ -23,13 +23,7 @@ from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
-from fasaco_edge.wire.status import (
-    ErrorCounts,
-    PathAttachment,
-    Recorder,
-    Status,
-    known_settings,
-)
+from fasaco_edge.wire.status import ErrorCounts, PathAttachment, Recorder, Status, known_settings
 
 DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
