@@ -1,9 +1,9 @@
-"""Text that came from elsewhere, made fit to be shown: in a terminal or a log, and on a page.
+"""Text from elsewhere, made safe to show: in a terminal, in a log and on a page.
 
 A name, a reason or a message off the bus, out of a file or a recording may hold what a terminal
 obeys (escapes, C0 and C1 controls), what turns a line about or hides in it (overrides, joiners,
 fillers), line ends that feign another line, and mark-up. Whoever writes to people writes through
-here: ``cli.terminal`` and ``cli.logs``, ``daemon.notify``, ``drawing``, ``review.page``.
+here: ``cli.console``, ``daemon.notify``, ``drawing`` and ``review``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How a command ends: its exit codes."""
+"""Exit codes of commands."""
 
 OK = 0
 ERROR = 1

@@ -1,10 +1,7 @@
-"""Under a storm of faults: one line of each kind in ten seconds, and how many were left out.
+"""Logging: to standard error, or to the systemd journal where standard error leads there.
 
-Log lines as the journal takes them: with a priority, and fields to search for.
-
-One datagram for each, in the native protocol, https://systemd.io/JOURNAL_NATIVE_PROTOCOL/.
-
-Where log lines go: to standard error, or to the journal where that is what stands behind it.
+Of each kind of line one in ten seconds is written, with how many were left out. The journal gets a
+datagram a line, with priority and fields (https://systemd.io/JOURNAL_NATIVE_PROTOCOL/).
 """
 
 from __future__ import annotations
@@ -35,11 +32,11 @@ class _Kind:
 
 
 class OneOfAKind(logging.Handler):
-    """Hands lines on to another handler, but of each kind only one in ten seconds.
+    """Passes lines on to another handler, but of each kind only one in ten seconds.
 
     The kind is the event and its code, where a line has them (``extra``), else the whole text.
-    What was left out is told by the next line of the kind; where none comes, by a line of its
-    own, once another line is due.
+    The next line of a kind says how many were left out; where none comes, a line of its own
+    does, once another line is due.
     """
 
     def __init__(
@@ -51,7 +48,7 @@ class OneOfAKind(logging.Handler):
         self._kinds: dict[object, _Kind] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Take a line."""
+        """Pass a line on, or count it."""
         now = self._clock()
         kind = _kind_of(record)
         known = self._kinds.get(kind)
@@ -61,17 +58,17 @@ class OneOfAKind(logging.Handler):
             return
         self._kinds[kind] = _Kind(now + PERIOD_S)
         if known is not None:
-            _tell(record, known.left_out)
+            _add_count(record, known.left_out)
         self._target.handle(record)
-        self._tell_others(now)
+        self._report_others(now)
 
     def close(self) -> None:
-        """Tell what was left out to the end."""
-        self._tell_others(float("inf"))
+        """Report what was left out, and close the target."""
+        self._report_others(float("inf"))
         self._target.close()
         super().close()
 
-    def _tell_others(self, now: float) -> None:
+    def _report_others(self, now: float) -> None:
         for kind, known in list(self._kinds.items()):
             if now < known.until:
                 continue
@@ -79,7 +76,7 @@ class OneOfAKind(logging.Handler):
             if known.last is not None:
                 # Of the same kind as well, so that its ten seconds begin again.
                 self._kinds[kind] = _Kind(now + PERIOD_S)
-                _tell(known.last, known.left_out - 1)
+                _add_count(known.last, known.left_out - 1)
                 self._target.handle(known.last)
 
 
@@ -90,7 +87,7 @@ def _kind_of(record: logging.LogRecord) -> object:
     return event, getattr(record, "code", None), getattr(record, "state", None)
 
 
-def _tell(record: logging.LogRecord, left_out: int) -> None:
+def _add_count(record: logging.LogRecord, left_out: int) -> None:
     if left_out:
         record.suppressed = left_out
         record.msg, record.args = f"{record.getMessage()} (and {left_out} more like it)", ()
@@ -98,9 +95,9 @@ def _tell(record: logging.LogRecord, left_out: int) -> None:
 
 SOCKET = "/run/systemd/journal/socket"
 IDENTIFIER = "fasaco-edge"
-# A datagram has to fit into the socket's buffer; who says more than that, says less.
+# A datagram has to fit into the socket's buffer; a longer value is cut.
 MOST_BYTES = 32_768
-# A journal that hangs must not hold the loop up [s].
+# How long a journal that hangs may delay the loop [s].
 PATIENCE_S = 0.05
 # syslog(3): critical, error, warning, info, debug.
 PRIORITIES = ((50, 2), (40, 3), (30, 4), (20, 6), (0, 7))
@@ -109,7 +106,7 @@ EXTRA = ("event", "code", "state", "suppressed")
 
 
 def is_journal(environ: Mapping[str, str] = os.environ) -> bool:
-    """Tell whether standard error leads to the journal, and not where somebody has turned it."""
+    """Tell whether standard error leads to the journal, and was not redirected."""
     try:
         there = os.fstat(sys.stderr.fileno())
     except (OSError, ValueError):
@@ -143,7 +140,7 @@ class JournalHandler(logging.Handler):
 
 
 def fields_of(record: logging.LogRecord, message: str) -> dict[str, str]:
-    """Return a line's fields. An event has an id that stays the same, from its name."""
+    """Return a line's fields; an event has a fixed id, made of its name."""
     priority = next(number for level, number in PRIORITIES if record.levelno >= level)
     fields = {
         "MESSAGE": message,
@@ -184,7 +181,7 @@ def encode_entry(fields: Mapping[str, str]) -> bytes:
 
 LOG = logging.getLogger(__name__)
 # Of an error with all that is wrong with a file, or a traceback [characters].
-MOST_SAID = 20_000
+MOST_CHARACTERS = 20_000
 PLAIN, JOURNAL = "%(levelname)s %(name)s: %(message)s", "%(message)s"
 
 
@@ -206,7 +203,7 @@ def begin_logging(level: str) -> None:
         target: logging.Handler = JournalHandler()
         target.setFormatter(OneLine(JOURNAL))
         sys.excepthook = _log_uncaught
-        # Where a watchdog ends a service that hangs (SIGABRT), the log shows in what.
+        # Where the watchdog ends a service that hangs (SIGABRT), the log shows where it hung.
         faulthandler.enable()
     else:
         target = logging.StreamHandler()
@@ -215,7 +212,7 @@ def begin_logging(level: str) -> None:
 
 
 def say_why(error: FasacoError) -> None:
-    """Say why a command has failed, and what to do."""
+    """Print or log why a command has failed, and what to do."""
     if is_journal():
         text = f"{error} ({error.hint})" if error.hint else str(error)
         LOG.error("%s", text, extra={"event": "failure", "code": error.code})
@@ -227,7 +224,7 @@ def say_why(error: FasacoError) -> None:
 
 
 def _indented(text: str) -> str:
-    return lines(text, MOST_SAID).replace("\n", "\n    ")
+    return lines(text, MOST_CHARACTERS).replace("\n", "\n    ")
 
 
 def _log_uncaught(

@@ -1,7 +1,7 @@
-"""Standard output and error as a command writes to them: nothing in them controls a terminal.
+"""Clean standard output and error: no text that is printed can control a terminal.
 
-Whatever is printed goes through here, a traceback and a mistake on the command line, too; tables
-and progress bars, which have escapes of their own, through ``cli.terminal``.
+Tracebacks and the parser's errors go through here, too; tables and progress bars, which have
+escapes of their own, through ``cli.console.terminal``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What people look at in a terminal: progress and tables. Both go to standard error and out."""
+"""Terminal output: tables on standard output, progress bars on standard error."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def progress() -> Progress:
 
 
 def progress_of_time() -> Progress:
-    """Return a progress bar of seconds, which nobody wants to see counted."""
+    """Return a progress bar of time, without a count."""
     return Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=32),
