@@ -13,8 +13,8 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+import msgspec
 import numpy as np
 import yaml
 from numpy.typing import NDArray
@@ -148,7 +148,7 @@ def builtin_maps() -> list[tuple[str, str]]:
     Raises:
         MapFileError: this installation has no maps.
     """
-    return [(name, entry["why"]) for name, entry in _index().items()]
+    return [(name, entry.why) for name, entry in _index().items()]
 
 
 def suggested_start(path: Path) -> tuple[float, float] | None:
@@ -160,8 +160,12 @@ def suggested_start(path: Path) -> tuple[float, float] | None:
     entry = _index().get(path.stem)
     if entry is None or path.resolve() != (_maps() / f"{path.stem}.yaml").resolve():
         return None
-    x, y = entry["start"]
-    return float(x), float(y)
+    return entry.start
+
+
+class _BuiltIn(msgspec.Struct):
+    why: str
+    start: tuple[float, float]
 
 
 def _maps() -> Path:
@@ -171,12 +175,11 @@ def _maps() -> Path:
         raise MapFileError(str(error)) from error
 
 
-def _index() -> dict[str, dict[str, Any]]:
-    index: dict[str, dict[str, Any]] = _load_yaml(_maps() / "index.yaml")
-    return index
+def _index() -> dict[str, _BuiltIn]:
+    return msgspec.convert(_load_yaml(_maps() / "index.yaml"), dict[str, _BuiltIn])
 
 
-def _load_yaml(path: Path) -> dict[str, Any]:
+def _load_yaml(path: Path) -> dict[str, object]:
     try:
         loaded = load(read_bounded(path))
     except (OSError, PlainYamlError) as error:
@@ -207,7 +210,7 @@ def _read_yaml(path: Path) -> _MapYaml:
 @dataclass(frozen=True, slots=True)
 class _YamlKeys:
     path: Path
-    values: dict[str, Any]
+    values: dict[str, object]
 
     def error(self, key: str, expected: str) -> MapFileError:
         got = f"got {shown(self.values[key])}" if key in self.values else "the key is missing"

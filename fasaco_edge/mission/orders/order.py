@@ -60,63 +60,8 @@ class MissionOrder:
     return_home: bool = False
     keep_covered: bool = False
 
-    def check(self) -> None:
-        """Check all that can be checked without a map.
-
-        Raises:
-            OrderError: naming the member, what is wrong with it, and what is allowed.
-        """
-        _check_count("zones", len(self.zones), 1, MOST_ZONES)
-        _check_count("keep_out", len(self.keep_out), 0, MOST_KEEP_OUT)
-        names = [zone.name for zone in self.zones]
-        for index, zone in enumerate(self.zones):
-            where = f"zones[{index}]"
-            _check_name(f"{where}.name", zone.name)
-            if zone.name in names[:index]:
-                raise OrderError(f"{where}.name: there is a zone {zone.name!r} already")
-            if not 1 <= zone.passes <= MOST_PASSES:
-                raise OrderError(f"{where}.passes must be in 1..{MOST_PASSES}, got {zone.passes}")
-        polygons = {
-            f"zones[{index}].polygon": zone.polygon
-            for index, zone in enumerate(self.zones)
-            if zone.polygon is not None
-        } | {f"keep_out[{index}]": polygon for index, polygon in enumerate(self.keep_out)}
-        points = sum(map(len, polygons.values()))
-        if points > MOST_POINTS_IN_ALL:
-            raise OrderError(
-                f"polygons must have at most {MOST_POINTS_IN_ALL} points, got {points}"
-            )
-        for where, polygon in polygons.items():
-            _check_polygon(where, polygon)
-
 
 EVERYTHING_ONCE = MissionOrder()
-
-
-def _check_count(where: str, count: int, least: int, most: int) -> None:
-    if not least <= count <= most:
-        raise OrderError(f"{where} must be {least}..{most}, got {count}")
-
-
-def _check_name(where: str, name: str) -> None:
-    if not (1 <= len(name) <= LONGEST_NAME and name.isprintable() and name.strip() == name):
-        raise OrderError(
-            f"{where} must be 1..{LONGEST_NAME} printable characters, got {name!r:.80}"
-        )
-
-
-def _check_polygon(where: str, polygon: Polygon) -> None:
-    if len(polygon) > MOST_POINTS:
-        raise OrderError(f"{where} must have at most {MOST_POINTS} points, got {len(polygon)}")
-    for index, (x, y) in enumerate(polygon):
-        # A negated comparison, so that NaN is caught too.
-        if not math.hypot(x, y) <= FARTHEST_M:
-            raise OrderError(
-                f"{where}[{index}] must be finite and within {FARTHEST_M:g} m of 0, got ({x}, {y})"
-            )
-    if why := polygon_flaw(polygon):
-        raise OrderError(f"{where} {why}")
-
 
 CommandName = Literal["start", "pause", "resume", "cancel", "reset", "replan", "status"]
 
@@ -219,8 +164,43 @@ def order_of(document: OrderDocument) -> MissionOrder:
         document.return_home,
         document.keep_covered,
     )
-    order.check()
+    _check(order)
     return order
+
+
+def _check(order: MissionOrder) -> None:
+    """Check what the types of a document do not say, and no map is needed for.
+
+    Raises:
+        OrderError: naming the member, what is wrong with it, and what is allowed.
+    """
+    names = [zone.name for zone in order.zones]
+    for index, name in enumerate(names):
+        where = f"zones[{index}].name"
+        if not (name.isprintable() and name.strip() == name):
+            raise OrderError(
+                f"{where} must be 1..{LONGEST_NAME} printable characters, got {name!r:.80}"
+            )
+        if name in names[:index]:
+            raise OrderError(f"{where}: there is a zone {name!r} already")
+    polygons = {
+        f"zones[{index}].polygon": zone.polygon
+        for index, zone in enumerate(order.zones)
+        if zone.polygon is not None
+    } | {f"keep_out[{index}]": polygon for index, polygon in enumerate(order.keep_out)}
+    points = sum(map(len, polygons.values()))
+    if points > MOST_POINTS_IN_ALL:
+        raise OrderError(f"polygons must have at most {MOST_POINTS_IN_ALL} points, got {points}")
+    for where, polygon in polygons.items():
+        for index, (x, y) in enumerate(polygon):
+            # A negated comparison, so that NaN is caught too.
+            if not math.hypot(x, y) <= FARTHEST_M:
+                raise OrderError(
+                    f"{where}[{index}] must be finite and within {FARTHEST_M:g} m of 0, "
+                    f"got ({x}, {y})"
+                )
+        if why := polygon_flaw(polygon):
+            raise OrderError(f"{where} {why}")
 
 
 def _converted(document: object, kind: type[_Read]) -> _Read:

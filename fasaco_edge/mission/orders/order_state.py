@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
@@ -162,7 +162,7 @@ class OrderState:
 
     def to_json(self) -> str:
         """Return it as JSON, to be kept with the ledger."""
-        plain: dict[str, Any] = {
+        plain = {
             "version": VERSION,
             "order": None if self.order is None else order_document(self.order),
             "standing": self.automatic,
