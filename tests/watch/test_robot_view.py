@@ -7,8 +7,10 @@ import json
 import numpy as np
 import pytest
 
+from fasaco_edge.bus.session import Sample
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch
+from fasaco_edge.watch.feed import SUBSCRIBED
 from fasaco_edge.watch.robot_view import KEPT, EventLog, PathProgress, RobotView
 from fasaco_edge.wire.maps import encode_map_update
 from fasaco_edge.wire.poses import encode_pose_stamped
@@ -123,6 +125,12 @@ def test_what_cannot_be_read_costs_only_itself(topic, payload):
     tell(view, "status", status(state="done"))
     assert view.status is not None
     assert view.status.state == "done"
+
+
+@pytest.mark.parametrize("topic", SUBSCRIBED, ids=lambda topic: topic.name)
+def test_every_topic_subscribed_is_read(topic):
+    view = RobotView("robot")
+    view.take(topic.name, Sample("key", b"broken"), NOW)  # a KeyError where nothing reads it
 
 
 def test_members_nobody_knows_yet_are_passed_over():

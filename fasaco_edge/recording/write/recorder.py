@@ -103,7 +103,6 @@ class Recorder:
             "pose": self._draw_pose,
             "tf_static": partial(self._draw_pose, is_static=True),
             "command": self._draw_command,
-            "turns": lambda _: None,  # for a replay, which reads the inputs
             "path": self._draw_path,
             "coverage": lambda sample: self._scene.add_coverage(
                 decode_occupancy_grid(sample.payload)
@@ -186,7 +185,9 @@ class Recorder:
             return
         self._inputs.add(arrival)
         try:
-            self._drawers[arrival.topic](arrival.sample)
+            # What has no drawer, as the turn log, is an input for a replay alone.
+            if (draw := self._drawers.get(arrival.topic)) is not None:
+                draw(arrival.sample)
         except FasacoError as error:
             self._malformed += 1
             # A faulty publisher is so with every message: log the 1st, 2nd, 4th, 8th ...
