@@ -1,4 +1,4 @@
-"""What a benchmark is: options, samples one by one, and a report on any number of them.
+"""A benchmark: options, samples one by one, and a report on any number of them.
 
 A new benchmark is a file that ends with a ``Benchmark``, and a row of ``BENCHMARKS`` in
 ``fasaco_edge.cli.bench`` or ``tests.benchmarks.__main__``. Whoever runs it may stop between two
@@ -15,13 +15,13 @@ from typing import Any, Generic, TypeVar
 
 Sample = TypeVar("Sample")
 
-# Hears what is being measured now, in a few words.
+# Called with what is being measured now, in a few words.
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What was wanted and what came out, in the same ``unit``.
+    """A limit and what was measured, in the same ``unit``.
 
     Attributes:
         what: what is measured.
@@ -60,7 +60,7 @@ class ResultTable:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What came out, for people and for machines.
+    """Results, for people and for machines.
 
     Attributes:
         title: heads the table.

@@ -1,7 +1,4 @@
-"""Where a process may run and how much of it: cores, niceness, and a control group's weight.
-
-Where figures come from: without the machine they mean little.
-"""
+"""Placement of processes (cores, niceness, CPU weight), and the machine that figures come from."""
 
 from __future__ import annotations
 

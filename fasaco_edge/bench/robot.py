@@ -85,7 +85,7 @@ class PathArrival:
 
 
 class MapSource:
-    """Publishes maps and the pose to a daemon, and hears its paths."""
+    """Publishes maps and the pose to a daemon, and receives its paths."""
 
     def __init__(self, daemon: DaemonProcess, bus: Bus) -> None:
         keys = daemon.keys
@@ -147,7 +147,7 @@ class MapSource:
 
 
 class CoveringRobot:
-    """Drives; to be told of paths on Zenoh's threads, and to be ticked by one.
+    """Drives; takes paths on Zenoh's threads, and is ticked by one.
 
     Attributes:
         paths: how many it was given.

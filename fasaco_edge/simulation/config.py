@@ -19,7 +19,7 @@ class SimulationConfig:
         turn_rad_s: turning speed in place [rad/s].
         acceleration_m_s2: of driving, up and down [m/s^2].
         turn_acceleration_rad_s2: of turning, up and down [rad/s^2].
-        robot_radius_m: radius the planner is told [m].
+        robot_radius_m: radius that the planner uses [m].
         padding_m: what that radius has in excess of the hull [m]. The hull is what
             collides: a robot as wide as its corridor would touch at the first rounding error.
         range_m: reach of the scanner [m].

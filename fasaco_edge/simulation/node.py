@@ -25,8 +25,8 @@ from fasaco_edge.wire.poses import encode_pose_stamped
 
 log = logging.getLogger(__name__)
 
-# A turn of the loop runs ticks for this long at most, before it looks for a new path [s].
-TURN_S = 0.02
+# A cycle of the loop runs ticks for this long at most, before it looks for a new path [s].
+CYCLE_S = 0.02
 # Waits are no shorter than this, or a fast simulation would do nothing but wake up [s].
 WAIT_S = 0.004
 REPORT_EVERY_S = 0.5
@@ -34,13 +34,13 @@ REPORT_EVERY_S = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How a simulation is getting on.
+    """Progress of a simulation.
 
     Attributes:
         sim_s: simulated time [s].
         pose: the robot's pose.
-        activity: what it is about.
-        distance_m: way driven [m].
+        activity: what it is doing.
+        distance_m: distance driven [m].
         collisions: how often a path led into an obstacle.
         refused_paths: how many paths were malformed or in another frame.
         speed: simulated seconds per second, achieved since the report before.
@@ -57,16 +57,16 @@ class Progress:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulationResult:
-    """What became of a simulation.
+    """Result of a simulation.
 
     Attributes:
-        trail: float64 (n, 2): where the robot was, points (x, y) [m], the start first.
-        distance_m: way driven [m].
+        track: float64 (n, 2): where the robot was, points (x, y) [m], the start first.
+        distance_m: distance driven [m].
         sim_s: simulated time [s].
         collisions: how often a path led into an obstacle.
     """
 
-    trail: NDArray[np.float64]
+    track: NDArray[np.float64]
     distance_m: float
     sim_s: float
     collisions: int
@@ -81,7 +81,7 @@ def run_simulation(
     should_stop: Callable[[], bool] = lambda: False,
     report: Callable[[Progress], None] = lambda _progress: None,
 ) -> SimulationResult:
-    """Run the robot of ``world`` on the bus until it is told to stop.
+    """Run the robot of ``world`` on the bus until it has to stop.
 
     It publishes its map (latched) and its pose with simulated time as the stamp, and
     drives along the newest path. In the main thread, SIGINT and SIGTERM end it too.
@@ -108,15 +108,15 @@ def run_simulation(
         pace = Pace(speed, world.config.tick_s, time.monotonic())
         while not (stop.is_set() or should_stop()):
             behind_s = pace.behind_s(time.monotonic())
-            robot.take_path(0.0 if behind_s >= 0.0 else min(max(-behind_s, WAIT_S), TURN_S))
-            turn_ends_s = time.monotonic() + TURN_S
-            while pace.behind_s(now_s := time.monotonic()) >= 0.0 and now_s < turn_ends_s:
+            robot.take_path(0.0 if behind_s >= 0.0 else min(max(-behind_s, WAIT_S), CYCLE_S))
+            cycle_ends_s = time.monotonic() + CYCLE_S
+            while pace.behind_s(now_s := time.monotonic()) >= 0.0 and now_s < cycle_ends_s:
                 robot.publish(world.tick())
                 pace.ticked(now_s)
             meter.report_if_due(now_s)
         robot.publish(world.emission())
         meter.report(time.monotonic())
-    return SimulationResult(world.trail, world.distance_m, world.stamp_ns * 1e-9, world.collisions)
+    return SimulationResult(world.track, world.distance_m, world.stamp_ns * 1e-9, world.collisions)
 
 
 class _RobotOnBus:

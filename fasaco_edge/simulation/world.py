@@ -22,14 +22,14 @@ from fasaco_edge.simulation.joining import joined
 from fasaco_edge.simulation.mapper import Mapper
 from fasaco_edge.simulation.robot import ARRIVED_M, DriveState, driven, stopping_point
 
-# Spacing of the recorded trail on straight runs [m]; corners are recorded as they are.
-TRAIL_SPACING_M = 0.02
-# About two metres of it tell what of a new path is driven already.
-RECENT_TRAIL_POINTS = 100
+# Spacing of the recorded track on straight runs [m]; corners are recorded as they are.
+TRACK_SPACING_M = 0.02
+# About two metres of it show which part of a new path is driven already.
+RECENT_TRACK_POINTS = 100
 
 
 class Activity(enum.Enum):
-    """What the robot is about."""
+    """What the robot is doing."""
 
     IDLE = "idle"
     """It has no path, or has driven it to its end."""
@@ -70,7 +70,7 @@ class World:
         self._mapper = Mapper(truth, config)
         self._path: NDArray[np.float64] | None = None
         self._corners: list[tuple[float, float]] = []
-        self._trail = [(start.x, start.y)]
+        self._track = [(start.x, start.y)]
         self._ticks = 0
         self.activity = Activity.IDLE
         self.distance_m = 0.0
@@ -92,10 +92,10 @@ class World:
         return self._ticks * self.config.tick_ns
 
     @property
-    def trail(self) -> NDArray[np.float64]:
+    def track(self) -> NDArray[np.float64]:
         """Where the robot has been: points (x, y) [m], float64 (n, 2), the start first."""
         pose = self._drive.pose
-        return np.array([*self._trail, (pose.x, pose.y)], np.float64)
+        return np.array([*self._track, (pose.x, pose.y)], np.float64)
 
     def emission(self) -> Emission:
         """Return map and pose as they are now; there is no map before the first tick."""
@@ -132,19 +132,19 @@ class World:
     def _join(self) -> None:
         if self._path is None:
             return
-        route = joined(self._path, self._recent_trail(), self._mapper.is_clear)
+        route = joined(self._path, self._recent_track(), self._mapper.is_clear)
         if route is None:
             self._corners, self.activity = [], Activity.NO_WAY
             return
         self._corners = [(float(x), float(y)) for x, y in route[::-1]]
         self.activity = Activity.DRIVING if self._corners else Activity.IDLE
 
-    def _recent_trail(self) -> NDArray[np.float64]:
-        """Return the trail's last metres, to the point where the robot can come to rest."""
+    def _recent_track(self) -> NDArray[np.float64]:
+        """Return the track's last metres, to the point where the robot can come to rest."""
         here = (self.pose.x, self.pose.y)
         rest = stopping_point(self._drive, self.config)
-        points = 2 + int(math.dist(here, rest) / TRAIL_SPACING_M)
-        behind = np.array(self._trail[-RECENT_TRAIL_POINTS:], np.float64)
+        points = 2 + int(math.dist(here, rest) / TRACK_SPACING_M)
+        behind = np.array(self._track[-RECENT_TRACK_POINTS:], np.float64)
         return np.vstack((behind, np.linspace(here, rest, points)))
 
     def _move(self) -> None:
@@ -159,7 +159,7 @@ class World:
         if not _fits(self._truth, ahead.pose, self.config):
             self._collide()
             return
-        self._leave_trail(ahead)
+        self._extend_track(ahead)
         self.distance_m += ahead.speed * self.config.tick_s
         self._drive = ahead
 
@@ -172,13 +172,13 @@ class World:
         self.activity = Activity.COLLIDED
         self.collisions += 1
 
-    def _leave_trail(self, ahead: DriveState) -> None:
-        """Note the place the robot is about to leave, where the trail so far does not tell it."""
+    def _extend_track(self, ahead: DriveState) -> None:
+        """Add the place the robot is about to leave, if the track so far misses it."""
         here = (self.pose.x, self.pose.y)
-        gone = math.dist(self._trail[-1], here)
+        gone = math.dist(self._track[-1], here)
         turns_off = ahead.speed > 0.0 and self._drive.speed == 0.0
-        if gone >= TRAIL_SPACING_M or (gone > 0.0 and turns_off):
-            self._trail.append(here)
+        if gone >= TRACK_SPACING_M or (gone > 0.0 and turns_off):
+            self._track.append(here)
 
 
 def _fits(truth: OccupancyGrid, pose: Pose2D, config: SimulationConfig) -> bool:

@@ -114,7 +114,7 @@ def test_where_a_gap_was_never_reached_the_table_says_so():
 
 def test_scale(capsys, tmp_path):
     picture = tmp_path / "scale.png"
-    words = ["--sizes", "1000", "2000", "--seeds", "1", "--budget-s", "0.05"]
+    words = ["--sizes", "1000", "2000", "--seeds", "1", "--budget-s", "0.3"]
     assert main(["scale", *words, "--plot", str(picture), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert [size["size"] for size in document["sizes"]] == [1000, 2000]

@@ -12,8 +12,8 @@ def clear(_start, _end):
     return True
 
 
-def trail(*corners):
-    """A trail over some corners, a point every 2 cm."""
+def track(*corners):
+    """A track over some corners, a point every 2 cm."""
     points = [np.asarray(corners[0], float)[np.newaxis]]
     for begin, end in pairwise(corners):
         count = max(1, round(np.hypot(*np.subtract(end, begin)) / 0.02))
@@ -37,39 +37,39 @@ def route(path, came, is_clear=clear):
 def test_what_is_driven_through_is_left_out():
     path = centres((0, 0), (0, 1), (0, 2), (1, 2))
     x, y = at(0, 1)
-    assert route(path, trail(at(0, 0), (x + 0.13, y))) == points((0, 2), (1, 2))
-    assert route(path, trail(at(0, 0), (x, y))) == points((0, 2), (1, 2))
-    assert route(path, trail(at(0, 0), at(0, 2), at(1, 2))) == []
+    assert route(path, track(at(0, 0), (x + 0.13, y))) == points((0, 2), (1, 2))
+    assert route(path, track(at(0, 0), (x, y))) == points((0, 2), (1, 2))
+    assert route(path, track(at(0, 0), at(0, 2), at(1, 2))) == []
 
 
 def test_short_of_the_first_waypoint_it_drives_on_to_it():
     x, y = at(0, 0)
     path = centres((0, 0), (1, 0), (1, 1))
-    assert route(path, trail((x - 0.2, y), (x - 0.03, y))) == points((0, 0), (1, 0), (1, 1))
+    assert route(path, track((x - 0.2, y), (x - 0.03, y))) == points((0, 0), (1, 0), (1, 1))
 
 
 def test_a_dead_end_is_not_left_out_because_the_way_back_passes_here():
     x, y = at(0, 1)
     into_and_back = centres((0, 1), (0, 0), (0, 1), (0, 2), (1, 2))
     # On the way to the dead end, a little short of the first waypoint.
-    assert route(into_and_back, trail(at(0, 2), (x + 0.05, y)))[0] == points((0, 0))[0]
+    assert route(into_and_back, track(at(0, 2), (x + 0.05, y)))[0] == points((0, 0))[0]
     # It had been here some time before, on the way out.
-    before = trail((x, y), at(0, 2), (x + 0.05, y))
+    before = track((x, y), at(0, 2), (x + 0.05, y))
     assert route(into_and_back, before)[0] == points((0, 0))[0]
 
 
 def test_only_the_latest_visit_to_the_first_waypoint_counts():
     path = centres((0, 0), (0, 1), (0, 2))
-    assert passed_waypoints(path, trail(at(0, 0), at(0, 2))) == 3
-    assert passed_waypoints(path, trail(at(0, 0), at(0, 2), at(0, 0))) == 1
-    assert passed_waypoints(path, trail(at(0, 2), at(0, 1))) == 0
+    assert passed_waypoints(path, track(at(0, 0), at(0, 2))) == 3
+    assert passed_waypoints(path, track(at(0, 0), at(0, 2), at(0, 0))) == 1
+    assert passed_waypoints(path, track(at(0, 2), at(0, 1))) == 0
     # In order: the way from the second to the first is not the way there.
-    assert passed_waypoints(path, trail(at(0, 1), at(0, 0))) == 1
+    assert passed_waypoints(path, track(at(0, 1), at(0, 0))) == 1
 
 
 def test_a_path_that_turned_off_behind_is_caught_up_with_directly():
     path = centres((0, 0), (1, 0), (2, 0))
-    assert route(path, trail(at(0, 0), at(0, 1))) == points((1, 0), (2, 0))
+    assert route(path, track(at(0, 0), at(0, 1))) == points((1, 0), (2, 0))
 
 
 def test_where_the_direct_way_is_not_clear_it_returns_to_where_the_path_turned_off():
@@ -78,13 +78,13 @@ def test_where_the_direct_way_is_not_clear_it_returns_to_where_the_path_turned_o
     def along_the_lane_only(start, end):
         return abs(start[1] - end[1]) < 1e-9
 
-    came = trail(at(0, 0), at(0, 1))
+    came = track(at(0, 0), at(0, 1))
     assert route(path, came, along_the_lane_only) == points((0, 0), (2, 0))
 
 
 def test_where_no_way_is_clear_it_goes_back_where_it_came_from():
     path = centres((0, 0), (0, 1))
-    came = trail(at(1, 0), at(1, 1), at(1, 2), at(2, 2))
+    came = track(at(1, 0), at(1, 1), at(1, 2), at(2, 2))
 
     def only_from_the_corner(start, end):
         return np.allclose(start, at(1, 1)) and np.allclose(end, at(0, 0))
@@ -99,18 +99,18 @@ def test_as_a_last_resort_waypoints_are_passed_over():
     def no_way_to_the_first(_start, end):
         return end[0] > CELL
 
-    assert route(path, trail(at(1, 0)), no_way_to_the_first) == points((0, 1), (0, 19))
+    assert route(path, track(at(1, 0)), no_way_to_the_first) == points((0, 1), (0, 19))
 
     def no_way_to_the_first_metres(_start, end):
         return end[0] > 3.0
 
-    assert route(path, trail(at(1, 0)), no_way_to_the_first_metres) is None
+    assert route(path, track(at(1, 0)), no_way_to_the_first_metres) is None
 
 
 def test_an_empty_path_leaves_nothing_to_drive():
-    assert route(np.empty((0, 2)), trail((1.0, 1.0))) == []
+    assert route(np.empty((0, 2)), track((1.0, 1.0))) == []
 
 
 def test_a_single_waypoint_is_driven_to():
-    assert route(centres((3, 3)), trail(at(0, 0))) == points((3, 3))
-    assert route(centres((3, 3)), trail(at(0, 0), at(3, 3))) == []
+    assert route(centres((3, 3)), track(at(0, 0))) == points((3, 3))
+    assert route(centres((3, 3)), track(at(0, 0), at(3, 3))) == []

@@ -38,7 +38,7 @@ from tests.simulation.rooms import building
 
 world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
 result = run_simulation(world, Keys("r1"), BusSettings(connect=(sys.argv[1],)), speed=40.0)
-print(json.dumps({"trail": result.trail.tolist(), "distance_m": result.distance_m,
+print(json.dumps({"track": result.track.tolist(), "distance_m": result.distance_m,
                   "sim_s": result.sim_s, "collisions": result.collisions}))
 """
 
@@ -114,7 +114,7 @@ def test_a_robot_in_another_process_maps_and_drives_until_told_to_end(planner):
     assert robot.returncode == 0
     result = json.loads(output)
     assert result["collisions"] == 0
-    assert distances_to(np.array(result["trail"]), path).max() < 0.03
+    assert distances_to(np.array(result["track"]), path).max() < 0.03
     # Its last words are its final state.
     until(lambda: planner.pose().stamp_ns == round(result["sim_s"] * 1e9))
     last = planner.map()
@@ -158,7 +158,7 @@ def test_bad_paths_cost_only_themselves(planner):
     )
     assert stage[0] is None
     assert reports[-1].refused_paths == 2
-    assert result.trail[-1] == pytest.approx(centres((2, 5))[0], abs=2e-3)
+    assert result.track[-1] == pytest.approx(centres((2, 5))[0], abs=2e-3)
     assert result.distance_m == pytest.approx(reports[-1].distance_m)
     assert all(0.0 < report.speed < 40.0 for report in reports[1:])
 

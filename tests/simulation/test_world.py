@@ -36,13 +36,13 @@ def test_a_serpentine_is_driven_to_its_end_on_the_line():
     run(world)
     assert world.activity is Activity.IDLE
     assert world.collisions == 0
-    trail = world.trail
-    assert distances_to(trail, path).max() < 0.03
-    on_the_path = trail[np.flatnonzero(distances_to(path, trail) < 1e-6)[0] :]
+    track = world.track
+    assert distances_to(track, path).max() < 0.03
+    on_the_path = track[np.flatnonzero(distances_to(path, track) < 1e-6)[0] :]
     assert distances_to(path, on_the_path).max() < 0.03
     length = np.hypot(*np.diff(path, axis=0).T).sum()
     assert world.distance_m == pytest.approx(length, abs=0.15)
-    assert np.hypot(*np.diff(trail, axis=0).T).sum() == pytest.approx(world.distance_m, abs=0.01)
+    assert np.hypot(*np.diff(track, axis=0).T).sum() == pytest.approx(world.distance_m, abs=0.01)
 
 
 def test_a_path_through_a_wall_ends_before_it_and_is_counted_once():
@@ -84,7 +84,7 @@ def test_a_new_path_that_turns_off_behind_is_fetched():
     run(world)
     assert world.activity is Activity.IDLE
     assert world.collisions == 0
-    assert distances_to(world.trail, off).max() < 0.03
+    assert distances_to(world.track, off).max() < 0.03
 
 
 def test_an_empty_path_halts():
@@ -138,7 +138,7 @@ def test_two_runs_are_equal_bit_for_bit():
         return world, emissions
 
     (one, ones), (other, others) = once(), once()
-    assert one.trail.tobytes() == other.trail.tobytes()
+    assert one.track.tobytes() == other.track.tobytes()
     assert (one.pose, one.distance_m, one.stamp_ns) == (
         other.pose,
         other.distance_m,

@@ -195,7 +195,7 @@ class MappingRobot:
     @property
     def trail(self) -> np.ndarray:
         """Where the robot was in truth: points (x, y) [m], float64 (n, 2)."""
-        return self._world.trail
+        return self._world.track
 
     def _take_path(self, sample: Sample) -> None:
         self.notes.append((time.monotonic(), decode_json(sample.attachment)))
