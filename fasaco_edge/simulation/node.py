@@ -15,7 +15,6 @@ from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.host.signals import stop_event
-from fasaco_edge.simulation.pace import Pace
 from fasaco_edge.simulation.world import Activity, Emission, World
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
@@ -30,6 +29,33 @@ CYCLE_S = 0.02
 # Waits are no shorter than this, or a fast simulation would do nothing but wake up [s].
 WAIT_S = 0.004
 REPORT_EVERY_S = 0.5
+
+
+class Pace:
+    """Says when the next tick is due, so that ``speed`` simulated seconds pass in a second.
+
+    A machine that cannot keep up falls behind by ``patience_s`` at most; what is more
+    is forgiven, so that the simulation slows down instead of racing later.
+
+    Args:
+        speed: simulated seconds per second, above 0.
+        tick_s: simulated length of a tick [s].
+        now_s: reading of a monotonic clock [s]; the first tick is due then.
+        patience_s: longest debt kept [s].
+    """
+
+    def __init__(self, speed: float, tick_s: float, now_s: float, patience_s: float = 0.1) -> None:
+        self._interval_s = tick_s / speed
+        self._due_s = now_s
+        self._patience_s = patience_s
+
+    def behind_s(self, now_s: float) -> float:
+        """Return since when the next tick is due [s]; below 0, until when it is not."""
+        return now_s - self._due_s
+
+    def ticked(self, now_s: float) -> None:
+        """Note that a tick was run."""
+        self._due_s = max(self._due_s + self._interval_s, now_s - self._patience_s)
 
 
 @dataclass(frozen=True, slots=True)

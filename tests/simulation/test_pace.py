@@ -2,7 +2,7 @@
 
 import pytest
 
-from fasaco_edge.simulation.pace import Pace
+from fasaco_edge.simulation.node import Pace
 
 
 def ticks_until(pace, begin_s, end_s, cost_s):
