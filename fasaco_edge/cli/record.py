@@ -179,7 +179,7 @@ def recorder_settings(
 ) -> RecorderSettings:
     """Return a configuration as the recorder takes it."""
     from fasaco_edge.recording.write.settings import MEGABYTE, RecorderSettings
-    from fasaco_edge.wire.pose_decoding import DEFAULT_FRAMES
+    from fasaco_edge.wire.transforms import DEFAULT_FRAMES
 
     ros, limits = config.ros2, config.recording
     return RecorderSettings(

@@ -11,7 +11,7 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.topics import TURNS
-from fasaco_edge.wire.turns import Beginning, Taken, Told, decode_turns
+from fasaco_edge.wire.turns import EarlySample, LogStart, TakenSample, decode_turns
 
 # A sample that waits longer than this was taken by nobody [ns].
 KEPT_NS = 60_000_000_000
@@ -33,7 +33,7 @@ class CycleRecord:
         taken: topic and checksum of every sample it took.
     """
 
-    beginning: Beginning
+    beginning: LogStart
     kernels: str = ""
     turns: int = 0
     gap: str = ""
@@ -42,7 +42,7 @@ class CycleRecord:
 
 def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
     """Return what the turn log says; None where there is none, or not from the beginning."""
-    beginning: Beginning | None = None
+    beginning: LogStart | None = None
     kernels, turns, gap = "", 0, ""
     taken: set[tuple[str, int]] = set()
     told_ns = heard_ns = 0
@@ -99,7 +99,7 @@ class UntakenSamples:
                 break
             del self._samples[oldest]
 
-    def find(self, taken: Taken) -> tuple[Sample | None, bool]:
+    def find(self, taken: TakenSample) -> tuple[Sample | None, bool]:
         """Return the sample, and whether it is the one.
 
         In place of one that is not there comes one that nobody took.
@@ -111,7 +111,7 @@ class UntakenSamples:
         return (strange.popleft() if strange else None), False
 
 
-def inflated_sample(told: Told) -> Sample:
+def inflated_sample(told: EarlySample) -> Sample:
     """Return a sample that is in the turn log itself.
 
     Raises:

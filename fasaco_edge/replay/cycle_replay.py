@@ -29,7 +29,7 @@ from fasaco_edge.replay.cycle_record import CycleRecord, UntakenSamples, inflate
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
 from fasaco_edge.samples.codec import SampleDecoder
 from fasaco_edge.wire.topics import POSE, TURNS
-from fasaco_edge.wire.turns import Decided, PlanTaken, Taken, Turn, TurnBatch, decode_turns
+from fasaco_edge.wire.turns import Cycle, Decided, PlanTaken, TakenSample, TurnBatch, decode_turns
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,11 +110,11 @@ class CycleReplay:
             if self.difference is not None or number > self._record.turns:
                 return
             self._at_s = 0.0 if drive.began is None else now - drive.began
-            step = self._cycle(told.get(number) or Turn(number, drive.is_begun), now)
+            step = self._cycle(told.get(number) or Cycle(number, drive.is_begun), now)
             self.turns += self.difference is None
             yield step
 
-    def _cycle(self, turn: Turn, now: float) -> ReplayStep:
+    def _cycle(self, turn: Cycle, now: float) -> ReplayStep:
         drive = self._drive
         commands = [
             CommandReceived(number, *read_command(document)) for number, document in turn.commands
@@ -130,14 +130,14 @@ class CycleReplay:
             return step
         return replace(step, as_recorded=_facts(turn.decided)["path"] == _facts(decided)["path"])
 
-    def _received(self, turn: Turn) -> list[Received]:
+    def _received(self, turn: Cycle) -> list[Received]:
         """Return the samples that the daemon took, as far as they were recorded."""
         found = [(taken, self._find(turn, taken)) for taken in turn.samples]
         return [
             Received(taken.topic, sample, taken.at) for taken, sample in found if sample is not None
         ]
 
-    def _find(self, turn: Turn, taken: Taken) -> Sample | None:
+    def _find(self, turn: Cycle, taken: TakenSample) -> Sample | None:
         if taken.told is not None:
             return inflated_sample(taken.told)
         if not taken.checksum and self._logged[taken.topic]:
@@ -149,7 +149,7 @@ class CycleReplay:
             self.lacking.append(Difference(turn.number, self._at_s, what, "taken", recorded))
         return sample
 
-    def _plans(self, turn: Turn) -> list[PlanReady]:
+    def _plans(self, turn: Cycle) -> list[PlanReady]:
         """Return the plan that came back in this cycle, made once more."""
         taken, request = turn.plan, self._request
         if taken is None:
@@ -168,7 +168,7 @@ class CycleReplay:
             self._differ(turn, f"plan {taken.number}", _plan_words(taken), _plan_words(again))
         return [PlanReady(taken.number, path, taken.seconds, tuple(taken.stops))]
 
-    def _compare(self, turn: Turn, decided: Decided | None, before: str) -> None:
+    def _compare(self, turn: Cycle, decided: Decided | None, before: str) -> None:
         # A cycle without a decision leaves the state as it was before.
         then, now = (_facts(one or Decided(before, "")) for one in (turn.decided, decided))
         for name, was in then.items():
@@ -176,7 +176,7 @@ class CycleReplay:
                 self._differ(turn, name, was, now[name])
                 return
 
-    def _differ(self, turn: Turn, what: str, recorded: object, replayed: object) -> None:
+    def _differ(self, turn: Cycle, what: str, recorded: object, replayed: object) -> None:
         if self.difference is None:
             self.difference = Difference(turn.number, self._at_s, what, recorded, replayed)
 

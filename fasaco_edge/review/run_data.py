@@ -17,11 +17,11 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.orders.order import MissionOrder, read_command
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
-from fasaco_edge.wire.pose_decoding import PoseDecoder
 from fasaco_edge.wire.replies import CoverageReport, ZoneReport
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from fasaco_edge.wire.status import PathAttachment, Rectangle, Settings, Status, known_settings
-from fasaco_edge.wire.turns import Turn, TurnBatch, decode_turns
+from fasaco_edge.wire.transforms import PoseDecoder
+from fasaco_edge.wire.turns import Cycle, TurnBatch, decode_turns
 
 # The reasons that the mission gives when it asks for a better path, and when it takes one.
 SPARE, BETTER = "spare time", "better further on"
@@ -63,7 +63,7 @@ class PlanLog:
             ago_s = last - batch.times[index] if 0 <= index < len(batch.times) else 0.0
             self._take(turn, max(at_s - ago_s, 0.0))
 
-    def _take(self, turn: Turn, at_s: float) -> None:
+    def _take(self, turn: Cycle, at_s: float) -> None:
         decided, ready = turn.decided, turn.plan
         if ready is not None:
             reason = self._asked.pop(ready.number, "")

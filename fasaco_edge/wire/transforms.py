@@ -1,6 +1,6 @@
-"""Transforms between frames: tf2_msgs/TFMessage, what ROS 2 sends on /tf and /tf_static.
+"""Transforms between frames (tf2_msgs/TFMessage on /tf and /tf_static), and poses from them.
 
-The robot's pose out of transforms: the newest of each link between map and robot.
+The robot's pose is the product of the newest transform of each link between map and robot.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from fasaco_edge.wire.limits import (
     MAX_TRANSFORMS,
     QUATERNION_TOLERANCE,
 )
+from fasaco_edge.wire.poses import decode_pose
 from fasaco_edge.wire.schemas import TF_MESSAGE
 
 LEAST_TRANSFORM_BYTES = 80
@@ -187,3 +188,40 @@ def _placed(frame: Pose2D, pose: Pose2D) -> Pose2D:
         frame.y + sin * pose.x + cos * pose.y,
         math.remainder(frame.yaw + pose.yaw, math.tau),
     )
+
+
+DEFAULT_FRAMES = ("map", "base_link")
+
+
+class PoseDecoder:
+    """Decodes poses one after the other, be they messages of three types or transforms.
+
+    Args:
+        schema: type of those that come without one.
+        frames: the map's and the robot's, for transforms; None where none are taken.
+
+    Attributes:
+        schema: as above; may be changed.
+    """
+
+    def __init__(self, schema: str, frames: tuple[str, str] | None = DEFAULT_FRAMES) -> None:
+        self.schema = schema
+        self._transforms = TransformTree(*frames) if frames else None
+
+    def follow(self, frames: tuple[str, str]) -> None:
+        """Take poses out of the transforms between these frames from now on."""
+        if self._transforms is None:
+            self._transforms = TransformTree(*frames)
+        self._transforms.follow(*frames)
+
+    def decode(self, payload: bytes, schema: str, *, is_static: bool = False) -> StampedPose | None:
+        """Return the pose; None for transforms that tell no new one.
+
+        Raises:
+            MalformedMessage: it is none of these.
+            TransformLoop: the frames hang on each other.
+        """
+        schema = schema or self.schema
+        if self._transforms is None or schema != TF_MESSAGE:
+            return decode_pose(payload, schema)
+        return self._transforms.take(decode_transforms(payload), is_static=is_static)

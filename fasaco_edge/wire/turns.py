@@ -1,7 +1,8 @@
-"""The turn log: what each turn of the daemon's loop took in and decided, as JSON on the bus.
+"""Turn log documents: what each cycle of the daemon's loop received and decided, as JSON.
 
-With the samples it names it repeats a mission bit for bit. Numbers are the JSON numbers of
-float64, which come back as they were; bytes are base64.
+With the samples it names, a replay repeats a mission bit for bit. The members are named by the
+contract, where a cycle is a turn and an embedded sample is ``told``. Numbers are the JSON numbers
+of float64, which come back as they were; bytes are base64.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.status import Settings
 
 
-class Beginning(msgspec.Struct, frozen=True):
-    """What a daemon began with.
+class LogStart(msgspec.Struct, frozen=True):
+    """The state a daemon started with.
 
     Attributes:
         version: its release.
@@ -27,28 +28,28 @@ class Beginning(msgspec.Struct, frozen=True):
     ledger: bytes = b""
 
 
-class Told(msgspec.Struct, frozen=True):
-    """A sample that came before anybody listened: its key, type and deflated payload."""
+class EarlySample(msgspec.Struct, frozen=True):
+    """A sample from before the recorder listened: its key, type and deflated payload."""
 
     key: str
     schema: str
     deflated: bytes
 
 
-class Taken(msgspec.Struct, frozen=True, array_like=True):
+class TakenSample(msgspec.Struct, frozen=True, array_like=True):
     """A sample that was taken.
 
     Attributes:
         topic: what it is.
-        checksum: CRC-32 of its payload; 0 of one that is told in the batch.
+        checksum: CRC-32 of its payload; 0 where the batch itself holds the sample.
         at: when it came, of maps and their updates [s]; 0 of others, where it decides nothing.
-        told: a sample from before anybody listened; None of others.
+        told: the sample itself, from before the recorder listened; None of others.
     """
 
     topic: str
     checksum: int
     at: float = 0.0
-    told: Told | None = None
+    told: EarlySample | None = None
 
 
 class PlanTaken(msgspec.Struct, frozen=True, array_like=True):
@@ -89,22 +90,22 @@ class Decided(msgspec.Struct, frozen=True, omit_defaults=True):
     answers: list[tuple[int, str]] = []
 
 
-class Turn(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A turn in which something came in or was decided.
+class Cycle(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A cycle in which something came in or was decided.
 
     Attributes:
-        number: of the turn.
+        number: of the cycle.
         is_begun: whether there is a mission; what comes before is held for it.
         samples: in the order they were taken in.
         patches_lost: map updates that were lost before them.
         commands: number and document of each.
         plan: that came back.
-        decided: what of it all came.
+        decided: what was decided.
     """
 
     number: int
     is_begun: bool = True
-    samples: list[Taken] = []
+    samples: list[TakenSample] = []
     patches_lost: int = 0
     commands: list[tuple[int, dict[str, object]]] = []
     plan: PlanTaken | None = None
@@ -112,22 +113,22 @@ class Turn(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class TurnBatch(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Some turns, one after the other.
+    """Consecutive cycles.
 
     Attributes:
         first: number of the first one, from 1.
         times: when each was, by the daemon's steady clock [s].
-        turns: those of them in which something came in or was decided.
+        turns: those cycles in which something came in or was decided.
         beginning: in the first batch alone.
-        told: poses and small maps taken in these turns, in order, as ``bus.sample_codec`` has
-            them: a link that is busy may lose a recorder some.
+        told: poses and small maps received in these cycles, in order, as ``samples.codec`` encodes
+            them: on a busy link a recorder may miss some.
         kernels: names the compiled kernels; in the first batch with a mission alone.
     """
 
     first: int
     times: list[float]
-    turns: list[Turn]
-    beginning: Beginning | None = None
+    turns: list[Cycle]
+    beginning: LogStart | None = None
     told: bytes = b""
     kernels: str = ""
 

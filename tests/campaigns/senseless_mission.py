@@ -51,8 +51,8 @@ from fasaco_edge.wire.maps import (
 )
 from fasaco_edge.wire.paths import decode_path, encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
-from fasaco_edge.wire.pose_decoding import PoseDecoder
 from fasaco_edge.wire.schemas import TF_MESSAGE
+from fasaco_edge.wire.transforms import PoseDecoder
 from tests.campaigns import raw_messages
 from tests.campaigns.senseless import Event, pixels_of
 

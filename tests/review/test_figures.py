@@ -19,7 +19,7 @@ from fasaco_edge.review.moments import (
 )
 from fasaco_edge.review.rows import clock
 from fasaco_edge.review.run_data import PlanLog, RunData
-from fasaco_edge.wire.turns import Beginning, Decided, PlanTaken, Turn, TurnBatch
+from fasaco_edge.wire.turns import Cycle, Decided, LogStart, PlanTaken, TurnBatch
 
 ALL = Span("under way", 0.0, 100.0)
 
@@ -120,7 +120,7 @@ def test_times_are_told_as_on_a_clock():
 def turn(number, *, ready=None, asked=None, path=None):
     plan = ready and PlanTaken(ready, 0.002 * ready, [], (1, 0, 0), 7)
     decided = Decided("covering", "", asked, path) if asked or path else None
-    return Turn(number, plan=plan, decided=decided)
+    return Cycle(number, plan=plan, decided=decided)
 
 
 def test_plans_are_told_from_those_that_became_a_path():
@@ -129,7 +129,7 @@ def test_plans_are_told_from_those_that_became_a_path():
         turn(1, asked=(1, "first plan")),
         turn(2, ready=1, path=(1, "first plan", 7), asked=(2, "spare time")),
     ]
-    log.take(TurnBatch(1, [10.0, 10.5], first, Beginning("1", {})), at_s=3.0)
+    log.take(TurnBatch(1, [10.0, 10.5], first, LogStart("1", {})), at_s=3.0)
     # A path that was cut off just then is not the one that was planned.
     second = [
         turn(3, ready=2, path=(2, "better further on", 8), asked=(3, "map: 1 cell more")),
@@ -146,7 +146,7 @@ def test_plans_are_told_from_those_that_became_a_path():
     assert [p.at_s for p in log.plans] == [3.0, 4.0, 4.5, 5.0]
     assert [p.took_ms for p in log.plans] == [2.0, 4.0, 6.0, 8.0]
     # A daemon that was started again counts from 1 again.
-    log.take(TurnBatch(1, [1.0], [turn(1, ready=3)], Beginning("1", {})), at_s=9.0)
+    log.take(TurnBatch(1, [1.0], [turn(1, ready=3)], LogStart("1", {})), at_s=9.0)
     assert log.plans[-1].reason == ""
 
 

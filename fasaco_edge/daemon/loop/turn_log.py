@@ -29,12 +29,12 @@ from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.orders.order import command_document
 from fasaco_edge.samples.codec import SampleEncoder
 from fasaco_edge.wire.turns import (
-    Beginning,
+    Cycle,
     Decided,
+    EarlySample,
+    LogStart,
     PlanTaken,
-    Taken,
-    Told,
-    Turn,
+    TakenSample,
     TurnBatch,
     encode_turns,
 )
@@ -93,7 +93,7 @@ class TurnLog:
         self._heard_at = self._told_until = float("inf")
         self._published_at = float("-inf")
         self._first, self._times = 1, list[float]()
-        self._turns: list[Turn] = []
+        self._turns: list[Cycle] = []
         self._told_room, self._deflated_room = TOLD_BYTES, DEFLATED_BYTES
         self._samples = SampleEncoder(run=0)
         self._news = DecisionFilter()
@@ -117,7 +117,7 @@ class TurnLog:
         self._times.append(turn.now)
         if not is_empty or (mission is not None and not self._has_begun):
             self._turns.append(
-                Turn(
+                Cycle(
                     number=self._first + len(self._times) - 1,
                     is_begun=mission is not None,
                     samples=samples,
@@ -176,18 +176,18 @@ class TurnLog:
         self._times, self._turns, self._restored = [], [], None
         self._samples = SampleEncoder(run=0)
 
-    def _taken(self, received: Received) -> Taken:
+    def _taken(self, received: Received) -> TakenSample:
         kind, sample, at = received.kind, received.sample, received.at
         if kind == POSE and len(sample.payload) <= POSE_BYTES:
             self._samples.add(Arrival(kind, sample, 0, 0))
-            return Taken(kind, 0)
+            return TakenSample(kind, 0)
         if kind == "map" and len(sample.payload) <= MAP_BYTES and at >= self._told_until:
             self._samples.add(Arrival(kind, sample, 0, 0))
-            return Taken(kind, 0, at)
+            return TakenSample(kind, 0, at)
         told = self._told(sample) if at < self._told_until else None
-        return Taken(kind, zlib.crc32(sample.payload), at if kind in MAPS else 0.0, told)
+        return TakenSample(kind, zlib.crc32(sample.payload), at if kind in MAPS else 0.0, told)
 
-    def _told(self, sample: Sample) -> Told | None:
+    def _told(self, sample: Sample) -> EarlySample | None:
         """Return the sample itself; None where there is no room for it."""
         if len(sample.payload) > self._told_room:
             return None
@@ -196,7 +196,7 @@ class TurnLog:
         if len(deflated) > self._deflated_room:
             return None
         self._deflated_room -= len(deflated)
-        return Told(sample.key, sample.schema, deflated)
+        return EarlySample(sample.key, sample.schema, deflated)
 
     def _forget_poses(self, newest: Sequence[Sample]) -> None:
         """As long as there is nothing but poses, the newest is all that will count."""
@@ -207,9 +207,9 @@ class TurnLog:
             for sample in newest:
                 self._samples.add(Arrival(POSE, sample, 0, 0))
 
-    def _beginning(self) -> Beginning:
+    def _beginning(self) -> LogStart:
         ledger = encode_ledger(self._restored) if self._restored else b""
-        return Beginning(__version__, config_document(self._config), ledger)
+        return LogStart(__version__, config_document(self._config), ledger)
 
     def _kernels(self) -> str:
         if self._kernels_told or not self._has_begun:
@@ -229,14 +229,14 @@ def _plan_taken(ready: PlanReady) -> PlanTaken:
     )
 
 
-def _is_pose(turn: Turn) -> bool:
+def _is_pose(turn: Cycle) -> bool:
     return (
         not turn.commands and not turn.patches_lost and all(s.topic == POSE for s in turn.samples)
     )
 
 
-def _numbered(turn: Turn, number: int) -> Turn:
-    return Turn(number, turn.is_begun, turn.samples)
+def _numbered(turn: Cycle, number: int) -> Cycle:
+    return Cycle(number, turn.is_begun, turn.samples)
 
 
 class DecisionFilter:

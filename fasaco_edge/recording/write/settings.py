@@ -8,8 +8,8 @@ from pathlib import Path
 from fasaco_edge.bus.session import BusSettings
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.pose_decoding import DEFAULT_FRAMES
 from fasaco_edge.wire.schemas import POSE_STAMPED
+from fasaco_edge.wire.transforms import DEFAULT_FRAMES
 
 MEGABYTE = 1_000_000
 
