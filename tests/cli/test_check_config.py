@@ -158,4 +158,4 @@ def test_who_starts_a_daemon_with_it_is_told_the_first_and_where_the_others_are(
         load_config(file)
     # What stands twice comes first: what the rest says depends on which of the two is meant.
     assert str(refused.value).startswith(f"{file}, line 12: planner.ants: stands twice")
-    assert refused.value.hint.endswith(f"check-config {file} tells the 9 others")
+    assert refused.value.hint.endswith(f"check-config {file} shows the 9 others")

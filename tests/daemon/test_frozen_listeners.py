@@ -113,13 +113,13 @@ def test_a_recorder_that_starts_slowly_is_waited_for_and_one_that_hangs_is_not(
         try:
             states = [watched.poll(time.monotonic())]
             # Its words come more than 0.05 s apart: after the first, it counts as hanging.
-            while states[-1]["state"] not in ("silent", "restarting"):
+            while states[-1].state not in ("silent", "restarting"):
                 time.sleep(0.01)
                 states.append(watched.poll(time.monotonic()))
         finally:
             watched.close(60.0)
-    assert {"starting", "recording"} <= {state["state"] for state in states}
-    assert states[-1]["reason"] == "no word for 0 s"
+    assert {"starting", "recording"} <= {state.state for state in states}
+    assert states[-1].reason == "no word for 0 s"
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import asdict
 
 from fasaco_edge.daemon.ledger import writer as ledger_writer
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
@@ -40,7 +41,7 @@ def wait_until(holds: Callable[[], bool]) -> None:
 
 
 def document(writer: LedgerWriter) -> dict[str, Any]:
-    return writer.document(time.monotonic())
+    return asdict(writer.report(time.monotonic()))
 
 
 @pytest.fixture
