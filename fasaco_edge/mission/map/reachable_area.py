@@ -149,11 +149,8 @@ class ReachableArea:
 
 def _around(marked: NDArray[np.bool_], window: Window) -> Window | None:
     """Return the smallest window around the marked cells of ``window``, bool (rows, cols)."""
-    rows, cols = np.flatnonzero(marked.any(axis=1)), np.flatnonzero(marked.any(axis=0))
-    if not len(rows):
-        return None
-    first = Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
-    return first.moved(window.row0, window.col0)
+    found = Window.of(marked)
+    return found.moved(window.row0, window.col0) if found else None
 
 
 def anchor_cell(lattice: CoverageLattice, pose: Pose2D) -> Cell | None:
