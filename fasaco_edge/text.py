@@ -70,10 +70,10 @@ def html(*parts: object, most: int = MOST) -> Html:
 
 def element(name: str, *parts: object, **attributes: object) -> Html:
     """Return an element; ``class_`` stands for ``class``, and ``_`` in a name for ``-``."""
-    told = "".join(
+    written = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{html(value)}"' for key, value in attributes.items()
     )
-    return Html(f"<{name}{told}>{html(*parts)}</{name}>")
+    return Html(f"<{name}{written}>{html(*parts)}</{name}>")
 
 
 def _escaped(part: object, most: int) -> str:

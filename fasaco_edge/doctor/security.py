@@ -170,7 +170,7 @@ def _login(bus: BusConfig) -> Finding:
 
 def _recording(bus: BusConfig, name: str) -> str:
     if name in bus.security.roles.recorder:
-        return "a recorder that it starts itself (--record) may hear everything"
+        return "a recorder that it starts itself (--record) may receive everything"
     where = "bus.security.roles.recorder" if bus.listen else "the recorders of the router"
     return f"to record with --record, add {name!r} to {where}"
 

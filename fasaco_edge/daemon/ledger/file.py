@@ -262,5 +262,5 @@ def _aside(path: Path, why: str) -> dict[tuple[int, str, str], Path]:
 
 
 def reason_of(error: Exception) -> str:
-    """Return what went wrong, without the path that is told anyway."""
+    """Return what went wrong, without the path, which the message names anyway."""
     return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)

@@ -1,6 +1,6 @@
-"""Answers to who asks what was said last: on Zenoh's thread, without waiting for the loop.
+"""Answers to queries for the last samples, the configuration and the versions.
 
-Answers to who asks what this daemon is: its configuration, its versions, what can be asked.
+They are given on Zenoh's thread, without waiting for the loop.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def _tell(document: Callable[[], object], request: Request) -> Reply:
 
 
 def _unknown(keys: Keys, request: Request) -> Reply | None:
-    """Answer what no other queryable does: this one hears every query."""
+    """Answer what no other queryable does: this one gets every query."""
     if any(matches(request.key, keys.rpc(name)) for name in topics.RPC_NAMES):
         return None
     name = request.key.rpartition("/")[2]

@@ -49,17 +49,17 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 PERIOD_S = 0.5
-# A recorder needs some seconds to start; nobody is waited for any longer than so many turns.
+# A recorder needs some seconds to start; the log waits for it no longer than this many cycles.
 WAITING_TURNS = 2048
-# Samples from before are told as long as there is room, deflated; more would hold the loop up.
-TOLD_BYTES, DEFLATED_BYTES = 8_000_000, 500_000
-# A longer pose is none, and named only; of so many bytes of poses no turn more is waited for.
+# Earlier samples go into the log itself, deflated, up to this size; more would delay the loop.
+EMBEDDED_BYTES, DEFLATED_BYTES = 8_000_000, 500_000
+# Longer poses are only named; the log waits for a recorder no longer than this many bytes of poses.
 POSE_BYTES, POSES_BYTES = 1024, 500_000
-# A busy link drops maps, too; larger ones are named only, for to tell them costs the loop time.
+# A busy link drops maps, too. Larger ones are only named: to copy them costs the loop time.
 MAP_BYTES = 100_000
-# So many bytes of samples do not wait for the next batch's time.
+# A batch of this size is published at once.
 FULL_BYTES = 4_000_000
-# From when somebody listens, until everything surely comes to them, too.
+# Time until a new listener surely gets all samples itself [s].
 MARGIN_S = 0.2
 POSE = "pose"
 
@@ -90,17 +90,17 @@ class TurnLog:
         self._config = config
         self._restored = restored
         self._is_open = True
-        self._heard_at = self._told_until = float("inf")
+        self._listened_at = self._embed_until = float("inf")
         self._published_at = float("-inf")
         self._first, self._times = 1, list[float]()
         self._turns: list[Cycle] = []
-        self._told_room, self._deflated_room = TOLD_BYTES, DEFLATED_BYTES
+        self._embed_room, self._deflated_room = EMBEDDED_BYTES, DEFLATED_BYTES
         self._samples = SampleEncoder(run=0)
         self._news = DecisionFilter()
-        self._has_begun = self._kernels_told = False
+        self._has_begun = self._kernels_named = False
 
     def note(self, turn: TurnNote, mission: Mission | None) -> None:
-        """Take a turn into the log; what was published may be some turns behind."""
+        """Add a cycle to the log; it is published some cycles later."""
         if not self._is_open:
             return
         self._listen(turn.now)
@@ -138,10 +138,10 @@ class TurnLog:
             self.publish()
 
     def publish(self) -> None:
-        """Publish what has gathered, if somebody listens."""
+        """Publish the batch, if somebody listens."""
         if not self._is_open or not self._times:
             return
-        if self._heard_at == float("inf"):
+        if self._listened_at == float("inf"):
             if len(self._times) > WAITING_TURNS or self._samples.waiting_bytes > POSES_BYTES:
                 self._close()
             return
@@ -161,14 +161,14 @@ class TurnLog:
 
     def _listen(self, now: float) -> None:
         """Find out whether somebody listens by now."""
-        if self._heard_at == float("inf") and self._publisher.has_listeners():
-            self._heard_at, self._told_until = now, time.monotonic() + MARGIN_S
+        if self._listened_at == float("inf") and self._publisher.has_listeners():
+            self._listened_at, self._embed_until = now, time.monotonic() + MARGIN_S
 
     def _close(self) -> None:
         self.end("nobody listens to it")
 
     def end(self, why: str) -> None:
-        """End the log: what comes after could not be repeated."""
+        """End the log: what follows could not be replayed."""
         if not self._is_open:
             return
         LOG.info("the turn log ends: %s", why)
@@ -181,17 +181,17 @@ class TurnLog:
         if kind == POSE and len(sample.payload) <= POSE_BYTES:
             self._samples.add(Arrival(kind, sample, 0, 0))
             return TakenSample(kind, 0)
-        if kind == "map" and len(sample.payload) <= MAP_BYTES and at >= self._told_until:
+        if kind == "map" and len(sample.payload) <= MAP_BYTES and at >= self._embed_until:
             self._samples.add(Arrival(kind, sample, 0, 0))
             return TakenSample(kind, 0, at)
-        told = self._told(sample) if at < self._told_until else None
+        told = self._embedded(sample) if at < self._embed_until else None
         return TakenSample(kind, zlib.crc32(sample.payload), at if kind in MAPS else 0.0, told)
 
-    def _told(self, sample: Sample) -> EarlySample | None:
-        """Return the sample itself; None where there is no room for it."""
-        if len(sample.payload) > self._told_room:
+    def _embedded(self, sample: Sample) -> EarlySample | None:
+        """Return the sample itself, deflated; None where there is no room for it."""
+        if len(sample.payload) > self._embed_room:
             return None
-        self._told_room -= len(sample.payload)
+        self._embed_room -= len(sample.payload)
         deflated = zlib.compress(sample.payload, 1)
         if len(deflated) > self._deflated_room:
             return None
@@ -199,8 +199,8 @@ class TurnLog:
         return EarlySample(sample.key, sample.schema, deflated)
 
     def _forget_poses(self, newest: Sequence[Sample]) -> None:
-        """As long as there is nothing but poses, the newest is all that will count."""
-        is_waiting = self._heard_at == float("inf") and not self._has_begun
+        """Keep only the newest pose as long as there is nothing but poses."""
+        is_waiting = self._listened_at == float("inf") and not self._has_begun
         if is_waiting and len(self._turns) > 1 and all(map(_is_pose, self._turns)):
             self._times, self._turns = self._times[-1:], [_numbered(self._turns[-1], self._first)]
             self._samples = SampleEncoder(run=0)
@@ -212,9 +212,9 @@ class TurnLog:
         return LogStart(__version__, config_document(self._config), ledger)
 
     def _kernels(self) -> str:
-        if self._kernels_told or not self._has_begun:
+        if self._kernels_named or not self._has_begun:
             return ""
-        self._kernels_told = True
+        self._kernels_named = True
         return kernels_name()
 
 
@@ -240,13 +240,13 @@ def _numbered(turn: Cycle, number: int) -> Cycle:
 
 
 class DecisionFilter:
-    """Tells turns in which something was decided, or the state has changed, from the others."""
+    """Picks the cycles in which something was decided, or the state has changed."""
 
     def __init__(self) -> None:
         self._state = ("", "")
 
     def of(self, decision: Decision, mission: Mission | None) -> Decided | None:
-        """Return what is to be said of the next turn; None for nothing."""
+        """Return the entry for the next cycle; None for none."""
         state = (str(mission.state), mission.reason) if mission else ("", "")
         decided = decided_of(decision, *state)
         is_news = state != self._state or decided != Decided(*state)
@@ -255,7 +255,7 @@ class DecisionFilter:
 
 
 def decided_of(decision: Decision, state: str, reason: str) -> Decided:
-    """Return what the log says of a decision."""
+    """Return a decision as the log has it."""
     plan, path = decision.plan, decision.path
     return Decided(
         state=state,
