@@ -83,6 +83,13 @@ def test_a_rectangle_is_whole_or_missing():
     assert tolerant({"changed": edges | {"x_min": "0"}}, PathAttachment).changed is None
 
 
+def test_members_nobody_knows_may_be_nested_as_deep_as_json_may():
+    deep: dict = {}
+    for _ in range(900):
+        deep = {"a": deep}
+    assert tolerant({"state": "done", "deep": deep}, Status) == Status(state="done")
+
+
 def test_no_attachment_is_an_empty_one():
     assert decode_tolerant(b"", PathAttachment) == PathAttachment()
 
