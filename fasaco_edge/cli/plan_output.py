@@ -42,7 +42,7 @@ def figures_of(
         "local_search": args.local_search,
         "seed": path.seed,
         "ants": path.work.ants,
-        "kicks": path.work.kicks,
+        "kicks": path.work.perturbations,
         "proposals": path.work.proposals,
         "velocities": {"fasaco": args.velocities, "aco": "1"}.get(path.planner),
         "map": str(args.map),
@@ -80,7 +80,7 @@ def draw(
     ants = path.work.ants
     counted = "1 ant" if ants == 1 else f"{ants} ants"
     colony = f" {figures['velocities']}, {counted}, seed {path.seed}" if ants else ""
-    search = f", {path.work.kicks} kicks" if args.local_search else ""
+    search = f", {path.work.perturbations} perturbations" if args.local_search else ""
     title = path.planner + colony + search
     lines = [
         f"{Path(figures['map']).name}: {figures['cells']} cells of {figures['cell_m']} m, "

@@ -132,9 +132,9 @@ def _begin_stage(stage: str) -> None:
 
     The compiler would keep 570 MB in the end; what it has compiled is loaded in a second.
     """
-    from fasaco_edge.kernels.jit import KEPT  # noqa: PLC0415
+    from fasaco_edge.kernels.jit import FAULTS  # noqa: PLC0415
 
-    if KEPT.failure:
+    if FAULTS.failure:
         # What this process compiles is lost with it: the daemon does that, with its first map.
         sys.exit(0)
     _say(STAGE, stage)

@@ -1,13 +1,13 @@
-"""Where the compiled code of the kernels is kept, and whether all of it is there.
+"""The folder of compiled kernels: where it is, whether it may be used, whether it is complete.
 
-The folder is named after a hash of all kernel sources and of what compiles them: changed kernels
-never meet old code. In it lies one sealed file for each function, the types it is called with and
-the processor; and for each processor a list of all that a mission needs, once that is there.
+It is named after a hash of all kernel sources and of the compiler: changed kernels never use old
+code. It holds one sealed file for each function, argument types and processor; and for each
+processor a list of all that a mission needs, once all of it is compiled.
 
-A cache is code. It is taken from a folder that nobody but root and this user could have written,
-and each file in it is looked at (``kernels.sealed``) before it is used; what is not as it was
-written counts as not there, and is compiled again. Where the user's cache will not do, a temporary
-folder does, and where there is none either, nothing is kept.
+A cache is code. It is used only from a folder that nobody but root and this user could have
+written, and each file in it is checked (``kernels.sealed``) before use; a damaged one counts as
+missing and is compiled again. Where the user's cache cannot be used, a temporary folder is; where
+there is none either, nothing is kept.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ LOG = logging.getLogger(__name__)
 KERNELS = Path(__file__).parent
 KERNEL_SOURCES = sorted(KERNELS.rglob("*.py"))
 COMPILERS = ("numba", "llvmlite")
-# What the code of all kernels takes, twice over [MB].
-ROOM_MB = 20
+# Free space to have: twice the size of the code of all kernels [MB].
+NEEDED_MB = 20
 _FOLDER = re.compile(r"kernels-[0-9a-f]{12}$")
 _NOTE = "complete-"
 KERNEL_SUFFIX = ".kernel"
-# Then the number of the process that made it, and what nobody foresees.
+# Then the number of the process that made it, and random letters.
 _FRESH = "fasaco-edge-of-"
-_TOLD: set[str] = set()
+_WARNED: set[str] = set()
 
 
 def kernel_module(source: Path) -> str:
@@ -66,7 +66,7 @@ def code_digest(version_of: Callable[[str], str] = metadata.version) -> str:
 
 
 def wanted_folder(environ: Mapping[str, str] = os.environ) -> Path:
-    """Return the folder for compiled kernels, where it will do.
+    """Return the folder for compiled kernels, if it can be used.
 
     It is in the user's cache, or in ``NUMBA_CACHE_DIR``, where set (a systemd CacheDirectory, say).
     A user without a home has the temporary folder that others fall back to.
@@ -78,7 +78,7 @@ def wanted_folder(environ: Mapping[str, str] = os.environ) -> Path:
         homes = environ.get("XDG_CACHE_HOME", ""), os.path.expanduser("~/.cache")
         home = next(filter(os.path.isabs, homes), None)
         if home is None:
-            return _straight_in(Path(os.path.abspath(tempfile.gettempdir())), name)
+            return _directly_in(Path(os.path.abspath(tempfile.gettempdir())), name)
         given = f"{home}/fasaco-edge"
     base = Path(os.path.abspath(given))
     if base.name.endswith(name):
@@ -87,9 +87,9 @@ def wanted_folder(environ: Mapping[str, str] = os.environ) -> Path:
 
 
 def cache_folder() -> Path | None:
-    """Return the folder for compiled kernels, made where it was not there.
+    """Return the folder for compiled kernels, made if it was missing; None if none can be used.
 
-    None where nothing can be kept. What is not as it was wished for is logged.
+    A folder other than the wanted one is logged with the reason.
     """
     reasons: list[str] = []
     folder: Path | None
@@ -100,15 +100,15 @@ def cache_folder() -> Path | None:
         reasons.append(why)
     else:
         folder = _fresh_folder()
-    if reasons and reasons[0] not in _TOLD:
-        _TOLD.add(reasons[0])
+    if reasons and reasons[0] not in _WARNED:
+        _WARNED.add(reasons[0])
         kept = f"kept in {folder}" if folder else "not kept, each process compiles them anew"
         LOG.warning("%s: compiled kernels are %s", reasons[0], kept)
     return folder
 
 
 def _make(folder: Path) -> str:
-    """Make it; return why it cannot be used then, "" if it can: somebody may have been faster."""
+    """Make it; return why it cannot be used, "" if it can: another process may have made it."""
     try:
         make_folder(folder, mode=0o700)
     except OSError as error:
@@ -117,9 +117,9 @@ def _make(folder: Path) -> str:
 
 
 def usable_folder() -> tuple[Path, str]:
-    """Return the folder that kernels come from as things are, and why not the one wanted, if so.
+    """Return the folder that kernels come from, and why that is not the wanted one, "" if it is.
 
-    Nothing is made. Where none can be used it is the one wanted.
+    Nothing is made. Where none can be used it is the wanted one.
     """
     wanted, reason = wanted_folder(), ""
     for folder in _places(wanted):
@@ -141,7 +141,7 @@ def why_unusable(folder: Path) -> str:
     while not there.exists():
         there = there.parent
     why = _why_not_writable(there)
-    # What is all there needs not be written.
+    # A complete folder need not be written.
     return why if why and missing_from(folder) else ""
 
 
@@ -149,12 +149,12 @@ def _why_not_writable(folder: Path) -> str:
     if not os.access(folder, os.W_OK):
         return f"{folder} cannot be written"
     try:
-        room = os.statvfs(folder)
+        disk = os.statvfs(folder)
     except OSError as error:
         return f"{folder}: {error.strerror}"
-    is_full = room.f_blocks > 0 and room.f_bavail * room.f_frsize < ROOM_MB * 1e6
-    if is_full or (room.f_files > 0 and room.f_favail == 0):
-        return f"{folder} has no room for {ROOM_MB} MB"
+    is_full = disk.f_blocks > 0 and disk.f_bavail * disk.f_frsize < NEEDED_MB * 1e6
+    if is_full or (disk.f_files > 0 and disk.f_favail == 0):
+        return f"{folder} has less than {NEEDED_MB} MB free"
     return ""
 
 
@@ -169,22 +169,22 @@ def _places(wanted: Path) -> Iterator[Path]:
         yield Path(given) / wanted.name
     for base in _temporary()[:1]:
         if wanted.parent != base:
-            yield _straight_in(base, wanted.name)
+            yield _directly_in(base, wanted.name)
 
 
-def _straight_in(base: Path, name: str) -> Path:
-    """Return this user's folder in a sticky one, where nobody else can move it away."""
+def _directly_in(base: Path, name: str) -> Path:
+    """Return this user's folder directly in a sticky one, where nobody else can move it."""
     return base / f"fasaco-edge-{os.geteuid()}-{name}"
 
 
 def _temporary() -> list[Path]:
-    """Return the temporary folders in which what is ours stays ours."""
+    """Return the temporary folders in which nobody else can replace our files."""
     bases = dict.fromkeys((os.path.abspath(tempfile.gettempdir()), "/tmp", "/var/tmp"))
     return [base for base in map(Path, bases) if base.is_dir() and not why_not_trusted(base / "x")]
 
 
 def _fresh_folder() -> Path | None:
-    """Make a folder for this process and those that it starts, and that goes with it."""
+    """Make a folder for this process and its children, removed at its end."""
     for base in _temporary():
         if why_unusable(base / _name()):
             continue
@@ -203,11 +203,11 @@ def _fresh_folder() -> Path | None:
 
 def _clear(base: Path) -> None:
     """Remove the folders of processes that were killed."""
-    for left in base.glob(f"{_FRESH}*"):
-        maker = left.name.removeprefix(_FRESH).partition("-")[0]
-        with contextlib.suppress(OSError):  # somebody else may be doing it
-            if left.lstat().st_uid == os.geteuid() and not Path("/proc", maker).exists():
-                shutil.rmtree(left)
+    for abandoned in base.glob(f"{_FRESH}*"):
+        maker = abandoned.name.removeprefix(_FRESH).partition("-")[0]
+        with contextlib.suppress(OSError):  # another process may be doing it
+            if abandoned.lstat().st_uid == os.geteuid() and not Path("/proc", maker).exists():
+                shutil.rmtree(abandoned)
 
 
 def _remove(folder: Path, maker: int) -> None:
@@ -216,9 +216,9 @@ def _remove(folder: Path, maker: int) -> None:
 
 
 def note_complete(folder: Path) -> None:
-    """Note that all kernels are there now, where that is not noted yet.
+    """Record that all kernels are compiled, unless that is recorded already.
 
-    What cannot be used is removed; where nothing can be written, nothing is noted.
+    Damaged files are removed; where nothing can be written, nothing is recorded.
     """
     if not missing_from(folder):
         return
@@ -235,7 +235,7 @@ def note_complete(folder: Path) -> None:
 
 
 def missing_from(folder: Path, user: int | None = None) -> str:
-    """Return why kernels would be compiled that come from ``folder``; "" where none would.
+    """Return why kernels in ``folder`` would be compiled again; "" where none would.
 
     Args:
         folder: where they are kept.
@@ -269,7 +269,7 @@ def _never(folder: Path, user: int | None) -> str:
 
 
 def outdated(folder: Path) -> list[Path]:
-    """Return the folders beside ``folder`` that hold code of other kernels, and are ours."""
+    """Return this user's folders beside ``folder`` that hold code of other kernels."""
     beside = folder.parent.glob("kernels-*") if folder.parent.is_dir() else ()
     return sorted(
         other
@@ -283,7 +283,7 @@ def outdated(folder: Path) -> list[Path]:
 
 
 def prune(folder: Path) -> tuple[int, float]:
-    """Remove what is outdated; return how many folders that were, and how much they held [MB]."""
+    """Remove outdated folders; return how many they were and how much they held [MB]."""
     gone, size = 0, 0
     for other in outdated(folder):
         held = sum(file.lstat().st_size for file in other.rglob("*") if file.is_file())

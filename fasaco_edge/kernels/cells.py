@@ -1,13 +1,11 @@
-"""What is known of a cell of the lattice. Free of the compiler, for those who only read maps.
+"""States of a lattice cell, and the four directions of a step, counter-clockwise from east.
 
-The four directions of a step, counter-clockwise from east.
-
-Row 0 is the row with the smallest y, so north is towards larger rows. Bit
-``1 << direction`` of a cell's step mask says that this step is legal.
+Free of the compiler, for those who only read maps. Row 0 is the row with the smallest y, so
+north is towards larger rows. Bit ``1 << direction`` of a cell's step mask says that this step
+is legal.
 """
 
 UNKNOWN, BLOCKED, COVERABLE = 0, 1, 2
-
 
 EAST, NORTH, WEST, SOUTH = 0, 1, 2, 3
 ROW_STEP = (0, 1, 0, -1)

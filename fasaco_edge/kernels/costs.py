@@ -1,4 +1,4 @@
-"""What a walk costs."""
+"""Cost of a walk."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from fasaco_edge.kernels.jit import lean_kernel
 
 @lean_kernel
 def walk_cost(walk: NDArray[np.int32], step_us: int, quarter_turn_us: int) -> int:
-    """Return what a walk of flat cells, int32 (n,) with n >= 1, costs [us].
+    """Return the cost [us] of a walk of flat cells, int32 (n,) with n >= 1.
 
     A half turn is two quarter-turns; before the first step there is no turn.
     """

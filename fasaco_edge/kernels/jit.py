@@ -1,10 +1,10 @@
-"""How kernels are compiled, and what is loaded in place of that and kept after it.
+"""Compilation of kernels, and the cache of compiled code.
 
-numba's own cache is not used. It keeps an index beside the code of each function, which processes
-write in turns: two that compile at once can leave one that leads to the code of other types; it
+numba's own cache is not used. It keeps an index beside the code of each function, which several
+processes write: two that compile at once can leave one that leads to the code of other types; it
 unpickles before anything is checked; and it is not written through. Here each piece of code is a
-file by itself, named after what it is for and sealed, so no process ever changes what another one
-relies on. ``kernels.cache`` says where the files lie.
+file by itself, named after function, types and processor, and sealed, so no process changes what
+another one reads. ``kernels.cache`` has the folder of the files.
 """
 
 from __future__ import annotations
@@ -50,32 +50,32 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 CACHE_FOLDER = cache_folder()
 
 
-class Kept:
-    """What this process has met in the folder, each kind said once.
+class CacheFaults:
+    """Faults of the cache that this process met; each kind is logged once as a warning.
 
     Attributes:
-        failure: why one could not be written; "" while all could be.
+        failure: why a file could not be written; "" while all could be.
     """
 
     def __init__(self) -> None:
         self.failure = ""
-        self._said: set[str] = set()
+        self._logged: set[str] = set()
 
     def cannot_load(self, file: Path, why: object) -> None:
-        """Say once that what is kept is not as it was written."""
-        self._say("load", f"{file}: the compiled kernel {why}: it is compiled again")
+        """Log that a file is damaged or cannot be rebuilt."""
+        self._log("load", f"{file}: the compiled kernel {why}: it is compiled again")
 
     def cannot_keep(self, file: Path, error: OSError) -> None:
-        """Say once that nothing is kept."""
+        """Log that nothing is kept."""
         self.failure = f"{file.parent} cannot be written: {error.strerror}"
-        self._say("keep", f"{self.failure}: each process compiles its kernels anew")
+        self._log("keep", f"{self.failure}: each process compiles its kernels anew")
 
-    def _say(self, about: str, text: str) -> None:
-        LOG.log(logging.DEBUG if about in self._said else logging.WARNING, "%s", text)
-        self._said.add(about)
+    def _log(self, about: str, text: str) -> None:
+        LOG.log(logging.DEBUG if about in self._logged else logging.WARNING, "%s", text)
+        self._logged.add(about)
 
 
-KEPT = Kept()
+FAULTS = CacheFaults()
 
 
 class _Codegen(Protocol):
@@ -114,9 +114,9 @@ class _KernelCache:
         self._line = code.co_firstlineno
 
     def load_overload(self, signature: object, target: _Target) -> object:
-        """Return the result of compiling for ``signature``; None where it is not kept, or harmed.
+        """Return the result of compiling for ``signature``; None where it is missing or damaged.
 
-        Nothing that goes wrong here is more than a reason to compile.
+        Whatever goes wrong here is only a reason to compile.
         """
         target.refresh()
         file = self._file(signature, target.codegen())
@@ -128,11 +128,11 @@ class _KernelCache:
                 return None
             result: object = CompileResult._rebuild(target, *parts)
         except UnsoundFileError as why:
-            KEPT.cannot_load(file, why)
+            FAULTS.cannot_load(file, why)
             return None
         except Exception as error:
-            # It is as it was written; what numba cannot rebuild of that is numba's to know.
-            KEPT.cannot_load(file, f"cannot be used ({type(error).__name__}: {error})")
+            # The file is sound, but numba cannot rebuild it.
+            FAULTS.cannot_load(file, f"cannot be used ({type(error).__name__}: {error})")
             return None
         return result
 
@@ -144,10 +144,10 @@ class _KernelCache:
         try:
             write_sealed(file, dumps((signature, result._reduce())))
         except OSError as error:
-            KEPT.cannot_keep(file, error)
+            FAULTS.cannot_keep(file, error)
 
     def flush(self) -> None:
-        """Forget nothing: what is compiled again takes the place of what there was."""
+        """Do nothing: code that is compiled again replaces its file."""
 
     def _file(self, signature: object, codegen: _Codegen) -> Path:
         words = [str(self._line), str(signature), *codegen.magic_tuple()]
@@ -156,9 +156,9 @@ class _KernelCache:
 
 
 def _compiled(function: Kernel, compiler: Callable[[Kernel], object]) -> Kernel:
-    """Return what compiles ``function`` when it is called, or loads what is kept."""
+    """Return ``function`` as a dispatcher that loads or compiles it on its first call."""
     compiled = compiler(function)
-    # The folder's name stands for all that the code comes from: for these files, and no closures.
+    # The folder's name is a hash of these files alone, and says nothing of closures.
     is_ours = KERNELS in Path(function.__code__.co_filename).parents
     is_named = is_ours and not function.__closure__
     if is_named and CACHE_FOLDER is not None and not numba.config.DISABLE_JIT:
@@ -166,7 +166,7 @@ def _compiled(function: Kernel, compiler: Callable[[Kernel], object]) -> Kernel:
     return cast(Kernel, compiled)
 
 
-# Nothing calls kernels from C: without that way in they are compiled a fifth faster.
+# Nothing calls kernels from C: without that entry point they compile a fifth faster.
 _compile = numba.njit(nogil=True, no_cfunc_wrapper=True)
 
 
@@ -175,8 +175,8 @@ def kernel(function: Kernel) -> Kernel:
     return _compiled(function, _compile)
 
 
-# Innermost loops allocate nothing. Without reference counts on the arrays they
-# hand on, a loop of small functions runs four times as fast.
+# Innermost loops allocate nothing. Without reference counts on the arrays they pass on, a
+# loop of small functions runs four times as fast.
 _compile_lean = numba.njit(nogil=True, no_cfunc_wrapper=True, _nrt=False)
 _compile_into = numba.njit(nogil=True, forceinline=True, no_cfunc_wrapper=True, _nrt=False)
 
@@ -193,6 +193,6 @@ def inlined(function: Kernel) -> Kernel:
 
 
 def note_all_compiled() -> None:
-    """Note that every kernel has been compiled by now, or loaded."""
-    if not numba.config.DISABLE_JIT and CACHE_FOLDER is not None and not KEPT.failure:
+    """Record that every kernel has been compiled or loaded by now."""
+    if not numba.config.DISABLE_JIT and CACHE_FOLDER is not None and not FAULTS.failure:
         note_complete(CACHE_FOLDER)

@@ -1,21 +1,24 @@
 """Random numbers in whole numbers, the same on every machine.
 
-Source: Marsaglia, "Xorshift RNGs", 2003. No function of the mathematical
-library takes part, so no machine rounds otherwise.
+No function of the mathematical library takes part, so no machine rounds otherwise.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined
+from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 # The lowest bits choose among few things, the highest an index: they do not meet.
 INDEX_BITS = 41
+WORD = 0xFFFFFFFF
 
 
 @inlined
 def draw(random: NDArray[np.uint64]) -> int:
-    """Advance the stream, uint64 (1,), not 0; return 63 random bits."""
+    """Advance the stream, uint64 (1,), not 0; return 63 random bits.
+
+    Source: Marsaglia, "Xorshift RNGs", 2003.
+    """
     word = random[0]
     word ^= word << np.uint64(13)
     word ^= word >> np.uint64(7)
@@ -28,3 +31,22 @@ def draw(random: NDArray[np.uint64]) -> int:
 def index_of(bits: int, size: int) -> int:
     """Return an index in 0..size - 1, size < 2^22, from the upper bits of a ``draw``."""
     return ((bits >> 22) * size) >> INDEX_BITS
+
+
+@lean_kernel
+def draw_unit(state: NDArray[np.int64]) -> float:
+    """Advance a stream of four words of 32 bits, int64 (4,); return a number in [0, 1).
+
+    Source: xoshiro128++, Blackman and Vigna 2019. Words live in int64 and are masked, so that
+    nothing overflows in plain Python.
+    """
+    total = (state[0] + state[3]) & WORD
+    word = ((((total << 7) & WORD) | (total >> 25)) + state[0]) & WORD
+    shifted = (state[1] << 9) & WORD
+    state[2] ^= state[0]
+    state[3] ^= state[1]
+    state[1] ^= state[2]
+    state[0] ^= state[3]
+    state[2] ^= shifted
+    state[3] = ((state[3] << 11) & WORD) | (state[3] >> 21)
+    return float(word / 4294967296.0)

@@ -1,15 +1,14 @@
-"""Files that carry the SHA-256 of what is in them, so that what was harmed is never taken for code.
+"""Sealed files, which carry the SHA-256 of their content: a damaged one is never used as code.
 
-A loss of power leaves files that are empty, half or full of zeros, a worn card other bytes; machine
-code of that kind ends the process, and a pickle may do anything. So each file begins with a line
-that has the digest of all that follows, and is looked at before a byte of it is used::
+A loss of power leaves files that are empty, cut off or full of zeros, a worn card other bytes;
+such machine code ends the process, and a pickle may do anything. So each file begins with a line
+that has the digest of all that follows, and is checked before a byte of it is used::
 
     fasaco-edge sealed 9f86d081...\\n
-    what is in it
+    content
 
-That tells harm, not malice, which could write the digest, too: ``fasaco_edge.host.files`` says
-who could have written the file. Reading needs no right to write: the rule is the same in a folder
-of root's.
+That detects damage, not malice, which could write the digest, too: ``fasaco_edge.host.files``
+checks who could have written the file. Reading needs no right to write, as in a folder of root's.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from fasaco_edge.host.files import UntrustedFileError, read_trusted
 _WORD = b"fasaco-edge sealed "
 _HEX = 64
 _HEAD = len(_WORD) + _HEX + 1
-# Begun, and not yet in place.
+# A file that is being written.
 PARTIAL = ".partial-"
 
 
@@ -38,14 +37,14 @@ def _head_of(payload: bytes | memoryview) -> bytes:
 
 
 def read_sealed(file: Path, user: int | None = None) -> memoryview:
-    """Return what a sealed file holds, byte for byte as it was written.
+    """Return the content of a sealed file, byte for byte as it was written.
 
     Args:
         file: the file, in a folder that is trusted.
         user: whose it may be, beside root; without it this process's.
 
     Raises:
-        UnsoundFileError: it is not there, cannot be read or is harmed, or others could have
+        UnsoundFileError: it is missing, damaged or cannot be read, or others could have
             written it.
     """
     try:
@@ -63,12 +62,12 @@ def read_sealed(file: Path, user: int | None = None) -> memoryview:
 
 
 def write_sealed(file: Path, payload: bytes) -> None:
-    """Put a sealed file in place, whole: whoever reads meanwhile finds the one before it, or none.
+    """Write a sealed file in one step: a reader meanwhile finds the one before it, or none.
 
     Raises:
-        OSError: that failed; what was there before is there.
+        OSError: that failed; the file before it stays.
     """
-    # Of each process its own, so that two may write one file at once.
+    # One for each process, so that two may write one file at once.
     partial = file.with_name(f"{file.name}{PARTIAL}{os.getpid()}")
     try:
         remove(partial)  # of a process of the same number, that was killed
@@ -94,7 +93,7 @@ def remove(path: Path) -> None:
 
 
 def sweep(folder: Path, pattern: str) -> list[Path]:
-    """Remove what cannot be used, and what was begun by processes that are no more.
+    """Remove damaged files, and unfinished ones of processes that have ended.
 
     Args:
         folder: the folder, which is trusted.

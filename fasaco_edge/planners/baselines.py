@@ -15,20 +15,20 @@ their code makes at dead ends, which Table I counts too; see ``fasaco_edge/bench
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.ants.baselines import spanning_tree_walk, sweep
-from fasaco_edge.kernels.ants.colony import FEWEST_OPEN, Rules, walk_ants
-from fasaco_edge.kernels.ants.growth import Graph
+from fasaco_edge.kernels.ants.colony import FEWEST_OPEN, ColonyState, Rules, walk_ants
+from fasaco_edge.kernels.ants.graph import Graph
 from fasaco_edge.kernels.costs import walk_cost
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk
 from fasaco_edge.planners.graph import (
     cells_of,
-    flat_cells,
     flat_end,
     flat_start,
     graph_of,
@@ -51,65 +51,21 @@ STEPS_PER_CELL = 2
 
 
 @dataclass(frozen=True, slots=True)
-class SpanningTree:
-    """Once around a tree that spans blocks of 2 x 2 cells."""
+class FixedRule:
+    """A planner without chance: the one walk that a rule gives.
 
-    def plan(
-        self, problem: CoverageProblem, stop: StoppingCriterion = never, observe: Observer = ignore
-    ) -> CoveragePath:
-        """Return the walk around the tree; it takes too little time to be stopped."""
-        began = time.perf_counter()
-        lattice = problem.lattice
-        row, col = lattice.local(problem.start)
-        # The tree spans covered cells too: those to cover need not be connected.
-        reachable = reachable_from(lattice.steps, row, col)
-        walk = spanning_tree_walk(lattice.steps, reachable, row, col)
-        if problem.end is None:
-            walk = walk[: _last_needed(problem, walk) + 1]
-        elif not problem.closed:
-            readings = (_led_to_end(problem, walk), _led_to_end(problem, walk[::-1]))
-            walk = min(readings, key=problem.cost.of_walk)
-        cells = walk + np.array((lattice.window.row0, lattice.window.col0), np.int32)
-        return CoveragePath(
-            cells,
-            planner="stc",
-            seed=0,
-            cost_s=problem.cost.of_walk(cells),
-            first_walk_s=time.perf_counter() - began,
-        )
-
-
-def _led_to_end(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return a walk up to the last cell that is needed, and from there on to the end."""
-    assert problem.end is not None
-    needed = walk[: _last_needed(problem, walk) + 1]
-    lattice = problem.lattice
-    # Plain integers, or the kernel is compiled a second time for numpy's.
-    row, col = needed[-1].tolist()
-    way = shortest_walk(lattice.steps, (row, col), lattice.local(problem.end))
-    return np.concatenate((needed, way[1:]))
-
-
-def _last_needed(problem: CoverageProblem, walk: NDArray[np.int32]) -> int:
-    """Return the index of the walk's last first visit to a cell that is to be covered."""
-    flat = walk[:, 0].astype(np.int64) * problem.to_cover.shape[1] + walk[:, 1]
-    first_visits = np.unique(flat, return_index=True)[1]
-    wanted = problem.to_cover[walk[first_visits, 0], walk[first_visits, 1]]
-    return int(first_visits[wanted].max())
-
-
-@dataclass(frozen=True, slots=True)
-class _Sweep:
-    """A walk by a fixed rule; nothing in it is drawn at random."""
+    Attributes:
+        name: of the planner.
+        walk: returns the walk over a problem's graph, flat cells int32 (n,).
+    """
 
     name: str
-    order: tuple[int, int, int, int]
-    turns_along: bool
+    walk: Callable[[CoverageProblem, Graph], NDArray[np.int32]]
 
     def plan(
         self, problem: CoverageProblem, stop: StoppingCriterion = never, observe: Observer = ignore
     ) -> CoveragePath:
-        """Return the one walk there is; it takes too little time to be stopped."""
+        """Return the walk; it takes too little time to be stopped."""
         began = time.perf_counter()
         cells = cells_of(problem, self.walk(problem, graph_of(problem)))
         return CoveragePath(
@@ -120,30 +76,71 @@ class _Sweep:
             first_walk_s=time.perf_counter() - began,
         )
 
-    def walk(self, problem: CoverageProblem, graph: Graph) -> NDArray[np.int32]:
-        """Return the walk as flat cells, int32 (n,)."""
-        scratch, start, end = scratch_for(graph), flat_start(problem), flat_end(problem)
-        length = capacity = 2 * problem.cells
-        while length >= capacity:
-            capacity = 2 * length
-            walk = np.empty(capacity, np.int32)
-            length = sweep(graph, scratch, start, self.order, self.turns_along, end, walk)
-        return walk[:length]
+
+def _around_tree(problem: CoverageProblem, graph: Graph) -> NDArray[np.int32]:
+    """Return the walk once around a tree that spans blocks of 2 x 2 cells."""
+    lattice = problem.lattice
+    # The tree spans covered cells too: those to cover need not be connected.
+    reachable = reachable_from(lattice.steps, *lattice.local(problem.start))
+    walk = spanning_tree_walk(lattice.steps, reachable, flat_start(problem))
+    if problem.end is None:
+        return walk[: _last_needed(problem, walk) + 1]
+    if problem.closed:
+        return walk
+    readings = (_led_to_end(problem, walk), _led_to_end(problem, walk[::-1]))
+    return min(readings, key=_price(problem))
 
 
-def stc(*unused: object) -> SpanningTree:
+def _price(problem: CoverageProblem) -> Callable[[NDArray[np.int32]], int]:
+    """Return the function that gives a walk's cost [us]."""
+    step_us, quarter_turn_us = problem.cost.step_us, problem.cost.quarter_turn_us
+    return lambda walk: walk_cost(walk, step_us, quarter_turn_us)
+
+
+def _led_to_end(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return a walk, flat cells int32 (n,), up to the last cell needed and on to the end."""
+    assert problem.end is not None
+    needed = walk[: _last_needed(problem, walk) + 1]
+    lattice = problem.lattice
+    cols = lattice.window.cols
+    # Plain integers, or the kernel is compiled a second time for numpy's.
+    way = shortest_walk(lattice.steps, divmod(int(needed[-1]), cols), lattice.local(problem.end))
+    return np.concatenate((needed, way[1:, 0] * np.int32(cols) + way[1:, 1]))
+
+
+def _last_needed(problem: CoverageProblem, walk: NDArray[np.int32]) -> int:
+    """Return the index of the walk's last first visit to a cell that is to be covered."""
+    first_visits = np.unique(walk, return_index=True)[1]
+    needed = problem.to_cover.ravel()[walk[first_visits]]
+    return int(first_visits[needed].max())
+
+
+def _sweep(
+    order: tuple[int, int, int, int], turns_along: bool, problem: CoverageProblem, graph: Graph
+) -> NDArray[np.int32]:
+    """Return the walk that tries directions in an order; see ``kernels.ants.baselines``."""
+    scratch, start, end = scratch_for(graph), flat_start(problem), flat_end(problem)
+    length = capacity = 2 * problem.cells
+    while length >= capacity:
+        capacity = 2 * length
+        walk = np.empty(capacity, np.int32)
+        length = sweep(graph, scratch, start, order, turns_along, end, walk)
+    return walk[:length]
+
+
+def stc(*unused: object) -> FixedRule:
     """Return spanning-tree coverage; it needs no colony and no threads, nor do those below."""
-    return SpanningTree()
+    return FixedRule("stc", _around_tree)
 
 
-def spiral_stc(*unused: object) -> _Sweep:
+def spiral_stc(*unused: object) -> FixedRule:
     """Return the backtracking spiral."""
-    return _Sweep("spiral-stc", RIGHT_HAND, turns_along=True)
+    return FixedRule("spiral-stc", partial(_sweep, RIGHT_HAND, True))
 
 
-def zigzag(*unused: object) -> _Sweep:
+def zigzag(*unused: object) -> FixedRule:
     """Return the sweep in a fixed order of directions."""
-    return _Sweep("zigzag", ROWS_FIRST, turns_along=False)
+    return FixedRule("zigzag", partial(_sweep, ROWS_FIRST, False))
 
 
 def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[tuple[NDArray[np.int32], int]]:
@@ -154,18 +151,17 @@ def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[tuple[NDArra
     straight on, the spiral, the zigzag and the walk around a spanning tree: each is
     best on some grids.
     """
-    cost = problem.cost
+    price = _price(problem)
     for walk in _walks(problem, graph):
-        yield walk, walk_cost(walk, cost.step_us, cost.quarter_turn_us)
+        yield walk, price(walk)
 
 
 def _walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.int32]]:
     yield _ant(problem, graph, velocity=1)
     if problem.cost.quarter_turn_us:
         yield _ant(problem, graph, velocity=STRAIGHT_ON)
-        yield spiral_stc().walk(problem, graph)
-        yield zigzag().walk(problem, graph)
-        yield flat_cells(problem, SpanningTree().plan(problem).cells)
+        for rule in (spiral_stc(), zigzag(), stc()):
+            yield rule.walk(problem, graph)
 
 
 def _ant(problem: CoverageProblem, graph: Graph, velocity: int) -> NDArray[np.int32]:
@@ -175,20 +171,19 @@ def _ant(problem: CoverageProblem, graph: Graph, velocity: int) -> NDArray[np.in
         q0=1.0,
         alpha=0.0,
         tau0=1.0,
+        start=flat_start(problem),
         end=flat_end(problem),
         step_us=cost.step_us,
         quarter_turn_us=cost.quarter_turn_us,
         visibility=FEWEST_OPEN,
         powers=1.0 / np.arange(1.0, max(velocity, 4) + 1.0),
     )
-    trail, scratch = np.ones((graph.steps.size, 4)), scratch_for(graph)
+    colony = ColonyState(graph, np.ones((graph.steps.size, 4)), rules)
     lengths = np.full(1, STEPS_PER_CELL * problem.cells + 2)
     walks = np.empty((1, 0), np.int32)
     while walks.shape[1] < lengths[0]:
         # The first try, or a walk that did not fit: the same ant again, with more memory.
         walks = np.empty((1, int(lengths[0])), np.int32)
         stream = np.ones((1, 4), np.int64)
-        walk_ants(
-            graph, trail, rules, scratch, flat_start(problem), velocity, stream, walks, lengths
-        )
+        walk_ants(colony, scratch_for(graph), velocity, stream, walks, lengths)
     return walks[0, : lengths[0]].copy()

@@ -1,4 +1,4 @@
-"""How much a local search tries, and how boldly: what trials on real grids came to."""
+"""Parameters of the local search for a cost, as trials on real grids found them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fasaco_edge.kernels.local_search.perturbation import KickRules
+from fasaco_edge.kernels.local_search.perturbation import PerturbationRules
 from fasaco_edge.planners.cost import CoverageCost
 
 # The temperatures of an annealing: from 1.5 down to 0.2.
@@ -18,79 +18,79 @@ EVERY_CELL = 1 << 30
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """The plan of a local search.
+    """Parameters of a search.
 
     Attributes:
-        heats_us: temperatures of the first improvement, in order [us].
+        temperatures_us: temperatures of the first improvement, in order [us].
         proposals: proposals for each visit in it, at all temperatures together.
-        kick: how to kick.
-        patience: kicks without gain after which another walk is begun with.
+        rules: how to perturb.
+        patience: perturbations without gain after which the search restarts.
     """
 
-    heats_us: tuple[int, ...]
+    temperatures_us: tuple[int, ...]
     proposals: int
-    kick: KickRules
+    rules: PerturbationRules
     patience: int
 
 
 def effort_for(cost: CoverageCost) -> Effort:
-    """Return the plan for a cost.
+    """Return the parameters of a search for a cost.
 
-    Where turns are free, what helps is to mix the whole walk at temperature 0. Where
-    they are not, annealing takes the place of mixing, and a kick is felt only nearby.
+    Where turns are free, proposals at temperature 0 all over the walk work best. Where
+    they are not, the surroundings of a perturbation are annealed.
     """
     if not cost.quarter_turn_us:
-        mixing = KickRules(
+        rules = PerturbationRules(
             limit=EVERY_CELL,
-            mixing=25,
+            proposals=25,
             radius=WHOLE_WALK,
-            heat_us=0,
-            patience_us=cost.step_us * 2 // 5,
+            temperature_us=0,
+            acceptance_us=cost.step_us * 2 // 5,
             loops_of_256=256,
         )
-        return Effort((0,), 200, mixing, 100)
+        return Effort((0,), 200, rules, 100)
     # The trials had turns of 1.5 steps; their temperatures are in steps.
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
-    heating = KickRules(
+    rules = PerturbationRules(
         limit=300,
-        mixing=100,
+        proposals=100,
         radius=8,
-        heat_us=unit,
-        patience_us=unit * 3 // 10,
+        temperature_us=unit,
+        acceptance_us=unit * 3 // 10,
         loops_of_256=64,
         steady=True,
     )
-    heats = tuple(int(np.rint(unit * level)) for level in LEVELS)
-    return Effort(heats, 250, heating, 500)
+    temperatures_us = tuple(int(np.rint(unit * level)) for level in LEVELS)
+    return Effort(temperatures_us, 250, rules, 500)
 
 
 @dataclass(frozen=True, slots=True)
 class RepairEffort:
-    """The plan of a repair.
+    """Parameters of a repair.
 
     Attributes:
-        rules: how to kick.
-        kicks: that a neighbourhood gets.
-        held_kicks: so many of them hold still what is just ahead of the robot.
+        rules: how to perturb.
+        perturbations: in each neighbourhood.
+        held: so many of them leave the walk just ahead of the robot as it is.
     """
 
-    rules: KickRules
-    kicks: int
-    held_kicks: int
+    rules: PerturbationRules
+    perturbations: int
+    held: int
 
 
 def repair_for(cost: CoverageCost) -> RepairEffort:
-    """Return how to improve a mended walk: nothing is taken that gains nothing.
+    """Return how to improve a repaired walk: no change is taken that gains nothing.
 
-    What is kicked is the neighbourhood of what changed, small enough to be mixed whole
-    where turns are free.
+    The neighbourhood of what changed is small enough for proposals all over it where turns
+    are free.
     """
-    rules = KickRules(
+    rules = PerturbationRules(
         limit=100,
-        mixing=6,
+        proposals=6,
         radius=WHOLE_WALK,
-        heat_us=0,
-        patience_us=0,
+        temperature_us=0,
+        acceptance_us=0,
         loops_of_256=256,
         steady=True,
         strict=True,
@@ -98,5 +98,5 @@ def repair_for(cost: CoverageCost) -> RepairEffort:
     if not cost.quarter_turn_us:
         return RepairEffort(rules, 50, 40)
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
-    rules = rules._replace(mixing=40, radius=6, heat_us=unit * 3 // 2, loops_of_256=128)
+    rules = rules._replace(proposals=40, radius=6, temperature_us=unit * 3 // 2, loops_of_256=128)
     return RepairEffort(rules, 80, 60)

@@ -22,8 +22,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.ants.colony import Rules, deposit, settle, walk_ants
-from fasaco_edge.kernels.ants.growth import Graph
+from fasaco_edge.kernels.ants.colony import ColonyState, Rules, deposit, settle, walk_ants
+from fasaco_edge.kernels.ants.graph import Graph
 from fasaco_edge.planners.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.cost import MICROSECONDS
 from fasaco_edge.planners.graph import cells_of, flat_end, flat_start, graph_of, scratch_for
@@ -59,9 +59,7 @@ class Colony:
         self.best = np.empty(0, np.int32)
         self.best_us = 0
         self._cells = problem.cells
-        self._graph = graph
-        self._rules = _rules(config, problem)
-        self._start = flat_start(problem)
+        self._state = ColonyState(graph, self.trail, _rules(config, problem))
         self._pool = pool
         self._scratches = [scratch_for(graph) for _ in range(threads)]
         self._walks = np.empty((self.group, STEPS_PER_CELL * problem.cells + 2), np.int32)
@@ -85,7 +83,7 @@ class Colony:
             self._walks = np.empty((self.group, 2 * int(lengths.max())), np.int32)
             streams[:] = before
             self._walk_on_threads(velocity, streams, lengths)
-        ant, cost_us = settle(self._graph, self.trail, self._rules, self._walks, lengths)
+        ant, cost_us = settle(self._state, self._walks, lengths)
         walk = self._walks[ant, : lengths[ant]].copy()
         self.offer(walk, cost_us)
         return walk, cost_us
@@ -98,9 +96,9 @@ class Colony:
     def strengthen(self) -> None:
         """Strengthen the trail along the best walk by equation (8)."""
         # Whole numbers divided once: for steps alone it is cells / steps to the last bit.
-        step_us = self._rules.step_us
+        step_us = self._state.rules.step_us
         amount = self._cells * step_us / max(self.best_us, step_us)
-        deposit(self._graph, self.trail, self._rules.alpha, amount, self.best)
+        deposit(self._state, amount, self.best)
 
     def progress(self, walked: int) -> SearchProgress:
         """Return how far the search is after so many ants."""
@@ -114,11 +112,8 @@ class Colony:
         def share(thread: int) -> None:
             mine = slice(*(len(streams) * edge // threads for edge in (thread, thread + 1)))
             walk_ants(
-                self._graph,
-                self.trail,
-                self._rules,
+                self._state,
                 self._scratches[thread],
-                self._start,
                 velocity,
                 streams[mine],
                 self._walks[mine],
@@ -147,6 +142,7 @@ def _rules(config: ColonyConfig, problem: CoverageProblem) -> Rules:
         q0=config.q0,
         alpha=config.alpha,
         tau0=config.tau0,
+        start=flat_start(problem),
         end=flat_end(problem),
         step_us=cost.step_us,
         quarter_turn_us=cost.quarter_turn_us,

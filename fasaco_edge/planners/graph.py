@@ -1,8 +1,7 @@
-"""From a coverage problem to the flat arrays that kernels walk on, and back.
+"""Conversion of a coverage problem to the flat arrays of the kernels, and back.
 
-The ground that local search walks on: the problem's lattice with a frame around it.
-
-How short a covering walk can be at best.
+Ants walk on ``Graph``, the lattice as it is; local search on ``FramedGround``, the lattice
+with a frame around it.
 """
 
 from __future__ import annotations
@@ -13,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.kernels.ants.growth import Graph, Scratch
-from fasaco_edge.kernels.bound.bound import covering_bound
+from fasaco_edge.kernels.ants.graph import Graph, Scratch
+from fasaco_edge.kernels.bound.covering import covering_bound
 from fasaco_edge.kernels.local_search.walk_array import FRAME, Ground
 from fasaco_edge.planners.problem import CoverageProblem
 
 
 def graph_of(problem: CoverageProblem) -> Graph:
-    """Return the problem's lattice and wishes, cells as flat indices ``row * cols + col``."""
+    """Return the problem's lattice and cells to cover, as flat indices ``row * cols + col``."""
     steps = problem.lattice.steps
     cols = steps.shape[1]
     offsets = np.array([1, cols, -1, -cols], np.int64)
@@ -64,13 +63,6 @@ def cells_of(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[np.in
     return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
 
 
-def flat_cells(problem: CoverageProblem, cells: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return cells (row, col), int32 (n, 2), as flat indices, int32 (n,)."""
-    window = problem.lattice.window
-    flat = (cells[:, 0] - window.row0) * window.cols + cells[:, 1] - window.col0
-    return flat.astype(np.int32)
-
-
 def _flat(problem: CoverageProblem, cell: Cell) -> int:
     row, col = problem.lattice.local(cell)
     return row * problem.lattice.window.cols + col
@@ -78,7 +70,7 @@ def _flat(problem: CoverageProblem, cell: Cell) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FramedGround:
-    """The problem's steps and cells to cover, and the way between both kinds of flat index.
+    """The problem's steps and cells to cover, framed, and conversion of flat indices.
 
     Attributes:
         rows, cols: shape of the lattice, without the frame.
@@ -118,7 +110,7 @@ class FramedGround:
 def lower_bound_steps(problem: CoverageProblem) -> int:
     """Return a number of steps that no walk which solves ``problem`` can beat.
 
-    Turns do not enter it. The proof stands in ``kernels.bound``.
+    Turns do not count. The proof is in ``kernels.bound.covering``.
     """
     required = problem.to_cover.astype(np.uint8)
     return covering_bound(problem.lattice.steps, required, flat_start(problem), flat_end(problem))

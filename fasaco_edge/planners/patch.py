@@ -1,4 +1,4 @@
-"""A region under local search: a part of the ground with the parts of the walk that lie there."""
+"""A region under local search: part of the ground with the parts of the walk that lie there."""
 
 from __future__ import annotations
 
@@ -8,17 +8,25 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.local_search.holes import rays
 from fasaco_edge.kernels.local_search.parity import JUMPS, Tally
 from fasaco_edge.kernels.local_search.perturbation import (
-    KICKS,
+    PERTURBATIONS,
     PROPOSALS,
-    KickRules,
     Memory,
-    kick,
+    PerturbationRules,
+    Search,
+    perturb,
     recall,
     remember,
     touch_up,
 )
 from fasaco_edge.kernels.local_search.proposals import improve
-from fasaco_edge.kernels.local_search.regions import AFTER, Box, cut_ground, cut_walk, put_back
+from fasaco_edge.kernels.local_search.regions import (
+    AFTER,
+    Box,
+    Jumps,
+    cut_ground,
+    cut_walk,
+    put_back,
+)
 from fasaco_edge.kernels.local_search.walk_array import (
     COST,
     FRAME,
@@ -37,7 +45,7 @@ LOOPS = 4096
 
 
 class Patch:
-    """Room for a region of up to ``rows`` x ``cols`` cells and a walk in it.
+    """Memory for a region of up to ``rows`` x ``cols`` cells and a walk in it.
 
     Args:
         rows, cols: size of the largest region.
@@ -47,31 +55,30 @@ class Patch:
 
     def __init__(self, rows: int, cols: int, visits: int, jumps: int) -> None:
         size = (rows + 2 * FRAME) * (cols + 2 * FRAME)
-        both, room = size + jumps, 2 * visits + 4 * jumps + 64
-        self._ground = Ground(
+        both, capacity = size + jumps, 2 * visits + 4 * jumps + 64
+        ground = Ground(
             np.zeros(both, np.uint8), np.zeros(both, np.int32), np.zeros(4, np.int64), size
         )
-        self._walk = Walk(
-            cells=np.empty(room, np.int32),
+        walk = Walk(
+            cells=np.empty(capacity, np.int32),
             place=np.zeros(both, np.int32),
             visits=np.zeros(both, np.int32),
             spare=np.zeros(both, np.int32),
             spare_at=np.zeros(both, np.int32),
             counts=np.zeros(3, np.int64),
         )
-        self._tally = _tally(size, jumps, room)
+        tally = _tally(size, jumps, capacity)
         self._memory = Memory(
-            saved=np.empty(room, np.int32),
-            best=np.empty(room, np.int32),
+            saved=np.empty(capacity, np.int32),
+            best=np.empty(capacity, np.int32),
             best_counts=np.zeros(3, np.int64),
             touched=np.empty(size, np.int32),
             area=np.empty(size, np.int32),
             marked=np.zeros(size, np.int32),
             work=np.zeros(2, np.int64),
         )
-        self._sections = np.empty((jumps, 2), np.int32)
-        self._limits = np.zeros(2, np.int64)
-        self._prices = Prices(1, 0, False)
+        self._search = Search(ground, walk, Prices(1, 0, False), tally, self._memory)
+        self._jumps = Jumps(tally.jump_ends, np.empty((jumps, 2), np.int32), np.zeros(2, np.int64))
         self._loaded_us = self._loaded_length = 0
 
     def load(self, ground: Ground, cells: NDArray[np.int32], box: Box, prices: Prices) -> bool:
@@ -83,46 +90,40 @@ class Patch:
             box: the region, no larger than the patch.
             prices: of the whole walk.
         """
+        _, walk, _, tally, _ = self._search
         width = box.cols + 2 * FRAME
-        bound = (box.rows + 2 * FRAME) * width
-        self._ground.offsets[:] = (1, width, -1, -width)
-        self._ground = self._ground._replace(bound=bound)
-        if not cut_ground(ground, box, self._ground):
+        region = self._search.ground._replace(bound=(box.rows + 2 * FRAME) * width)
+        region.offsets[:] = (1, width, -1, -width)
+        self._search = self._search._replace(ground=region)
+        if not cut_ground(ground, box, region):
             return False
-        length, jumps = cut_walk(
-            ground,
-            box,
-            cells,
-            bound,
-            self._walk.cells[: self._walk.cells.size // 2],
-            self._tally.jump_ends,
-            self._sections,
-            self._limits,
-        )
+        half = walk.cells[: walk.cells.size // 2]
+        length, jumps = cut_walk(ground, box, cells, half, self._jumps)
         if not length:
             return False
-        self._tally.counts[JUMPS] = jumps
-        self._prices = prices._replace(
-            free_end=prices.free_end and int(self._limits[AFTER]) == cells.size
-        )
-        rays(self._ground, self._tally.rays)
-        recount(self._ground, self._walk, length, self._prices)
-        remember(self._walk, self._memory)
-        self._loaded_us, self._loaded_length = int(self._walk.counts[COST]), length
+        tally.counts[JUMPS] = jumps
+        free_end = prices.free_end and int(self._jumps.limits[AFTER]) == cells.size
+        prices = prices._replace(free_end=free_end)
+        self._search = self._search._replace(prices=prices)
+        rays(region, tally.rays)
+        recount(region, walk, length, prices)
+        remember(walk, self._memory)
+        self._loaded_us, self._loaded_length = int(walk.counts[COST]), length
         return True
 
     def hold(self, visits: int) -> None:
         """Let the first so many visits change only where something is gained, from now on."""
-        self._prices = self._prices._replace(held=visits)
+        prices = self._search.prices._replace(held=visits)
+        self._search = self._search._replace(prices=prices)
 
     @property
     def gain_us(self) -> int:
-        """By how much the best walk here costs more than the one loaded [us], so 0 or less."""
+        """Cost of the best walk here less that of the walk loaded [us], so 0 or less."""
         return int(self._memory.best_counts[COST]) - self._loaded_us
 
     @property
     def longer_by(self) -> int:
-        """By how many steps it is longer."""
+        """Steps of the best walk here less those of the walk loaded."""
         return self.best_length - self._loaded_length
 
     @property
@@ -133,58 +134,40 @@ class Patch:
     @property
     def work(self) -> SearchWork:
         """What was done here, in this region and those before it."""
-        kicks, proposals = int(self._memory.work[KICKS]), int(self._memory.work[PROPOSALS])
-        return SearchWork(kicks=kicks, proposals=proposals)
+        work = self._memory.work
+        return SearchWork(perturbations=int(work[PERTURBATIONS]), proposals=int(work[PROPOSALS]))
 
-    def improve(self, heat_us: int, proposals: int, random: NDArray[np.uint64]) -> None:
+    def improve(self, temperature_us: int, proposals: int, random: NDArray[np.uint64]) -> None:
         """Make proposals all over the region at one temperature."""
-        improve(self._ground, self._walk, self._prices, EVERYWHERE, heat_us, proposals, random)
-        self._memory.work[PROPOSALS] += proposals
-        if self._walk.counts[COST] <= self._memory.best_counts[COST]:
-            remember(self._walk, self._memory)
+        ground, walk, prices, _, memory = self._search
+        improve(ground, walk, prices, EVERYWHERE, temperature_us, proposals, random)
+        memory.work[PROPOSALS] += proposals
+        if walk.counts[COST] <= memory.best_counts[COST]:
+            remember(walk, memory)
 
     def touch_up(
-        self, cells: NDArray[np.int32], rules: KickRules, random: NDArray[np.uint64]
+        self, cells: NDArray[np.int32], rules: PerturbationRules, random: NDArray[np.uint64]
     ) -> None:
         """Improve the walk around cells of the region, int32 (n,), if that gains something."""
         self._memory.touched[: cells.size] = cells
-        touch_up(self._ground, self._walk, self._prices, self._memory, rules, cells.size, random)
+        touch_up(self._search, rules, cells.size, random)
 
-    def kick(self, rules: KickRules, kicks: int, random: NDArray[np.uint64]) -> None:
-        """Kick the walk so many times."""
-        kick(
-            self._ground,
-            self._walk,
-            self._prices,
-            self._tally,
-            self._memory,
-            rules,
-            kicks,
-            random,
-        )
+    def perturb(self, rules: PerturbationRules, times: int, random: NDArray[np.uint64]) -> None:
+        """Perturb the walk so many times."""
+        perturb(self._search, rules, times, random)
 
     def go_back(self) -> None:
         """Go on from the best walk here."""
-        recall(self._ground, self._walk, self._prices, self._memory)
+        recall(self._search)
 
     def put_back(self, ground: Ground, cells: NDArray[np.int32], box: Box) -> NDArray[np.int32]:
         """Return the whole walk, int32 (m,), with the best walk here in it."""
-        length = self.best_length
-        out = np.empty(cells.size + length, np.int32)
-        size = put_back(
-            ground,
-            box,
-            cells,
-            self._ground.bound,
-            self._memory.best[:length],
-            self._sections,
-            self._limits,
-            out,
-        )
-        return out[:size]
+        best = self._memory.best[: self.best_length]
+        out = np.empty(cells.size + best.size, np.int32)
+        return out[: put_back(ground, box, cells, best, self._jumps, out)]
 
 
-def _tally(size: int, jumps: int, room: int) -> Tally:
+def _tally(size: int, jumps: int, capacity: int) -> Tally:
     return Tally(
         times=np.zeros((size, 2), np.int16),
         order_of_old=np.zeros((size, 4), np.int8),
@@ -200,7 +183,7 @@ def _tally(size: int, jumps: int, room: int) -> Tally:
         loops=np.zeros((LOOPS, 2), np.int64),
         marked=np.zeros(size, np.int64),
         clock=np.zeros(2, np.int64),
-        stack=np.empty(room, np.int32),
+        stack=np.empty(capacity, np.int32),
         counts=np.zeros(1, np.int64),
         jump_ends=np.zeros((jumps, 2), np.int32),
         next_jump=np.zeros((jumps, 2), np.int32),

@@ -1,9 +1,8 @@
-"""How a large ground is taken apart for local search: into square regions, again and again.
+"""Regions for local search: squares over a large ground, neighbourhoods of what changed.
 
-A region's walk stays in the processor's cache, and its reversals are short. Each
-pass lays the squares elsewhere, so that what lay on a rim comes to lie inside.
-
-Where a repair looks: neighbourhoods of what changed, each small enough to be kicked whole.
+A region's walk stays in the processor's cache, and its reversals are short. Each pass
+shifts the squares, so that what was on a rim is inside. A repair works on neighbourhoods
+of what changed, each small enough to be perturbed as a whole.
 """
 
 from __future__ import annotations
@@ -21,19 +20,19 @@ from fasaco_edge.planners.graph import FramedGround
 from fasaco_edge.planners.patch import Patch
 
 # A ground of up to so many cells to cover, on a lattice not too large for them, is one
-# region: what it costs to look at it as a whole does not matter yet.
+# region: the cost of working on it as a whole does not matter yet.
 ONE_REGION = 8_000
 LATTICE_OF_ONE = 5 * ONE_REGION
 
 # Edge of a square region, in cells.
 EDGE = 80
 
-# Where the squares of a pass begin, in halves of an edge: row, column.
-LAYS = ((0, 0), (1, 1), (1, 0), (0, 1))
+# Shift of the squares of each pass, in halves of an edge: row, column.
+SHIFTS = ((0, 0), (1, 1), (1, 0), (0, 1))
 
 
 def is_one_region(rows: int, cols: int, cells: int) -> bool:
-    """Tell whether a lattice with so many cells to cover is searched as a whole."""
+    """Return whether a lattice with so many cells to cover is searched as a whole."""
     return cells <= ONE_REGION and rows * cols <= LATTICE_OF_ONE
 
 
@@ -43,7 +42,7 @@ def regions_of(framed: FramedGround, cells: int, number: int) -> Iterator[Box]:
         labels = np.zeros(framed.ground.bound, np.int32)
         yield Box(labels, 0, FRAME, FRAME, framed.rows, framed.cols)
         return
-    row_shift, col_shift = (half * EDGE // 2 for half in LAYS[number % len(LAYS)])
+    row_shift, col_shift = (half * EDGE // 2 for half in SHIFTS[number % len(SHIFTS)])
     across = framed.width // EDGE + 2
     rows = (np.arange(framed.rows + 2 * FRAME) + row_shift) // EDGE
     cols = (np.arange(framed.width) + col_shift) // EDGE
@@ -75,8 +74,8 @@ MOST_CHANGED, MOST_CELLS = 1_000, 3_000
 # The same where nothing has changed, and a walk is to be made better somewhere.
 SPOT_RADIUS = 20
 GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
-# A walk may become longer for a while.
-ROOM = 600
+# Visits that a walk may become longer by for a while.
+SPARE_VISITS = 600
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,10 +93,10 @@ class Neighbourhood:
     is_first: bool
 
     def patch(self, walk: NDArray[np.int32]) -> Patch:
-        """Return room for it, and for the parts of a walk, framed cells, that lie in it."""
+        """Return memory for it, and for the parts of a walk, framed cells, that lie in it."""
         inside = self.box.labels[walk] == self.box.label
         jumps = int(np.count_nonzero(np.diff(inside))) // 2 + 1
-        visits = int(np.count_nonzero(inside)) + 4 * jumps + ROOM
+        visits = int(np.count_nonzero(inside)) + 4 * jumps + SPARE_VISITS
         return Patch(self.box.rows, self.box.cols, visits, jumps)
 
 
@@ -121,7 +120,7 @@ def neighbourhoods(
 def spot(framed: FramedGround, walk: NDArray[np.int32], number: int) -> Neighbourhood:
     """Return a neighbourhood somewhere along a walk, framed cells int32 (n,).
 
-    Those of successive numbers lie evenly along it, wherever one begins to count.
+    Those of successive numbers are spread evenly along it, from any first number.
     """
     at = int(walk.size * (number * GOLDEN_RATIO % 1.0))
     return _around(framed, walk[:0], walk[at : at + 1], is_first=False, radius=SPOT_RADIUS)

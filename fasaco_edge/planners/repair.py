@@ -1,12 +1,10 @@
-"""From the walk that was to a complete one for the problem as it is now.
+"""Repair of the walk that was still to be driven, after the problem changed.
 
-Repair: the walk that was still to be driven, mended, and improved where it changed.
-
-What holds stays as it is, cell by cell: a change is taken only if it gains
-something, and of what lies just ahead of the robot first only the change itself.
-A robot sees its path hold still wherever the map did, and what one search found
-serves the next. What a repair costs follows from what changed: all but a few
-passes over the walk happens in the neighbourhoods of that.
+The walk is made legal and complete, then improved around the changes. What is still
+valid stays as it is, cell by cell: a change is taken only if it gains something, and just
+ahead of the robot at first only the change itself. So the path is stable wherever the map
+is, and what one search found serves the next. A repair costs what changed: all but a few
+passes over the walk happens in the neighbourhoods of the changes.
 """
 
 from __future__ import annotations
@@ -21,8 +19,8 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.costs import walk_cost
 from fasaco_edge.kernels.lattice.reach import shortest_walk
-from fasaco_edge.kernels.local_search.mending import keep_legal, put_in_new
 from fasaco_edge.kernels.local_search.regions import changed_cells
+from fasaco_edge.kernels.local_search.repair import keep_legal, put_in_new
 from fasaco_edge.kernels.local_search.walk_array import Prices
 from fasaco_edge.planners.cost import MICROSECONDS
 from fasaco_edge.planners.effort import repair_for
@@ -34,10 +32,10 @@ from fasaco_edge.planners.regions import Neighbourhood, neighbourhoods, spot
 from fasaco_edge.planners.stopping import NO_WORK, SearchProgress, StoppingCriterion
 
 
-def mended(
+def completed(
     problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32], held: int = 0
 ) -> NDArray[np.int32]:
-    """Return a walk that solves ``problem`` and keeps what holds of ``before``.
+    """Return a walk that solves ``problem`` and keeps what is valid of ``before``.
 
     Args:
         problem: as it is now.
@@ -50,8 +48,7 @@ def mended(
     """
     start = int(framed.framed(np.array([flat_start(problem)], np.int32))[0])
     cells = framed_cells(problem, framed, before)
-    room = cells.size + 2 * framed.ground.bound
-    kept = np.empty(room, np.int32)
+    kept = np.empty(cells.size + 2 * framed.ground.bound, np.int32)
     length = keep_legal(framed.ground, cells, start, kept)
     whole = np.empty(length + 2 * framed.ground.bound, np.int32)
     size = put_in_new(framed.ground, kept[:length], problem.end is None, held, whole)
@@ -81,11 +78,11 @@ def _with_end(
     return np.concatenate((walk, framed.framed(flat)))
 
 
-# Kicks before it is asked whether to stop.
-KICKS_AT_ONCE = 10
+# Perturbations between two pauses.
+PERTURBATIONS_AT_ONCE = 10
 
-# Where there is nothing to repair: how far apart attempts begin, about how many cells a spot
-# has, and how many times all spots may gain nothing.
+# Where there is nothing to repair: difference of the first spots of two attempts, about how
+# many cells a spot has, and how many times all spots may gain nothing.
 STRIDE, SPOT_CELLS, PASSES = 997, 400, 4
 
 # The robot is about to drive these cells: five metres of common ones.
@@ -93,14 +90,14 @@ HELD_CELLS = 18
 
 
 def can_repair(problem: CoverageProblem) -> bool:
-    """Tell whether there is a walk to repair."""
+    """Return whether there is a walk to repair."""
     return problem.before is not None and len(problem.before) > 0
 
 
 def repaired(
     problem: CoverageProblem, name: str, seed: int, stop: StoppingCriterion
 ) -> CoveragePath:
-    """Return a complete walk that keeps what holds of ``problem.before``.
+    """Return a complete walk that keeps what is valid of ``problem.before``.
 
     Args:
         problem: with a walk ``before``, see ``can_repair``.
@@ -118,16 +115,16 @@ def repaired(
 def _of_the_whole(
     problem: CoverageProblem, whole: CoverageProblem, path: CoveragePath
 ) -> CoveragePath:
-    """Return a path with what is driven before it; steps, cost and bound are of one problem."""
+    """Return a path with the walk before it; steps, cost and bound are of the whole problem."""
     assert problem.before is not None
     cells = np.concatenate((problem.lead, path.cells))
-    # What is not better is no path: nobody asks how good it is.
+    # A path that is no better is dropped: its bound is not used.
     bound = 0 if np.array_equal(path.cells, problem.before) else lower_bound_steps(whole)
     return replace(path, cells=cells, cost_s=whole.cost.of_walk(cells), lower_bound_steps=bound)
 
 
 class _Repair:
-    """A repair under way, a generator of pauses like ``search.Search``."""
+    """A running repair, a generator of pauses like ``near_optimal.Search``."""
 
     def __init__(self, problem: CoverageProblem, seed: int) -> None:
         assert problem.before is not None
@@ -137,7 +134,7 @@ class _Repair:
         self._framed = FramedGround.of(problem)
         self._prices = Prices(cost.step_us, cost.quarter_turn_us, problem.end is None)
         self._effort = repair_for(cost)
-        self._walk = mended(problem, self._framed, problem.before, HELD_CELLS)
+        self._walk = completed(problem, self._framed, problem.before, HELD_CELLS)
         self._first_walk_s = time.perf_counter() - began
         before = framed_cells(problem, self._framed, problem.before)
         self._changed = _changed(self._framed, before, self._walk)
@@ -146,7 +143,7 @@ class _Repair:
         word = np.random.SeedSequence((seed, len(self._walk))).generate_state(1, np.uint64)
         self._random = np.maximum(word, np.uint64(1))
         self._work = NO_WORK
-        # What is under way: the patch with the walk's part, and where it lies.
+        # The patch that is being improved, and where it lies.
         self._loaded: tuple[Patch, Neighbourhood] | None = None
 
     def run(self) -> Iterator[None]:
@@ -159,7 +156,7 @@ class _Repair:
                 self._unload()
 
     def _places(self) -> Iterator[Neighbourhood]:
-        """Yield where to look: around what changed; or here and there, until nothing is gained."""
+        """Yield where to improve: around the changes; or at spots, until nothing is gained."""
         if not self._problem.only_better:
             yield from neighbourhoods(self._framed, self._walk[:HELD_CELLS], self._changed)
             return
@@ -174,27 +171,27 @@ class _Repair:
                 return
 
     def _improve(self, patch: Patch, place: Neighbourhood) -> Iterator[None]:
-        """Improve around what changed, then kick; pause after each piece.
+        """Improve around the changes, then perturb; pause after each piece.
 
-        Moves that gain nothing carry a walk about: first where the robot is not yet.
+        Moves at no cost shift a walk about: at first not just ahead of the robot.
         """
         for held in (HELD_CELLS, 0) if place.is_first else (0,):
             patch.hold(held)
             patch.touch_up(place.changed, self._effort.rules, self._random)
             yield
-        for kicks in range(0, self._effort.kicks, KICKS_AT_ONCE):
+        for done in range(0, self._effort.perturbations, PERTURBATIONS_AT_ONCE):
             if self._is_proven():
                 return
-            patch.hold(HELD_CELLS if place.is_first and kicks < self._effort.held_kicks else 0)
-            patch.kick(self._effort.rules, KICKS_AT_ONCE, self._random)
+            patch.hold(HELD_CELLS if place.is_first and done < self._effort.held else 0)
+            patch.perturb(self._effort.rules, PERTURBATIONS_AT_ONCE, self._random)
             yield
 
     def _is_proven(self) -> bool:
-        """Tell whether no walk can be better."""
+        """Return whether no walk can be better."""
         return not self._prices.quarter_turn_us and self.progress().steps == self._bound
 
     def _unload(self) -> None:
-        """Put what is under way back into the walk."""
+        """Put the patch that is being improved back into the walk."""
         if self._loaded is None:
             return
         patch, place = self._loaded
@@ -236,7 +233,7 @@ def _changed(
 ) -> NDArray[np.int32]:
     """Return the walk's cells at steps that one walk takes more often, int32 (n,), in its order.
 
-    The part that was driven since is gone from the old walk's beginning, no change.
+    The part driven meanwhile is missing from the old walk's beginning; that is no change.
     """
     ground = framed.ground
     listed = np.empty(2 * (before.size + walk.size), np.int32)

@@ -15,26 +15,30 @@ from dataclasses import dataclass, field
 class SearchWork:
     """Work of a search in counts; with problem, planner and seed they repeat its path.
 
+    The wire contract calls perturbations ``kicks``.
+
     Attributes:
         ants: ants that walked, and the sweeps that a search begins with.
-        kicks: perturbations by which a local search left a local optimum.
+        perturbations: changes by which a local search left a local optimum.
         proposals: moves that a local search tried.
     """
 
     ants: int = 0
-    kicks: int = 0
+    perturbations: int = 0
     proposals: int = 0
 
     def __add__(self, other: SearchWork) -> SearchWork:
         return SearchWork(
-            self.ants + other.ants, self.kicks + other.kicks, self.proposals + other.proposals
+            self.ants + other.ants,
+            self.perturbations + other.perturbations,
+            self.proposals + other.proposals,
         )
 
     def reaches(self, limit: SearchWork) -> bool:
         """Return whether every count is at least that of ``limit``."""
         return (
             self.ants >= limit.ants
-            and self.kicks >= limit.kicks
+            and self.perturbations >= limit.perturbations
             and self.proposals >= limit.proposals
         )
 

@@ -59,11 +59,11 @@ def _stages() -> Iterator[str]:
     yield BOUND
     lower_bound_steps(problem)
     yield LOCAL_SEARCH
-    # Turns at a price: no walk is proven to be the best, so the search goes on to kicks.
+    # Turns at a price: no walk is proven to be the best, so the search perturbs it.
     costly = CoverageProblem.of(lattice, (0, 0), cost=CoverageCost(1.0, 1.0))
-    path = NearOptimal(ColonyConfig(ants=1, velocities=(1,))).plan(costly, _after_a_kick, ignore)
+    path = NearOptimal(ColonyConfig(ants=1, velocities=(1,))).plan(costly, _perturbed, ignore)
     yield REPAIR
-    repaired(replace(costly, before=path.cells[2:]), path.planner, 0, _after_a_kick)
+    repaired(replace(costly, before=path.cells[2:]), path.planner, 0, _perturbed)
     for name in PLANNER_NAMES:
         yield name
         planner_of(name, ColonyConfig(ants=1, velocities=(1,))).plan(problem, never, ignore)
@@ -90,5 +90,5 @@ def _take_areas(lattice: CoverageLattice) -> None:
     count_in(np.packbits(cells)[np.newaxis], np.packbits(cells))
 
 
-def _after_a_kick(progress: SearchProgress) -> bool:
-    return progress.work.kicks > 0
+def _perturbed(progress: SearchProgress) -> bool:
+    return progress.work.perturbations > 0

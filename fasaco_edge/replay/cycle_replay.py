@@ -160,7 +160,7 @@ class CycleReplay:
             return []
         self.plans += 1
         path = self._drive.planner.plan(request.problem, StopAt(taken.stops), ignore)
-        work = (path.work.ants, path.work.kicks, path.work.proposals)
+        work = (path.work.ants, path.work.perturbations, path.work.proposals)
         again = PlanTaken(
             taken.number, taken.seconds, taken.stops, work, cells_checksum(path.cells)
         )
@@ -196,5 +196,5 @@ def _facts(decided: Decided | None) -> dict[str, object]:
 
 
 def _plan_words(plan: PlanTaken) -> str:
-    ants, kicks, proposals = plan.work
-    return f"{ants} ants, {kicks} kicks, {proposals} proposals, cells {plan.checksum:08x}"
+    ants, perturbations, proposals = plan.work
+    return f"{ants} ants, {perturbations} perturbations, {proposals} proposals, cells {plan.checksum:08x}"

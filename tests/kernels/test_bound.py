@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.kernels.bound.bound import covering_bound
+from fasaco_edge.kernels.bound.covering import covering_bound
 from tests import naive
 from tests.support.grids import ROOMS, lattice, with_passages_closed
 

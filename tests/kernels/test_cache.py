@@ -246,7 +246,7 @@ def test_a_full_folder_is_passed_over(installed, tmp):
     told = installed.tell(words=small)
     assert Path(told.folder).parent == tmp
     assert told.warnings == [
-        f"{installed.cache} has no room for {cache.ROOM_MB} MB: "
+        f"{installed.cache} has less than {cache.NEEDED_MB} MB free: "
         f"compiled kernels are kept in {told.folder}"
     ]
     # systemd gives a service one in memory.

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from fasaco_edge.kernels.ants.colony import NEIGHBOUR, Rules, deposit, settle, walk_ants
+from fasaco_edge.kernels.ants.colony import (
+    NEIGHBOUR,
+    ColonyState,
+    Rules,
+    deposit,
+    settle,
+    walk_ants,
+)
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.graph import graph_of, scratch_for
 from fasaco_edge.planners.problem import CoverageProblem
@@ -23,6 +30,10 @@ class Ground:
         self.graph = graph_of(CoverageProblem.of(drawn, (row, col)))
         self.trail = np.full((drawn.steps.size, 4), TAU0)
 
+    def state(self, q0=1.0, start=0, end=-1, turn_us=0):
+        rules = Rules(q0, ALPHA, TAU0, start, end, STEP_US, turn_us, NEIGHBOUR, np.ones(4))
+        return ColonyState(self.graph, self.trail, rules)
+
     def walks(self, start, velocity=1, q0=1.0, end=-1, ants=1, seed=None, turn_us=0):
         """Return the ants' walks; then their trail is settled."""
         streams = np.arange(1, 4 * ants + 1, dtype=np.int64).reshape(ants, 4)
@@ -30,19 +41,9 @@ class Ground:
             words = np.random.SeedSequence(seed).generate_state(4 * ants)
             streams = words.astype(np.int64).reshape(ants, 4)
         walks, lengths = np.empty((ants, 64), np.int32), np.empty(ants, np.int64)
-        rules = Rules(q0, ALPHA, TAU0, end, STEP_US, turn_us, NEIGHBOUR, np.ones(4))
-        walk_ants(
-            self.graph,
-            self.trail,
-            rules,
-            scratch_for(self.graph),
-            start,
-            velocity,
-            streams,
-            walks,
-            lengths,
-        )
-        self.best, self.least_us = settle(self.graph, self.trail, rules, walks, lengths)
+        state = self.state(q0, start, end, turn_us)
+        walk_ants(state, scratch_for(self.graph), velocity, streams, walks, lengths)
+        self.best, self.least_us = settle(state, walks, lengths)
         return [walk[:length].tolist() for walk, length in zip(walks, lengths, strict=True)]
 
     def walk(self, start, **options):
@@ -79,7 +80,7 @@ def test_equation_7_pulls_the_trail_of_every_move_towards_tau0():
 
 def test_equation_8_strengthens_the_moves_of_the_best_walk_each_time_they_occur():
     ground = Ground("...")
-    deposit(ground.graph, ground.trail, ALPHA, 2.0, np.array([1, 2, 1, 0, 1, 2], np.int32))
+    deposit(ground.state(), 2.0, np.array([1, 2, 1, 0, 1, 2], np.int32))
     once = (1 - ALPHA) * TAU0 + ALPHA * 2.0
     twice = (1 - ALPHA) * once + ALPHA * 2.0
     expected = np.full((3, 4), TAU0)
@@ -90,7 +91,7 @@ def test_equation_8_strengthens_the_moves_of_the_best_walk_each_time_they_occur(
 def test_a_column_deposits_north_and_south():
     """With one column, a step north and a step east are the same difference of index."""
     ground = Ground(".", ".")
-    deposit(ground.graph, ground.trail, ALPHA, 2.0, np.array([0, 1, 0], np.int32))
+    deposit(ground.state(), 2.0, np.array([0, 1, 0], np.int32))
     changed = np.argwhere(ground.trail != TAU0).tolist()
     assert changed == [[0, 1], [1, 3]]
 
@@ -141,12 +142,10 @@ def test_a_walk_ends_where_it_is_asked_to():
     }
 
 
-def test_a_walk_longer_than_its_room_is_cut_but_counted():
+def test_a_walk_longer_than_its_array_is_cut_but_counted():
     ground = Ground("....")
     streams = np.ones((1, 4), np.int64)
     walks, lengths = np.full((1, 3), -7, np.int32), np.empty(1, np.int64)
-    rules = Rules(1.0, ALPHA, TAU0, 0, STEP_US, 0, NEIGHBOUR, np.ones(4))
-    scratch = scratch_for(ground.graph)
-    walk_ants(ground.graph, ground.trail, rules, scratch, 0, 4, streams, walks, lengths)
+    walk_ants(ground.state(end=0), scratch_for(ground.graph), 4, streams, walks, lengths)
     assert lengths.tolist() == [7]
     assert walks.tolist() == [[0, 1, 2]]

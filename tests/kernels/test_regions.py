@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 
 from fasaco_edge.kernels.costs import walk_cost
 from fasaco_edge.kernels.local_search.holes import rays
-from fasaco_edge.kernels.local_search.parity import JUMPS, Tally
-from fasaco_edge.kernels.local_search.perturbation import Memory, kick, remember
+from fasaco_edge.kernels.local_search.parity import JUMPS
+from fasaco_edge.kernels.local_search.perturbation import Search, perturb, remember
 from fasaco_edge.kernels.local_search.proposals import improve
 from fasaco_edge.kernels.local_search.regions import (
     AFTER,
     BEFORE,
     Box,
+    Jumps,
     cut_ground,
     cut_walk,
     put_back,
@@ -28,8 +29,6 @@ from fasaco_edge.kernels.local_search.walk_array import (
     FRAME,
     LENGTH,
     Ground,
-    Prices,
-    Walk,
     recount,
 )
 from tests.kernels.grounds import (
@@ -48,7 +47,7 @@ from tests.kernels.grounds import (
     tally_on,
     walk_on,
 )
-from tests.kernels.test_kicks import rules_for
+from tests.kernels.test_perturbation import rules_for
 from tests.support.grids import lattice
 
 EVERYWHERE = np.empty(0, np.int32)
@@ -60,21 +59,21 @@ class Cut(NamedTuple):
     whole: Ground
     cells: np.ndarray
     box: Box
-    ground: Ground
-    walk: Walk
-    tally: Tally
-    memory: Memory
-    prices: Prices
-    sections: np.ndarray
-    limits: np.ndarray
+    search: Search
+    jumps: Jumps
+
+    ground = property(lambda self: self.search.ground)
+    walk = property(lambda self: self.search.walk)
+    tally = property(lambda self: self.search.tally)
+    memory = property(lambda self: self.search.memory)
+    prices = property(lambda self: self.search.prices)
+    sections = property(lambda self: self.jumps.sections)
+    limits = property(lambda self: self.jumps.limits)
 
     def put_back(self):
         inner = np.array(cells_of(self.walk), np.int32)
         out = guarded(self.cells.size + inner.size, np.int32)
-        length = put_back(
-            self.whole, self.box, self.cells, self.ground.bound, inner,
-            self.sections, self.limits, out,
-        )  # fmt: skip
+        length = put_back(self.whole, self.box, self.cells, inner, self.jumps, out)
         assert_guards_hold(self.walk, self.tally, self.memory)
         return out[:length].copy()
 
@@ -104,8 +103,9 @@ def cut(task, box, cells=None, prices=PRICES[0], jumps=200, room=None):
     room = 4 * cells.size + 300 if room is None else room
     walk = walk_on(ground, [], prices, room, jumps)
     tally, memory = tally_on(ground, room, jumps), memory_on(ground, room)
-    sections, limits = guarded((jumps, 2), np.int32), guarded(2, np.int64)
-    length, made = cut_walk(whole, box, cells, bound, walk.cells, tally.jump_ends, sections, limits)
+    limits = guarded(2, np.int64)
+    cut_out = Jumps(tally.jump_ends, guarded((jumps, 2), np.int32), limits)
+    length, made = cut_walk(whole, box, cells, walk.cells, cut_out)
     assert_guards_hold(ground, walk, tally)
     if not (length and inside):
         return None
@@ -114,7 +114,7 @@ def cut(task, box, cells=None, prices=PRICES[0], jumps=200, room=None):
     recount(ground, walk, length, prices)
     rays(ground, tally.rays)
     remember(walk, memory)
-    return Cut(whole, cells, box, ground, walk, tally, memory, prices, sections, limits)
+    return Cut(whole, cells, box, Search(ground, walk, prices, tally, memory), cut_out)
 
 
 def labels_for(random, shape):
@@ -188,23 +188,20 @@ def assert_whole_walk(task, region, cells):
 
 
 @settings(max_examples=200, deadline=None)
-@given(seed=SEEDS, prices=st.sampled_from(PRICES), hot=st.booleans(), kicks=st.booleans())
-def test_whatever_is_done_in_a_region_the_whole_is_a_walk(seed, prices, hot, kicks):
+@given(seed=SEEDS, prices=st.sampled_from(PRICES), hot=st.booleans(), perturbed=st.booleans())
+def test_whatever_is_done_in_a_region_the_whole_is_a_walk(seed, prices, hot, perturbed):
     task, region = drawn_cut(seed, prices)
     if region is None:
         return
-    random, heat = stream(seed), hot * 2 * (prices.step_us + prices.quarter_turn_us)
+    random, temperature_us = stream(seed), hot * 2 * (prices.step_us + prices.quarter_turn_us)
     rules, before = rules_for(prices, 3 if hot else -1), region.walk.counts[COST]
     for _ in range(4):
-        improve(region.ground, region.walk, region.prices, EVERYWHERE, heat, 300, random)
+        improve(region.ground, region.walk, region.prices, EVERYWHERE, temperature_us, 300, random)
         assert_counts(region.ground, region.walk)
         cells = region.put_back()
         assert_whole_walk(task, region, cells)
-        if kicks:
-            kick(
-                region.ground, region.walk, region.prices, region.tally, region.memory,
-                rules, 3, random,
-            )  # fmt: skip
+        if perturbed:
+            perturb(region.search, rules, 3, random)
             assert_counts(region.ground, region.walk)
             assert_whole_walk(task, region, region.put_back())
         if not prices.quarter_turn_us:
@@ -289,16 +286,14 @@ def test_a_way_there_and_back_through_the_rim_is_left_out():
 
 
 def test_sections_are_passed_in_either_direction():
-    """A kick orders the sections anew: each is there once, and some are turned round."""
+    """A perturbation orders the sections anew: each is there once, and some are reversed."""
     turned, prices = 0, PRICES[1]
     for seed in range(120):
         task, region = drawn_cut(seed, prices)
         if region is None or not region.tally.counts[JUMPS]:
             continue
-        kick(
-            region.ground, region.walk, region.prices, region.tally, region.memory,
-            rules_for(prices, 0, mixing=0, patience=1e4), 3, stream(seed),
-        )  # fmt: skip
+        rules = rules_for(prices, 0, proposals=0, patience=1e4)
+        perturb(region.search, rules, 3, stream(seed))
         after = region.put_back().tolist()
         for first, last in region.sections[: region.tally.counts[JUMPS]].tolist():
             section = region.cells[first : last + 1].tolist()

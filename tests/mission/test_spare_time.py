@@ -34,7 +34,7 @@ def lanes(rows, cols, gap):
 
 def plan(request, cells, seconds=0.05):
     """Answer a request with a walk."""
-    path = NearOptimal().plan(request.problem, WorkLimit(SearchWork(kicks=1)))
+    path = NearOptimal().plan(request.problem, WorkLimit(SearchWork(perturbations=1)))
     return PlanReady(request.number, replace(path, cells=cells), seconds)
 
 
@@ -78,7 +78,7 @@ def test_all_figures_of_a_path_are_of_one_problem():
         request, drive.request = drive.request, None
         known = len(drive.updates)
         if request is not None:
-            limit = WorkLimit(SearchWork(kicks=1))
+            limit = WorkLimit(SearchWork(perturbations=1))
             drive.tell(PlanReady(request.number, NearOptimal().plan(request.problem, limit), 0.05))
         drive.go()
         for update in drive.updates[known:]:

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-from fasaco_edge.planners import regions, search
+from fasaco_edge.planners import near_optimal, regions
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.graph import lower_bound_steps
@@ -24,8 +24,8 @@ def looks(count):
     return lambda progress: next(asked) >= count
 
 
-def after(kicks=0, proposals=0, ants=0):
-    return WorkLimit(SearchWork(ants=ants, kicks=kicks, proposals=proposals))
+def after(perturbations=0, proposals=0, ants=0):
+    return WorkLimit(SearchWork(ants=ants, perturbations=perturbations, proposals=proposals))
 
 
 def plan(problem, stop=never, config=FEW_ANTS, threads=1):
@@ -67,12 +67,12 @@ def take_apart(monkeypatch):
     """Let grounds of some hundred cells be taken apart into regions."""
     monkeypatch.setattr(regions, "ONE_REGION", 100)
     monkeypatch.setattr(regions, "EDGE", 16)
-    monkeypatch.setattr(search, "EDGE", 16)
+    monkeypatch.setattr(near_optimal, "EDGE", 16)
     ask_often(monkeypatch)
 
 
 def ask_often(monkeypatch):
-    monkeypatch.setattr(search, "PROPOSALS_AT_ONCE", 3_000)
+    monkeypatch.setattr(near_optimal, "PROPOSALS_AT_ONCE", 3_000)
 
 
 def hall(home=False, cost=STEPS_ALONE, covered=0.0, cells=1_000):

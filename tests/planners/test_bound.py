@@ -7,7 +7,7 @@ import pytest
 
 from fasaco_edge.bench.grids import read_grid
 from fasaco_edge.grid.map_files import builtin_maps
-from fasaco_edge.planners.baselines import SpanningTree, spiral_stc, zigzag
+from fasaco_edge.planners.baselines import spiral_stc, stc, zigzag
 from fasaco_edge.planners.graph import lower_bound_steps
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.support.grids import REFERENCE, lattice, placed, reference
@@ -36,7 +36,7 @@ def test_no_planner_beats_the_bound_on_the_maps_that_come_along(name, covered, e
     problem = CoverageProblem.of(lattice, start, covered=done, end=goal)
     least = lower_bound_steps(problem)
     assert problem.cells - 1 <= least
-    walks = [planner.plan(problem).steps for planner in (SpanningTree(), spiral_stc(), zigzag())]
+    walks = [planner.plan(problem).steps for planner in (stc(), spiral_stc(), zigzag())]
     assert least <= min(walks)
     if not covered:
         # Close enough to tell a good walk from a poor one.

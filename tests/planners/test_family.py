@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.planners.baselines import SpanningTree, spiral_stc, zigzag
+from fasaco_edge.planners.baselines import spiral_stc, stc, zigzag
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fasaco import Fasaco
@@ -90,7 +90,7 @@ def test_twin_goes_around_the_same_tree(ground):
     walk = naive.stc(lattice.steps, problem.to_cover, lattice.local(start))
     window = lattice.window
     expected = [[row + window.row0, col + window.col0] for row, col in walk]
-    assert SpanningTree().plan(problem).cells.tolist() == expected
+    assert stc().plan(problem).cells.tolist() == expected
 
 
 @settings(max_examples=300, deadline=None)
@@ -118,7 +118,7 @@ def test_twin_leads_the_tree_s_walk_to_the_same_end(ground, end, turn_s, covered
     )
     window = lattice.window
     expected = [[row + window.row0, col + window.col0] for row, col in walk]
-    assert SpanningTree().plan(problem).cells.tolist() == expected
+    assert stc().plan(problem).cells.tolist() == expected
 
 
 @settings(max_examples=300, deadline=None)
@@ -131,7 +131,7 @@ def test_stc_visits_every_cell_once_where_all_blocks_are_whole(blocks):
     ground = CoverageLattice.from_free(whole)
     start = tuple(np.argwhere(whole)[0].tolist())
     problem = CoverageProblem.of(ground, start, end=start)
-    path = SpanningTree().plan(problem)
+    path = stc().plan(problem)
     assert path.steps == problem.cells
 
 
@@ -141,19 +141,19 @@ def test_stc_is_no_longer_than_its_bound(ground):
     """Twice around any tree at most: 2 (k - 1) steps in a node of k cells, 2 for each join."""
     lattice, start = ground
     problem = CoverageProblem.of(lattice, start, end=start)
-    path = SpanningTree().plan(problem)
+    path = stc().plan(problem)
     assert path.steps <= 2 * (problem.cells - 1)
 
 
 def test_stc_goes_clockwise_around_its_tree():
     problem = CoverageProblem.of(lattice("....", "...."), (0, 0), end=(0, 0))
-    walk = SpanningTree().plan(problem).cells.tolist()
+    walk = stc().plan(problem).cells.tolist()
     assert walk == [[0, 0], [1, 0], [1, 1], [1, 2], [1, 3], [0, 3], [0, 2], [0, 1], [0, 0]]
 
 
 def test_stc_is_read_the_way_around_that_ends_nearer():
     ground = lattice("....", "....")
-    beside = {end: SpanningTree().plan(CoverageProblem.of(ground, (0, 0), end=end))
+    beside = {end: stc().plan(CoverageProblem.of(ground, (0, 0), end=end))
               for end in ((0, 1), (1, 0))}  # fmt: skip
     assert {end: path.steps for end, path in beside.items()} == {(0, 1): 7, (1, 0): 7}
     assert beside[0, 1].cells[1].tolist() == [1, 0]
@@ -165,7 +165,7 @@ def test_stc_ends_an_open_walk_with_the_last_cell_that_wants_a_visit():
     covered = np.zeros((2, 4), bool)
     covered[0, 1:] = True
     problem = CoverageProblem.of(ground, (0, 0), covered=covered)
-    path = SpanningTree().plan(problem)
+    path = stc().plan(problem)
     assert path.cells[-1].tolist() == [1, 3]
 
 

@@ -12,7 +12,7 @@ import pytest
 from fasaco_edge.bench.grids import read_grid
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.map_files import builtin_maps
-from fasaco_edge.planners import regions, search
+from fasaco_edge.planners import near_optimal, regions
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 from tests import naive
@@ -72,7 +72,7 @@ def test_on_small_grounds_it_finds_the_optimum_and_never_less(cost, grids, most)
     met = []
     for _ in range(grids):
         problem, least_us = small_problem(random, cost, most)
-        path = plan(problem, after(kicks=2000))
+        path = plan(problem, after(perturbations=2000))
         assert path.cost_s >= least_us / 1e6
         met.append(path.cost_s == least_us / 1e6)
     assert np.mean(met) >= 0.95
@@ -84,14 +84,14 @@ def test_the_maps_that_come_along_are_covered_almost_without_revisits(name, home
     grid = read_grid(name)
     end = grid.start if home else None
     problem = CoverageProblem.of(grid.lattice, grid.start, end=end)
-    path = plan(problem, after(kicks=50))
+    path = plan(problem, after(perturbations=50))
     assert path.gap < 0.02
 
 
 @pytest.mark.parametrize("cost", [TURNS, CoverageCost(0.001, 3600.0)], ids=str)
 def test_one_cell_needs_no_search(cost):
     path = plan(CoverageProblem.of(lattice("#.#"), (0, 1), cost=cost))
-    assert (path.steps, path.cost_s, path.work.kicks) == (0, 0.0, 0)
+    assert (path.steps, path.cost_s, path.work.perturbations) == (0, 0.0, 0)
 
 
 @pytest.mark.parametrize("cost", [STEPS_ALONE, TURNS], ids=["steps", "turns"])
@@ -103,7 +103,7 @@ def test_cells_far_apart_make_a_long_walk(shape, cost):
     covered[0, -1] = covered[-1, -1] = covered[-1, 0] = False
     open_floor = CoverageLattice.from_free(np.ones(shape, bool))
     problem = CoverageProblem.of(open_floor, (0, 0), covered=covered, cost=cost)
-    path = plan(problem, after(kicks=200))
+    path = plan(problem, after(perturbations=200))
     assert path.steps == 2 * (rows - 1) + cols - 1
     assert path.cost_s == path.steps * cost.step_s + 2 * cost.quarter_turn_s
 
@@ -119,7 +119,7 @@ def ring(cost):
 
 
 def test_a_loop_may_be_longer_than_any_walk():
-    path = plan(ring(TURNS), after(kicks=300))
+    path = plan(ring(TURNS), after(perturbations=300))
     assert path.steps == 4
 
 
@@ -135,7 +135,7 @@ def test_a_loop_may_be_longer_than_any_walk():
 )
 def test_extreme_costs_are_counted_to_the_microsecond(cost):
     problem = hall(True, cost)
-    watched = Watched(after(kicks=150))
+    watched = Watched(after(perturbations=150))
     path = plan(problem, watched)
     watched.assert_steady()
     assert path.cost_s < watched.seen[0].cost_s
@@ -151,18 +151,18 @@ def twin_paths():
     """Walks of every part of the search, with so little work that plain Python can do it."""
     comb, square = ROOMS["comb"], ROOMS["square"]
     for cost in (STEPS_ALONE, TURNS, CoverageCost(3600.0, 3600.0)):
-        yield plan(CoverageProblem.of(*comb, end=comb[1], cost=cost), after(kicks=12))
-        yield plan(CoverageProblem.of(*square, end=(0, 1), cost=cost), after(kicks=12))
-        yield plan(ring(cost), after(kicks=12))
+        yield plan(CoverageProblem.of(*comb, end=comb[1], cost=cost), after(perturbations=12))
+        yield plan(CoverageProblem.of(*square, end=(0, 1), cost=cost), after(perturbations=12))
+        yield plan(ring(cost), after(perturbations=12))
         # In regions.
-        yield plan(CoverageProblem.of(*ROOMS["rooms"], cost=cost), after(kicks=30))
+        yield plan(CoverageProblem.of(*ROOMS["rooms"], cost=cost), after(perturbations=30))
 
 
 def print_twin_paths():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(regions, "ONE_REGION", 60)
         patch.setattr(regions, "EDGE", 6)
-        patch.setattr(search, "EDGE", 6)
+        patch.setattr(near_optimal, "EDGE", 6)
         for path in twin_paths():
             print(path.work, path.cells.tolist())
 

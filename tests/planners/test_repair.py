@@ -1,4 +1,4 @@
-"""A mended walk: legal, complete, and the same where nothing changed."""
+"""A completed walk: legal, complete, and the same where nothing changed."""
 
 from itertools import pairwise
 
@@ -13,11 +13,11 @@ from fasaco_edge.planners.effort import repair_for
 from fasaco_edge.planners.graph import FramedGround
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.repair import can_repair, mended, repaired
+from fasaco_edge.planners.repair import can_repair, completed, repaired
 from fasaco_edge.planners.stopping import SearchWork, WorkLimit, never
 from tests.benchmarks.judge import check_walk
 
-SHORT = WorkLimit(SearchWork(kicks=8))
+SHORT = WorkLimit(SearchWork(perturbations=8))
 TURNS = CoverageCost(1.0, 1.5)
 
 
@@ -65,10 +65,10 @@ def judge(problem, cells):
     home=st.booleans(),
     held=st.sampled_from((0, 5, 1000)),
 )
-def test_a_mended_walk_is_legal_and_complete(seed, change, home, held):
+def test_a_completed_walk_is_legal_and_complete(seed, change, home, held):
     problem = driven_halfway(seed, change, end=home)
     framed = FramedGround.of(problem)
-    flat = framed.unframed(mended(problem, framed, problem.before, held))
+    flat = framed.unframed(completed(problem, framed, problem.before, held))
     judge(problem, np.column_stack(np.divmod(flat, framed.cols)))
 
 
@@ -78,7 +78,7 @@ def test_where_nothing_changed_the_walk_is_what_it_was(seed):
     problem = driven_halfway(seed, change=0.0)
     assume(not problem.to_cover[problem.start])  # else the whole walk was driven
     framed = FramedGround.of(problem)
-    flat = framed.unframed(mended(problem, framed, problem.before))
+    flat = framed.unframed(completed(problem, framed, problem.before))
     kept = np.column_stack(np.divmod(flat, framed.cols))
     assert np.array_equal(kept, problem.before[: len(kept)])
 
@@ -93,7 +93,7 @@ def test_what_can_wait_leaves_the_next_steps_alone():
     framed = FramedGround.of(problem)
     for later, kept in ((True, 12), (False, 1)):
         before = walk if later else walk[:12]
-        flat = framed.unframed(mended(problem, framed, before, held=12))
+        flat = framed.unframed(completed(problem, framed, before, held=12))
         cells = np.column_stack(np.divmod(flat, framed.cols))
         judge(problem, cells)
         same = (cells[: len(before)] == before).all(axis=1)
@@ -108,18 +108,18 @@ def test_what_can_wait_leaves_the_next_steps_alone():
     home=st.booleans(),
     cost=st.sampled_from((CoverageCost(), TURNS)),
 )
-def test_a_repaired_walk_costs_no_more_than_the_mended_one(seed, change, home, cost):
+def test_a_repaired_walk_costs_no_more_than_the_completed_one(seed, change, home, cost):
     problem = driven_halfway(seed, change, end=home, cost=cost)
     framed = FramedGround.of(problem)
-    flat = framed.unframed(mended(problem, framed, problem.before))
-    only_mended = np.column_stack(np.divmod(flat, framed.cols)).astype(np.int32)
+    flat = framed.unframed(completed(problem, framed, problem.before))
+    only_completed = np.column_stack(np.divmod(flat, framed.cols)).astype(np.int32)
     path = repaired(problem, "fasaco", 0, never)
     verdict = judge(problem, path.cells)
     assert path.cost_s == cost.of_walk(path.cells)
-    assert path.cost_s <= cost.of_walk(only_mended)
+    assert path.cost_s <= cost.of_walk(only_completed)
     assert path.lower_bound_steps <= verdict.steps == path.steps
-    # Two kicks that kick nothing come before, around what changed.
-    assert path.work.kicks <= repair_for(cost).kicks + 2
+    # Two that change no parity come before, around what changed.
+    assert path.work.perturbations <= repair_for(cost).perturbations + 2
 
 
 def test_a_repair_is_worth_its_while():
@@ -127,7 +127,7 @@ def test_a_repair_is_worth_its_while():
     for seed in range(30):
         problem = driven_halfway(seed, change=0.05)
         framed = FramedGround.of(problem)
-        gains.append(len(mended(problem, framed, problem.before)) - 1)
+        gains.append(len(completed(problem, framed, problem.before)) - 1)
         gains[-1] -= repaired(problem, "fasaco", 0, never).steps
     assert np.mean(gains) > 5
 
@@ -171,11 +171,11 @@ def test_many_changes_on_a_large_ground_are_all_repaired():
     changed[0, 0] = True
     problem = CoverageProblem.of(CoverageLattice.from_free(changed), (0, 0), before=walk)
     framed = FramedGround.of(problem)
-    only_mended = len(mended(problem, framed, walk)) - 1
+    only_completed = len(completed(problem, framed, walk)) - 1
     path = repaired(problem, "fasaco", 0, never)
     judge(problem, path.cells)
-    assert path.work.kicks > repair_for(problem.cost).kicks + 2
-    assert path.gap < 0.5 * (only_mended / path.lower_bound_steps - 1)
+    assert path.work.perturbations > repair_for(problem.cost).perturbations + 2
+    assert path.gap < 0.5 * (only_completed / path.lower_bound_steps - 1)
 
 
 def test_a_walk_far_above_its_bound_is_planned_anew():
@@ -199,7 +199,7 @@ def test_attempts_at_a_better_walk_never_lose_and_each_looks_elsewhere():
     for attempt in range(1, 9):
         # The walk is the same each time: where one looks follows from the attempt alone.
         again = CoverageProblem.of(lattice, start, before=walk, attempt=attempt)
-        path = NearOptimal().plan(again, WorkLimit(SearchWork(kicks=60)))
+        path = NearOptimal().plan(again, WorkLimit(SearchWork(perturbations=60)))
         judge(again, path.cells)
         costs.append(path.cost_s)
         found.add(path.cells.tobytes())

@@ -50,7 +50,7 @@ def test_wherever_it_is_stopped_the_walk_is_sound_and_repeats_from_its_work(
         ground, start, covered=done, end=end_of(end, ground, start), cost=cost
     )
     config = ColonyConfig(ants=4, velocities=(2, 1), seed=seed)
-    path = plan(problem, AnyOf(looks(looked), after(kicks=500)), config)
+    path = plan(problem, AnyOf(looks(looked), after(perturbations=500)), config)
     assert_repeats(problem, path, config)
 
 
@@ -62,11 +62,11 @@ def assert_repeats(problem, path, config, threads=1):
 
 
 # Where a search stands: at the first walk, on its way through the first improvement,
-# between kicks, behind the second group of ants.
+# between perturbations, behind the second group of ants.
 STOPS = {
     "first walk": lambda: looks(1),
     "improving": lambda: after(proposals=20_000),
-    "kicks": lambda: after(kicks=100),
+    "perturbations": lambda: after(perturbations=100),
     "ants": lambda: after(ants=20),
     "in between": lambda: looks(33),
 }
@@ -183,7 +183,7 @@ def test_it_is_asked_often_whether_to_stop(cost):
     """Counted in proposals, of which a millisecond has some thirty thousand."""
     grid = building(5_000, 1)
     problem = CoverageProblem.of(grid.lattice, grid.start, cost=cost)
-    watched = Watched(after(kicks=20))
+    watched = Watched(after(perturbations=20))
     plan(problem, watched)
     done = [progress.work.proposals for progress in watched.seen]
     assert max(np.diff(done)) <= 200_000
@@ -193,8 +193,8 @@ def test_it_is_asked_often_whether_to_stop(cost):
 def test_who_observes_sees_the_trail_and_changes_nothing():
     problem, seen = CoverageProblem.of(*ROOMS["rooms"]), []
     config = ColonyConfig(ants=32, seed=2)
-    path = NearOptimal(config).plan(problem, after(kicks=10), seen.append)
-    assert path.cells.tobytes() == plan(problem, after(kicks=10), config).cells.tobytes()
+    path = NearOptimal(config).plan(problem, after(perturbations=10), seen.append)
+    assert path.cells.tobytes() == plan(problem, after(perturbations=10), config).cells.tobytes()
     (snapshot,) = seen
     assert snapshot.best_steps == path.steps
     assert snapshot.ants == path.work.ants

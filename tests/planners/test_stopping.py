@@ -41,7 +41,7 @@ def test_a_budget_is_used_up_with_time():
     ],
 )
 def test_a_work_limit_is_reached_once_every_count_is(done, reached):
-    limit = WorkLimit(SearchWork(ants=5, kicks=7, proposals=90))
+    limit = WorkLimit(SearchWork(ants=5, perturbations=7, proposals=90))
     assert limit(SearchProgress(SearchWork(*done), 1.0, 1)) is reached
 
 

@@ -63,13 +63,13 @@ def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up():
     pose = PoseReceived(StampedPose(Pose2D(1.0, 1.0)))
     asked = mission.step([MapReceived(off_the_bus), pose], 0.0).plan
     assert asked is not None
-    path = NearOptimal().plan(asked.problem, WorkLimit(SearchWork(kicks=5)))
+    path = NearOptimal().plan(asked.problem, WorkLimit(SearchWork(perturbations=5)))
     answer = mission.step([PlanReady(asked.number, path, 0.0)], 0.0)
     assert answer.path is not None
     assert mission.coverage() is not None
     walk_figures(asked.problem.lattice, path.cells)
     again = replace(asked.problem, before=path.cells[::-1].copy())
-    assert NearOptimal().plan(again, WorkLimit(SearchWork(kicks=5))).steps
+    assert NearOptimal().plan(again, WorkLimit(SearchWork(perturbations=5))).steps
     assert Fasaco().plan(asked.problem).steps
     for event in changes(off_the_bus):
         assert mission.step([event], 1.0).faults == ()

@@ -202,7 +202,7 @@ def plan_figures(plan: CoveragePath | None) -> PlanFigures:
         planner=plan.planner,
         seed=plan.seed,
         ants=plan.work.ants,
-        kicks=plan.work.kicks,
+        kicks=plan.work.perturbations,
         proposals=plan.work.proposals,
         planned_steps=plan.steps,
         planned_cost_s=round(plan.cost_s, 3),

@@ -224,7 +224,7 @@ def _plan_taken(ready: PlanReady) -> PlanTaken:
         ready.number,
         ready.seconds,
         list(ready.stops),
-        (work.ants, work.kicks, work.proposals),
+        (work.ants, work.perturbations, work.proposals),
         cells_checksum(ready.path.cells),
     )
 

@@ -12,10 +12,9 @@ Eq. (7)      local update, after every move              ``settle``
 Eq. (8)      global update along the best walk           ``deposit``
 ===========  ==========================================  ======================
 
-What ants tell each other, and when: the ants of a group walk at the same time,
-as ants do, on the trail that the groups before them left. Then (7) is applied
-for each of their moves, ant by ant. So the ants of a group may walk on several
-threads, and the result is the same for any number of them.
+The ants of a group walk at the same time, on the trail that the groups before them
+left. Then (7) is applied for each of their moves, ant by ant. So the ants of a group
+may walk on several threads, and the result is the same for any number of them.
 
 Where the paper is silent: a tie in (4) goes straight on; a dead end is left by
 the shortest walk to the nearest cell not yet covered, whose moves are moves
@@ -29,19 +28,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.ants.growth import (
+from fasaco_edge.kernels.ants.graph import (
     Graph,
     Scratch,
     append_way,
     begin,
     close,
-    find,
     open_steps_of,
 )
 from fasaco_edge.kernels.costs import walk_cost
-from fasaco_edge.kernels.jit import kernel
-
-WORD = 0xFFFFFFFF
+from fasaco_edge.kernels.jit import lean_kernel
+from fasaco_edge.kernels.random import draw_unit
 
 # What eta of equation (5) is 1 over: the distance to a neighbour, which is 1; the
 # distance an ant of this velocity will go; one more than the cells still open
@@ -50,19 +47,21 @@ NEIGHBOUR, DISTANCE, FEWEST_OPEN = 0, 1, 2
 
 
 class Rules(NamedTuple):
-    """Constants of equations (4) to (8), the end of the walk, and what makes one the best.
+    """Constants of equations (4) to (8), both ends of the walk, and its prices.
 
     Attributes:
         q0, alpha, tau0: as in the equations.
+        start: the cell that all ants start from.
         end: the cell the walk ends in, -1 for anywhere.
         step_us, quarter_turn_us: what they cost [us].
         visibility: NEIGHBOUR, DISTANCE or FEWEST_OPEN.
-        powers: float64, ``(1 / (i + 1)) ** beta`` at index i, as far as it is needed.
+        powers: float64, ``(1 / (i + 1)) ** beta`` at index i, for each index in use.
     """
 
     q0: float
     alpha: float
     tau0: float
+    start: int
     end: int
     step_us: int
     quarter_turn_us: int
@@ -70,29 +69,26 @@ class Rules(NamedTuple):
     powers: NDArray[np.float64]
 
 
-@kernel
-def _draw(state: NDArray[np.int64]) -> float:
-    """Advance a xoshiro128++ stream (Blackman and Vigna 2019); return a number in [0, 1).
+class ColonyState(NamedTuple):
+    """Where ants walk, and by what.
 
-    Words live in int64 and are masked, so that nothing overflows in plain Python.
+    Attributes:
+        graph: where they walk; all wanted cells, and the end, can be reached from the start.
+        trail: pheromone on the move out of a cell in each direction, float64 (n, 4), > 0.
+        rules: constants.
     """
-    total = (state[0] + state[3]) & WORD
-    word = ((((total << 7) & WORD) | (total >> 25)) + state[0]) & WORD
-    shifted = (state[1] << 9) & WORD
-    state[2] ^= state[0]
-    state[3] ^= state[1]
-    state[1] ^= state[2]
-    state[0] ^= state[3]
-    state[2] ^= shifted
-    state[3] = ((state[3] << 11) & WORD) | (state[3] >> 21)
-    return float(word / 4294967296.0)
+
+    graph: Graph
+    trail: NDArray[np.float64]
+    rules: Rules
 
 
-@kernel
+@lean_kernel
 def _visibility(
-    graph: Graph, rules: Rules, scratch: Scratch, here: int, direction: int, velocity: int
+    colony: ColonyState, scratch: Scratch, here: int, direction: int, velocity: int
 ) -> float:
     """Return eta ** beta of equation (5) for the open neighbour in a direction."""
+    graph, rules = colony.graph, colony.rules
     after = here + graph.offsets[direction]
     if rules.visibility == FEWEST_OPEN:
         mask = open_steps_of(graph, scratch, after)
@@ -105,24 +101,17 @@ def _visibility(
     return float(rules.powers[run - 1])
 
 
-@kernel
-def _weigh(
-    graph: Graph,
-    trail: NDArray[np.float64],
-    rules: Rules,
-    scratch: Scratch,
-    here: int,
-    velocity: int,
-) -> None:
+@lean_kernel
+def _weigh(colony: ColonyState, scratch: Scratch, here: int, velocity: int) -> None:
     """Fill ``scratch.weights`` with tau * eta ** beta of the open neighbours."""
-    mask = open_steps_of(graph, scratch, here)
+    mask = open_steps_of(colony.graph, scratch, here)
     for direction in range(4):
         if mask >> direction & 1:
-            seen = _visibility(graph, rules, scratch, here, direction, velocity)
-            scratch.weights[0, direction] = trail[here, direction] * seen
+            eta = _visibility(colony, scratch, here, direction, velocity)
+            scratch.weights[0, direction] = colony.trail[here, direction] * eta
 
 
-@kernel
+@lean_kernel
 def _choose(
     mask: int,
     weights: NDArray[np.float64],
@@ -131,7 +120,10 @@ def _choose(
     q0: float,
     random: NDArray[np.int64],
 ) -> int:
-    """Return a direction in ``mask`` by equation (4), from the weights in ``weights[row]``."""
+    """Return a direction in ``mask`` by equation (4).
+
+    Weights are float64 (k, 4), those in ``row`` count; ``random`` is int64 (4,).
+    """
     total, best, best_weight = 0.0, heading, 0.0
     for turn in range(4):
         direction = (heading + turn) & 3
@@ -139,10 +131,10 @@ def _choose(
         total += weight
         if weight > best_weight:
             best, best_weight = direction, weight
-    if mask & (mask - 1) == 0 or _draw(random) <= q0:
+    if mask & (mask - 1) == 0 or draw_unit(random) <= q0:
         return best
     # Eq. (6)
-    left = _draw(random) * total
+    left = draw_unit(random) * total
     for turn in range(4):
         direction = (heading + turn) & 3
         if mask >> direction & 1:
@@ -153,34 +145,31 @@ def _choose(
     return best
 
 
-@kernel
+@lean_kernel
 def _walk_one(
-    graph: Graph,
-    trail: NDArray[np.float64],
-    rules: Rules,
+    colony: ColonyState,
     scratch: Scratch,
-    start: int,
     velocity: int,
     random: NDArray[np.int64],
     walk: NDArray[np.int32],
 ) -> int:
     """Let one ant walk until every cell is covered; return the walk's length."""
-    remaining = begin(graph, scratch, start)
-    walk[0] = start
-    here, length, heading = start, 1, 0
+    graph, rules = colony.graph, colony.rules
+    remaining = begin(graph, scratch, rules.start)
+    walk[0] = rules.start
+    here, length, heading = rules.start, 1, 0
     while remaining > 0:
         mask = open_steps_of(graph, scratch, here)
         if mask == 0:
-            goal = find(graph, scratch, here, -1)
-            length = append_way(graph, scratch, walk, length, here, goal)
-            here, heading = goal, scratch.came_from[goal]
+            length, here = append_way(graph, scratch, walk, length, here, -1)
+            heading = scratch.came_from[here]
             close(graph, scratch, here)
             remaining -= 1
             continue
         if rules.visibility == NEIGHBOUR:
-            heading = _choose(mask, trail, here, heading, rules.q0, random)
+            heading = _choose(mask, colony.trail, here, heading, rules.q0, random)
         else:
-            _weigh(graph, trail, rules, scratch, here, velocity)
+            _weigh(colony, scratch, here, velocity)
             heading = _choose(mask, scratch.weights, 0, heading, rules.q0, random)
         # A cohort of velocity v keeps straight on for up to v cells.
         for _ in range(velocity):
@@ -193,18 +182,14 @@ def _walk_one(
             if not open_steps_of(graph, scratch, here) >> heading & 1:
                 break
     if rules.end >= 0 and here != rules.end:
-        find(graph, scratch, here, rules.end)
-        length = append_way(graph, scratch, walk, length, here, rules.end)
+        length, _ = append_way(graph, scratch, walk, length, here, rules.end)
     return length
 
 
-@kernel
+@lean_kernel
 def walk_ants(
-    graph: Graph,
-    trail: NDArray[np.float64],
-    rules: Rules,
+    colony: ColonyState,
     scratch: Scratch,
-    start: int,
     velocity: int,
     streams: NDArray[np.int64],
     walks: NDArray[np.int32],
@@ -213,28 +198,22 @@ def walk_ants(
     """Let ants walk on a trail that stays as it is.
 
     Args:
-        graph: where they walk; all that is wanted, and the end, can be reached from the start.
-        trail: pheromone on the move out of a cell in each direction, float64 (n, 4), > 0.
-        rules: constants.
+        colony: where they walk, and by what.
         scratch: working memory.
-        start: the cell all ants start from.
         velocity: cells an ant keeps straight on for, at least 1.
         streams: int64 (ants, 4): state of each ant's random stream, words of 32 bits,
             not all zero; advanced in place.
-        walks: out, int32 (ants, room); a longer walk is cut.
+        walks: out, int32 (ants, capacity); a longer walk is cut.
         lengths: out, int64 (ants,), the walks' whole lengths.
     """
     for ant in range(streams.shape[0]):
-        lengths[ant] = _walk_one(
-            graph, trail, rules, scratch, start, velocity, streams[ant], walks[ant]
-        )
+        lengths[ant] = _walk_one(colony, scratch, velocity, streams[ant], walks[ant])
 
 
-@kernel
-def _pull(
-    graph: Graph, trail: NDArray[np.float64], walk: NDArray[np.int32], alpha: float, towards: float
-) -> None:
-    """Pull the trail of every move of a walk a little towards a value."""
+@lean_kernel
+def _pull(colony: ColonyState, walk: NDArray[np.int32], towards: float) -> None:
+    """Pull the trail of every move of a walk towards a value, by the weight alpha."""
+    graph, trail, alpha = colony.graph, colony.trail, colony.rules.alpha
     for index in range(walk.size - 1):
         here, gap = walk[index], walk[index + 1] - walk[index]
         for direction in range(4):
@@ -244,32 +223,32 @@ def _pull(
                 break
 
 
-@kernel
+@lean_kernel
 def settle(
-    graph: Graph,
-    trail: NDArray[np.float64],
-    rules: Rules,
-    walks: NDArray[np.int32],
-    lengths: NDArray[np.int64],
+    colony: ColonyState, walks: NDArray[np.int32], lengths: NDArray[np.int64]
 ) -> tuple[int, int]:
     """Apply the local update (7) for every move, ant by ant.
+
+    Args:
+        colony: whose trail is changed.
+        walks: int32 (ants, capacity).
+        lengths: int64 (ants,).
 
     Returns:
         The index of the cheapest walk, of equals the first, and its cost [us].
     """
+    rules = colony.rules
     best, least = 0, 0
     for ant in range(lengths.size):
         walk = walks[ant, : lengths[ant]]
-        _pull(graph, trail, walk, rules.alpha, rules.tau0)
+        _pull(colony, walk, rules.tau0)
         cost = walk_cost(walk, rules.step_us, rules.quarter_turn_us)
         if ant == 0 or cost < least:
             best, least = ant, cost
     return best, least
 
 
-@kernel
-def deposit(
-    graph: Graph, trail: NDArray[np.float64], alpha: float, amount: float, best: NDArray[np.int32]
-) -> None:
-    """Strengthen the trail along ``best`` by equation (8), ``amount`` being delta phi."""
-    _pull(graph, trail, best, alpha, amount)
+@lean_kernel
+def deposit(colony: ColonyState, amount: float, best: NDArray[np.int32]) -> None:
+    """Strengthen the trail along ``best``, int32 (n,), by (8), ``amount`` being delta phi."""
+    _pull(colony, best, amount)

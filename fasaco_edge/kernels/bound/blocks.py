@@ -1,15 +1,13 @@
-"""Biconnected blocks of a lattice: what stays connected if any one cell is taken away.
+"""Biconnected blocks of a lattice, which stay connected without any one cell; islands in them.
 
 Source: Hopcroft and Tarjan, "Algorithm 447: efficient algorithms for graph
 manipulation", 1973, depth first without recursion. Two blocks share at most one
 cell, a cut vertex; a step joins two cells of exactly one block; a block of two
 cells is a bridge.
 
-Islands: what a walk over a block can reach along steps that touch an independent set.
-
-A step between two islands touches no cell of the set, so a bound that counts the
-steps at the set's cells does not count it yet. This file finds the islands and
-what it costs at least to drive between them.
+Islands are the cells of a block that are joined by steps at an independent set. A step
+between two islands touches no cell of the set, so a bound that counts the steps at the
+set's cells does not count it yet. The least number of such steps is found here.
 """
 
 from typing import NamedTuple
@@ -42,19 +40,19 @@ def biconnected_blocks(steps: NDArray[np.uint8], offsets: NDArray[np.int64], roo
         offsets: int64 (4,), difference of flat index for a step in each direction.
         root: where the search begins.
     """
-    room = np.count_nonzero(steps) + 1
+    most = np.count_nonzero(steps) + 1
     # Every cell but the root is below the top of one block, and each block has one top.
-    cells, first = np.empty(2 * room, np.int32), np.empty(room + 1, np.int32)
-    open_cells = np.empty(room, np.int32)
+    cells, first = np.empty(2 * most, np.int32), np.empty(most + 1, np.int32)
+    open_cells = np.empty(most, np.int32)
     rank, low = np.zeros(steps.size, np.int32), np.empty(steps.size, np.int32)
-    turn, came_by = np.zeros(steps.size, np.uint8), np.empty(steps.size, np.uint8)
+    tried, came_by = np.zeros(steps.size, np.uint8), np.empty(steps.size, np.uint8)
     blocks, filled, waiting, ranks = 0, 0, 0, 1
     here = root
     rank[here] = low[here] = 1
     while True:
-        direction = turn[here]
+        direction = tried[here]
         if direction < 4:
-            turn[here] += 1
+            tried[here] += 1
             if not steps[here] >> direction & 1:
                 continue
             after = here + offsets[direction]

@@ -1,7 +1,7 @@
-"""Connected areas of a grid: cells of one kind that hang together by their edges.
+"""Connected areas of a grid: cells of one kind, connected by their edges.
 
-Two passes over the grid, with a union of the pieces that turn out to be one (Rosenfeld and
-Pfaltz, 1966): a hall of a hundred thousand closed chambers takes as long as an empty one.
+Two passes over the grid, with a union of pieces that are connected (Rosenfeld and Pfaltz, 1966):
+a hall of a hundred thousand closed chambers takes as long as an empty one.
 """
 
 from typing import NamedTuple
@@ -43,7 +43,7 @@ def _join_pieces(
 ) -> int:
     """Give each cell the number of a piece; return how many pieces that are.
 
-    Of pieces that hang together the root is the one that was met first.
+    Of connected pieces the root is the one that was met first.
     """
     rows, cols = kinds.shape
     pieces = 0

@@ -1,8 +1,8 @@
-"""What differs between two maps on one raster, and which lattice cells that concerns.
+"""Differences of two maps on one raster, and the lattice cells that they may change.
 
 Most of two maps is equal. So strips as wide as the map are compared first, in the order
 they lie in memory, then segments of those that differ, and pixels last. Beyond its
-window a map is unknown: one that has grown differs where it has come to know something.
+window a map is unknown: one that has grown differs where it is known now.
 """
 
 from typing import NamedTuple
@@ -37,7 +37,7 @@ class Box(NamedTuple):
 
 @inlined
 def _shows(pixels: Pixels, box: Box) -> bool:
-    """Tell whether all pixels of a box lie in the window."""
+    """Return whether all pixels of a box lie in the window."""
     height, width = pixels.values.shape
     return bool(
         pixels.row <= box.row0
@@ -66,7 +66,7 @@ def _row_is_blank(values: NDArray[np.int8]) -> bool:
 
 @lean_kernel
 def _is_blank(pixels: Pixels, box: Box) -> bool:
-    """Tell whether a box in the window holds unknown pixels alone."""
+    """Return whether a box in the window holds unknown pixels alone."""
     left, right = box.col0 - pixels.col, box.col1 - pixels.col
     for row in range(box.row0 - pixels.row, box.row1 - pixels.row):
         if not _row_is_blank(pixels.values[row, left:right]):
@@ -76,7 +76,7 @@ def _is_blank(pixels: Pixels, box: Box) -> bool:
 
 @lean_kernel
 def are_equal(before: Pixels, after: Pixels, box: Box) -> bool:
-    """Tell whether two maps are the same in a box; False where one shows a part of it alone."""
+    """Return whether two maps are the same in a box; False where one shows a part of it alone."""
     if not _shows(before, box):
         return _shows(after, box) and _is_blank(after, box)
     if not _shows(after, box):
@@ -156,8 +156,8 @@ def mark_stale(
 ) -> None:
     """Mark the lattice cells whose state or steps may have changed with the pixels.
 
-    Where they turn out to be most of the lattice, all are marked: to look on would cost
-    more than it saves.
+    Where they are most of the lattice, all are marked: to search on would cost more than
+    it saves.
 
     Args:
         before, after: the maps.

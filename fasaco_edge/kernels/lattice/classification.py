@@ -1,10 +1,10 @@
-"""Which cells of a lattice are coverable and which steps are legal, tile by tile.
+"""Classification of lattice cells and steps, tile by tile.
 
-Most of a map is open floor or unknown: one look at a summed-area table spares the look
-at each pixel under the robot. A table as large as the map would neither fit into the
-cache nor be at the cost of what has changed, so each tile has its own, of the pixels
-around the cells that are to be classified. The tables spare work and decide nothing:
-where they do not hold the answer, it is found row by row of the disc, or by ``footprint``.
+Most of a map is open floor or unknown: one read of a summed-area table replaces reading
+each pixel under the robot. A table as large as the map would not fit into the cache, and
+would cost more than what has changed, so each tile has its own, of the pixels around the
+cells to be classified. The tables only save work: where they do not hold the answer, it
+is found row by row of the disc, or by ``footprint``.
 """
 
 from typing import NamedTuple
@@ -33,8 +33,8 @@ from fasaco_edge.kernels.lattice.pixels import (
     weigh,
 )
 
-# A tile spans about so many pixels beside those that the robot reaches over from it, but
-# not more cells; less, and tables overlap too much, more, and they leave the cache.
+# A tile spans about so many pixels, beside those that the robot reaches from it, and at
+# most so many cells: smaller tables overlap too much, larger ones leave the cache.
 TILE_PIXELS = 192
 MOST_TILE_CELLS = 128
 
@@ -54,6 +54,15 @@ class Cells(NamedTuple):
     stale: NDArray[np.bool_]
     row: int
     col: int
+
+
+class _Map(NamedTuple):
+    """Arguments of ``classify_cells``."""
+
+    pixels: Pixels
+    placement: Placement
+    thresholds: Thresholds
+    cells: Cells
 
 
 class _Block(NamedTuple):
@@ -79,14 +88,8 @@ def _stale_block(stale: NDArray[np.bool_], row0: int, col0: int, side: int) -> _
 
 
 @lean_kernel
-def _classify_states(
-    pixels: Pixels,
-    placement: Placement,
-    thresholds: Thresholds,
-    cells: Cells,
-    block: _Block,
-    table: PixelSums,
-) -> None:
+def _classify_states(given: _Map, block: _Block, table: PixelSums) -> None:
+    pixels, placement, cells = given.pixels, given.placement, given.cells
     radius = placement.radius
     height, width = pixels.values.shape
     for row in range(block.row0, block.row1):
@@ -108,20 +111,12 @@ def _classify_states(
 
 
 @inlined
-def _classify_step(
-    pixels: Pixels,
-    placement: Placement,
-    thresholds: Thresholds,
-    cells: Cells,
-    row: int,
-    col: int,
-    towards: int,
-    table: PixelSums,
-) -> None:
+def _classify_step(given: _Map, row: int, col: int, towards: int, table: PixelSums) -> None:
     """Settle the steps between a stale cell and its neighbour in the east or north.
 
     Between a stale cell and one that is not, nothing has changed.
     """
+    pixels, placement, cells = given.pixels, given.placement, given.cells
     back = WEST if towards == EAST else SOUTH
     far_row, far_col = (row, col + 1) if towards == EAST else (row + 1, col)
     rows, cols = cells.stale.shape
@@ -137,7 +132,7 @@ def _classify_step(
                 ux, uy = -uy, ux
             reach_x, reach_y = 0.5 * abs(ux) + radius, 0.5 * abs(uy) + radius
             count = count_around(table, x + 0.5 * ux, y + 0.5 * uy, reach_x, reach_y)
-            if is_free(count) or lane_is_free(pixels, x, y, ux, uy, radius, thresholds):
+            if is_free(count) or lane_is_free(pixels, x, y, ux, uy, radius, given.thresholds):
                 legal = 1
         others = cells.steps[far_row, far_col] & 15 - (1 << back)
         cells.steps[far_row, far_col] = others | legal << back
@@ -147,14 +142,9 @@ def _classify_step(
 
 @lean_kernel
 def _classify_tile(
-    pixels: Pixels,
-    placement: Placement,
-    thresholds: Thresholds,
-    cells: Cells,
-    tile: _Block,
-    weights: NDArray[np.int64],
-    sums: NDArray[np.int64],
+    given: _Map, tile: _Block, weights: NDArray[np.int64], sums: NDArray[np.int64]
 ) -> None:
+    pixels, placement, cells = given.pixels, given.placement, given.cells
     rows, cols = cells.stale.shape
     # With the neighbours in the north and east, whose states the steps depend on.
     block = _Block(tile.row0, tile.col0, min(tile.row1 + 1, rows), min(tile.col1 + 1, cols))
@@ -166,12 +156,12 @@ def _classify_tile(
     reach_x, reach_y = wide * ux + high * uy + reach, wide * uy + high * ux + reach
     table = sums_around(pixels, x, y, reach_x, reach_y, sums)
     sum_up(pixels, weights, table)
-    _classify_states(pixels, placement, thresholds, cells, block, table)
+    _classify_states(given, block, table)
     for row in range(tile.row0, tile.row1):
         for col in range(tile.col0, tile.col1):
             if cells.stale[row, col]:
                 for towards in (EAST, NORTH):
-                    _classify_step(pixels, placement, thresholds, cells, row, col, towards, table)
+                    _classify_step(given, row, col, towards, table)
 
 
 @kernel
@@ -188,6 +178,7 @@ def classify_cells(
         thresholds: what counts as free and as occupied.
         cells: in and out.
     """
+    given = _Map(pixels, placement, thresholds, cells)
     rows, cols = cells.stale.shape
     reach, scale = reach_of(placement), abs(placement.ux) + abs(placement.uy)
     side = min(max(int((TILE_PIXELS + 2.0 * reach) / scale), 2), MOST_TILE_CELLS)
@@ -200,7 +191,7 @@ def classify_cells(
         for col in range(0, cols, side):
             tile = _stale_block(cells.stale, row, col, side)
             if tile.row0 < tile.row1:
-                _classify_tile(pixels, placement, thresholds, cells, tile, weights, sums)
+                _classify_tile(given, tile, weights, sums)
     # No step leads out of the arrays.
     for row in range(rows if cols else 0):
         if cells.stale[row, 0]:

@@ -1,4 +1,4 @@
-"""Where the robot's disc fits, and between which neighbouring cells it can drive.
+"""Footprint of the robot, a disc: where it fits, and between which cells it can drive.
 
 All lengths are in pixels of the map's raster. A pixel is the closed unit square
 ``[col, col + 1] x [row, row + 1]``; a robot touches it when the distance is smaller
@@ -51,7 +51,7 @@ class Pixels(NamedTuple):
 
 @inlined
 def state_of(value: int, thresholds: Thresholds) -> int:
-    """Return what an occupancy value means."""
+    """Return the state that an occupancy value stands for."""
     if 0 <= value <= thresholds.free:
         return COVERABLE
     return BLOCKED if value >= thresholds.occupied else UNKNOWN
@@ -93,7 +93,7 @@ def lane_is_free(
     radius: float,
     thresholds: Thresholds,
 ) -> bool:
-    """Tell whether the rectangle swept from (x, y) to (x + ux, y + uy) is free.
+    """Return whether the rectangle swept from (x, y) to (x + ux, y + uy) is free.
 
     The discs at both ends are known to be free. Pixels are tested against the
     rectangle by the separating axis theorem, so any yaw of the grid is right.

@@ -1,12 +1,11 @@
-"""How many free pixels lie beside the cells that can be reached.
+"""Counts of pixels: free ones outside reachable cells, and those of a rectangle in four reads.
 
-A pixel is in the cell that its centre is in. Stretches of pixels beside those cells are found
-once for all rows of pixels in a row of cells, where the raster lies along the lattice, and
-counted in one sweep each.
+Outside: a pixel is in the cell that its centre is in. Stretches of pixels outside reachable
+cells are found once for all rows of pixels in a row of cells, where the raster is aligned with
+the lattice, and counted in one sweep each.
 
-Summed-area tables of a map: how many pixels of a rectangle are free or known, in four looks.
-
-After F. Crow, "Summed-area tables for texture mapping", SIGGRAPH 1984.
+Rectangles: summed-area tables, after F. Crow, "Summed-area tables for texture mapping",
+SIGGRAPH 1984.
 """
 
 from typing import NamedTuple
@@ -132,7 +131,7 @@ def weigh(thresholds: Thresholds, weights: NDArray[np.int64]) -> None:
 def sums_around(
     pixels: Pixels, x: float, y: float, reach_x: float, reach_y: float, sums: NDArray[np.int64]
 ) -> PixelSums:
-    """Return the sums, yet to be filled in, of all pixels of a map within reach of (x, y)."""
+    """Return the sums, empty until ``sum_up``, of all pixels within reach of (x, y)."""
     height, width = pixels.values.shape
     row0 = max(int(np.floor(y - reach_y)), pixels.row)
     col0 = max(int(np.floor(x - reach_x)), pixels.col)
@@ -169,19 +168,19 @@ def count_around(table: PixelSums, x: float, y: float, reach_x: float, reach_y: 
 
 @inlined
 def is_free(count: int) -> bool:
-    """Tell whether a count is of free pixels alone."""
+    """Return whether a count is of free pixels alone."""
     return bool(count >= 0 and count & NOT_FREE == 0)
 
 
 @inlined
 def is_unknown(count: int) -> bool:
-    """Tell whether a count is of unknown pixels alone."""
+    """Return whether a count is of unknown pixels alone."""
     return bool(count >= 0 and count >> KNOWN_BIT == 0)
 
 
 @inlined
 def _is_off(col: int, x: float, dy: float, radius: float) -> bool:
-    """Tell whether a disc leaves out the pixel of a column, its row being ``dy`` away."""
+    """Return whether a disc leaves out the pixel of a column, its row being ``dy`` away."""
     dx = max(col - x, 0.0, x - col - 1)
     return bool(dx * dx + dy * dy >= radius * radius)
 
@@ -190,7 +189,7 @@ def _is_off(col: int, x: float, dy: float, radius: float) -> bool:
 def disc_state(pixels: Pixels, x: float, y: float, radius: float, table: PixelSums) -> int:
     """Return the worst state under a disc: blocked before unknown before free.
 
-    Row by row, each in four looks: pixels may be ever so much smaller than the robot. The table
+    Row by row, each in four reads: pixels may be much smaller than the robot. The table
     has to span all of the map that the disc touches.
     """
     height, width = pixels.values.shape

@@ -1,7 +1,7 @@
-"""Cells of the lattice that polygons hold or come near, and how many of them are marked.
+"""Rasterisation of polygons on the lattice: cells inside and near the border, counts of them.
 
-Polygons are walked edge by edge, cells row by row: an order of thousands of corners costs a turn
-of the loop milliseconds.
+Polygons are followed edge by edge, cells row by row: an order of thousands of corners costs a
+cycle of the control loop milliseconds.
 """
 
 import numpy as np

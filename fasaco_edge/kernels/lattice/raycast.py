@@ -1,4 +1,4 @@
-"""What a laser scanner sees of a ground-truth map, and what lies under a disc.
+"""Ray casting: what a laser scanner sees of a ground-truth map; pixels under a disc.
 
 Rays follow J. Amanatides and A. Woo, "A fast voxel traversal algorithm for
 ray tracing", Eurographics 1987: every pixel a ray passes is visited, in order,
@@ -20,11 +20,12 @@ from fasaco_edge.kernels.jit import kernel
 
 
 class Scanner(NamedTuple):
-    """Where a scanner stands and what it can tell.
+    """Place and range of a scanner.
 
-    x, y: its place, pixel coordinates (column, row), not rounded.
-    reach: pixels entered at this distance or nearer are seen [pixels].
-    free_at_most: occupancy values 0..free_at_most let a ray through [percent].
+    Attributes:
+        x, y: its place, pixel coordinates (column, row), not rounded.
+        reach: pixels entered at this distance or nearer are seen [pixels].
+        free_at_most: occupancy values 0..free_at_most let a ray through [percent].
     """
 
     x: float
@@ -95,7 +96,7 @@ def cast_rays(
     Args:
         truth: occupancy, int8 (rows, cols), -1 unknown, 0..100.
         known: in and out, int8 (rows, cols): the scanner's own map.
-        scanner: where it stands and what it can tell.
+        scanner: its place and range.
         directions: unit vectors (dx, dy) of the rays, float64 (n, 2).
 
     Returns:
@@ -141,7 +142,7 @@ def reveal_disc(
 def disc_is_free(
     cells: NDArray[np.int8], x: float, y: float, radius: float, free_at_most: int
 ) -> bool:
-    """Tell whether every pixel a disc touches lies in the array and is free.
+    """Return whether every pixel a disc touches lies in the array and is free.
 
     Args:
         cells: occupancy, int8 (rows, cols), -1 unknown, 0..100.

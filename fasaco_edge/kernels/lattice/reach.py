@@ -1,12 +1,11 @@
-"""Shortest walks over a lattice: what can be reached, and the way there.
+"""Reachability over a lattice, shortest walks, and its update after a change.
 
-What can be reached after some cells have changed, at the cost of these.
-
-Steps have changed in a part of the lattice alone. If inside this part the cells at its
-rim - those with a step across it - hang together as they did before, then outside all
-hangs together as it did before: any walk can be led around. So it is enough to look at
-the part, and at whose rim the old reach came to. Only where the rim has come apart or
-together elsewhere must the whole be searched.
+After some cells have changed, reachability is updated at the cost of these. Steps have
+changed in a part of the lattice alone. If inside this part the cells at its rim - those
+with a step across it - are connected as they were before, then outside all is connected
+as it was before: any walk can be led around. So it is enough to look at the part, and at
+which cells of its rim were reachable. Only where cells of the rim were parted or joined
+must the whole lattice be searched.
 """
 
 from typing import NamedTuple
@@ -21,41 +20,60 @@ UNSEEN = 255
 ROOT = 254
 
 
-@kernel
-def _spread(
-    steps: NDArray[np.uint8], row: int, col: int, came_from: NDArray[np.uint8], goal: int
-) -> int:
-    """Search breadth first from (row, col) until flat cell ``goal``; return how many were seen.
+@lean_kernel
+def search(
+    steps: NDArray[np.uint8],
+    offsets: NDArray[np.int64],
+    start: int,
+    goal: int,
+    came_from: NDArray[np.uint8],
+    queue: NDArray[np.int32],
+) -> None:
+    """Search breadth first from flat cell ``start`` until ``goal``, -1 for all that is reachable.
 
-    ``came_from`` (rows, cols), all UNSEEN, receives the direction of the step by
-    which each cell was first reached.
+    Args:
+        steps: step masks, uint8 (n,).
+        offsets: int64 (4,), difference of flat index for a step in each direction.
+        start, goal: flat cells.
+        came_from: uint8 (n,), in: all UNSEEN; out: direction of the step by which each cell
+            was first reached, ROOT at the start.
+        queue: int32 (n,), working memory.
     """
-    cols = steps.shape[1]
-    queue = np.empty(steps.size, np.int32)
-    queue[0] = row * cols + col
-    came_from[row, col] = ROOT
+    queue[0] = start
+    came_from[start] = ROOT
     head, tail = 0, 1
-    while head < tail and queue[head] != goal:
-        here_row, here_col = queue[head] // cols, queue[head] % cols
+    while head < tail and (goal < 0 or came_from[goal] == UNSEEN):
+        here = queue[head]
         head += 1
         for direction in range(4):
-            if not steps[here_row, here_col] >> direction & 1:
+            if not steps[here] >> direction & 1:
                 continue
-            next_row, next_col = here_row + ROW_STEP[direction], here_col + COL_STEP[direction]
-            if came_from[next_row, next_col] == UNSEEN:
-                came_from[next_row, next_col] = direction
-                queue[tail] = next_row * cols + next_col
+            after = here + offsets[direction]
+            if came_from[after] == UNSEEN:
+                came_from[after] = direction
+                queue[tail] = after
                 tail += 1
-    return tail
+
+
+@lean_kernel
+def steps_to(offsets: NDArray[np.int64], came_from: NDArray[np.uint8], goal: int) -> int:
+    """Return the steps of the way to a ``goal`` that ``search`` reached."""
+    count = 0
+    while came_from[goal] != ROOT:
+        goal -= offsets[came_from[goal]]
+        count += 1
+    return count
 
 
 @kernel
 def reachable_from(steps: NDArray[np.uint8], row: int, col: int) -> NDArray[np.uint8]:
     """Return uint8 (rows, cols), 1 where a walk from (row, col) can come."""
-    came_from = np.full(steps.shape, UNSEEN, np.uint8)
-    _spread(steps, row, col, came_from, -1)
+    cols = steps.shape[1]
+    offsets = np.array([1, cols, -1, -cols], np.int64)
+    came_from = np.full(steps.size, UNSEEN, np.uint8)
+    search(steps.ravel(), offsets, row * cols + col, -1, came_from, np.empty(steps.size, np.int32))
     reached: NDArray[np.uint8] = (came_from != UNSEEN).astype(np.uint8)
-    return reached
+    return reached.reshape(steps.shape)
 
 
 @kernel
@@ -68,28 +86,24 @@ def shortest_walk(
         steps: step masks, uint8 (rows, cols).
         start, goal: cells (row, col) inside the array.
     """
-    came_from = np.full(steps.shape, UNSEEN, np.uint8)
-    _spread(steps, start[0], start[1], came_from, goal[0] * steps.shape[1] + goal[1])
-    if came_from[goal[0], goal[1]] == UNSEEN:
+    cols = steps.shape[1]
+    offsets = np.array([1, cols, -1, -cols], np.int64)
+    came_from = np.full(steps.size, UNSEEN, np.uint8)
+    first, cell = start[0] * cols + start[1], goal[0] * cols + goal[1]
+    search(steps.ravel(), offsets, first, cell, came_from, np.empty(steps.size, np.int32))
+    if came_from[cell] == UNSEEN:
         return np.empty((0, 2), np.int32)
-    length = 1
-    row, col = goal
-    while came_from[row, col] != ROOT:
-        direction = came_from[row, col]
-        row, col = row - ROW_STEP[direction], col - COL_STEP[direction]
-        length += 1
+    length = steps_to(offsets, came_from, cell) + 1
     walk = np.empty((length, 2), np.int32)
-    row, col = goal
-    for index in range(length - 1, 0, -1):
-        walk[index, 0], walk[index, 1] = row, col
-        direction = came_from[row, col]
-        row, col = row - ROW_STEP[direction], col - COL_STEP[direction]
-    walk[0, 0], walk[0, 1] = row, col
+    for index in range(length - 1, -1, -1):
+        walk[index, 0], walk[index, 1] = cell // cols, cell % cols
+        if index:
+            cell -= offsets[came_from[cell]]
     return walk
 
 
-# The part reaches so many cells beyond those that changed, so that what came to stand
-# in the open does not part its rim.
+# The part reaches so many cells beyond those that changed, so that a new obstacle in the
+# open does not part its rim.
 MARGIN = 2
 
 
@@ -112,7 +126,7 @@ class _Part(NamedTuple):
 
 @lean_kernel
 def _holds(part: _Part, row: int, col: int) -> bool:
-    """Tell whether a cell of the lattice belongs to the part."""
+    """Return whether a cell of the lattice belongs to the part."""
     rows, cols = part.inside.shape
     row, col = row - part.row, col - part.col
     return bool(0 <= row < rows and 0 <= col < cols and part.inside[row, col])
@@ -124,13 +138,11 @@ def _label(steps: NDArray[np.uint8], part: _Part) -> int:
     rows, cols = part.inside.shape
     pieces = 0
     for source in range(rows * cols):
-        if (
-            not part.inside[source // cols, source % cols]
-            or part.labels[source // cols, source % cols]
-        ):
+        row, col = source // cols, source % cols
+        if not part.inside[row, col] or part.labels[row, col]:
             continue
         pieces += 1
-        part.labels[source // cols, source % cols] = pieces
+        part.labels[row, col] = pieces
         part.queue[0] = source
         head, tail = 0, 1
         while head < tail:
@@ -151,7 +163,7 @@ def _label(steps: NDArray[np.uint8], part: _Part) -> int:
 
 @lean_kernel
 def _is_rim(steps: NDArray[np.uint8], part: _Part, row: int, col: int) -> bool:
-    """Tell whether a step leads out of the part from a cell of its rectangle."""
+    """Return whether a step leads out of the part from a cell of its rectangle."""
     row, col = part.row + row, part.col + col
     for direction in range(4):
         if steps[row, col] >> direction & 1 and not _holds(
@@ -171,9 +183,14 @@ def _match(
     to_old: NDArray[np.int32],
     reached: NDArray[np.bool_],
 ) -> bool:
-    """Match old and new pieces by the cells at the rim; tell whether that is one to one.
+    """Match old and new pieces by the cells at the rim; return whether that is one to one.
 
-    ``reached`` receives whether the rim of a new piece was reachable.
+    Args:
+        steps: step masks, uint8 (rows, cols), as they are now.
+        old, new: the part before and now.
+        reachable: bool (rows, cols), before.
+        to_new, to_old: int32 (pieces + 1,), in: 0; out: the pieces that match.
+        reached: out, bool (new pieces + 1,), whether the rim of a new piece was reachable.
     """
     rows, cols = new.inside.shape
     for row in range(rows):
@@ -197,15 +214,15 @@ def update_reach(
     row: int,
     col: int,
 ) -> bool:
-    """Correct what can be reached after steps have changed; tell whether that was possible.
+    """Update what can be reached after steps have changed; return whether that was possible.
 
-    Where it was not, nothing was written, and ``walks.reachable_from`` has the answer.
+    Where it was not, nothing was written, and ``reachable_from`` has the answer.
 
     Args:
         before, after: step masks, uint8 (rows, cols).
         changed: int32 (n, 2), n > 0: all cells (row, col) whose steps differ.
-        reachable: in and out, bool (rows, cols): what could be reached, and can be now.
-        row, col: a cell from where.
+        reachable: in and out, bool (rows, cols): what was reachable, and is now.
+        row, col: the cell from which.
     """
     rows, cols = after.shape
     top, left, bottom, right = rows, cols, 0, 0
@@ -231,7 +248,7 @@ def update_reach(
     reached = np.zeros(new_pieces + 1, np.bool_)
     if not _match(after, old, new, reachable, to_new, to_old, reached):
         return False
-    # Where from is a place that could be reached, or one in a piece whose rim could be.
+    # The cell (row, col) was reachable, or lies in a piece whose rim was.
     from_inside = _holds(new, row, col)
     if from_inside and not reached[new.labels[row - top, col - left]]:
         return False

@@ -1,12 +1,11 @@
-"""Which loops go round an obstacle.
+"""Holes of the ground, and a test whether a loop goes round one.
 
-The moves of the local search change a walk within unit squares. How often the
-walk passes an obstacle on one side, odd or even, they cannot change: the parity
-of a walk's steps is a chain over the two-element field, a square adds a
-boundary, and what is left is the chain's class in the first homology of the
-ground. To leave a class takes a loop round a hole, and to find one takes this:
-each hole throws a ray to the east, and a loop goes round some hole if the rays
-it crosses do not cancel out.
+The moves of the local search change a walk within unit squares. They cannot change
+whether the walk passes an obstacle on one side an odd or an even number of times: the
+parity of a walk's steps is a chain over the two-element field, a square adds a boundary,
+and what stays is the chain's class in the first homology of the ground. To leave a class
+takes a loop round a hole. To find one, each hole has a ray to the east, and a loop goes
+round some hole if the rays it crosses do not cancel out.
 
 A hole is a connected set of squares of which some step is missing; the one
 outside is no hole.
@@ -28,7 +27,7 @@ def _has(ground: Ground, cell: int, direction: int) -> bool:
 
 @kernel
 def _is_whole(ground: Ground, corner: int) -> bool:
-    """Tell whether the square north-east of ``corner`` has all four steps."""
+    """Return whether the square north-east of ``corner`` has all four steps."""
     north = ground.offsets[NORTH]
     return (
         _has(ground, corner, EAST)
@@ -42,7 +41,7 @@ def _is_whole(ground: Ground, corner: int) -> bool:
 def _flood(
     ground: Ground, first: int, seen: NDArray[np.uint8], queue: NDArray[np.int32], bound: int
 ) -> None:
-    """Mark all squares that hang together with ``first`` across missing steps."""
+    """Mark all squares that are connected to ``first`` across missing steps."""
     north = ground.offsets[NORTH]
     queue[0] = first
     seen[first] = 1
@@ -68,7 +67,7 @@ def _flood(
 
 @kernel
 def rays(ground: Ground, rays_crossed: NDArray[np.int64]) -> int:
-    """Throw the rays; return the number of holes.
+    """Set the rays; return the number of holes.
 
     Args:
         ground: framed by cells without steps.

@@ -1,11 +1,11 @@
-"""Changes of a walk that local search cannot make: its end moves, or a loop is added.
+"""Changes of a walk's step parities, which local search cannot make: a moved end, a loop.
 
-How often each step is walked is all that counts for a covering walk's length:
-any such numbers that hang together and are odd only at the walk's two ends are
-a walk (Euler). Along a way or a loop each number changes by one, down where the
-step is walked twice, up where it is not: the walk stays connected, and its ends
-move, or the walk passes a hole on another side. A search that finds steps
-walked twice at no cost proposes ways that gain much and lose little.
+Only how often each step is walked counts for a covering walk's length: any such numbers
+that are connected and have an odd sum at the walk's two ends only are a walk (Euler).
+Along a way or a loop each number changes by one, down where the step is walked twice, up
+where it is not: the walk stays connected, and its ends move, or the walk passes a hole
+on another side. A search to which steps walked twice cost nothing proposes ways that
+gain much and lose little.
 """
 
 from typing import NamedTuple
@@ -48,7 +48,7 @@ class Tally(NamedTuple):
             and their odds.
         marked: int64 (n,), number of the last climb that passed the cell.
         clock: int64 (2,), numbers given to searches and climbs.
-        stack: int32 (room of the walk,).
+        stack: int32 (capacity of the walk,).
         counts: int64 (1,), number of JUMPS.
         jump_ends: int32 (jumps, 2), the cells a jump leads between. Jump i stands in the
             walk as cell n + i, between its two cells.
@@ -90,7 +90,7 @@ def _direction(ground: Ground, one: int, other: int) -> int:
 
 @lean_kernel
 def note_order(ground: Ground, walk: Walk, tally: Tally) -> None:
-    """Set ``order_of_old``."""
+    """Set ``order_of_old`` from the walk."""
     bound, cells = ground.bound, walk.cells
     tally.order_of_old[:] = -1
     for index in range(1, walk.counts[LENGTH] - 1):
@@ -102,7 +102,7 @@ def note_order(ground: Ground, walk: Walk, tally: Tally) -> None:
 
 @lean_kernel
 def count_steps(ground: Ground, walk: Walk, tally: Tally) -> None:
-    """Set ``times``; jumps are not steps."""
+    """Set ``times`` from the walk; jumps are not steps."""
     bound = ground.bound
     tally.times[:] = 0
     for index in range(walk.counts[LENGTH] - 1):
@@ -266,7 +266,7 @@ def _heading(ground: Ground, tally: Tally, depth: int) -> int:
 
 
 @lean_kernel
-def _hang_up_jumps(tally: Tally) -> None:
+def _list_jumps(tally: Tally) -> None:
     """Let each cell's ``links`` begin the list of the jumps from there."""
     for jump in range(tally.counts[JUMPS]):
         for side in range(2):
@@ -295,7 +295,7 @@ def _next_jump(tally: Tally, here: int) -> int:
     while tally.links[here] >= 0:
         link = tally.links[here]
         tally.links[here] = tally.next_jump[link >> 1, link & 1]
-        # A jump hangs in two lists, and is made once.
+        # A jump is in two lists, and is made once.
         if not tally.jumped[link >> 1]:
             tally.jumped[link >> 1] = 1
             return int(link)
@@ -319,7 +319,7 @@ def euler_walk(
     walk's length.
     """
     bound, stack = ground.bound, tally.stack
-    _hang_up_jumps(tally)
+    _list_jumps(tally)
     stack[0] = end
     depth, length = 1, 0
     while depth:

@@ -1,9 +1,9 @@
-"""Kicks: change the walk where local search cannot, improve it, keep it or take it back.
+"""Perturbations: change the walk where local search cannot, improve it, keep it or take it back.
 
 Three kinds: the free end moves; a loop round a hole is added (see ``parity``);
-or, where turns count, a spot is only heated up. Where steps alone count, the
-whole walk is mixed afterwards, as what can be spared must travel to meet. Where
-turns count, the surroundings are annealed.
+or, where turns count, only the temperature rises at a spot. Where steps alone count,
+proposals are made all over the walk afterwards, as spare visits must travel to meet.
+Where turns count, the surroundings are annealed.
 """
 
 from typing import NamedTuple
@@ -37,48 +37,49 @@ from fasaco_edge.kernels.local_search.walk_array import (
 )
 from fasaco_edge.kernels.random import draw, index_of
 
-PROPOSALS, KICKS = 0, 1
+# Entries of ``Memory.work``.
+PROPOSALS, PERTURBATIONS = 0, 1
 
 # Temperatures of an annealing, from 1 down to 1 / 5, in units of 1 / 1024.
 COOLING = np.round(1024 * 0.2 ** (np.arange(8) / 7)).astype(np.int64)
 
 
-class KickRules(NamedTuple):
-    """How to kick.
+class PerturbationRules(NamedTuple):
+    """How to perturb.
 
     Attributes:
         limit: cells that a search for another end or a loop settles.
-        mixing: proposals for each cell of the walk, or of the surroundings.
+        proposals: proposals for each visit of the walk, or each cell of the surroundings.
         radius: steps from what was changed to the rim of the surroundings; -1 for
             the whole walk, at temperature 0.
-        heat_us: temperature that an annealing begins with [us].
-        patience_us: temperature at which a worse walk is gone on with [us].
-        loops_of_256: so many of 256 kicks change the end or add a loop.
+        temperature_us: temperature that an annealing begins with [us].
+        acceptance_us: temperature at which a worse walk is kept [us].
+        loops_of_256: so many of 256 perturbations change the end or add a loop.
         steady: whether what need not change stays in the order it is in.
         strict: whether a walk that costs the same as the one before is taken back.
     """
 
     limit: int
-    mixing: int
+    proposals: int
     radius: int
-    heat_us: int
-    patience_us: int
+    temperature_us: int
+    acceptance_us: int
     loops_of_256: int
     steady: bool = False
     strict: bool = False
 
 
 class Memory(NamedTuple):
-    """What a search remembers, and its working memory.
+    """The best walk of a search, and working memory.
 
     Attributes:
-        saved: int32 (room,), the walk before the kick.
-        best: int32 (room,), the best walk.
+        saved: int32 (capacity,), the walk before the perturbation.
+        best: int32 (capacity,), the best walk.
         best_counts: int64 (3,), its counts as in ``Walk``.
-        touched: int32 (n,), cells that the kick changed something at.
+        touched: int32 (n,), cells where the perturbation changed something.
         area: int32 (n,), their surroundings.
-        marked: int32 (n,), number of the last kick whose surroundings hold the cell.
-        work: int64 (2,), PROPOSALS and KICKS so far.
+        marked: int32 (n,), number of the last perturbation whose surroundings hold the cell.
+        work: int64 (2,), PROPOSALS and PERTURBATIONS so far.
     """
 
     saved: NDArray[np.int32]
@@ -90,6 +91,19 @@ class Memory(NamedTuple):
     work: NDArray[np.int64]
 
 
+class Search(NamedTuple):
+    """A local search: where the walk goes, the walk, its prices, and working memory.
+
+    The walk is changed in place; a worse one than ``memory.best`` may be left behind.
+    """
+
+    ground: Ground
+    walk: Walk
+    prices: Prices
+    tally: Tally
+    memory: Memory
+
+
 @lean_kernel
 def remember(walk: Walk, memory: Memory) -> None:
     """Let the walk be the best one."""
@@ -98,58 +112,52 @@ def remember(walk: Walk, memory: Memory) -> None:
         memory.best_counts[index] = walk.counts[index]
 
 
+@inlined
+def _load(search: Search, cells: NDArray[np.int32], length: int) -> None:
+    """Let the walk be ``cells[:length]``, int32 (capacity,)."""
+    copy(cells, search.walk.cells, length)
+    recount(search.ground, search.walk, length, search.prices)
+
+
 @lean_kernel
-def recall(ground: Ground, walk: Walk, prices: Prices, memory: Memory) -> None:
+def recall(search: Search) -> None:
     """Go back to the best walk."""
-    length = memory.best_counts[LENGTH]
-    copy(memory.best, walk.cells, length)
-    recount(ground, walk, length, prices)
+    _load(search, search.memory.best, search.memory.best_counts[LENGTH])
 
 
 @inlined
-def _change_way(ground: Ground, tally: Tally, memory: Memory, cell: int, root: int, at: int) -> int:
+def _change_way(search: Search, cell: int, root: int, at: int) -> int:
     """Change the steps on the way from ``root`` to ``cell``; list it from ``touched[at]`` on."""
+    tally, touched = search.tally, search.memory.touched
     while cell != root:
         before = tally.parent[cell]
-        change_step(ground, tally, cell, before)
-        memory.touched[at] = cell
+        change_step(search.ground, tally, cell, before)
+        touched[at] = cell
         at += 1
         cell = before
-    memory.touched[at] = root
+    touched[at] = root
     return at + 1
 
 
 @lean_kernel
-def _move_end(
-    ground: Ground,
-    walk: Walk,
-    tally: Tally,
-    memory: Memory,
-    rules: KickRules,
-    random: NDArray[np.uint64],
-) -> int:
+def _move_end(search: Search, limit: int, random: NDArray[np.uint64]) -> int:
     """Let the walk end elsewhere; return how many cells were touched."""
+    walk, tally = search.walk, search.tally
     root = walk.cells[walk.counts[LENGTH] - 1]
-    settled = search_ways(ground, tally, root, rules.limit, random)
+    settled = search_ways(search.ground, tally, root, limit, random)
     if settled < 2:
         return 0
-    return _change_way(ground, tally, memory, draw_end(tally, settled, random), root, 0)
+    return _change_way(search, draw_end(tally, settled, random), root, 0)
 
 
 @lean_kernel
-def _add_loop(
-    ground: Ground,
-    walk: Walk,
-    tally: Tally,
-    memory: Memory,
-    rules: KickRules,
-    random: NDArray[np.uint64],
-) -> int:
+def _add_loop(search: Search, limit: int, random: NDArray[np.uint64]) -> int:
     """Add a loop round a hole near some visit; return how many cells were touched."""
+    ground, walk, tally = search.ground, search.walk, search.tally
     root = walk.cells[index_of(draw(random), walk.counts[LENGTH])]
     if root >= ground.bound:
         return 0
-    settled = search_ways(ground, tally, root, rules.limit, random)
+    settled = search_ways(ground, tally, root, limit, random)
     found = find_loops(ground, tally, settled)
     if not found:
         return 0
@@ -158,128 +166,100 @@ def _add_loop(
     other = one + ground.offsets[step & 1]
     shared = common_ancestor(tally, one, other)
     change_step(ground, tally, one, other)
-    touched = _change_way(ground, tally, memory, one, shared, 0)
-    return _change_way(ground, tally, memory, other, shared, touched)
+    touched = _change_way(search, one, shared, 0)
+    return _change_way(search, other, shared, touched)
 
 
 @lean_kernel
-def _change_parity(
-    ground: Ground,
-    walk: Walk,
-    prices: Prices,
-    tally: Tally,
-    memory: Memory,
-    rules: KickRules,
-    random: NDArray[np.uint64],
-) -> int:
+def _change_parity(search: Search, rules: PerturbationRules, random: NDArray[np.uint64]) -> int:
     """Move the end or add a loop; return how many cells were touched, 0 if nothing was."""
+    ground, walk, tally = search.ground, search.walk, search.tally
     length = walk.counts[LENGTH]
     count_steps(ground, walk, tally)
     if rules.steady:
         note_order(ground, walk, tally)
     end = walk.cells[length - 1]
-    if prices.free_end and draw(random) & 1:
-        touched = _move_end(ground, walk, tally, memory, rules, random)
-        end = memory.touched[0]
+    if search.prices.free_end and draw(random) & 1:
+        touched = _move_end(search, rules.limit, random)
+        end = search.memory.touched[0]
     else:
-        touched = _add_loop(ground, walk, tally, memory, rules, random)
+        touched = _add_loop(search, rules.limit, random)
     if touched == 0 or length + touched + 1 > walk.cells.size:
         return 0
     length = euler_walk(ground, walk, tally, end, rules.steady, random)
-    recount(ground, walk, length, prices)
+    recount(ground, walk, length, search.prices)
     return touched
 
 
 @lean_kernel
 def _settle(
-    ground: Ground,
-    walk: Walk,
-    prices: Prices,
-    memory: Memory,
-    rules: KickRules,
-    touched: int,
-    random: NDArray[np.uint64],
+    search: Search, rules: PerturbationRules, touched: int, random: NDArray[np.uint64]
 ) -> None:
-    """Improve the walk after a kick: all of it, or the surroundings, cooling down."""
+    """Improve the walk after a perturbation: all of it, or the surroundings, cooling down."""
+    ground, walk, prices, memory = search.ground, search.walk, search.prices, search.memory
     if rules.radius < 0:
-        proposals = rules.mixing * walk.counts[LENGTH]
+        proposals = rules.proposals * walk.counts[LENGTH]
         improve(ground, walk, prices, memory.area[:0], 0, proposals, random)
         memory.work[PROPOSALS] += proposals
         return
-    number = memory.work[KICKS] + 1
+    number = memory.work[PERTURBATIONS] + 1
     around = memory.touched[:touched]
     size = neighbourhood(ground, around, rules.radius, memory.marked, number, memory.area)
-    proposals = rules.mixing * size // COOLING.size
+    proposals = rules.proposals * size // COOLING.size
     for level in COOLING:
-        heat = rules.heat_us * level >> 10
-        improve(ground, walk, prices, memory.area[:size], heat, proposals, random)
+        temperature_us = rules.temperature_us * level >> 10
+        improve(ground, walk, prices, memory.area[:size], temperature_us, proposals, random)
         memory.work[PROPOSALS] += proposals
 
 
 @lean_kernel
 def touch_up(
-    ground: Ground,
-    walk: Walk,
-    prices: Prices,
-    memory: Memory,
-    rules: KickRules,
-    touched: int,
-    random: NDArray[np.uint64],
+    search: Search, rules: PerturbationRules, touched: int, random: NDArray[np.uint64]
 ) -> None:
     """Improve the walk around the first ``touched`` cells of ``memory.touched``.
 
     If that gains nothing the walk stays as it was.
     """
+    walk, memory = search.walk, search.memory
     length, cost = walk.counts[LENGTH], walk.counts[COST]
     copy(walk.cells, memory.saved, length)
-    _settle(ground, walk, prices, memory, rules, touched, random)
-    memory.work[KICKS] += 1
+    _settle(search, rules, touched, random)
+    memory.work[PERTURBATIONS] += 1
     if walk.counts[COST] < cost:
         remember(walk, memory)
     else:
-        copy(memory.saved, walk.cells, length)
-        recount(ground, walk, length, prices)
+        _load(search, memory.saved, length)
 
 
 @lean_kernel
-def kick(
-    ground: Ground,
-    walk: Walk,
-    prices: Prices,
-    tally: Tally,
-    memory: Memory,
-    rules: KickRules,
-    kicks: int,
-    random: NDArray[np.uint64],
+def perturb(
+    search: Search, rules: PerturbationRules, times: int, random: NDArray[np.uint64]
 ) -> None:
-    """Kick the walk so many times; ``memory.best`` follows the best one.
+    """Perturb the walk so many times; ``memory.best`` follows the best one.
 
     Args:
-        ground: where the walk goes.
-        walk: changed in place; a worse walk may be left behind.
-        prices: what is to become less.
-        tally, memory: working memory, and the best walk.
-        rules: how to kick.
-        kicks: how many.
+        search: changed in place.
+        rules: how to perturb.
+        times: how often.
         random: stream, uint64 (1,), not 0; advanced.
     """
-    for _ in range(kicks):
+    walk, memory = search.walk, search.memory
+    for _ in range(times):
         length, cost = walk.counts[LENGTH], walk.counts[COST]
         copy(walk.cells, memory.saved, length)
         if draw(random) & 255 < rules.loops_of_256:
-            touched = _change_parity(ground, walk, prices, tally, memory, rules, random)
+            touched = _change_parity(search, rules, random)
         else:
             touched = 0
         if touched == 0:
-            # Nothing to change there: heat up a spot.
+            # Nothing to change there: anneal around a spot.
             spot = walk.cells[index_of(draw(random), walk.counts[LENGTH])]
-            if spot < ground.bound:
+            if spot < search.ground.bound:
                 memory.touched[0] = spot
                 touched = 1
-        _settle(ground, walk, prices, memory, rules, touched, random)
-        memory.work[KICKS] += 1
+        _settle(search, rules, touched, random)
+        memory.work[PERTURBATIONS] += 1
         if walk.counts[COST] < memory.best_counts[COST]:
             remember(walk, memory)
-        elif rules.strict or not accepts(walk.counts[COST] - cost, rules.patience_us, random):
-            copy(memory.saved, walk.cells, length)
-            recount(ground, walk, length, prices)
+        elif rules.strict or not accepts(walk.counts[COST] - cost, rules.acceptance_us, random):
+            _load(search, memory.saved, length)

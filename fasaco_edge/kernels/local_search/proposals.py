@@ -1,23 +1,26 @@
-"""Local search on a walk: thousands of small proposals, none of which needs a distance.
+"""Local search on a walk: a stream of small proposals, none of which needs a distance.
 
 ============  =================================================  ==============
 move          what it does                                       steps
 ============  =================================================  ==============
-square flip   steps a-b and c-d become a-c and b-d, what lies    0
-              between is turned round (2-opt on a square)
-end flip      the tail behind a step a-b is turned round, where  0
-              the free end lies beside a
-corner flip   a visit that can be spared goes to the opposite    0
-              corner of its square
-shrink        a spike, or two visits that can be spared between  -2 (-1 at a
-              neighbours, or the free end, is left out           free end)
+square flip   steps a-b and c-d become a-c and b-d, the part     0
+              between is reversed (2-opt on a square)
+end flip      the part behind a step a-b is reversed, where the  0
+              free end lies beside a
+corner flip   a spare visit moves to the opposite corner of its  0
+              square
+shrink        a spike, or two spare visits between neighbours,   -2 (-1 at a
+              or the free end, is left out                       free end)
 detour        one step becomes three, or a spike                 +2
 ============  =================================================  ==============
 
-Where steps alone count, the moves at no cost are always taken: they carry the
-visits that can be spared about until two of them meet and shrink. Where turns
-count, most moves cost something, and simulated annealing decides (Metropolis).
+A visit is spare where its cell is visited more often than it needs to be. Where
+steps alone count, the moves at no cost are always taken: they move spare visits
+about until two of them meet and shrink. Where turns count, most moves cost
+something, and simulated annealing decides (Metropolis).
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,28 +44,38 @@ from fasaco_edge.kernels.local_search.walk_array import (
 from fasaco_edge.kernels.random import draw, index_of
 
 # -ln(u) for u spread evenly over (0, 1), in units of 1 / 65536: whole numbers, so
-# that a walk is accepted or not alike on every machine.
+# that every machine decides alike.
 EXPONENTIAL = np.round(-np.log((np.arange(4096) + 0.5) / 4096) * 65536).astype(np.int64)
 
-# Of 64 proposals at a visit that can be spared so many try to be rid of it, and of
-# 64 proposals so many are detours where they can be afforded.
-SPARED_OF_64 = 40
+# Of 64 proposals at a spare visit so many try to remove it, and of 64 proposals at a
+# temperature above 0 so many are detours.
+REMOVALS_OF_64 = 40
 DETOURS_OF_64 = 8
 
-# Half of the proposals go where something can be gained: to visits that can be
-# spared, or to a cell one or two steps beside one.
+# Half of the proposals go where something can be gained: to cells with spare visits,
+# or to a cell one or two steps beside one.
 AT_SPARE_OF_256 = 128
 BESIDE_OF_256 = 128
 
 
 @inlined
-def accepts(delta: int, heat_us: int, random: NDArray[np.uint64]) -> bool:
-    """Tell whether a change of cost [us] is taken at a temperature [us] (Metropolis)."""
+def accepts(delta: int, temperature_us: int, random: NDArray[np.uint64]) -> bool:
+    """Return whether a change of cost [us] is taken at a temperature [us] (Metropolis)."""
     if delta <= 0:
         return True
-    if heat_us == 0:
+    if temperature_us == 0:
         return False
-    return bool(delta <= heat_us * EXPONENTIAL[draw(random) & 4095] >> 16)
+    return bool(delta <= temperature_us * EXPONENTIAL[draw(random) & 4095] >> 16)
+
+
+class _State(NamedTuple):
+    """The walk, and what decides over its changes: arguments of ``improve``."""
+
+    ground: Ground
+    walk: Walk
+    prices: Prices
+    temperature_us: int
+    random: NDArray[np.uint64]
 
 
 @inlined
@@ -86,48 +99,38 @@ def _turn_in(walk: Walk, before: int, here: int, after: int, quarter_turn_us: in
 
 
 @inlined
-def _shorten_end(
-    ground: Ground, walk: Walk, prices: Prices, heat_us: int, random: NDArray[np.uint64]
-) -> None:
-    last = walk.counts[LENGTH] - 1
-    delta = -prices.step_us - _turn_at(walk, last - 1, prices.quarter_turn_us)
-    if accepts(delta, heat_us, random):
-        drop(ground, walk, last, 1)
-        walk.counts[COST] += delta
+def _propose_drop(state: _State, index: int, visits: int, delta: int) -> None:
+    """Leave out one or two visits from ``index`` on if the change of cost [us] is accepted."""
+    if accepts(delta, state.temperature_us, state.random):
+        drop(state.ground, state.walk, index, visits)
+        state.walk.counts[COST] += delta
 
 
 @inlined
-def _drop_spike(
-    ground: Ground,
-    walk: Walk,
-    index: int,
-    prices: Prices,
-    heat_us: int,
-    random: NDArray[np.uint64],
-) -> None:
+def _drop_end(state: _State) -> None:
+    """Leave out the last visit."""
+    last = state.walk.counts[LENGTH] - 1
+    prices = state.prices
+    delta = -prices.step_us - _turn_at(state.walk, last - 1, prices.quarter_turn_us)
+    _propose_drop(state, last, 1, delta)
+
+
+@inlined
+def _drop_spike(state: _State, index: int) -> None:
     """Leave out visit ``index`` between two visits of one cell, and the second of these."""
-    turn = prices.quarter_turn_us
-    delta = -2 * prices.step_us
+    walk, turn = state.walk, state.prices.quarter_turn_us
+    delta = -2 * state.prices.step_us
     if turn:
         delta -= 2 * turn + _turn_at(walk, index - 1, turn) + _turn_at(walk, index + 1, turn)
         delta += _turn_in(walk, index - 2, walk.cells[index - 1], index + 2, turn)
-    if accepts(delta, heat_us, random):
-        drop(ground, walk, index, 2)
-        walk.counts[COST] += delta
+    _propose_drop(state, index, 2, delta)
 
 
 @inlined
-def _drop_detour(
-    ground: Ground,
-    walk: Walk,
-    index: int,
-    prices: Prices,
-    heat_us: int,
-    random: NDArray[np.uint64],
-) -> None:
+def _drop_detour(state: _State, index: int) -> None:
     """Leave out visits ``index`` and ``index + 1``, whose neighbours are beside each other."""
-    turn = prices.quarter_turn_us
-    delta = -2 * prices.step_us
+    walk, turn = state.walk, state.prices.quarter_turn_us
+    delta = -2 * state.prices.step_us
     if turn:
         for place in range(index - 1, index + 3):
             delta -= _turn_at(walk, place, turn)
@@ -136,27 +139,33 @@ def _drop_detour(
             delta += turning(walk.cells[index - 2], before, after, turn)
         if index + 3 < walk.counts[LENGTH]:
             delta += turning(before, after, walk.cells[index + 3], turn)
-    if accepts(delta, heat_us, random):
-        drop(ground, walk, index, 2)
-        walk.counts[COST] += delta
+    _propose_drop(state, index, 2, delta)
 
 
 @inlined
-def _flip_corner(
-    ground: Ground,
-    walk: Walk,
-    index: int,
-    prices: Prices,
-    heat_us: int,
-    random: NDArray[np.uint64],
-) -> None:
+def _takes_flip(state: _State, first: int, delta: int) -> bool:
+    """Return whether a change from visit ``first`` on that keeps the length is taken, and count it.
+
+    Visits that are held are changed only where something is gained.
+    """
+    if delta >= 0 and first < state.prices.held:
+        return False
+    if state.prices.quarter_turn_us:
+        if not accepts(delta, state.temperature_us, state.random):
+            return False
+        state.walk.counts[COST] += delta
+    return True
+
+
+@inlined
+def _flip_corner(state: _State, index: int) -> None:
     """Move a visit to the opposite corner of the square that the walk turns in there."""
+    ground, walk, turn = state.ground, state.walk, state.prices.quarter_turn_us
     cells = walk.cells
     before, here, after = cells[index - 1], cells[index], cells[index + 1]
     corner = before + after - here
     if corner == here or not (leads(ground, before, corner) and leads(ground, after, corner)):
         return
-    turn = prices.quarter_turn_us
     delta = 0
     if turn:
         delta -= _turn_at(walk, index - 1, turn) + _turn_at(walk, index + 1, turn)
@@ -164,49 +173,37 @@ def _flip_corner(
             delta += turning(cells[index - 2], before, corner, turn)
         if index + 2 < walk.counts[LENGTH]:
             delta += turning(corner, after, cells[index + 2], turn)
-    if delta >= 0 and index < prices.held:
-        return
-    if turn:
-        if not accepts(delta, heat_us, random):
-            return
-        walk.counts[COST] += delta
-    put(ground, walk, index, corner)
+    if _takes_flip(state, index, delta):
+        put(ground, walk, index, corner)
 
 
 @inlined
-def _be_rid_of(
-    ground: Ground,
-    walk: Walk,
-    index: int,
-    choice: int,
-    prices: Prices,
-    heat_us: int,
-    random: NDArray[np.uint64],
-) -> None:
-    """Leave out a visit that can be spared, or move it."""
+def _remove(state: _State, index: int, choice: int) -> None:
+    """Leave out a spare visit, or move it."""
+    ground, walk = state.ground, state.walk
     if index == 0:
         return
     last = walk.counts[LENGTH] - 1
     if index == last:
-        if prices.free_end:
-            _shorten_end(ground, walk, prices, heat_us, random)
+        if state.prices.free_end:
+            _drop_end(state)
         return
     cells = walk.cells
     before, here, after = cells[index - 1], cells[index], cells[index + 1]
     if before == after:
-        _drop_spike(ground, walk, index, prices, heat_us, random)
+        _drop_spike(state, index)
         return
     both_spare = index + 2 <= last and walk.visits[after] > ground.needed[after]
     if choice & 1 and both_spare and leads(ground, before, cells[index + 2]):
-        _drop_detour(ground, walk, index, prices, heat_us, random)
+        _drop_detour(state, index)
         return
     if after - here != here - before:
-        _flip_corner(ground, walk, index, prices, heat_us, random)
+        _flip_corner(state, index)
 
 
 @inlined
 def _turns_of_flip(walk: Walk, first: int, last: int, turn: int) -> int:
-    """Return by how much turns cost more if visits ``first + 1`` to ``last`` are turned round."""
+    """Return by how much turns cost more if visits ``first + 1`` to ``last`` are reversed."""
     cells, length = walk.cells, walk.counts[LENGTH]
     near, after, far = cells[first], cells[first + 1], cells[last]
     delta = turning(near, far, cells[last - 1], turn)
@@ -226,7 +223,7 @@ def _turns_of_flip(walk: Walk, first: int, last: int, turn: int) -> int:
 
 @inlined
 def _is_flip(ground: Ground, walk: Walk, first: int, last: int, back: int, free_end: bool) -> bool:
-    """Tell whether visits ``first + 1`` to ``last`` can be turned round.
+    """Return whether visits ``first + 1`` to ``last`` can be reversed.
 
     One of the two new steps is known to be there: between the last visits of both
     parts if ``back``, else between the first ones.
@@ -242,17 +239,9 @@ def _is_flip(ground: Ground, walk: Walk, first: int, last: int, back: int, free_
 
 
 @inlined
-def _flip_square(
-    ground: Ground,
-    walk: Walk,
-    index: int,
-    direction: int,
-    choice: int,
-    prices: Prices,
-    heat_us: int,
-    random: NDArray[np.uint64],
-) -> None:
+def _flip_square(state: _State, index: int, direction: int, choice: int) -> None:
     """Flip the square beside visit ``index`` in ``direction``, if two steps run along it."""
+    ground, walk, prices = state.ground, state.walk, state.prices
     here = walk.cells[index]
     if not ground.steps[here] >> direction & 1:
         return
@@ -266,27 +255,14 @@ def _flip_square(
         return
     turn = prices.quarter_turn_us
     delta = _turns_of_flip(walk, first, last, turn) if turn else 0
-    if delta >= 0 and first + 1 < prices.held:
-        return
-    if turn:
-        if not accepts(delta, heat_us, random):
-            return
-        walk.counts[COST] += delta
-    reverse(walk, first + 1, last)
+    if _takes_flip(state, first + 1, delta):
+        reverse(walk, first + 1, last)
 
 
 @inlined
-def _detour(
-    ground: Ground,
-    walk: Walk,
-    index: int,
-    direction: int,
-    choice: int,
-    prices: Prices,
-    heat_us: int,
-    random: NDArray[np.uint64],
-) -> None:
+def _add_detour(state: _State, index: int, direction: int, choice: int) -> None:
     """Go from visit ``index`` to the next around a square, or to a side and back first."""
+    ground, walk, prices = state.ground, state.walk, state.prices
     length = walk.counts[LENGTH]
     if index + 1 >= length or length + 2 > walk.cells.size or index + 1 < prices.held:
         return
@@ -309,14 +285,14 @@ def _detour(
         delta -= _turn_at(walk, index + 1, turn)
         if index + 2 < length:
             delta += turning(back, after, cells[index + 2], turn)
-    if accepts(delta, heat_us, random):
+    if accepts(delta, state.temperature_us, state.random):
         insert_two(ground, walk, index + 1, aside, back)
         walk.counts[COST] += delta
 
 
 @inlined
 def _pick_spare(ground: Ground, walk: Walk, bits: int) -> int:
-    """Return a cell that has a visit to spare, or one a step or two beside such a cell; or -1."""
+    """Return a cell with a spare visit, or one a step or two beside such a cell; or -1."""
     cell = walk.spare[index_of(bits, walk.counts[SPARE_CELLS])]
     aside = bits >> 16 & 255
     if aside < BESIDE_OF_256:
@@ -336,7 +312,7 @@ def improve(
     walk: Walk,
     prices: Prices,
     area: NDArray[np.int32],
-    heat_us: int,
+    temperature_us: int,
     proposals: int,
     random: NDArray[np.uint64],
 ) -> None:
@@ -345,12 +321,13 @@ def improve(
     Args:
         ground: where the walk goes.
         walk: changed in place; its length is below 2^22.
-        prices: what is to become less.
+        prices: of the walk, whose cost is minimised.
         area: cells to make the proposals at, int32 (m,); empty for the whole walk.
-        heat_us: temperature [us]; at 0 no change for the worse is taken.
+        temperature_us: temperature [us]; at 0 no change for the worse is taken.
         proposals: how many to make.
         random: stream, uint64 (1,), not 0; advanced.
     """
+    state = _State(ground, walk, prices, temperature_us, random)
     for _ in range(proposals):
         bits = draw(random)
         if area.size:
@@ -367,9 +344,9 @@ def improve(
         if not is_at(walk, cell, index):
             continue
         direction, choice = bits & 3, bits >> 2 & 63
-        if choice < SPARED_OF_64 and walk.visits[cell] > ground.needed[cell]:
-            _be_rid_of(ground, walk, index, choice, prices, heat_us, random)
-        elif heat_us == 0 or choice < 64 - DETOURS_OF_64:
-            _flip_square(ground, walk, index, direction, choice, prices, heat_us, random)
+        if choice < REMOVALS_OF_64 and walk.visits[cell] > ground.needed[cell]:
+            _remove(state, index, choice)
+        elif temperature_us == 0 or choice < 64 - DETOURS_OF_64:
+            _flip_square(state, index, direction, choice)
         else:
-            _detour(ground, walk, index, direction, choice, prices, heat_us, random)
+            _add_detour(state, index, direction, choice)

@@ -1,13 +1,11 @@
-"""Where a walk changed, and what lies around.
+"""Regions of a large ground: where a walk changed, and parts of a walk cut out and put back.
 
-A region of a large ground, cut out with the parts of a walk that lie in it.
-
-What the walk does outside stands in the region's own walk as a jump between the
-two cells just outside where it leaves and comes back; jumps and those cells
-stay as they are (``needed`` is FIXED, no step leads there), so that whatever
-improves the region's walk improves the whole one, and the whole one stays
-connected. Put back, the outside parts are taken over in the order and the
-direction that the region's walk has come to visit them in.
+A part of the walk outside stands in the region's own walk as a jump between the two
+cells just outside where it leaves and comes back; jumps and those cells stay as they
+are (``needed`` is FIXED, no step leads there), so that whatever improves the region's
+walk improves the whole one, and the whole one stays connected. Put back, the outside
+parts are copied in the order and the direction that the region's walk now visits
+them in.
 """
 
 from typing import NamedTuple
@@ -75,8 +73,8 @@ def neighbourhood(
         radius: steps from them to the rim.
         labels: int32 (cells of the ground,), changed in place.
         label: one that no cell has yet.
-        found: out, int32 (room,), the labelled cells, nearest first; no more are labelled
-            than there is room for.
+        found: out, int32 (capacity,), the labelled cells, nearest first; no more are
+            labelled than fit.
 
     Returns:
         How many were labelled.
@@ -103,12 +101,14 @@ def neighbourhood(
     return size
 
 
-# What ``sections`` notes at its end besides the jumps.
+# Entries of ``Jumps.limits``.
 BEFORE, AFTER = 0, 1
 
 
 class Box(NamedTuple):
     """A region: the cells with its label, and the rectangle they lie in.
+
+    Its own ground is the rectangle with a frame around it.
 
     Attributes:
         labels: int32 (n,), label of each cell of the large ground.
@@ -123,6 +123,28 @@ class Box(NamedTuple):
     col: int
     rows: int
     cols: int
+
+
+class Jumps(NamedTuple):
+    """The parts of the whole walk outside a region; jump i is cell ``bound + i`` of its walk.
+
+    Attributes:
+        ends: int32 (jumps, 2), the cells of the region's ground a jump leads between.
+        sections: int32 (jumps, 2), first and last visit of the whole walk that the jump
+            stands for.
+        limits: int64 (2,): visits up to BEFORE come before the region's walk, those from
+            AFTER on come after it.
+    """
+
+    ends: NDArray[np.int32]
+    sections: NDArray[np.int32]
+    limits: NDArray[np.int64]
+
+
+@inlined
+def _bound(box: Box) -> int:
+    """Return how many cells the region's ground has, frame and all."""
+    return (box.rows + 2 * FRAME) * (box.cols + 2 * FRAME)
 
 
 @inlined
@@ -166,14 +188,7 @@ def cut_ground(ground: Ground, box: Box, region: Ground) -> int:
 
 @lean_kernel
 def cut_walk(
-    ground: Ground,
-    box: Box,
-    cells: NDArray[np.int32],
-    bound: int,
-    walk: NDArray[np.int32],
-    jump_ends: NDArray[np.int32],
-    sections: NDArray[np.int32],
-    limits: NDArray[np.int64],
+    ground: Ground, box: Box, cells: NDArray[np.int32], walk: NDArray[np.int32], jumps: Jumps
 ) -> tuple[int, int]:
     """Write the parts of a walk that lie in the region, with jumps between them.
 
@@ -181,20 +196,15 @@ def cut_walk(
         ground: the large ground.
         box: the region.
         cells: int32 (length,), the whole walk.
-        bound: number of cells of the region's ground, frame and all: jump i is cell
-            ``bound + i``.
-        walk: out, int32 (room,), the region's walk.
-        jump_ends: out, int32 (jumps, 2), see ``parity.Tally``.
-        sections: out, int32 (jumps, 2), first and last visit of the whole walk that the
-            jump stands for.
-        limits: out, int64 (2,): visits up to BEFORE come before the region's walk, those
-            from AFTER on come after it.
+        walk: out, int32 (capacity,), the region's walk.
+        jumps: out.
 
     Returns:
         Length of the region's walk and number of jumps; (0, 0) where the walk does not
-        come there or there is too little room.
+        come there or does not fit.
     """
-    length, jumps, visit = 0, 0, 0
+    bound, limits = _bound(box), jumps.limits
+    length, made, visit = 0, 0, 0
     while visit < cells.size and box.labels[cells[visit]] != box.label:
         visit += 1
     if visit == cells.size:
@@ -219,15 +229,15 @@ def cut_walk(
         if visit == cells.size:
             limits[AFTER] = first + 1
             break
-        if jumps == sections.shape[0]:
+        if made == jumps.sections.shape[0]:
             return 0, 0
         there = _local(ground, box, cells[visit - 1])
-        walk[length], walk[length + 1] = bound + jumps, there
+        walk[length], walk[length + 1] = bound + made, there
         length += 2
-        jump_ends[jumps, 0], jump_ends[jumps, 1] = here, there
-        sections[jumps, 0], sections[jumps, 1] = first, visit - 1
-        jumps += 1
-    return length, jumps
+        jumps.ends[made, 0], jumps.ends[made, 1] = here, there
+        jumps.sections[made, 0], jumps.sections[made, 1] = first, visit - 1
+        made += 1
+    return length, made
 
 
 @lean_kernel
@@ -235,19 +245,18 @@ def put_back(
     ground: Ground,
     box: Box,
     cells: NDArray[np.int32],
-    bound: int,
     walk: NDArray[np.int32],
-    sections: NDArray[np.int32],
-    limits: NDArray[np.int64],
+    jumps: Jumps,
     out: NDArray[np.int32],
 ) -> int:
     """Write the whole walk with the region's parts as they are now; return its length.
 
     Args:
-        ground, box, cells, bound, sections, limits: as in ``cut_walk``.
+        ground, box, cells, jumps: as in ``cut_walk``.
         walk: int32 (m,), the region's walk.
-        out: int32 (room,), there must be room.
+        out: int32 (capacity,), long enough.
     """
+    bound, sections, limits = _bound(box), jumps.sections, jumps.limits
     length = limits[BEFORE]
     copy(cells, out, length)
     written = False

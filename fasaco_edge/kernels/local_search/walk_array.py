@@ -1,12 +1,12 @@
-"""A covering walk as an array of cells, and the changes it can be put through.
+"""A covering walk as an array of cells, and the elementary changes of it.
 
 Cells are flat indices of a ground that is framed by two cells without any step,
 so that a neighbour is one addition away and never outside. Steps lead to a
-neighbour; a cell may be visited more than once. ``place`` knows one visit of
-each cell, wherever a change has left it: it is checked before it is believed.
+neighbour; a cell may be visited more than once. ``place`` holds the index of one
+visit of each cell, which may be out of date: it is checked before it is used.
 
-A walk of this form is always connected, whatever is done to it, and needs no
-distances: what a jump would be is a run of cells that are visited elsewhere too.
+A walk of this form stays connected through every change, and needs no distances:
+what would be a jump is a run of cells that are visited elsewhere too.
 """
 
 from typing import NamedTuple
@@ -32,9 +32,9 @@ class Ground(NamedTuple):
     Attributes:
         steps: step masks, uint8 (n,); 0 for a jump.
         needed: int32 (n,), how many visits the cell must keep: 1 where it is to be
-            covered, 0 where it is not, FIXED where its visits are none of ours.
+            covered, 0 where it is not, FIXED where its visits must not change.
         offsets: int64 (4,), difference of flat index for a step in each direction.
-        bound: cells from here on are none: they stand for jumps, see ``regions``.
+        bound: indices from here on are no cells but jumps, see ``regions``.
     """
 
     steps: NDArray[np.uint8]
@@ -44,10 +44,10 @@ class Ground(NamedTuple):
 
 
 class Walk(NamedTuple):
-    """The walk and what is known of it.
+    """The walk and counts over it.
 
     Attributes:
-        cells: int32 (room,), the walk; beyond its length anything.
+        cells: int32 (capacity,), the walk; beyond its length undefined.
         place: int32 (n,), index of one of the cell's visits.
         visits: int32 (n,), how often the cell is visited.
         spare: int32 (n,), cells with more visits than needed, in any order.
@@ -64,12 +64,12 @@ class Walk(NamedTuple):
 
 
 class Prices(NamedTuple):
-    """What a walk costs, whether its last cell is free to be another, and what is to hold still.
+    """Prices of steps and turns, and what may change of a walk.
 
     Attributes:
         step_us, quarter_turn_us: [us]; a half turn is two quarter-turns.
         free_end: whether the walk may end anywhere.
-        held: so many of the first visits are changed only where something is gained.
+        held: so many of the first visits change only where something is gained.
     """
 
     step_us: int
@@ -87,7 +87,7 @@ def copy(source: NDArray[np.int32], target: NDArray[np.int32], length: int) -> N
 
 @inlined
 def leads(ground: Ground, here: int, there: int) -> bool:
-    """Tell whether there is a step from ``here`` to ``there``."""
+    """Return whether there is a step from ``here`` to ``there``."""
     gap, mask = there - here, ground.steps[here]
     if gap == 1:
         return bool(mask & 1)
@@ -140,7 +140,7 @@ def take_visit(ground: Ground, walk: Walk, cell: int) -> None:
 
 @lean_kernel
 def recount(ground: Ground, walk: Walk, length: int, prices: Prices) -> None:
-    """Set all that follows from ``cells[:length]``."""
+    """Set the walk to ``cells[:length]``: all counts and indices."""
     walk.visits[:] = 0
     walk.place[:] = 0
     walk.counts[LENGTH] = length
@@ -154,7 +154,7 @@ def recount(ground: Ground, walk: Walk, length: int, prices: Prices) -> None:
 
 @inlined
 def is_at(walk: Walk, cell: int, index: int) -> bool:
-    """Tell whether the walk's visit ``index``, any number, is one of ``cell``."""
+    """Return whether the walk's visit ``index``, any number, is one of ``cell``."""
     return bool(0 <= index < walk.counts[LENGTH] and walk.cells[index] == cell)
 
 
@@ -182,7 +182,7 @@ def find_visit(ground: Ground, walk: Walk, cell: int) -> None:
 
 @inlined
 def reverse(walk: Walk, first: int, last: int) -> None:
-    """Turn round the visits from ``first`` to ``last``."""
+    """Reverse the visits from ``first`` to ``last``."""
     cells, place = walk.cells, walk.place
     while first < last:
         one, other = cells[first], cells[last]
@@ -229,7 +229,7 @@ def drop(ground: Ground, walk: Walk, index: int, visits: int) -> None:
 
 @lean_kernel
 def insert_two(ground: Ground, walk: Walk, index: int, one: int, other: int) -> None:
-    """Put two visits before visit ``index``; there must be room."""
+    """Put two visits before visit ``index``; the array must be long enough."""
     cells, place = walk.cells, walk.place
     for after in range(walk.counts[LENGTH] - 1, index - 1, -1):
         cell = cells[after]

@@ -72,8 +72,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--variants",
         ("ants", "flat", "never"),
         ["ants"],
-        "what the search goes on from where kicks gain nothing any more: the colony's next ants; "
-        "ants on a trail that nothing strengthens; or the same walk",
+        "what the search restarts from where perturbations gain nothing any more: the colony's "
+        "next ants; ants on a trail that nothing strengthens; or the same walk",
     )
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw ratios over budgets")
 

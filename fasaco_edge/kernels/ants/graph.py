@@ -1,8 +1,8 @@
-"""Walks that grow cell by cell on a flat lattice, and the way out of their dead ends.
+"""The graph that walks are built on cell by cell, and the way out of their dead ends.
 
 Cells are flat indices ``row * cols + col``; n of them. A walk is an int32 array
-with a count beside it; one that outgrows its array is counted on but no longer
-written, so that the caller can give it more room and ask again.
+with a count beside it; where the array is too short the count goes on and nothing
+is written, so that the caller can pass a longer one and ask again.
 """
 
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import kernel
+from fasaco_edge.kernels.jit import lean_kernel
 
 
 class Graph(NamedTuple):
@@ -18,10 +18,10 @@ class Graph(NamedTuple):
 
     Attributes:
         steps: step masks, uint8 (n,).
-        wanted: uint8 (n,), 1 where a visit is asked for.
+        wanted: uint8 (n,), 1 for the cells to visit.
         open_steps: uint8 (n + 2 * cols,), bit ``1 << direction`` where a step leads to a
-            wanted cell; cell c stands at index ``c + cols``. The margins spare a test
-            whether a neighbour exists.
+            wanted cell; cell c stands at index ``c + cols``. With the margins no
+            test is needed whether a neighbour exists.
         offsets: int64 (4,), difference of flat index for a step in each direction.
     """
 
@@ -51,15 +51,19 @@ class Scratch(NamedTuple):
     weights: NDArray[np.float64]
 
 
-@kernel
+@lean_kernel
 def begin(graph: Graph, scratch: Scratch, start: int) -> int:
-    """Open all wanted cells but the start; return how many there are."""
-    scratch.open_steps[:] = graph.open_steps
+    """Open all wanted cells but the start; return how many they are."""
+    for index in range(graph.open_steps.size):
+        scratch.open_steps[index] = graph.open_steps[index]
     close(graph, scratch, start)
-    return int(np.sum(graph.wanted)) - int(graph.wanted[start])
+    wanted = 0
+    for cell in range(graph.wanted.size):
+        wanted += graph.wanted[cell]
+    return int(wanted - graph.wanted[start])
 
 
-@kernel
+@lean_kernel
 def close(graph: Graph, scratch: Scratch, cell: int) -> None:
     """Note the visit of ``cell``: no step leads to an open cell there any more."""
     at = cell + graph.offsets[1]
@@ -67,14 +71,14 @@ def close(graph: Graph, scratch: Scratch, cell: int) -> None:
         scratch.open_steps[at + graph.offsets[direction]] &= 255 ^ (1 << ((direction + 2) & 3))
 
 
-@kernel
+@lean_kernel
 def open_steps_of(graph: Graph, scratch: Scratch, cell: int) -> int:
     """Return the mask of steps from ``cell`` to open cells."""
     return int(scratch.open_steps[cell + graph.offsets[1]])
 
 
-@kernel
-def find(graph: Graph, scratch: Scratch, here: int, goal: int) -> int:
+@lean_kernel
+def _find(graph: Graph, scratch: Scratch, here: int, goal: int) -> int:
     """Search breadth first; return ``goal``, or with goal -1 the nearest open cell."""
     scratch.searches[0] += 1
     search = scratch.searches[0]
@@ -101,11 +105,16 @@ def find(graph: Graph, scratch: Scratch, here: int, goal: int) -> int:
     return here
 
 
-@kernel
+@lean_kernel
 def append_way(
     graph: Graph, scratch: Scratch, walk: NDArray[np.int32], length: int, here: int, goal: int
-) -> int:
-    """Append the way from ``here`` to a ``goal`` that was found; return the new length."""
+) -> tuple[int, int]:
+    """Append a shortest way from ``here`` to ``goal``, or with goal -1 to the nearest open cell.
+
+    Returns:
+        The walk's new length and the cell it has come to, by step ``scratch.came_from[cell]``.
+    """
+    goal = _find(graph, scratch, here, goal)
     distance, cell = 0, goal
     while cell != here:
         cell -= graph.offsets[scratch.came_from[cell]]
@@ -115,4 +124,4 @@ def append_way(
         if index < walk.size:
             walk[index] = cell
         cell -= graph.offsets[scratch.came_from[cell]]
-    return length + distance
+    return length + distance, goal

@@ -1,4 +1,4 @@
-"""A number of steps that no covering walk can beat.
+"""A lower bound on the steps of a covering walk.
 
 A walk from ``start`` to ``end`` visits all required cells; start and end count as
 required. Each bound below counts some steps that every such walk makes.
@@ -14,12 +14,12 @@ the bounds of the blocks add up.
 *Independent set.* Let I be wanted cells of B, no two of them neighbours. A step has
 at most one end in I, so visits to I share no steps. Each has a step before it and one
 after it, but for the first and the last cell of an open walk. So a closed walk makes
-2 |I| steps at I, an open one 2 |I| - [a in I] - [b in I]. Any I will do: what hinges on
-the matching it is read from is only how large it is.
+2 |I| steps at I, an open one 2 |I| - [a in I] - [b in I]. Any I is valid: the matching it
+is read from decides only how large it is.
 
 *Islands.* Cells joined by steps at I are an island; only islands with wanted cells
 count. If there are k > 1, the walk makes further steps between them, none of them at I:
-(1) Islands have two colours, and no step joins two of one colour (kernels/islands.py).
+(1) Islands have two colours, and no step joins two of one colour (see ``blocks.find_islands``).
 A walk comes to each of the m islands of a colour and leaves it, which is 2 m steps, as
 none of them serves two of these islands; one less for each end of the walk in one of
 them. With both ends in the same island it leaves that one, too, and comes back: 2 m.
@@ -185,15 +185,15 @@ def _bound_block(ground: Ground, cells: NDArray[np.int32], count: int, number: i
         ground.open_steps[cell] = 0
     same = 1 if ground.colour[top] else 0
     closed, first = 0, -1
-    for turn in range(3):
+    for attempt in range(3):
         # The first two sets leave out all cells of one colour that any largest set leaves
         # out; the second, of the top's colour, the top if it can. Then the third leaves out
         # the top and what cells of the other colour can be left out with it.
-        if turn == 2:
+        if attempt == 2:
             if ground.chosen[top]:
                 break
             first = pairing.mate[top]
-        side = same if turn == 1 else 1 - same
+        side = same if attempt == 1 else 1 - same
         closed = max(closed, _bound_by_set(ground, graph, sea, side, first))
     if count < cells.size:
         measure_from(sea, top)

@@ -1,4 +1,4 @@
-"""Kicks: what they leave behind is a walk, and the best one is remembered."""
+"""Perturbations leave a walk behind, and the best one is remembered."""
 
 from collections import Counter
 
@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from fasaco_edge.kernels.local_search.perturbation import (
     COOLING,
-    KICKS,
-    KickRules,
-    kick,
+    PERTURBATIONS,
+    PerturbationRules,
+    Search,
+    perturb,
     recall,
     remember,
     touch_up,
@@ -39,12 +40,14 @@ EVERY_CELL = 1 << 30
 
 
 def rules_for(
-    prices, radius, mixing=10, loops_of_256=256, limit=EVERY_CELL, patience=0.4, steady=False,
+    prices, radius, proposals=10, loops_of_256=256, limit=EVERY_CELL, patience=0.4, steady=False,
     strict=False,
 ):  # fmt: skip
     unit = (prices.step_us + prices.quarter_turn_us) * 2 // 5
     patience_us = int(unit * patience)
-    return KickRules(limit, mixing, radius, unit, patience_us, loops_of_256, steady, strict)
+    return PerturbationRules(
+        limit, proposals, radius, unit, patience_us, loops_of_256, steady, strict
+    )
 
 
 def set_up(task, prices, room=None):
@@ -52,7 +55,7 @@ def set_up(task, prices, room=None):
     walk = walk_on(ground, task.cells(), prices, room or 4 * len(task.walk) + 300)
     tally, memory = tally_on(ground, walk.cells.size), memory_on(ground, walk.cells.size)
     remember(walk, memory)
-    return ground, walk, tally, memory
+    return Search(ground, walk, prices, tally, memory)
 
 
 def best_of(memory):
@@ -77,24 +80,25 @@ def assert_best_is_sound(task, ground, memory, prices):
     strict=st.booleans(),
     seed=st.integers(0, 2**32),
 )
-def test_kicks_leave_a_sound_walk_and_remember_the_best(
+def test_perturbations_leave_a_sound_walk_and_remember_the_best(
     task, prices, radius, loops_of_256, limit, room, steady, strict, seed
 ):
-    ground, walk, tally, memory = set_up(task, prices, len(task.walk) + room)
+    search = set_up(task, prices, len(task.walk) + room)
+    ground, walk, _, tally, memory = search
     rules = rules_for(prices, radius, 5, loops_of_256, limit, steady=steady, strict=strict)
     random = stream(seed)
     seen = [walk.counts[COST]]
     for number in range(1, 25):
-        kick(ground, walk, prices, tally, memory, rules, 1, random)
+        perturb(search, rules, 1, random)
         assert_sound(task, ground, walk, prices)
         seen.append(walk.counts[COST])
         assert memory.best_counts[COST] == min(seen)
-        assert memory.work[KICKS] == number
+        assert memory.work[PERTURBATIONS] == number
         assert not strict or cells_of(walk) == best_of(memory)
         # At the end of the search the lists of jumps and steps are as at its beginning.
         assert (tally.links == -1).all()
     assert_best_is_sound(task, ground, memory, prices)
-    recall(ground, walk, prices, memory)
+    recall(search)
     assert cells_of(walk) == best_of(memory)
     assert_sound(task, ground, walk, prices)
     assert_guards_hold(walk, tally, memory)
@@ -102,28 +106,28 @@ def test_kicks_leave_a_sound_walk_and_remember_the_best(
 
 @pytest.mark.parametrize("prices", PRICES, ids=str)
 @pytest.mark.parametrize("radius", [-1, 8])
-def test_many_kicks_at_once_are_as_many_kicks_one_by_one(prices, radius):
+def test_many_perturbations_at_once_are_as_many_one_by_one(prices, radius):
     task = task_on(ROOMS["rooms"][0].steps, (0, 0), np.random.default_rng(5))
     ends = []
     for pieces in ([30], [1] * 30, [7, 23]):
-        ground, walk, tally, memory = set_up(task, prices)
-        random = stream(9)
-        for kicks in pieces:
-            kick(ground, walk, prices, tally, memory, rules_for(prices, radius), kicks, random)
-        ends.append((cells_of(walk), best_of(memory), memory.work.tolist(), random.tolist()))
+        search = set_up(task, prices)
+        memory, random = search.memory, stream(9)
+        for times in pieces:
+            perturb(search, rules_for(prices, radius), times, random)
+        ends.append((cells_of(search.walk), best_of(memory), memory.work.tolist(), random.tolist()))
     assert ends[0] == ends[1] == ends[2]
 
 
-def unmixed_kicks(task, prices, kicks, seed):
-    """The walks that single kicks lead to, each from the same walk, without any improvement."""
-    rules = rules_for(prices, 0, mixing=0, patience=1e4)
-    for number in range(kicks):
-        ground, walk, tally, memory = set_up(task, prices)
-        kick(ground, walk, prices, tally, memory, rules, 1, stream((seed, number)))
-        yield ground, cells_of(walk)
+def bare_perturbations(task, prices, times, seed):
+    """The walks that single perturbations of one walk lead to, without any improvement."""
+    rules = rules_for(prices, 0, proposals=0, patience=1e4)
+    for number in range(times):
+        search = set_up(task, prices)
+        perturb(search, rules, 1, stream((seed, number)))
+        yield search.ground, cells_of(search.walk)
 
 
-def test_kicks_move_the_end_or_lead_round_a_hole():
+def test_perturbations_move_the_end_or_lead_round_a_hole():
     changes = Counter()
     for seed in range(40):
         task = drawn_task(seed, 6)
@@ -134,7 +138,7 @@ def test_kicks_move_the_end_or_lead_round_a_hole():
             squares.add(square)
         before = task.cells().tolist()
         for prices in PRICES[:2]:
-            for ground, after in unmixed_kicks(task, prices, 10, seed):
+            for ground, after in bare_perturbations(task, prices, 10, seed):
                 chain = chain_of(ground, before) ^ chain_of(ground, after)
                 if after[-1] != before[-1]:
                     changes["end"] += 1
@@ -147,26 +151,28 @@ def test_kicks_move_the_end_or_lead_round_a_hole():
     assert changes["loop", False] > 60
 
 
-def test_a_kick_finds_the_other_way_round_a_pillar():
+def test_a_perturbation_finds_the_other_way_round_a_pillar():
     """Round a pillar of one cell eight steps are the least; local search alone leaves ten."""
     ring = lattice("...", ".#.", "...")
     task = task_on(ring.steps, (0, 0), np.random.default_rng(0))
     there_and_back = [(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0)]
     task = task._replace(walk=there_and_back + there_and_back[-2::-1])
     prices = PRICES[1]
-    ground, walk, tally, memory = set_up(task, prices)
-    kick(ground, walk, prices, tally, memory, rules_for(prices, -1, loops_of_256=0), 20, stream(1))
+    search = set_up(task, prices)
+    memory = search.memory
+    perturb(search, rules_for(prices, -1, loops_of_256=0), 20, stream(1))
     assert memory.best_counts[LENGTH] - 1 == 14
-    kick(ground, walk, prices, tally, memory, rules_for(prices, -1), 20, stream(1))
+    perturb(search, rules_for(prices, -1), 20, stream(1))
     assert memory.best_counts[LENGTH] - 1 == 8
 
 
 @pytest.mark.parametrize("radius", [0, 1, 3])
 def test_the_surroundings_of_a_spot_are_improved_at_each_temperature(radius):
     prices, task = PRICES[2], drawn_task(1, 7)
-    ground, walk, tally, memory = set_up(task, prices)
-    rules = rules_for(prices, radius, mixing=101, loops_of_256=0)
-    kick(ground, walk, prices, tally, memory, rules, 1, stream(1))
+    search = set_up(task, prices)
+    memory = search.memory
+    rules = rules_for(prices, radius, proposals=101, loops_of_256=0)
+    perturb(search, rules, 1, stream(1))
     away = naive.distances(task.steps, task.unframed(memory.touched[0]))
     near = {cell for cell, steps in away.items() if steps <= radius}
     assert {task.unframed(cell) for cell in memory.area[: len(near)]} == near
@@ -176,16 +182,17 @@ def test_the_surroundings_of_a_spot_are_improved_at_each_temperature(radius):
 @settings(max_examples=60, deadline=None)
 @given(task=tasks(), prices=st.sampled_from(PRICES), seed=st.integers(0, 2**32))
 def test_touching_up_a_spot_makes_the_walk_better_or_leaves_it(task, prices, seed):
-    ground, walk, _, memory = set_up(task, prices)
+    search = set_up(task, prices)
+    ground, walk, _, _, memory = search
     random = stream(seed)
     for number in range(1, 15):
         before, cost = cells_of(walk), walk.counts[COST]
         spots = sorted(set(before[number::7])) or before[:1]
         memory.touched[: len(spots)] = spots
-        touch_up(ground, walk, prices, memory, rules_for(prices, 2), len(spots), random)
+        touch_up(search, rules_for(prices, 2), len(spots), random)
         assert_sound(task, ground, walk, prices)
         assert cells_of(walk) == before or walk.counts[COST] < cost
         assert cells_of(walk) == best_of(memory)
-        assert memory.work[KICKS] == number
+        assert memory.work[PERTURBATIONS] == number
     assert_best_is_sound(task, ground, memory, prices)
     assert_guards_hold(walk, memory)

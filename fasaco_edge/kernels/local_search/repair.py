@@ -1,7 +1,7 @@
-"""Mending a walk after the ground changed: what is gone is left out, what is new is put in.
+"""Repair of a walk after the ground changed: lost cells are left out, new ones put in.
 
-A mended walk is legal and complete, and where nothing changed it is the walk
-that it was; how good it is, is left to local search.
+A repaired walk is legal and complete, and where nothing changed it is the walk
+that it was; local search improves it.
 """
 
 from typing import NamedTuple
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import inlined, kernel
+from fasaco_edge.kernels.lattice.reach import UNSEEN, search, steps_to
 from fasaco_edge.kernels.local_search.walk_array import Ground, leads
 
 NOWHERE = -1
@@ -19,67 +20,21 @@ VISITS, LAST = range(2)
 
 
 @kernel
-def _way(
-    ground: Ground,
-    start: int,
-    goal: int,
-    came_from: NDArray[np.int32],
-    queue: NDArray[np.int32],
-) -> int:
-    """Search a shortest way breadth first; return its steps, -1 where there is none.
-
-    ``came_from``, int32 (n,), all NOWHERE, receives the cell before each one reached.
-    """
-    queue[0] = start
-    came_from[start] = start
-    head, tail = 0, 1
-    while head < tail and came_from[goal] == NOWHERE:
-        here = queue[head]
-        head += 1
-        for direction in range(4):
-            if not ground.steps[here] >> direction & 1:
-                continue
-            after = here + ground.offsets[direction]
-            if came_from[after] == NOWHERE:
-                came_from[after] = here
-                queue[tail] = after
-                tail += 1
-    if came_from[goal] == NOWHERE:
-        return -1
-    steps, cell = 0, goal
-    while cell != start:
-        cell = came_from[cell]
-        steps += 1
-    return steps
-
-
-@inlined
-def _append_way(
-    came_from: NDArray[np.int32], walk: NDArray[np.int32], length: int, goal: int, steps: int
-) -> int:
-    cell = goal
-    for index in range(length + steps - 1, length - 1, -1):
-        walk[index] = cell
-        cell = came_from[cell]
-    return length + steps
-
-
-@kernel
 def keep_legal(
     ground: Ground, before: NDArray[np.int32], start: int, walk: NDArray[np.int32]
 ) -> int:
-    """Write what is left of a walk; return its length.
+    """Write what remains of a walk; return its length.
 
     Args:
         ground: as it is now.
-        before: int32 (m,), the walk that was, cells of this ground.
+        before: int32 (m,), the walk before the change, cells of this ground.
         start: where the walk begins now.
-        walk: out, int32 (room,): the walk from ``start``. Where a step is gone, or leads
-            from where the robot is not, it goes by a shortest way to the next cell
-            that is still to be covered; it ends with the last of these.
+        walk: out, int32 (capacity,): the walk from ``start``. Where a step no longer exists
+            or starts elsewhere, it goes by a shortest way to the next cell that is still
+            to be covered; it ends with the last of these.
 
     Returns:
-        The walk's length; it ends early where the room does.
+        The walk's length; it ends early where the array does.
     """
     size = ground.bound
     seen = np.zeros(size, np.uint8)
@@ -97,15 +52,18 @@ def keep_legal(
             walk[length] = cell
             length += 1
         elif is_open and ground.steps[cell]:
-            came_from = np.full(size, NOWHERE, np.int32)
-            steps = _way(ground, here, cell, came_from, queue)
-            if steps < 0:
+            came_from = np.full(size, UNSEEN, np.uint8)
+            search(ground.steps, ground.offsets, here, cell, came_from, queue)
+            if came_from[cell] == UNSEEN:
                 continue
+            steps, at = steps_to(ground.offsets, came_from, cell), cell
             if length + steps > walk.size:
                 break
-            length = _append_way(came_from, walk, length, cell, steps)
-            for index in range(length - steps, length):
-                seen[walk[index]] = 1
+            for index in range(length + steps - 1, length - 1, -1):
+                walk[index] = at
+                seen[at] = 1
+                at -= ground.offsets[came_from[at]]
+            length += steps
         else:
             continue
         here = cell
@@ -119,8 +77,8 @@ class _Walk(NamedTuple):
     """A walk that visits are put into, as a linked list.
 
     Attributes:
-        cells: int32 (room,), the cell of each visit.
-        following: int32 (room,), the visit after each one, NOWHERE after the last.
+        cells: int32 (capacity,), the cell of each visit.
+        following: int32 (capacity,), the visit after each one, NOWHERE after the last.
         visit_of: int32 (n,), the last visit of each cell, NOWHERE where there is none.
         counts: int64 (2,), VISITS so far, and the LAST one.
     """
@@ -234,18 +192,18 @@ def put_in_new(
     """Lead a walk over all cells that it misses; return the new walk's length.
 
     In a wave from the walk outward, each missing cell is visited from the nearest
-    cell that is on the walk by then: there and back; or there alone, where a free
-    end lies beside it. Of several such visits it is the last one: more may be known
-    until then, and what lies just ahead stays as it is. From there a cell is visited
-    only where no way over missing cells leads to it from later on.
+    cell that is on the walk by then: there and back; or one way, where a free end lies
+    beside it. Of several visits of that cell the last one is taken: the map may be known
+    better by then, and the walk just ahead of the robot stays as it is. A cell is visited
+    from there only where no way over missing cells leads to it from a later visit.
 
     Args:
         ground: whose cells with ``needed`` above 0 are to be visited; those that cannot
             be reached are left out.
         before: int32 (m,), the walk, m at least 1.
         free_end: whether the walk may end anywhere.
-        held: so many first visits lie just ahead.
-        out: out, int32 (room,); room for ``m + 2 * n`` visits is enough for any walk.
+        held: so many first visits lie just ahead of the robot.
+        out: out, int32 (capacity,); ``m + 2 * n`` is enough for any walk.
     """
     size = ground.bound
     walk = _Walk(
