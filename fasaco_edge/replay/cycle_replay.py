@@ -197,4 +197,5 @@ def _facts(decided: Decided | None) -> dict[str, object]:
 
 def _plan_words(plan: PlanTaken) -> str:
     ants, perturbations, proposals = plan.work
-    return f"{ants} ants, {perturbations} perturbations, {proposals} proposals, cells {plan.checksum:08x}"
+    counts = f"{ants} ants, {perturbations} perturbations, {proposals} proposals"
+    return f"{counts}, cells {plan.checksum:08x}"
