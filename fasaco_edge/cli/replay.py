@@ -16,7 +16,7 @@ from fasaco_edge.cli.console.streams import print_json
 if TYPE_CHECKING:
     from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.mission.core.events import PathUpdate
-    from fasaco_edge.recording.read.samples import RecordedSamples
+    from fasaco_edge.recording.read.run import RecordedSamples
     from fasaco_edge.replay.cycle_record import CycleRecord
     from fasaco_edge.replay.cycle_replay import CycleReplay, Difference
     from fasaco_edge.replay.mission_drive import ReplayStep
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     """Replay."""
     from fasaco_edge.cli.console import terminal
     from fasaco_edge.config.config import load_config
-    from fasaco_edge.recording.read.samples import RecordedSamples
+    from fasaco_edge.recording.read.run import RecordedSamples
     from fasaco_edge.replay.cycle_record import read_turns
     from fasaco_edge.replay.cycle_replay import CycleReplay
     from fasaco_edge.replay.recorded_run import read_run

@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         print_review(review, told)
     if args.png:
-        from fasaco_edge.review.picture import draw_review
+        from fasaco_edge.review.pictures import draw_review
 
         with writing(args.png):
             draw_review(review).save(args.png, "PNG")

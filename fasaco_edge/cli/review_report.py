@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.review import rows
-from fasaco_edge.review.charts import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
 from fasaco_edge.review.comparison import (
     compared_rows,
     reason_counts,
     setup_differences,
     setup_words,
 )
+from fasaco_edge.review.pictures import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
 from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:

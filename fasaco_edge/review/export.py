@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import astuple
 from numpy.typing import NDArray
 
-from fasaco_edge.review.charts import covered_share
+from fasaco_edge.review.pictures import covered_share
 from fasaco_edge.review.review import Review
 from fasaco_edge.text import one_line
 

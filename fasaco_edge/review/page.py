@@ -12,7 +12,6 @@ from pathlib import Path
 
 from fasaco_edge.drawing.chart import COLOURS, Panel
 from fasaco_edge.review import rows
-from fasaco_edge.review.charts import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.comparison import (
     Document,
     compared_rows,
@@ -21,7 +20,7 @@ from fasaco_edge.review.comparison import (
     setup_words,
 )
 from fasaco_edge.review.document import document
-from fasaco_edge.review.picture import draw_map
+from fasaco_edge.review.pictures import coverage_panel, draw_map, replan_panel, state_panel
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.svg import svg_of
 from fasaco_edge.text import Html, element, html

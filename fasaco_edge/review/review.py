@@ -15,8 +15,13 @@ from fasaco_edge.errors import MapTooLarge
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.mission.orders.zones import kept_out, without
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.run import RunRecord, TimedText, count_frames, read_run_record
-from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.recording.read.run import (
+    RecordedSamples,
+    RunRecord,
+    TimedText,
+    count_frames,
+    read_run_record,
+)
 from fasaco_edge.review.drive import Drive, WalkFigures, drive_over, first_covered, walk_figures
 from fasaco_edge.review.faults import Faults, faults_of
 from fasaco_edge.review.moments import (

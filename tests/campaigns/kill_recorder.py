@@ -23,7 +23,7 @@ from pathlib import Path
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import repair_folder
-from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.recording.read.run import RecordedSamples
 from tests.support.recordings import bus_on_free_port, read_column, recorder_process
 from tests.support.scripted_mission import Mission
 

@@ -16,7 +16,7 @@ from fasaco_edge.bus.session import Sample
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene

@@ -22,7 +22,7 @@ pytest.importorskip("rerun")
 from fasaco_edge.bus.arrival import PATH_DIGEST
 from fasaco_edge.errors import MissingExtra, UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.recording.write.input_log import PERIOD_NS as INPUT_PERIOD_NS
 from fasaco_edge.recording.write.part import Part
 from fasaco_edge.recording.write.writer import FLUSH_PERIOD_NS

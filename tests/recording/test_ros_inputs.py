@@ -13,7 +13,7 @@ pytest.importorskip("rerun")
 from fasaco_edge.cli.record import ros_config
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.recorded_run import read_run
 from fasaco_edge.replay.replay import Replay
 from fasaco_edge.review.review import read_review

@@ -20,7 +20,7 @@ from fasaco_edge.daemon.ledger.file import LedgerFile
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.recorded_run import read_run
 from fasaco_edge.replay.replay import Replay
 

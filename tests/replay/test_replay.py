@@ -14,7 +14,7 @@ pytest.importorskip("rerun")
 from fasaco_edge.bus.arrival import PATH_DIGEST
 from fasaco_edge.cli import main
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.recorded_run import read_run
 from fasaco_edge.replay.replay import Replay
 from tests.replay import scenarios

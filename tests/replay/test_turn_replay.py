@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
-from fasaco_edge.recording.read.samples import RecordedSamples
+from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.cycle_record import read_turns
 from fasaco_edge.replay.cycle_replay import CycleReplay
 from fasaco_edge.replay.recorded_run import read_run

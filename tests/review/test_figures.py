@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from fasaco_edge.recording.read.run import RunRecord
-from fasaco_edge.review.charts import curve
 from fasaco_edge.review.drive import milestones, walk_figures
 from fasaco_edge.review.faults import faults_of
 from fasaco_edge.review.moments import (
@@ -17,6 +16,7 @@ from fasaco_edge.review.moments import (
     longest_stand,
     spans_of,
 )
+from fasaco_edge.review.pictures import curve
 from fasaco_edge.review.rows import clock
 from fasaco_edge.review.run_data import PlanLog, RunData
 from fasaco_edge.wire.turns import Cycle, Decided, LogStart, PlanTaken, TurnBatch

@@ -22,7 +22,7 @@ from fasaco_edge.review.document import document
 from fasaco_edge.review.export import export
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.page import page_of
-from fasaco_edge.review.picture import SIZE, draw_review
+from fasaco_edge.review.pictures import SIZE, draw_review
 from fasaco_edge.review.review import CoverageCounts, read_review, review_of
 from fasaco_edge.wire.replies import ZoneReport
 from tests.review.test_parts import run_told

@@ -10,9 +10,9 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.review.charts import covered_share
 from fasaco_edge.review.document import document
 from fasaco_edge.review.drive import walk_figures
+from fasaco_edge.review.pictures import covered_share
 from fasaco_edge.review.review import read_review
 from tests.benchmarks.judge import check_walk
 from tests.review.naive import nearest_rank, passed_cells, quarter_turns
