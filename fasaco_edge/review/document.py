@@ -84,7 +84,7 @@ def document(review: Review) -> dict[str, Any]:
         "replan_list": [_replan(path) for path in replans.later],
         **_plans(review),
         **_resources(review),
-        "restored_cells": _restored(review),
+        "restored_cells": review.data.restored_cells,
         "states": {name: round(s, 3) for name, s in seconds_by_state(review.states).items()},
         "troubles": [
             {"state": s.name, "reason": s.reason, "at_s": _rounded(s.begin_s)}
@@ -107,17 +107,18 @@ def document(review: Review) -> dict[str, Any]:
 
 
 def _replan(path: PublishedPath) -> dict[str, Any]:
+    about = path.about
     return {
         "at_s": _rounded(path.at_s),
-        "revision": path.revision,
-        "reason": path.reason,
+        "revision": about.revision,
+        "reason": about.reason,
         "plan_ms": _rounded(path.plan_ms),
-        "steps": path.steps,
-        "planned_steps": path.planned_steps,
-        "lower_bound_steps": path.lower_bound,
-        "gap": path.gap,
-        "cost_s": path.cost_s,
-        "changed": path.changed and asdict(path.changed),
+        "steps": about.steps,
+        "planned_steps": about.planned_steps,
+        "lower_bound_steps": about.lower_bound_steps,
+        "gap": about.gap,
+        "cost_s": about.planned_cost_s,
+        "changed": about.changed and asdict(about.changed),
     }
 
 
@@ -153,14 +154,10 @@ def _resources(review: Review) -> dict[str, Any]:
 
 
 def _reached(review: Review) -> dict[str, float | None] | None:
-    if review.drive is None or _restored(review):
+    if review.drive is None or review.data.restored_cells:
         return None
     moments = milestones(review.first_s, review.drive.coverage.coverable)
     return {str(percent): _rounded(at_s) for percent, at_s in moments.items()}
-
-
-def _restored(review: Review) -> int:
-    return max((status.restored_cells for status in review.data.statuses), default=0)
 
 
 def _not_recorded(review: Review) -> dict[str, str]:
@@ -170,9 +167,10 @@ def _not_recorded(review: Review) -> dict[str, str]:
     if review.drive is None:
         lacks = "no map" if data.grid is None else "no configuration"
         why["steps, revisits, turns_90, turns_180, driven_m, reached_s"] = f"there is {lacks}"
-    elif _restored(review):
+    elif review.data.restored_cells:
+        restored = review.data.restored_cells
         why["reached_s"] = (
-            f"{_restored(review)} cells were covered before, and a recording does not tell which"
+            f"{restored} cells were covered before, and a recording does not tell which"
         )
     if review.counts is None:
         why["covered_cells, coverable_cells, recovered_cells"] = (

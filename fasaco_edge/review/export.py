@@ -65,12 +65,12 @@ def _tables(review: Review) -> dict[str, tuple[Sequence[str], Iterable[Sequence[
             PATH_COLUMNS,
             (
                 (
-                    *(f"{p.at_s:.6f}", p.revision, p.steps, p.planner, p.plan_ms),
-                    *(p.planned_steps, p.lower_bound, p.gap, p.cost_s),
-                    *(astuple(p.changed) if p.changed else none),
-                    p.reason,
+                    *(f"{at_s:.6f}", a.revision, a.steps, a.planner, plan_ms),
+                    *(a.planned_steps, a.lower_bound_steps, a.gap, a.planned_cost_s),
+                    *(astuple(a.changed) if a.changed else none),
+                    a.reason,
                 )
-                for p in data.paths
+                for at_s, a, plan_ms in ((p.at_s, p.about, p.plan_ms) for p in data.paths)
             ),
         ),
         "plans": (

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec import UNSET
 from numpy.typing import NDArray
 
 from fasaco_edge.recording import entities
@@ -46,13 +47,14 @@ class Faults:
 
 def faults_of(data: RunData, record: RunRecord) -> Faults:
     """Return the faults in a recording."""
-    by_code = _over_restarts(status.faults for status in data.statuses)
+    by_code = _over_restarts(each.status.errors.by_code for each in data.statuses)
     # As curves they are recorded up to the end; of a daemon that was started again not each one.
     by_code |= _plotted(record.plots)
     total = _counted(line for _, line in record.log.get(entities.MISSION_LOG, ()))
     if total > by_code.total():
         by_code[NOT_RECORDED] = total - by_code.total()
-    lost = [status.recorder_lost for status in data.statuses if status.recorder_lost is not None]
+    recorders = [each.status.recorder for each in data.statuses]
+    lost = [recorder.lost for recorder in recorders if recorder and recorder.lost is not UNSET]
     return Faults(
         by_code=dict(sorted(by_code.items())),
         lost=max(lost, default=None),

@@ -167,14 +167,18 @@ class Replans:
     @classmethod
     def of(cls, paths: Sequence[PublishedPath]) -> Replans:
         """Sort out ``paths``; those that no plan was needed for are none."""
-        planned = [path for path in paths if path.planner]
-        later = [after for before, after in pairwise(planned) if after.revision > before.revision]
+        planned = [path for path in paths if path.about.planner]
+        later = [
+            after
+            for before, after in pairwise(planned)
+            if after.about.revision > before.about.revision
+        ]
         return cls(planned[0] if planned else None, tuple(later))
 
     @property
     def by_reason(self) -> dict[str, int]:
         """How many there were of each kind of reason, the most frequent first."""
-        return dict(Counter(kind_of(path.reason) for path in self.later).most_common())
+        return dict(Counter(kind_of(path.about.reason) for path in self.later).most_common())
 
     @property
     def spread_by_reason(self) -> dict[str, tuple[float | None, float | None]]:
@@ -182,7 +186,7 @@ class Replans:
         took: dict[str, list[float]] = {kind: [] for kind in self.by_reason}
         for path in self.later:
             if path.plan_ms is not None:
-                took[kind_of(path.reason)].append(path.plan_ms)
+                took[kind_of(path.about.reason)].append(path.plan_ms)
         return {kind: (percentile(ms, 50), percentile(ms, 100)) for kind, ms in took.items()}
 
     def slowest_first(self, most: int) -> list[PublishedPath]:
@@ -232,7 +236,8 @@ def worst_moments(
         ]
     slowest = replans.slowest
     if slowest is not None and slowest.plan_ms is not None:
-        found.append(Moment("slowest replan", slowest.plan_ms, "ms", slowest.at_s, slowest.reason))
+        reason = slowest.about.reason
+        found.append(Moment("slowest replan", slowest.plan_ms, "ms", slowest.at_s, reason))
     found.append(largest_drop(fractions, data.map_s, [at_s for at_s, _, _ in data.commands]))
     # A mission that was begun again has its moments each time: the worst one counts.
     worst: dict[str, Moment] = {}

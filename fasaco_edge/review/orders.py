@@ -63,11 +63,11 @@ def chapters(
     )
 
 
-def is_complete(state: str, status: StatusSample | None, covered: int, coverable: int) -> bool:
+def is_complete(state: str, sample: StatusSample | None, covered: int, coverable: int) -> bool:
     """Return whether an order is done with nothing left uncovered."""
     if state != "done":
         return False
-    zones = status.zones if status else ()
+    zones = sample.status.mission.zones if sample else ()
     if zones:
         return all(zone.covered == zone.cells for zone in zones)
     return covered == coverable > 0
@@ -118,10 +118,14 @@ def _chapter(
 ) -> OrderChapter:
     until = end_s if ended_by else float("inf")
     state = _state_at(states, until)
-    counted = [s for s in data.statuses if begin_s <= s.at_s < until and s.coverage is not None]
+    counted = [
+        each
+        for each in data.statuses
+        if begin_s <= each.at_s < until and each.status.coverage is not None
+    ]
     own = fractions[(fractions[:, 0] >= begin_s) & (fractions[:, 0] < until)]
     last = counted[-1] if counted and is_still_true(counted[-1], own) else None
-    coverage = last.coverage if last else None
+    coverage = last.status.coverage if last else None
     covered, coverable = (coverage.covered, coverage.coverable) if coverage else (None, None)
     complete: bool | None = None
     if state and state != "done":
@@ -131,8 +135,8 @@ def _chapter(
     return OrderChapter(ordered, begin_s, end_s, ended_by, state, covered, coverable, complete)
 
 
-def is_still_true(status: StatusSample, fractions: NDArray[np.float64]) -> bool:
+def is_still_true(sample: StatusSample, fractions: NDArray[np.float64]) -> bool:
     """Return whether the covered share has not changed since a status came."""
-    later = fractions[fractions[:, 0] > status.at_s + SAME_STEP_S]
-    then = fractions[fractions[:, 0] <= status.at_s + SAME_STEP_S]
+    later = fractions[fractions[:, 0] > sample.at_s + SAME_STEP_S]
+    then = fractions[fractions[:, 0] <= sample.at_s + SAME_STEP_S]
     return not len(later) or (len(then) > 0 and bool((later[:, 1] == then[-1, 1]).all()))

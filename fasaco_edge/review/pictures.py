@@ -26,8 +26,7 @@ def covered_share(review: Review) -> Points:
 
     Where some were covered before the recording began, the share of what was known then.
     """
-    restored = any(status.restored_cells for status in review.data.statuses)
-    if review.drive is None or restored:
+    if review.drive is None or review.data.restored_cells:
         return review.known_fractions[:, 0], review.known_fractions[:, 1]
     count = len(review.first_s)
     coverable = max(review.drive.coverage.coverable, 1)

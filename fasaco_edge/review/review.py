@@ -228,7 +228,7 @@ def _end_s(record: RunRecord, data: RunData) -> float:
 
 def _mission_states(data: RunData, record: RunRecord) -> list[Entered]:
     """Return when the mission entered its states, by its statuses and by what was drawn."""
-    published = [(status.at_s, status.state, status.reason) for status in data.statuses]
+    published = [(each.at_s, each.status.state, each.status.reason) for each in data.statuses]
     drawn = _entered(record, entities.MISSION_STATE, entities.MISSION_LOG)
     return sorted((*published, *drawn), key=lambda entry: entry[0])
 
@@ -252,15 +252,14 @@ def _counts(
     data: RunData, drive: Drive | None, fractions: NDArray[np.float64]
 ) -> CoverageCounts | None:
     """Return the daemon's counts if its last status still holds, else those of the track."""
-    counted = [status for status in data.statuses if status.coverage is not None]
-    if counted and is_still_true(counted[-1], fractions):
-        own = counted[-1].coverage
-        assert own is not None
+    counted = [each for each in data.statuses if each.status.coverage is not None]
+    own = counted[-1].status.coverage if counted else None
+    if own is not None and is_still_true(counted[-1], fractions):
         return CoverageCounts(
             own.covered, own.coverable, own.recovered, own.unreachable, source="status"
         )
     # The track does not show what was covered before the recording began.
-    if drive is None or any(status.restored_cells for status in data.statuses):
+    if drive is None or data.restored_cells:
         return None
     cover = drive.coverage
     return CoverageCounts(

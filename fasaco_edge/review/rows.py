@@ -132,17 +132,18 @@ def reason_rows(document: Document) -> list[tuple[str, str, str, str]]:
 
 def replan_rows(review: Review) -> list[tuple[str, ...]]:
     """Return the slowest replans: when, how long, the plan, where the map changed, and why."""
+    slowest = review.replans.slowest_first(MOST_REPLANS)
     return [
         (
             clock(path.at_s),
             amount(path.plan_ms, "ms"),
-            str(path.steps if path.planned_steps is None else path.planned_steps),
-            "-" if path.gap is None else f"{100 * path.gap:.1f} %",
-            "-" if path.cost_s is None else clock(path.cost_s),
-            _place(path.changed),
-            path.reason,
+            str(about.steps if about.planned_steps is None else about.planned_steps),
+            "-" if about.gap is None else f"{100 * about.gap:.1f} %",
+            "-" if about.planned_cost_s is None else clock(about.planned_cost_s),
+            _place(about.changed),
+            about.reason,
         )
-        for path in review.replans.slowest_first(MOST_REPLANS)
+        for path, about in ((path, path.about) for path in slowest)
     ]
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
-from msgspec import UNSET
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival
@@ -17,9 +16,8 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.orders.order import MissionOrder, read_command
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
-from fasaco_edge.wire.replies import CoverageReport, ZoneReport
 from fasaco_edge.wire.schemas import POSE_STAMPED
-from fasaco_edge.wire.status import PathAttachment, Rectangle, Settings, Status, known_settings
+from fasaco_edge.wire.status import PathAttachment, Settings, Status, known_settings
 from fasaco_edge.wire.transforms import PoseDecoder
 from fasaco_edge.wire.turns import Cycle, TurnBatch, decode_turns
 
@@ -85,57 +83,23 @@ class PlanLog:
 
 @dataclass(frozen=True, slots=True)
 class PublishedPath:
-    """A path that was published.
-
-    Attributes:
-        at_s: when, since the recording began [s].
-        revision: counts the paths of a daemon.
-        reason: why it came.
-        steps: from its first cell to its last.
-        planned_steps: of the plan as it was made, which gap and bound are of; None where not given.
-        planner: what found it; "" where no plan was needed.
-        plan_ms: how long planning took [ms]; None where no plan was needed.
-        gap: steps of the plan above the lower bound, as a share of it; None where not given.
-        cost_s: what driving it takes [s]; None where not given.
-        lower_bound: no plan has fewer steps; None where not given.
-        changed: rectangle of the map that led to it; None for nothing.
-    """
+    """A path's attachment, and when the path came, since the recording began [s]."""
 
     at_s: float
-    revision: int
-    reason: str
-    steps: int
-    planner: str
-    plan_ms: float | None
-    gap: float | None = None
-    cost_s: float | None = None
-    lower_bound: int | None = None
-    planned_steps: int | None = None
-    changed: Rectangle | None = None
+    about: PathAttachment
+
+    @property
+    def plan_ms(self) -> float | None:
+        """How long planning took [ms]; None where no plan was needed."""
+        return self.about.plan_ms if self.about.planner else None
 
 
 @dataclass(frozen=True, slots=True)
 class StatusSample:
-    """What a review needs of a status.
-
-    Attributes:
-        at_s: when, since the recording began [s].
-        state, reason: of the mission.
-        coverage: its counts; None where there were none.
-        zones: what of each zone is covered.
-        restored_cells: covered cells taken over from before a restart.
-        faults: what was refused so far, by code.
-        recorder_lost: samples the recorder says it could not write; None where it does not.
-    """
+    """A status, and when it came, since the recording began [s]."""
 
     at_s: float
-    state: str
-    reason: str
-    coverage: CoverageReport | None
-    zones: tuple[ZoneReport, ...]
-    restored_cells: int
-    faults: Mapping[str, int]
-    recorder_lost: int | None
+    status: Status
 
 
 @dataclass(slots=True)
@@ -169,6 +133,11 @@ class RunData:
     robot: str = ""
     undecodable: Counter[str] = field(default_factory=Counter)
     last_s: float = 0.0
+
+    @property
+    def restored_cells(self) -> int:
+        """Cells that were covered before a restart."""
+        return max((each.status.ledger.restored_cells for each in self.statuses), default=0)
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -255,19 +224,7 @@ class _SampleReader:
         self._poses.schema = known.pose.schema or self._poses.schema
         if frames := known.ros2.frames:
             self._poses.follow((frames.map, frames.robot))
-        lost = status.recorder.lost if status.recorder else UNSET
-        data.statuses.append(
-            StatusSample(
-                at_s=self._now,
-                state=status.state,
-                reason=status.reason,
-                coverage=status.coverage,
-                zones=status.mission.zones,
-                restored_cells=status.ledger.restored_cells,
-                faults=status.errors.by_code,
-                recorder_lost=None if lost is UNSET else lost,
-            )
-        )
+        data.statuses.append(StatusSample(self._now, status))
 
     def _turns(self, arrival: Arrival) -> None:
         self.data.plan_log.take(decode_turns(arrival.sample.payload), self._now)
@@ -276,20 +233,6 @@ class _SampleReader:
         about = decode_tolerant(arrival.sample.attachment, PathAttachment)
         paths = self.data.paths
         # One that is published again is still the same.
-        if paths and paths[-1].revision == about.revision:
+        if paths and paths[-1].about.revision == about.revision:
             return
-        paths.append(
-            PublishedPath(
-                at_s=self._now,
-                revision=about.revision,
-                reason=about.reason,
-                steps=about.steps,
-                planner=about.planner or "",
-                plan_ms=about.plan_ms if about.planner else None,
-                gap=about.gap,
-                cost_s=about.planned_cost_s,
-                lower_bound=about.lower_bound_steps,
-                planned_steps=about.planned_steps,
-                changed=about.changed,
-            )
-        )
+        paths.append(PublishedPath(self._now, about))

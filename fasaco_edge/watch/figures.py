@@ -138,10 +138,9 @@ def _ledger(status: Status) -> Text:
 def _recorder(recorder: SupervisedRecorder | None) -> Text:
     if recorder is None:
         return _text("none")
-    good = recorder.state in ("recording", "starting")
-    return _text(
-        recorder.state if good else f"{recorder.state}: {recorder.reason}", "" if good else "red"
-    )
+    if recorder.state in ("recording", "starting"):
+        return _text(recorder.state)
+    return _text(f"{recorder.state}: {recorder.reason or ''}", "red")
 
 
 def _cells(count: int) -> str:

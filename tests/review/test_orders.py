@@ -14,6 +14,7 @@ from fasaco_edge.review.orders import chapters
 from fasaco_edge.review.rows import verdicts
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.replies import CoverageReport
+from fasaco_edge.wire.status import Status
 
 ALL = read_order({})
 KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]], "passes": 1}]})
@@ -24,13 +25,7 @@ def told(*rows, commands=()):
     statuses = [
         StatusSample(
             at_s,
-            state,
-            "",
-            CoverageReport(covered=covered, coverable=coverable),
-            (),
-            0,
-            {},
-            None,
+            Status(state=state, coverage=CoverageReport(covered=covered, coverable=coverable)),
         )
         for at_s, state, covered, coverable in rows
     ]

@@ -24,7 +24,9 @@ from fasaco_edge.review.moments import Span
 from fasaco_edge.review.page import page_of
 from fasaco_edge.review.pictures import SIZE, draw_review
 from fasaco_edge.review.review import CoverageCounts, read_review, review_of
-from fasaco_edge.wire.replies import ZoneReport
+from fasaco_edge.review.run_data import StatusSample
+from fasaco_edge.wire.replies import MissionReport, ZoneReport
+from fasaco_edge.wire.status import LedgerReport, Status
 from tests.review.test_parts import run_told
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge
 
@@ -124,7 +126,7 @@ def zone(cells, covered):
     ],
 )
 def test_complete_is_done_and_nothing_left_over(review, state, covered, zones, complete):
-    last = replace(review.data.statuses[-1], zones=zones)
+    last = StatusSample(0.0, Status(mission=MissionReport(zones=zones)))
     told = replace(
         review,
         data=replace(review.data, statuses=[last]),
@@ -136,9 +138,8 @@ def test_complete_is_done_and_nothing_left_over(review, state, covered, zones, c
 
 
 def test_what_was_covered_before_is_not_guessed_at(review):
-    data = replace(
-        review.data, statuses=[replace(s, restored_cells=7) for s in review.data.statuses]
-    )
+    before = StatusSample(0.0, Status(ledger=LedgerReport(restored_cells=7)))
+    data = replace(review.data, statuses=[before, *review.data.statuses])
     told = document(review_of(review.record, data, 0))
     assert told["covered_cells"] is told["reached_s"] is None
     assert told["steps"] == 5

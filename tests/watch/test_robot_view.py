@@ -173,3 +173,9 @@ def test_a_journal_keeps_the_newest():
     assert [entry.text for entry in events.since(KEPT + 3)] == [str(KEPT + 3), str(KEPT + 4)]
     assert len(events.since(0)) == KEPT
     assert events.since(events.count) == []
+
+
+def test_a_recorder_that_gives_no_reason_yet_is_shown_without_one():
+    view = mid_mission()
+    tell(view, "status", status(recorder={"state": "starting", "restarts": 0}))
+    assert texts(view)[-1] == "recorder starting: "
