@@ -61,9 +61,11 @@ def test_a_seed_says_the_same_again():
 
 def test_what_breaks_is_written_down_and_said_again(tmp_path, monkeypatch):
     """With the fault that the fuzz found first: a path cut off at a cell that is lost."""
-    holding = ReachableArea.holding
+    prefix = ReachableArea.drivable_prefix
     monkeypatch.setattr(
-        ReachableArea, "holding", lambda on, cells: max(holding(on, cells), min(1, len(cells)))
+        ReachableArea,
+        "drivable_prefix",
+        lambda on, cells: max(prefix(on, cells), min(1, len(cells))),
     )
     findings = Findings(tmp_path)
     fuzz_missions(8_000, 5, findings)
