@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
-from typing import Any
 
 import msgspec
 
@@ -96,9 +95,9 @@ def with_changeable(running: DaemonConfig, written: DaemonConfig) -> DaemonConfi
     return msgspec.structs.replace(running, **sections)
 
 
-def _flat(config: DaemonConfig) -> dict[str, Any]:
+def _flat(config: DaemonConfig) -> dict[str, object]:
     """Return the values by ``section.key``; a section that may be left out counts as one value."""
-    flat: dict[str, Any] = {}
+    flat: dict[str, object] = {}
     for name in config.__struct_fields__:
         section = getattr(config, name)
         if name == "ros2":

@@ -7,7 +7,6 @@ other things of a text than it says, are refused.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import yaml
 
@@ -39,7 +38,7 @@ def read_bounded(path: Path) -> str:
         raise PlainYamlError(str(error)) from error
 
 
-def load(text: str) -> Any:  # noqa: ANN401 - whatever the document is
+def load(text: str) -> object:
     """Return the plain values of a document; None for an empty one.
 
     Raises:
@@ -48,7 +47,7 @@ def load(text: str) -> Any:  # noqa: ANN401 - whatever the document is
     return compose(text)[1]
 
 
-def compose(text: str) -> tuple[yaml.Node | None, Any]:
+def compose(text: str) -> tuple[yaml.Node | None, object]:
     """Return a document as its nodes, which know their lines, and as plain values.
 
     Raises:
