@@ -91,10 +91,14 @@ def afforded(config: DaemonConfig, limit: int | None) -> DaemonConfig:
     """
     if limit is None or needed_bytes(config) <= limit:
         return config
-    maps = config.map
-    share = max(limit - BASE_BYTES, 0) / (needed_bytes(config) - BASE_BYTES)
-    pixels = max(int(share * maps.max_pixels), min(LEAST_PIXELS, maps.max_pixels))
-    cells = max(int(share * maps.max_lattice_cells), min(LEAST_CELLS, maps.max_lattice_cells))
+    maps, spare = config.map, limit - BASE_BYTES
+    least_pixels = min(LEAST_PIXELS, maps.max_pixels)
+    least_cells = min(LEAST_CELLS, maps.max_lattice_cells)
+    share = max(spare, 0) / (needed_bytes(config) - BASE_BYTES)
+    cells = max(int(share * maps.max_lattice_cells), least_cells)
+    pixels = max(min((spare - CELL_BYTES * cells) // MAPS, maps.max_pixels), least_pixels)
+    # Where the pixels cannot shrink alike, the cells have to make up for that.
+    cells = max(min((spare - MAPS * pixels) // CELL_BYTES, cells), least_cells)
     smaller = structs.replace(maps, max_pixels=pixels, max_lattice_cells=cells)
     return structs.replace(config, map=smaller)
 

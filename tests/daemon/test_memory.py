@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec import structs
 
@@ -65,6 +65,7 @@ def test_what_waits_for_the_loop_is_part_of_it(max_pixels):
 
 
 @given(st.integers(0, 4 << 30), st.integers(1, MAX_GRID_CELLS), st.integers(1, 4_000_000))
+@example(limit=324_169_522, pixels=9, cells=379_721)  # where only the cells can shrink
 def test_under_any_limit_no_more_is_taken_than_it_affords(limit, pixels, cells):
     maps = MapConfig(max_pixels=pixels, max_lattice_cells=cells)
     config = structs.replace(DEFAULT, map=maps)
