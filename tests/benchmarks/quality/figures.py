@@ -138,7 +138,7 @@ class GridFigures:
             "overshoot_s": round(self.overshoot_s, 6),
             "work": {
                 name: self._spread([getattr(run.work, name) for run in self.runs]).median
-                for name in ("ants", "kicks", "proposals")
+                for name in ("ants", "perturbations", "proposals")
             },
         }
 

@@ -25,7 +25,7 @@ MOST_MEMORY_MB = {100_000: 300.0, 1_000_000: 1500.0}
 
 HEADER = (
     "cells", "budget\n[s]", "first\n[ms]", *(f"to {100 * target:g} %\n[s]" for target in TARGETS),
-    "gap\n[%]", "memory\n[MB]", "own\n[MB]", "kicks", "tried\n[10^6]",
+    "gap\n[%]", "memory\n[MB]", "own\n[MB]", "perturb-\nations", "tried\n[10^6]",
 )  # fmt: skip
 
 
@@ -139,7 +139,7 @@ def _row(size: Size) -> tuple[str, ...]:
         _two(size.spread(lambda run: 100.0 * run.gap), ".2f"),
         _two(size.spread(lambda run: run.peak_mb), ".0f"),
         _two(size.spread(lambda run: run.own_mb), ".1f"),
-        _two(size.spread(lambda run: run.work["kicks"]), ".0f"),
+        _two(size.spread(lambda run: run.work["perturbations"]), ".0f"),
         _two(size.spread(lambda run: run.work["proposals"] / 1e6), ".0f"),
     )
 
