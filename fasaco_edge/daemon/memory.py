@@ -8,13 +8,12 @@ whatever comes in, how often, and at what resolution; ``MemoryHigh=`` of its uni
 default configuration, ``MemoryMax=`` a tenth more, and under another limit the daemon takes no
 larger maps than that affords (``afforded``). A test holds the units to this file, and one measures.
 
-A pixel is a byte, and lies at worst ten times in memory, with updates as large as the map:
+A pixel is a byte, held in up to ten copies where updates are as large as the map:
 
-* in Zenoh, while a message is put together, once, once as it is handed over, and once on its way
-  to a recorder;
-* in the mailbox, where of maps and of updates no more waits than the largest takes, twice;
-* in the cycle, as a map and an update taken, twice, and a moment longer in Zenoh's buffers, once;
-* as the mission's map, while another is compared with it and patched, twice.
+* 3 in Zenoh: a message being assembled, one being handed over, one on its way to a recorder;
+* 2 in the mailbox: the map queue and the update queue hold at most one largest message each;
+* 3 in the cycle: a map and an update being decoded, and Zenoh's buffer of the last one;
+* 2 in the mission: its map, and the one it is compared with or patched to.
 
 Larger messages are dropped on arrival, by their size alone. Nothing else grows with the
 pixels: kernels look at a map tile by tile, and a tile has a bound, see ``grid.lattice``. Of a
@@ -46,7 +45,7 @@ CELL_BYTES = 330
 # MemoryMax= above MemoryHigh=, beyond which the system only slows a service down.
 SPARE = 1.1
 
-# What is tried under any limit: a small flat.
+# The smallest limits ever applied: a small flat.
 LEAST_PIXELS, LEAST_CELLS = 250_000, 10_000
 
 # Of these kinds no more than so much waits, either.
@@ -78,7 +77,10 @@ def needed_bytes(config: DaemonConfig) -> int:
 
 
 def limits_mib(config: DaemonConfig) -> tuple[int, int]:
-    """Return what ``MemoryHigh=`` and ``MemoryMax=`` of its unit should be [MiB], in 16s."""
+    """Return what ``MemoryHigh=`` and ``MemoryMax=`` of its unit should be [MiB].
+
+    Both are rounded up to multiples of 16.
+    """
     needed = needed_bytes(config) / MIB
     high, most = (-(-int(mib + 1) // 16) * 16 for mib in (needed, SPARE * needed))
     return high, most

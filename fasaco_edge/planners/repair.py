@@ -1,10 +1,10 @@
 """Repair of the walk that was still to be driven, after the problem changed.
 
 The walk is made legal and complete, then improved around the changes. What is still
-valid stays as it is, cell by cell: a change is taken only if it gains something, and just
-ahead of the robot at first only the change itself. So the path is stable wherever the map
-is, and what one search found serves the next. A repair costs what changed: all but a few
-passes over the walk happens in the neighbourhoods of the changes.
+valid stays as it is, cell by cell: a change is taken only if it gains something, and the
+next ``HELD_CELLS`` cells are left alone at first, except where the map itself changed. So
+the path is stable wherever the map is, and what one search found serves the next. A repair
+costs what changed: apart from a few passes over the walk, all work is local.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def completed(
         problem: as it is now.
         framed: its ground.
         before: int32 (n, 2), the walk that was still to be driven, cells (row, col).
-        held: so many first visits stay as they are where they can.
+        held: number of leading visits that are kept if possible.
 
     Returns:
         Framed cells, int32 (m,).
@@ -81,11 +81,11 @@ def _with_end(
 # Perturbations between two pauses.
 PERTURBATIONS_AT_ONCE = 10
 
-# Where there is nothing to repair: difference of the first spots of two attempts, about how
-# many cells a spot has, and how many times all spots may gain nothing.
+# Where there is nothing to repair: difference of the first spots of two attempts, cells of a
+# spot (about), and passes over all spots without gain after which the search ends.
 STRIDE, SPOT_CELLS, PASSES = 997, 400, 4
 
-# The robot is about to drive these cells: five metres of common ones.
+# The robot is about to drive these cells: about 5 m at usual tool widths.
 HELD_CELLS = 18
 
 
@@ -109,10 +109,10 @@ def repaired(
         if stop(repair.progress()):
             break
     path = repair.path(name, seed)
-    return path if problem.whole is None else _of_the_whole(problem, problem.whole, path)
+    return path if problem.whole is None else _with_lead(problem, problem.whole, path)
 
 
-def _of_the_whole(
+def _with_lead(
     problem: CoverageProblem, whole: CoverageProblem, path: CoveragePath
 ) -> CoveragePath:
     """Return a path with the walk before it; steps, cost and bound are of the whole problem."""

@@ -1,4 +1,4 @@
-"""Sequencer: goes through an order: zones pass by pass, what was left over again, the way home."""
+"""Sequencer: carries out an order: its zones pass by pass, then retries, then the way home."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from fasaco_edge.planners.problem import CoverageProblem
 # Around a cell from which nothing new was seen, others show nothing new either [cells].
 SEEN_AROUND = 1
 
-# After this many paths that left the same number of cells over, they wait for the next try: the
+# After this many paths in a row with the same number of cells left, those wait for the retry: the
 # robot may stop short of its path's end, out of the tool's reach of the last cell.
-MOST_TRIES = 3
+MAX_SAME_LEFTOVERS = 3
 
 
 def next_frontier(area: ReachableArea, polygon: Polygon, looked: Iterable[Cell]) -> Cell | None:
@@ -186,7 +186,7 @@ class Sequencer:
         if run.retry_at is not None and not self._is_worth_trying():
             self.advance(now)
         if run.retry_at is not None:
-            return self._begin_try(cell) if now >= run.retry_at else ""
+            return self._begin_retry(cell) if now >= run.retry_at else ""
         state = self.state
         if state.begun or state.order is None or state.stage is Stage.OVER:
             return ""
@@ -252,7 +252,7 @@ class Sequencer:
             self._unreached.note_failure()
         run.same_again = run.same_again + 1 if cells == run.left_over else 1
         run.left_over = cells
-        is_given_up = cells > 0 and run.same_again > MOST_TRIES
+        is_given_up = cells > 0 and run.same_again > MAX_SAME_LEFTOVERS
         return is_given_up and not run.exploration.skip_viewpoint()
 
     def advance(self, now: float) -> None:
@@ -296,12 +296,12 @@ class Sequencer:
         """Return what of the order stays uncovered on the map as it is."""
         return self._unreached.unreached(self.state)
 
-    def _begin_try(self, cell: Cell) -> str:
+    def _begin_retry(self, cell: Cell) -> str:
         run = self._run
         run.retry_at = None
         run.exploration.aim_at(self._viewpoints() - {cell})
-        # One path that changes nothing is enough this time.
-        run.left_over, run.same_again = self._left(), MOST_TRIES
+        # In a retry, one path without progress is enough to give up.
+        run.left_over, run.same_again = self._left(), MAX_SAME_LEFTOVERS
         return f"tried again, {self.state.tries + 1} of {self._config.retries}"
 
     def _end(self) -> None:

@@ -16,10 +16,10 @@ from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.status import PathAttachment, Status
 
-# A curve goes on as a step (``styles``); at the latest after so long it is drawn anyway, so
-# that a part, and what follows a gap, soon has all of them.
+# Curves are drawn as staircases (``archetypes``). Each value is repeated at least this often, so
+# that a new part, or the time after a gap, shows every curve within a minute.
 PERIOD_NS = 60_000_000_000
-# Noise of latencies and memory, as a share of them: by less nothing has changed.
+# Latencies and memory: relative changes below this are ignored.
 NOISE = 0.1
 
 
@@ -72,7 +72,7 @@ class Curves:
 COUNT_SPACING_NS = 30_000_000_000
 # Processor time is averaged over at least so many seconds.
 LEAST_SHARE_S = 30.0
-# The contract has some dozens; those of another daemon must not fill the recording.
+# The contract has dozens of codes; a foreign daemon's must not fill the recording.
 MOST_CODES = 50
 _CODE = re.compile(r"[a-z_]{1,40}")
 
@@ -93,7 +93,7 @@ class StatusFigures:
         for name, milliseconds in asdict(status.latency_ms).items():
             if milliseconds is not None:
                 self._curves.draw(f"{entities.LATENCY}/{name}", milliseconds, NOISE)
-        # No process has a memory of 0, or no threads: a daemon that does not send them.
+        # 0 means that the daemon does not send it.
         if status.rss_mb:
             self._curves.draw(f"{entities.MEMORY}/planner", status.rss_mb, NOISE)
         if status.uptime_s:
