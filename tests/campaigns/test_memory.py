@@ -25,7 +25,7 @@ limited = pytest.mark.skipif(bool(why_not()), reason=why_not())
     [
         (Flood("updates", 2000, 0.02, 20.0), "taken", ""),
         (Flood("mappers", 2000, 0.03, 20.0), "taken", ""),
-        (Flood("maps", 3000, 0.02, 10.0), "refused", "9000104 bytes was let go: it may have at"),
+        (Flood("maps", 3000, 0.02, 10.0), "refused", "9000104 bytes was dropped: it may have at"),
         (Flood("maps", 2000, 0.0003, 5.0), "refused", "must be 0.0012 m or larger"),
         (Flood("maps", 2000, 0.05, 5.0), "refused", "exceeds 60000 cells"),
     ],
