@@ -151,8 +151,8 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         "--planner",
         choices=PLANNER_NAMES,
         default="fasaco",
-        help="fasaco; aco is fasaco at velocity 1; stc is spanning-tree coverage; spiral-stc and "
-        "zigzag are the paper's baselines (default: %(default)s)",
+        help="; ".join(f"{name}: {entry.about}" for name, entry in PLANNERS.items())
+        + " (default: %(default)s)",
     )
     group.add_argument("--ants", type=int, default=1000, metavar="N", help="(default: %(default)s)")
     group.add_argument(

@@ -24,19 +24,21 @@ class Entry(NamedTuple):
 
     Attributes:
         factory: the planner as its source has it.
+        about: what it is, for the command line's help.
         with_local_search: the planner with local search; "" where there is none.
     """
 
     factory: str
+    about: str
     with_local_search: str = ""
 
 
 PLANNERS = {
-    "fasaco": Entry("fasaco:Fasaco", with_local_search="near_optimal:NearOptimal"),
-    "aco": Entry("fasaco:plain_aco"),
-    "stc": Entry("baselines:stc"),
-    "spiral-stc": Entry("baselines:spiral_stc"),
-    "zigzag": Entry("baselines:zigzag"),
+    "fasaco": Entry("fasaco:Fasaco", "ants", with_local_search="near_optimal:NearOptimal"),
+    "aco": Entry("fasaco:plain_aco", "fasaco at velocity 1"),
+    "stc": Entry("baselines:stc", "spanning-tree coverage"),
+    "spiral-stc": Entry("baselines:spiral_stc", "the paper's baseline"),
+    "zigzag": Entry("baselines:zigzag", "the paper's baseline"),
 }
 PLANNER_NAMES = tuple(PLANNERS)
 

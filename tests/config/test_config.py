@@ -20,6 +20,7 @@ from fasaco_edge.config.config import DaemonConfig, decode_config, load_config
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.sections import MissionSettings
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.planners.registry import PLANNER_NAMES
 from tests.support.processes import PROGRAM
 
 
@@ -120,7 +121,8 @@ def test_every_section_is_read(load):
         ),
         (
             "planner: {name: best}",
-            "planner.name: expected fasaco, aco, stc, spiral-stc or zigzag, got 'best'",
+            f"planner.name: expected {', '.join(PLANNER_NAMES[:-1])} or {PLANNER_NAMES[-1]}, "
+            "got 'best'",
         ),
         ("planner: {ants: 0}", "planner.ants: expected int >= 1, got 0"),
         ("planner: {ants: 1.5}", "planner.ants: expected int, got 1.5"),

@@ -16,7 +16,7 @@ from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.status import PathAttachment, Status
 
-# Curves are drawn as staircases (``archetypes``). Each value is repeated at least this often, so
+# Curves are drawn as staircases (``CURVES``). Each value is repeated at least this often, so
 # that a new part, or the time after a gap, shows every curve within a minute.
 PERIOD_NS = 60_000_000_000
 # Latencies and memory: relative changes below this are ignored.
