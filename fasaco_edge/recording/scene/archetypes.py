@@ -3,7 +3,7 @@
 A grid's row 0 has the smallest y, an image's row 0 is its top: every grid is
 flipped here, and nowhere else.
 
-The looks of curves and states are static, logged once.
+The looks of states are static, logged once.
 """
 
 from __future__ import annotations
@@ -190,19 +190,6 @@ def _grid(
     )
 
 
-CURVES: tuple[tuple[str, str, Colour], ...] = (
-    (entities.COVERED_FRACTION, "covered", COVERED_COLOUR),
-    (entities.RECOVERED_FRACTION, "again", RECOVERED_COLOUR),
-    (f"{entities.LATENCY}/ingest", "map in", (56, 152, 222)),
-    (f"{entities.LATENCY}/plan", "plan", (167, 139, 250)),
-    (f"{entities.LATENCY}/map_to_path", "map to path", (245, 140, 40)),
-    (entities.BEST_STEPS, "best walk", (250, 204, 21)),
-    (entities.GAP, "gap of the plan", (250, 204, 21)),
-    (f"{entities.MEMORY}/planner", "planner MB", (167, 139, 250)),
-    (f"{entities.MEMORY}/recorder", "recorder MB", (156, 163, 175)),
-    (entities.PROCESSOR, "planner %", (245, 140, 40)),
-)
-
 GREEN, AMBER, RED, BLUE, VIOLET, GREY = (
     0x059669FF,
     0xD97706FF,
@@ -238,12 +225,9 @@ STATES: dict[str, dict[str, int]] = {
 
 
 def log_styles(writer: RecordingWriter) -> None:
-    """Log names and colours of all curves and states."""
+    """Log the colours of all states, and which way is up."""
     writer.log_static(entities.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     writer.log_static(entities.DRIVEN_PATH, style_archetype(DRIVEN))
-    for entity, name, colour in CURVES:
-        line = rr.SeriesLines(names=name, colors=colour, widths=1.5, interpolation_mode="StepAfter")
-        writer.log_static(entity, line)
     for entity, colours in STATES.items():
         states = list(colours)
         palette = np.array(list(colours.values()), np.uint32)

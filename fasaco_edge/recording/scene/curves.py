@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from msgspec.structs import asdict
 
 from fasaco_edge.recording import entities
+from fasaco_edge.recording.scene.archetypes import COVERED_COLOUR, RECOVERED_COLOUR, Colour
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.status import PathAttachment, Status
@@ -21,6 +22,20 @@ from fasaco_edge.wire.status import PathAttachment, Status
 PERIOD_NS = 60_000_000_000
 # Latencies and memory: relative changes below this are ignored.
 NOISE = 0.1
+
+# Entity, name in the legend, colour; a curve that is in no plot needs none.
+CURVES: tuple[tuple[str, str, Colour], ...] = (
+    (entities.COVERED_FRACTION, "covered", COVERED_COLOUR),
+    (entities.RECOVERED_FRACTION, "again", RECOVERED_COLOUR),
+    (f"{entities.LATENCY}/ingest", "map in", (56, 152, 222)),
+    (f"{entities.LATENCY}/plan", "plan", (167, 139, 250)),
+    (f"{entities.LATENCY}/map_to_path", "map to path", (245, 140, 40)),
+    (entities.BEST_STEPS, "best walk", (250, 204, 21)),
+    (entities.GAP, "gap of the plan", (250, 204, 21)),
+    (f"{entities.MEMORY}/planner", "planner MB", (167, 139, 250)),
+    (f"{entities.MEMORY}/recorder", "recorder MB", (156, 163, 175)),
+    (entities.PROCESSOR, "planner %", (245, 140, 40)),
+)
 
 
 @dataclass(slots=True)
@@ -36,6 +51,11 @@ class Curves:
     def __init__(self, writer: RecordingWriter) -> None:
         self._writer = writer
         self._curves: dict[str, _Curve] = {}
+        for entity, name, colour in CURVES:
+            line = rr.SeriesLines(
+                names=name, colors=colour, widths=1.5, interpolation_mode="StepAfter"
+            )
+            writer.log_static(entity, line)
 
     def draw(self, entity: str, value: float, noise: float = 0.0, spacing_ns: int = 0) -> None:
         """Draw ``value`` where it differs from the one drawn.
