@@ -55,8 +55,8 @@ def run(args: argparse.Namespace) -> int:
     """Run the mission; 0 if every reachable cell was covered."""
     from fasaco_edge.cli.console.arguments import writing
     from fasaco_edge.cli.console.terminal import err
-    from fasaco_edge.cli.demo_mission import DemoMission
-    from fasaco_edge.cli.demo_summary import print_summary, summarise
+    from fasaco_edge.cli.demo.mission import DemoMission
+    from fasaco_edge.cli.demo.summary import print_summary, summarise
     from fasaco_edge.cli.warmup import compile_kernels
     from fasaco_edge.errors import BadConfiguration
     from fasaco_edge.grid.map_files import find_map

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.demo_mission import Ending
+from fasaco_edge.cli.demo.mission import Ending
 from fasaco_edge.drawing.pictures import draw_mission
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.grid.geometry import Pose2D
