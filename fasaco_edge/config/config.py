@@ -12,8 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
-from fasaco_edge.config.credentials import with_credentials
-from fasaco_edge.config.reading import Fault, read_text, section_faults
+from fasaco_edge.config.reading import Fault, read_text, section_faults, with_credentials
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.sections import MissionSettings, PlannerConfig, RecordingConfig, Section
 from fasaco_edge.config.security import SecurityConfig, security_faults

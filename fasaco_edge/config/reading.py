@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -17,6 +18,8 @@ from fasaco_edge.config.sections import Section
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.plain_yaml import PlainYamlError, compose, read_bounded
 from fasaco_edge.text import shown
+
+FOLDER = "CREDENTIALS_DIRECTORY"
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,3 +187,19 @@ def _keys(node: yaml.Node | None, before: str) -> Iterator[tuple[str, int]]:
             key = f"{before}[{index}]"
             yield key, item.start_mark.line + 1
             yield from _keys(item, key)
+
+
+def with_credentials(part: object, environ: Mapping[str, str] = os.environ) -> object:
+    """Return a part of a configuration with ``$CREDENTIALS_DIRECTORY/`` resolved.
+
+    A service manager lends files in a folder of another name for each service, see
+    LoadCredential= in systemd.exec(5). Without one the name stays, and the file is missing.
+    """
+    folder = environ.get(FOLDER)
+    if folder is None:
+        return part
+    if isinstance(part, dict):
+        return {key: with_credentials(value, environ) for key, value in part.items()}
+    if isinstance(part, str) and part.startswith(f"${FOLDER}/"):
+        return folder + part.removeprefix(f"${FOLDER}")
+    return part

@@ -9,12 +9,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import msgspec
 from msgspec import Meta
 
 from fasaco_edge.bus import access
 from fasaco_edge.config.endpoints import UNIX, is_local, protocol_of
 from fasaco_edge.config.sections import Section
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate, OpenToEveryone
+from fasaco_edge.host.plain_yaml import load, read_bounded
 from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_JSON_BYTES
 
 LOG = logging.getLogger(__name__)
@@ -93,7 +95,8 @@ class SecurityConfig(Section, frozen=True):
             written = [os.stat(path).st_mtime for _, path in files(self)]
             if time.time() >= max(*written, Path(__file__).stat().st_mtime):
                 return
-            from fasaco_edge.config.credentials import read_certificate  # noqa: PLC0415
+            # With it comes ssl, which takes 6 MB.
+            from fasaco_edge.config.certificates import read_certificate  # noqa: PLC0415
 
             read_certificate(self.tls)
         except ClockBeforeCertificate as error:
@@ -248,3 +251,22 @@ def _read(name: str, file: str) -> str:
         raise BadConfiguration(f"bus.security.{name}: {file}: {error.strerror}") from error
     except ValueError as error:
         raise BadConfiguration(f"bus.security.{name}: {file}: not a text") from error
+
+
+def read_client_security(file: str, connect: Sequence[str]) -> SecurityConfig:
+    """Read the YAML file of ``--security``.
+
+    Raises:
+        BadConfiguration: it cannot be read, is incomplete, or does not fit the endpoints.
+    """
+    try:
+        security = msgspec.convert(load(read_bounded(Path(file))) or {}, SecurityConfig)
+        for fault in security_faults(security, (), connect):
+            raise fault
+    except OSError as error:
+        raise BadConfiguration(f"--security: {file}: {error.strerror}") from error
+    except ValueError as error:
+        raise BadConfiguration(f"--security: {error}") from error
+    except BadConfiguration as error:
+        raise BadConfiguration(f"--security, --connect: {error}", hint=error.hint) from error
+    return security

@@ -12,7 +12,7 @@ import zenoh
 from fasaco_edge.bus import access
 from fasaco_edge.bus.session_config import session_config
 from fasaco_edge.config.config import load_config
-from fasaco_edge.config.credentials import read_client_security
+from fasaco_edge.config.security import read_client_security
 from fasaco_edge.host.resources import folder
 
 FOLDER = folder("protocol") / "config"

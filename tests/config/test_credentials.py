@@ -4,7 +4,7 @@ import pytest
 import yaml
 
 from fasaco_edge.config.config import load_config
-from fasaco_edge.config.credentials import with_credentials
+from fasaco_edge.config.reading import with_credentials
 
 LENT = {"CREDENTIALS_DIRECTORY": "/run/credentials/a.service"}
 

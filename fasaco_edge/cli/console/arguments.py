@@ -133,7 +133,7 @@ def client_settings(args: argparse.Namespace) -> BusSettings:
     connect = tuple(args.connect or (DEFAULT_ENDPOINT,))
     if args.security is None:
         return BusSettings("client", connect)
-    from fasaco_edge.config.credentials import read_client_security
+    from fasaco_edge.config.security import read_client_security
 
     security = read_client_security(args.security, connect)
     security.warn_of_clock()

@@ -1,29 +1,30 @@
-"""Credentials: certificates, a client's security file, and files lent by a service manager.
-
-Whether certificate, key and CA fit together is tried in a TLS handshake in memory: what it finds
-wrong is what a remote side would find wrong.
-"""
+"""Certificates: whether a certificate, its key and its CA fit together, tried by a handshake."""
 
 from __future__ import annotations
 
 import contextlib
-import os
 import ssl
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-import msgspec
-
-from fasaco_edge.config.security import SecurityConfig, TlsConfig, security_faults
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
-from fasaco_edge.host.plain_yaml import load, read_bounded
 
 ROUND_TRIPS = 8
 # X509_V_FLAG_NO_CHECK_TIME, for which ssl has no name.
 NO_CHECK_TIME = 0x20_0000
+
+
+class TlsFiles(Protocol):
+    """The PEM files of one side of a connection."""
+
+    @property
+    def certificate(self) -> str: ...
+    @property
+    def private_key(self) -> str: ...
+    @property
+    def root_ca(self) -> str: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,7 @@ class Certificate:
     ends: datetime
 
 
-def read_certificate(files: TlsConfig, *, listens: bool = True) -> Certificate:
+def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
     """Check a certificate, and return what it says.
 
     Args:
@@ -93,7 +94,7 @@ def _times(chain: Sequence[Mapping[str, Any]], name: str) -> list[datetime]:
     return [datetime.fromtimestamp(ssl.cert_time_to_seconds(one[name]), UTC) for one in chain]
 
 
-def _context(files: TlsConfig, *, server: bool) -> ssl.SSLContext:
+def _context(files: TlsFiles, *, server: bool) -> ssl.SSLContext:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER if server else ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname = False
     context.verify_mode = ssl.CERT_REQUIRED
@@ -117,41 +118,3 @@ def _handshake(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> dict[st
     shown: dict[str, Any] | None = server.getpeercert()
     assert shown is not None
     return shown
-
-
-def read_client_security(file: str, connect: Sequence[str]) -> SecurityConfig:
-    """Read the YAML file of ``--security``.
-
-    Raises:
-        BadConfiguration: it cannot be read, is incomplete, or does not fit the endpoints.
-    """
-    try:
-        security = msgspec.convert(load(read_bounded(Path(file))) or {}, SecurityConfig)
-        for fault in security_faults(security, (), connect):
-            raise fault
-    except OSError as error:
-        raise BadConfiguration(f"--security: {file}: {error.strerror}") from error
-    except ValueError as error:
-        raise BadConfiguration(f"--security: {error}") from error
-    except BadConfiguration as error:
-        raise BadConfiguration(f"--security, --connect: {error}", hint=error.hint) from error
-    return security
-
-
-FOLDER = "CREDENTIALS_DIRECTORY"
-
-
-def with_credentials(part: object, environ: Mapping[str, str] = os.environ) -> object:
-    """Return a part of a configuration with ``$CREDENTIALS_DIRECTORY/`` resolved.
-
-    A service manager lends files in a folder of another name for each service, see
-    LoadCredential= in systemd.exec(5). Without one the name stays, and the file is missing.
-    """
-    folder = environ.get(FOLDER)
-    if folder is None:
-        return part
-    if isinstance(part, dict):
-        return {key: with_credentials(value, environ) for key, value in part.items()}
-    if isinstance(part, str) and part.startswith(f"${FOLDER}/"):
-        return folder + part.removeprefix(f"${FOLDER}")
-    return part
