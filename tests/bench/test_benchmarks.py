@@ -113,7 +113,11 @@ def test_jitter(capsys):
         assert case["ticks"] == 150
         assert 0 < late_us["p50"] <= late_us["p99"] <= late_us["p99_9"] <= late_us["max"]
         # Held, it takes nothing; what it has published before may still arrive.
-        assert case["daemon_share"] > 0.0 if covering else case["daemon_share"] == 0.0
+        # A thread that a busy machine does not run stops only once it is run again.
+        if covering:
+            assert case["daemon_share"] > 0.0
+        else:
+            assert case["daemon_share"] < 0.01
     assert sum(case["paths"] for case in cases.values() if case["covering"]) > 0
     assert document["goals"] == []
 
