@@ -95,7 +95,7 @@ class SecurityConfig(Section, frozen=True):
             written = [os.stat(path).st_mtime for _, path in files(self)]
             if time.time() >= max(*written, Path(__file__).stat().st_mtime):
                 return
-            # With it comes ssl, which takes 6 MB.
+            # It imports ssl: a daemon whose clock is right does without.
             from fasaco_edge.config.certificates import read_certificate  # noqa: PLC0415
 
             read_certificate(self.tls)
