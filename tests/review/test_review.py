@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from itertools import pairwise
 
 import numpy as np
@@ -217,17 +218,30 @@ def test_the_longest_stand_is_one(review):
     assert np.hypot(*(xy - xy[0]).T).max() <= 0.05
 
 
+def frame_ends(content: bytes) -> list[int]:
+    """Return where the frames of a recording end: 12 bytes of header, then kind, length, body."""
+    ends = [12]
+    while ends[-1] < len(content):
+        _, length = struct.unpack_from("<QQ", content, ends[-1])
+        ends.append(ends[-1] + 16 + length)
+    return ends
+
+
+# Bytes behind the last whole frame: a cut may fall between two frames as well as into one.
+@pytest.mark.parametrize("behind", [0, 1, 17])
 @pytest.mark.parametrize("share", [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.99])
-def test_a_torn_file_is_read_as_far_as_it_is_whole(recording, review, tmp_path, share):
+def test_a_torn_file_is_read_as_far_as_it_is_whole(recording, review, tmp_path, share, behind):
     (whole,) = recording.paths
     content = whole.read_bytes()
     torn = tmp_path / "torn.rrd"
-    torn.write_bytes(content[: int(share * len(content))])
+    # The footer is the last frame.
+    end = max(at for at in frame_ends(content)[:-2] if at <= share * len(content))
+    torn.write_bytes(content[: end + behind])
     before = torn.read_bytes()
     cut = read_review([torn])
     assert torn.read_bytes() == before
     told = document(cut)
-    assert told["files"][0]["torn_bytes"] > 0
+    assert told["files"][0]["torn_bytes"] == behind
     assert told["files"][0]["ended"] is False
     if cut.drive is None:
         assert told["steps"] is told["covered_cells"] is None
