@@ -1,7 +1,7 @@
 """The table of all errors that users meet: each with its code, and a hint on what to do.
 
 The code is what travels: in a status, an error reply, the command line's ``--json``. The text says
-what is wrong and where. (``cli.console.asking`` repeats errors that a daemon has answered with.)
+what is wrong and where. (``cli.ask`` repeats errors that a daemon has answered with.)
 """
 
 

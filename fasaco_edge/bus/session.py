@@ -20,6 +20,7 @@ from typing import Any, Self
 
 import zenoh
 
+from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.bus.latched import Asker, LatchedSubscription, Subscription
 from fasaco_edge.bus.publisher import JSON, Publisher, schema_of
 from fasaco_edge.bus.queries import (
@@ -38,7 +39,6 @@ from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import VOLATILE, Qos, Topic
 
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 ZENOH_VERSION = metadata.version("eclipse-zenoh")
 
 

@@ -1,4 +1,8 @@
-"""The command line: ``fasaco-edge`` and its commands, one file each."""
+"""The command line: ``fasaco-edge`` and its commands, one file each.
+
+A new command is a file that ends with a ``Command``, and a row of ``COMMANDS``. Only the file of
+the command that is given is imported.
+"""
 
 from __future__ import annotations
 
@@ -6,37 +10,37 @@ import argparse
 import errno
 import os
 import sys
+import textwrap
 from collections.abc import Sequence
+from importlib import import_module
 
 from fasaco_edge import __version__
-from fasaco_edge.cli import (
-    ask,
-    bench,
-    check_config,
-    demo,
-    doctor,
-    maps,
-    mission,
-    plan,
-    record,
-    replay,
-    review,
-    run,
-    simulate,
-    warmup,
-    watch,
-)
-from fasaco_edge.cli.console import exits
-from fasaco_edge.cli.console.arguments import with_negative_pairs
+from fasaco_edge.cli.console.arguments import Command, Exit, add_common, with_negative_pairs
 from fasaco_edge.cli.console.logs import begin_logging, say_why
 from fasaco_edge.cli.console.streams import clean_streams
 from fasaco_edge.errors import BadConfiguration, DiskFailed, FasacoError
 from fasaco_edge.host.signals import end_with_parent
 
-COMMANDS = (
-    demo, plan, run, mission, ask, watch, record, review, replay, simulate, bench, maps, warmup,
-    check_config, doctor,
-)  # fmt: skip
+COMMANDS = {
+    "demo": "watch a simulated robot map and cover a building",
+    "plan": "plan a coverage path offline",
+    "run": "run the daemon: maps come in over Zenoh, paths go out",
+    "mission": "command a running daemon: start, pause, resume, cancel, replan, reset, status",
+    "ask": "ask a running daemon: status, path, coverage, pheromone, config, replan ...",
+    "watch": "watch a robot's mission live in this terminal",
+    "record": "record a robot's mission into a Rerun recording (.rrd)",
+    "review": "tell what happened in a recorded mission",
+    "replay": "play a recorded mission again and compare its decisions",
+    "simulate": "simulate a robot with a laser scanner on the bus",
+    "bench": "measure speed, footprint, latency and jitter on this machine",
+    "maps": "list the maps that come with the package",
+    "warmup": "compile the kernels into the cache, so that the first plan starts at once",
+    "check-config": (
+        "check a configuration: all that is wrong, with line, value and what is allowed"
+    ),
+    "doctor": "check host, bus and configuration, and say what to do",
+}
+"""Each command, and its line in the list of them."""
 
 # A broken or full disk, a computer that is out of files or memory. Who is told so does not look
 # for a mistake in the configuration, and a service is started again.
@@ -47,7 +51,8 @@ _PASSING = frozenset(
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the process's exit code."""
-    return run_command(_parser(), sys.argv[1:] if argv is None else argv)
+    words = sys.argv[1:] if argv is None else argv
+    return run_command(_parser(words), words)
 
 
 def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
@@ -64,16 +69,16 @@ def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
     except FasacoError as error:
         return _fail(DiskFailed(str(error)) if _may_pass(error) else error)
     except KeyboardInterrupt:
-        return exits.INTERRUPTED
+        return Exit.INTERRUPTED
     except SystemError as error:
         # What numba makes of Ctrl-C while a kernel runs.
         if isinstance(error.__cause__, KeyboardInterrupt):
-            return exits.INTERRUPTED
+            return Exit.INTERRUPTED
         raise
     except BrokenPipeError:
         # The reader has seen enough (``| head``); nothing is left to be flushed to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return exits.ERROR
+        return Exit.ERROR
     except OSError as error:
         if not _may_pass(error):
             raise
@@ -81,32 +86,31 @@ def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
     return code
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+    """Return a parser that knows all commands by name, and by its options the one in ``words``."""
     parser = argparse.ArgumentParser(
         prog="fasaco-edge",
         description="Coverage path planning with fast-spanning ant colonies, on a robot.",
         epilog="Begin with `fasaco-edge demo`. Each command explains itself with --help.",
     )
     parser.add_argument("--version", action="version", version=f"fasaco-edge {__version__}")
-    common = common_options()
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for module in COMMANDS:
-        module.add_to(commands, common)
+    for name, about in COMMANDS.items():
+        described = commands.add_parser(
+            name, help=about, formatter_class=argparse.RawDescriptionHelpFormatter
+        )
+        if name in words[:1]:
+            module = import_module(f"fasaco_edge.cli.{name.replace('-', '_')}")
+            _describe(described, module.COMMAND)
     return parser
 
 
-def common_options() -> argparse.ArgumentParser:
-    """Return a parser of the options that all commands take."""
-    common = argparse.ArgumentParser(add_help=False)
-    common.add_argument(
-        "--log-level",
-        choices=("debug", "info", "warning", "error"),
-        default="info",
-        help="how much to say on standard error (default: %(default)s)",
-    )
-    # For the processes that other commands start: they end when those do.
-    common.add_argument("--with-parent", type=int, metavar="PID", help=argparse.SUPPRESS)
-    return common
+def _describe(parser: argparse.ArgumentParser, command: Command) -> None:
+    parser.description, parser.epilog = textwrap.fill(command.description, 79), command.epilog
+    parser.set_defaults(command=command.run)
+    if not command.is_group:
+        add_common(parser)
+    command.add_options(parser)
 
 
 def _may_pass(error: BaseException | None) -> bool:
@@ -120,4 +124,4 @@ def _may_pass(error: BaseException | None) -> bool:
 
 def _fail(error: FasacoError) -> int:
     say_why(error)
-    return exits.CONFIG if isinstance(error, BadConfiguration) else exits.ERROR
+    return Exit.CONFIG if isinstance(error, BadConfiguration) else Exit.ERROR

@@ -1,17 +1,42 @@
-"""``fasaco-edge ask``: put a question to a running daemon."""
+"""``fasaco-edge ask``: put a question to a running daemon, and show its answer.
+
+Answers are tables for people, or JSON where they came as CDR.
+"""
 
 from __future__ import annotations
 
 import argparse
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING, Any
 
-from fasaco_edge.cli.console import asking, exits
-from fasaco_edge.cli.console.arguments import add_command
+import numpy as np
+import yaml
+from rich.table import Table
+
+from fasaco_edge.cli.console.arguments import (
+    Command,
+    Exit,
+    add_json,
+    add_robot_on_bus,
+    client_settings,
+    seconds,
+)
+from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.console.terminal import figures, out
+from fasaco_edge.errors import FasacoError, NobodyAnswersError
+from fasaco_edge.text import one_line
+from fasaco_edge.watch import phrases
+from fasaco_edge.wire import coverage, replies, schemas
+from fasaco_edge.wire.json_text import decode_json, decode_tolerant
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.maps import decode_occupancy_grid
+from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.topics import RPC_NAMES
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
+    from fasaco_edge.bus.queries import Reply
 
 EPILOG = """\
 examples:
@@ -28,17 +53,7 @@ exit codes: 0 answered; 1 refused, or nobody answered; 2 not understood; 78 no n
 """
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "ask",
-        run,
-        about="ask a running daemon: status, path, coverage, pheromone, config, replan ...",
-        description="Put a question to a running daemon over Zenoh, and show the answer.",
-        epilog=EPILOG,
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("question", choices=RPC_NAMES, metavar="NAME", help=", ".join(RPC_NAMES))
     parser.add_argument(
         "--param",
@@ -48,19 +63,17 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="parameter of the question; may be repeated",
     )
-    asking.add_question(parser)
+    add_question(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Ask, and show the answer."""
-    from fasaco_edge.cli.answers import print_answer, show
-
-    reply = asking.ask(args, args.question, ";".join(args.param))
+    reply = ask(args, args.question, ";".join(args.param))
     if args.json:
         print_answer(reply)
     else:
         show(args.question, reply)
-    return exits.OK
+    return Exit.OK
 
 
 def _parameter(text: str) -> str:
@@ -68,3 +81,181 @@ def _parameter(text: str) -> str:
     if not re.fullmatch(r"\w+=[^;?#&|]*", text):
         raise argparse.ArgumentTypeError(f"must be KEY=VALUE, got {text!r}")
     return text
+
+
+TIMEOUT_S = 5.0
+
+
+def nobody_answers(prefix: str, robots: Collection[str]) -> NobodyAnswersError:
+    """Return the error that no daemon answers at ``prefix``, where these robots are."""
+    names = one_line(", ".join(sorted(robots)))
+    there = f"there are {names}: give one as --robot" if names else "there is none"
+    return NobodyAnswersError(
+        f"no daemon answers at {prefix}",
+        hint=f"of robots on this bus {there}; `fasaco-edge run` starts a daemon",
+    )
+
+
+class RefusedError(FasacoError):
+    """The daemon's answer is an error."""
+
+    def __init__(self, answer: replies.Error) -> None:
+        super().__init__(one_line(answer.message), hint=one_line(answer.hint))
+        self.code = answer.code
+
+
+def add_question(parser: argparse.ArgumentParser) -> None:
+    """Add whom to ask, how long to wait, and how to show the answer."""
+    add_json(parser, "the answer")
+    parser.add_argument(
+        "--timeout",
+        type=seconds,
+        default=TIMEOUT_S,
+        metavar="S",
+        help="how long to wait for the answer (default: %(default)s)",
+    )
+    add_robot_on_bus(parser)
+
+
+def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: bytes = b"") -> Reply:
+    """Ask; ``parameters`` as they stand behind ``?``.
+
+    Raises:
+        RefusedError: the answer is an error; with ``--json`` it is printed as it came.
+        NobodyAnswersError: there is no answer in time.
+        BusUnavailable: nobody listens at the endpoint.
+    """
+    from fasaco_edge.bus.session import open_bus
+
+    keys = Keys(args.robot, args.base)
+    selector = keys.rpc(name) + (f"?{parameters}" if parameters else "")
+    with open_bus(client_settings(args)) as bus:
+        found = bus.get(selector, args.timeout, payload)
+        if not found:
+            alive = bus.alive(f"{args.base}/@v1/*/alive")
+            raise nobody_answers(keys.prefix, {key.split("/")[-2] for key in alive})
+    reply = found[0]
+    if reply.is_error:
+        if args.json:
+            print_json(decode_json(reply.payload))
+        raise RefusedError(decode_tolerant(reply.payload, replies.Error))
+    return reply
+
+
+def show_mission(reply: Reply) -> None:
+    """Print the state and the mission in a status, or in the answer to a command."""
+    told = decode_tolerant(reply.payload, replies.Reply)
+    mission, console = told.mission, out()
+    console.print(figures(_rows(told)))
+    if mission.zones:
+        console.print(_zones(mission.zones))
+    if mission.unreached.areas:
+        console.print(_unreached(mission.unreached))
+
+
+def _rows(told: replies.Reply) -> list[tuple[str, str]]:
+    mission = told.mission
+    rows = [("robot", told.robot), ("state", told.state), ("reason", told.reason)]
+    if mission.ordered is not None:
+        began = "begun by itself" if mission.ordered == "itself" else "as ordered"
+        stage = phrases.stage(mission)
+        rows.append(("mission", f"{stage}, {began}"))
+    if told.coverage is not None:
+        rows.append(("covered", phrases.covered(told.coverage)))
+    if mission.keep_out:
+        rows.append(("keep-out zones", str(mission.keep_out)))
+    if mission.return_home:
+        home = mission.home
+        rows.append(("home", f"({home.x:.2f}, {home.y:.2f}) m" if home else "not known yet"))
+    return rows
+
+
+def _zones(zones: Sequence[replies.ZoneReport]) -> Table:
+    table = Table("zone", "pass", "covered", title="Zones", title_justify="left")
+    for zone in zones:
+        table.add_row(zone.name, *phrases.zone_progress(zone))
+    return table
+
+
+def _unreached(unreached: replies.UnreachedReport) -> Table:
+    table = Table("cells", "m2", "at", "why", title="Not reached", title_justify="left")
+    for area in unreached.areas:
+        place = f"({area.x:.2f}, {area.y:.2f}) m"
+        table.add_row(str(area.cells), f"{area.m2:.2f}", place, area.reason)
+    if unreached.areas_left_out:
+        table.caption = f"and {unreached.areas_left_out} smaller areas"
+    return table
+
+
+def print_answer(reply: Reply) -> None:
+    """Print what came if it is JSON, escapes and all, else the figures of the message."""
+    print_json(_figures(reply) if reply.schema else decode_json(reply.payload))
+
+
+def show(name: str, reply: Reply) -> None:
+    """Print the answer to question ``name``."""
+    if reply.schema:
+        rows = [(title, str(value)) for title, value in _figures(reply).items()]
+        out().print(figures(rows))
+    elif name in ("status", "mission"):
+        show_mission(reply)
+    else:
+        document = decode_json(reply.payload)
+        print(yaml.safe_dump(document, sort_keys=False), end="")
+
+
+def _figures(reply: Reply) -> dict[str, Any]:
+    match reply.schema:
+        case schemas.PATH:
+            return _path_figures(reply)
+        case schemas.OCCUPANCY_GRID:
+            return _coverage_figures(reply)
+        case _:
+            return _trail_figures(reply)
+
+
+def _path_figures(reply: Reply) -> dict[str, Any]:
+    path = decode_path(reply.payload)
+    length_m = float(np.hypot(*np.diff(path.xy, axis=0).T).sum())
+    return {
+        "frame": path.frame,
+        "poses": len(path.xy),
+        "length_m": round(length_m, 2),
+        **decode_json(reply.attachment),
+    }
+
+
+def _coverage_figures(reply: Reply) -> dict[str, Any]:
+    grid = decode_occupancy_grid(reply.payload)
+    values = {name.lower(): value for name, value in vars(coverage).items() if name.isupper()}
+    return {
+        "frame": grid.frame,
+        "rows": grid.geometry.rows,
+        "cols": grid.geometry.cols,
+        "cell_m": grid.geometry.resolution,
+        **{name: int(np.count_nonzero(grid.cells == value)) for name, value in values.items()},
+    }
+
+
+def _trail_figures(reply: Reply) -> dict[str, Any]:
+    trail = decode_pheromone(reply.payload)
+    return {
+        "frame": trail.frame,
+        "rows": trail.geometry.rows,
+        "cols": trail.geometry.cols,
+        "cell_m": trail.geometry.resolution,
+        "cohort": trail.cohort,
+        "velocity": trail.velocity,
+        "ants": trail.ants,
+        "best_steps": trail.best_steps,
+        "trail_min": trail.trail_min,
+        "trail_max": trail.trail_max,
+    }
+
+
+COMMAND = Command(
+    description="Put a question to a running daemon over Zenoh, and show the answer.",
+    run=run,
+    add_options=_add_options,
+    epilog=EPILOG,
+)

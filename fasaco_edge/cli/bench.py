@@ -12,14 +12,13 @@ from fasaco_edge.bench.footprint import FOOTPRINT
 from fasaco_edge.bench.jitter import JITTER
 from fasaco_edge.bench.latency import LATENCY
 from fasaco_edge.bench.speed import SPEED
-from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.arguments import Command, Exit, add_common, add_json
 from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from fasaco_edge.bench.benchmark import Benchmark, Report
-    from fasaco_edge.cli.console.arguments import Subparsers
 
 WIDTH = 80
 BENCHMARKS: tuple[Benchmark[Any], ...] = (SPEED, FOOTPRINT, LATENCY, JITTER)
@@ -31,22 +30,8 @@ medians with their range; run them on a quiet machine.
 """
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command and its benchmarks."""
-    parser = commands.add_parser(
-        "bench",
-        help="measure speed, footprint, latency and jitter on this machine",
-        description="Measure this installation on this machine.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add_benchmarks(parser, BENCHMARKS, common)
-
-
 def add_benchmarks(
-    parser: argparse.ArgumentParser,
-    benchmarks: Sequence[Benchmark[Any]],
-    common: argparse.ArgumentParser,
+    parser: argparse.ArgumentParser, benchmarks: Sequence[Benchmark[Any]] = BENCHMARKS
 ) -> None:
     """Add each benchmark to ``parser``, as a command of its own."""
     parser.set_defaults(
@@ -54,26 +39,20 @@ def add_benchmarks(
     )
     commands = parser.add_subparsers(title="benchmarks", metavar="BENCHMARK")
     for benchmark in benchmarks:
-        _add(benchmark, commands, common)
-
-
-def _add(
-    benchmark: Benchmark[Any], benchmarks: Subparsers, common: argparse.ArgumentParser
-) -> None:
-    parser = benchmarks.add_parser(
-        benchmark.name,
-        parents=[common],
-        help=benchmark.summary,
-        description=textwrap.fill(benchmark.description, WIDTH),
-        epilog=benchmark.epilog,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    benchmark.add_options(parser)
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
-    parser.add_argument(
-        "--check", action="store_true", help=f"exit with {exits.ERROR} if a goal is missed"
-    )
-    parser.set_defaults(benchmark=benchmark)
+        words = commands.add_parser(
+            benchmark.name,
+            help=benchmark.summary,
+            description=textwrap.fill(benchmark.description, WIDTH),
+            epilog=benchmark.epilog,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        add_common(words)
+        benchmark.add_options(words)
+        add_json(words, "the figures")
+        words.add_argument(
+            "--check", action="store_true", help=f"exit with {Exit.ERROR:d} if a goal is missed"
+        )
+        words.set_defaults(benchmark=benchmark)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -94,9 +73,9 @@ def run(args: argparse.Namespace) -> int:
     for file in args.benchmark.write(args, samples):
         terminal.err().print(f"wrote {file}")
     if interrupted:
-        return exits.INTERRUPTED
+        return Exit.INTERRUPTED
     missed = any(goal.met is False for goal in report.goals)
-    return exits.ERROR if args.check and missed else exits.OK
+    return Exit.ERROR if args.check and missed else Exit.OK
 
 
 def _measure(benchmark: Benchmark[Any], args: argparse.Namespace) -> tuple[list[Any], bool]:
@@ -172,3 +151,12 @@ def _table(title: str) -> Table:
         box=box.SIMPLE_HEAD,
         padding=(0, 0, 0, 1),
     )
+
+
+COMMAND = Command(
+    description="Measure this installation on this machine.",
+    run=run,
+    add_options=add_benchmarks,
+    epilog=EPILOG,
+    is_group=True,
+)

@@ -6,12 +6,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.console import exits
-from fasaco_edge.cli.console.arguments import add_command
+from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.config.reading import Fault
 
@@ -28,25 +26,14 @@ examples:
 """
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "check-config",
-        run,
-        about="check a configuration: all that is wrong, with line, value and what is allowed",
-        description="Check a configuration before a daemon starts with it: all that is wrong, "
-        "each with its line, the value, and what is allowed.",
-        epilog=EPILOG,
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="YAML configuration")
     parser.add_argument(
         "--show",
         action="store_true",
         help="print the configuration in force, defaults included, as YAML; without secrets",
     )
-    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    add_json(parser, "the result")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -67,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
         print(yaml.safe_dump(config_document(config), sort_keys=False), end="")
     else:
         print(f"{args.file}: in order")
-    return exits.OK if config is not None else exits.CONFIG
+    return Exit.OK if config is not None else Exit.CONFIG
 
 
 def _document(
@@ -105,3 +92,12 @@ def _print(file: Path, faults: list[Fault]) -> None:
         console.print(f"{where}: {fault.error}", soft_wrap=True)
         if fault.error.hint != BadConfiguration.hint:
             console.print(f"  -> {fault.error.hint}", soft_wrap=True)
+
+
+COMMAND = Command(
+    description="Check a configuration before a daemon starts with it: all that is wrong, "
+    "each with its line, the value, and what is allowed.",
+    run=run,
+    add_options=_add_options,
+    epilog=EPILOG,
+)

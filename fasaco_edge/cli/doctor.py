@@ -9,12 +9,10 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.console import exits
-from fasaco_edge.cli.console.arguments import add_command
+from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.doctor.finding import Finding
 
 EPILOG = """\
@@ -47,18 +45,7 @@ examples:
 COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "doctor",
-        run,
-        about="check host, bus and configuration, and say what to do",
-        description="Check the host on which a daemon runs or will run, the bus and the "
-        "configuration: what is missing, what is open to whom, and what to do about it.",
-        epilog=EPILOG,
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--config",
         type=Path,
@@ -66,7 +53,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
         help="the daemon's YAML configuration (default: what a daemon without one does)",
     )
     parser.add_argument("--recordings", type=Path, metavar="DIR", help="where recordings are to go")
-    parser.add_argument("--json", action="store_true", help="print the findings as JSON")
+    add_json(parser, "the findings")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -80,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         _print(found)
     failed = any(finding.level is Level.FAIL for _, finding in found)
-    code = exits.ERROR if failed else exits.OK
+    code = Exit.ERROR if failed else Exit.OK
     if threading.active_count() > 1:
         # Something hangs, which the interpreter's end would wait for.
         sys.stdout.flush()
@@ -117,3 +104,12 @@ def _print(found: list[tuple[str, Finding]]) -> None:
             console.print(f"{indent}{line}", style="dim", soft_wrap=True)
         if finding.to_do:
             console.print(f"{indent}-> {finding.to_do}", soft_wrap=True)
+
+
+COMMAND = Command(
+    description="Check the host on which a daemon runs or will run, the bus and the "
+    "configuration: what is missing, what is open to whom, and what to do about it.",
+    run=run,
+    add_options=_add_options,
+    epilog=EPILOG,
+)

@@ -3,25 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.console.arguments import add_command
-
-if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
-
-
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    add_command(
-        commands,
-        common,
-        "maps",
-        run,
-        about="list the maps that come with the package",
-        description="List the maps that come with the package; plan, simulate and demo "
-        "take them by name.",
-    )
+from fasaco_edge.cli.console.arguments import Command
 
 
 def run(args: argparse.Namespace) -> int:
@@ -31,3 +14,10 @@ def run(args: argparse.Namespace) -> int:
 
     out().print(figures(builtin_maps()))
     return 0
+
+
+COMMAND = Command(
+    description="List the maps that come with the package; plan, simulate and demo "
+    "take them by name.",
+    run=run,
+)

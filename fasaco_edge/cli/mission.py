@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from fasaco_edge.cli.console import exits
-from fasaco_edge.cli.console.asking import add_question, ask
+from fasaco_edge.cli.ask import add_question, ask, show_mission
+from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.streams import print_json
-
-if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
+from fasaco_edge.wire.json_text import decode_json, encode_json
 
 EPILOG = """\
 examples:
@@ -54,23 +52,16 @@ COMMANDS = {
 }
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "mission",
-        help="command a running daemon: start, pause, resume, cancel, replan, reset, status",
-        description="Command the mission of a running daemon over Zenoh, and see how far it is.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def _add_commands(parser: argparse.ArgumentParser) -> None:
     names = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for name, told in COMMANDS.items():
         described = told[0].upper() + told[1:] + "."
-        command = names.add_parser(name, parents=[common], help=told, description=described)
+        command = names.add_parser(name, help=told, description=described)
+        add_common(command)
         if name == "start":
             _add_order(command)
         add_question(command)
-        command.set_defaults(command=run, mission_command=name)
+        command.set_defaults(mission_command=name)
 
 
 def _add_order(parser: argparse.ArgumentParser) -> None:
@@ -102,9 +93,6 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Ask, and show the answer."""
-    from fasaco_edge.cli.answers import show_mission
-    from fasaco_edge.wire.json_text import decode_json, encode_json
-
     asked: dict[str, Any] = {"command": args.mission_command}
     if args.mission_command == "start":
         asked["order"] = _order(args)
@@ -113,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
         print_json(decode_json(reply.payload))
     else:
         show_mission(reply)
-    return exits.OK
+    return Exit.OK
 
 
 def _order(args: argparse.Namespace) -> dict[str, Any]:
@@ -176,3 +164,12 @@ def _polygon(text: str) -> list[list[float]]:
     if len(corners) < 3 or any(len(corner) != 2 for corner in corners):
         raise argparse.ArgumentTypeError(f"must be x,y;x,y;x,y;... in metres, got {text!r}")
     return corners
+
+
+COMMAND = Command(
+    description="Command the mission of a running daemon over Zenoh, and see how far it is.",
+    run=run,
+    add_options=_add_commands,
+    epilog=EPILOG,
+    is_group=True,
+)

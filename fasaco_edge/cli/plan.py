@@ -4,50 +4,42 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fasaco_edge.cli.console import exits
-from fasaco_edge.cli.console.arguments import add_command
+from fasaco_edge.cli.console import terminal
+from fasaco_edge.cli.console.arguments import Command, Exit, check_output, writing
+from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.plan_options import ANYWHERE, EPILOG, HOME, add_options, check, settle
+from fasaco_edge.cli.warmup import compile_kernels
+from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
 from fasaco_edge.host.signals import ctrl_c_asks
+from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.planner import ignore
+from fasaco_edge.planners.registry import planner_of
+from fasaco_edge.planners.stopping import (
+    GapReached,
+    Interrupt,
+    SearchProgress,
+    StoppingCriterion,
+    TimeBudget,
+)
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.grid.lattice import Cell, CoverageLattice
     from fasaco_edge.grid.occupancy import OccupancyGrid
-    from fasaco_edge.planners.colony import ColonyConfig
     from fasaco_edge.planners.path import CoveragePath
     from fasaco_edge.planners.problem import CoverageProblem
-    from fasaco_edge.planners.stopping import Interrupt, SearchProgress, StoppingCriterion
-
-
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "plan",
-        run,
-        about="plan a coverage path offline",
-        description="Plan a walk over all cells the robot can reach, and say how good it is.",
-        epilog=EPILOG,
-    )
-    add_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Plan, print the figures, write what was asked for."""
-    from fasaco_edge.cli.console.arguments import check_output, writing
-    from fasaco_edge.cli.plan_output import draw, figures_of, print_figures
-    from fasaco_edge.cli.warmup import compile_kernels
-    from fasaco_edge.grid.map_files import find_map
-    from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
-    from fasaco_edge.planners.stopping import Interrupt
-
     settle(args)
     check(args)
     colony = ColonyConfig(
@@ -75,12 +67,11 @@ def run(args: argparse.Namespace) -> int:
         with writing(args.png):
             draw(args, args.png, lattice, grid, path, figures)
     print_figures(args, figures)
-    return exits.INTERRUPTED if asked.asked.is_set() else exits.OK
+    return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
 
 
 def _read(args: argparse.Namespace) -> tuple[CoverageLattice, OccupancyGrid | None, Path]:
     from fasaco_edge.grid.lattice import CoverageLattice, Footprint
-    from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
 
     file = find_map(args.map)
     if file.suffix == ".npy":
@@ -90,7 +81,6 @@ def _read(args: argparse.Namespace) -> tuple[CoverageLattice, OccupancyGrid | No
 
 
 def _pose(args: argparse.Namespace, lattice: CoverageLattice, file: Path) -> CoverageProblem:
-    from fasaco_edge.planners.cost import CoverageCost
     from fasaco_edge.planners.problem import CoverageProblem
 
     start = _start(args, lattice, file)
@@ -117,10 +107,7 @@ def _plan(
 
     A planner that knows no lower bound is given one, for its path and for ``--target-gap``.
     """
-    from fasaco_edge.cli.plan_output import watching
     from fasaco_edge.planners.graph import lower_bound_steps
-    from fasaco_edge.planners.planner import ignore
-    from fasaco_edge.planners.registry import planner_of
 
     planner = planner_of(args.planner, colony, args.threads, args.local_search)
     bound = 0 if args.local_search else lower_bound_steps(problem)
@@ -150,11 +137,123 @@ def _plan(
 
 def _criteria(args: argparse.Namespace, asked: Interrupt) -> dict[str, StoppingCriterion]:
     """Return what ends the search early, by its name; a budget begins to run here."""
-    from fasaco_edge.planners.stopping import GapReached, TimeBudget
-
     criteria: dict[str, StoppingCriterion] = {"Ctrl-C": asked}
     if args.target_gap is not None:
         criteria["target gap"] = GapReached(args.target_gap)
     if args.budget is not None:
         criteria["budget"] = TimeBudget(args.budget)
     return criteria
+
+
+# A terminal shows no more pictures a second; drawing them costs the search time.
+LEAST_INTERVAL_S = 0.05
+
+
+def figures_of(
+    args: argparse.Namespace,
+    problem: CoverageProblem,
+    path: CoveragePath,
+    search: dict[str, Any],
+) -> dict[str, Any]:
+    """Return the figures of a walk and of the search for it, as JSON values."""
+    from fasaco_edge.planners.path import walk_figures
+
+    walk = asdict(walk_figures(problem.lattice, path.cells))
+    return {
+        "planner": path.planner,
+        "local_search": args.local_search,
+        "seed": path.seed,
+        "ants": path.work.ants,
+        "kicks": path.work.perturbations,
+        "proposals": path.work.proposals,
+        "velocities": {"fasaco": args.velocities, "aco": "1"}.get(path.planner),
+        "map": str(args.map),
+        "cell_m": args.cell,
+        "start": list(problem.start),
+        "end": path.cells[-1].tolist(),
+        **walk,
+        # What there is to cover; the walk may pass over no other cells.
+        "cells": problem.cells,
+        "length_m": round(path.steps * args.cell, 3),
+        "cost_s": path.cost_s,
+        "lower_bound_steps": path.lower_bound_steps,
+        "gap": None if path.gap is None else round(path.gap, 6),
+        "unreachable_cells": int(np.count_nonzero(problem.unreachable)),
+        "speed_m_s": args.speed_m_s,
+        "turn_s": args.turn_s,
+        "budget_s": args.budget,
+        "target_gap": args.target_gap,
+        "threads": args.threads,
+        **search,
+    }
+
+
+def draw(
+    args: argparse.Namespace,
+    file: Path,
+    lattice: CoverageLattice,
+    grid: OccupancyGrid | None,
+    path: CoveragePath,
+    figures: dict[str, Any],
+) -> None:
+    """Draw the walk."""
+    from fasaco_edge.drawing.pictures import draw_walk
+
+    ants = path.work.ants
+    counted = "1 ant" if ants == 1 else f"{ants} ants"
+    colony = f" {figures['velocities']}, {counted}, seed {path.seed}" if ants else ""
+    search = f", {path.work.perturbations} perturbations" if args.local_search else ""
+    title = path.planner + colony + search
+    lines = [
+        f"{Path(figures['map']).name}: {figures['cells']} cells of {figures['cell_m']} m, "
+        f"{figures['steps']} steps, {figures['revisits']} revisits, "
+        f"{figures['turns_90']} quarter-turns; "
+        f"at most {path.gap or 0.0:.1%} above the fewest steps there can be",
+    ]
+    draw_walk(lattice, path.cells, grid=grid, title=title, lines=lines).save(file, "PNG")
+
+
+def print_figures(args: argparse.Namespace, figures: dict[str, Any]) -> None:
+    """Print the figures as JSON or as a table."""
+    if args.json:
+        print_json(figures)
+        return
+    rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
+    terminal.out().print(terminal.figures(rows))
+    for file in (args.path_out, args.png):
+        if file is not None:
+            terminal.out().print(f"wrote {file}")
+
+
+@contextmanager
+def watching(
+    args: argparse.Namespace, colony: ColonyConfig
+) -> Iterator[Callable[[SearchProgress], None]]:
+    """Yield what shows how far a search is: the budget used up, else the ants that walked."""
+    with terminal.progress_of_time() if args.local_search else terminal.progress() as bar:
+        total = args.budget if args.local_search else colony.ants
+        task = bar.add_task("ants", total=total)
+        began = shown = time.perf_counter()
+
+        def show(search: SearchProgress) -> None:
+            nonlocal shown
+            now = time.perf_counter()
+            if not bar.disable and now - shown >= LEAST_INTERVAL_S:
+                shown = now
+                done = now - began if args.local_search else search.work.ants
+                bar.update(task, completed=done, description=_words(search))
+
+        yield show
+
+
+def _words(search: SearchProgress) -> str:
+    words = f"{search.steps} steps"
+    return words if search.gap is None else f"{words}, {search.gap:.2%} above the bound"
+
+
+COMMAND = Command(
+    description="Plan a walk over all cells the robot can reach, and say how good it is.",
+    run=run,
+    add_options=add_options,
+    epilog=EPILOG,
+)

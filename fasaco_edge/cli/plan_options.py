@@ -9,6 +9,7 @@ from pathlib import Path
 from fasaco_edge.cli.console.arguments import (
     DEFAULT_CELL_M,
     DEFAULT_RADIUS_M,
+    add_json,
     pair_of_floats,
     pair_of_ints,
 )
@@ -209,7 +210,7 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
         "--path-out", type=Path, metavar="FILE.csv", help="write the walk: header row,col"
     )
     group.add_argument("--png", type=Path, metavar="FILE", help="draw the walk")
-    group.add_argument("--json", action="store_true", help="print the figures as JSON")
+    add_json(group, "the figures")
 
 
 def _end(text: str) -> str | tuple[int, int]:

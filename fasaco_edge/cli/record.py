@@ -7,13 +7,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.console.arguments import add_command, add_robot_on_bus, client_settings
+from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, client_settings
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from fasaco_edge.wire.topics import POSE_SCHEMAS
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.session import BusSettings
-    from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.config.ros import RosConfig
     from fasaco_edge.recording.write.settings import RecorderSettings, RosInput
@@ -21,18 +20,7 @@ if TYPE_CHECKING:
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "record",
-        run,
-        about="record a robot's mission into a Rerun recording (.rrd)",
-        description="Record map, coverage, pheromone, path, pose, states and latencies of one "
-        "robot, and byte for byte what its mission receives, until SIGTERM or SIGINT. Open the "
-        "result with `rerun FILE.rrd`, play it again with `fasaco-edge replay FILE.rrd`.",
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
     parser.add_argument(
         "--config",
@@ -205,3 +193,12 @@ def _ros_inputs(config: RosConfig) -> tuple[RosInput, ...]:
         RosInput(name, config.input_key(topic), topic.schema, topic.latched, topic.depth)
         for name, topic in config.inputs.items()
     )
+
+
+COMMAND = Command(
+    description="Record map, coverage, pheromone, path, pose, states and latencies of one "
+    "robot, and byte for byte what its mission receives, until SIGTERM or SIGINT. Open the "
+    "result with `rerun FILE.rrd`, play it again with `fasaco-edge replay FILE.rrd`.",
+    run=run,
+    add_options=_add_options,
+)

@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge import __version__
-from fasaco_edge.cli.console.arguments import add_command
+from fasaco_edge.cli.console.arguments import Command
 from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.recording.read.run import RecordedSamples
     from fasaco_edge.replay.cycle_record import CycleRecord
@@ -38,17 +37,7 @@ replay is of another mission, and approximate, too.
 """
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "replay",
-        run,
-        about="play a recorded mission again and compare its decisions",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "recordings",
         nargs="+",
@@ -286,3 +275,11 @@ def _words(document: dict[str, Any]) -> str:
         f"turn {document['turn']} at {document['at_s']:.2f} s: {document['what']} "
         f"was {document['recorded']}, is {document['replayed']}"
     )
+
+
+COMMAND = Command(
+    description=DESCRIPTION,
+    run=run,
+    add_options=_add_options,
+    epilog=EPILOG,
+)

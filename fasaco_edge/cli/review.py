@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.console.arguments import add_command
+from fasaco_edge.cli.console.arguments import Command
 from fasaco_edge.cli.console.streams import print_json
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.review.review import Review
 
 DESCRIPTION = """\
@@ -22,17 +21,7 @@ a crash cut short: of them, what is whole is told.
 """
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "review",
-        run,
-        about="tell what happened in a recorded mission",
-        description=DESCRIPTION,
-        epilog=_epilog(),
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "recordings", nargs="+", type=Path, metavar="FILE.rrd", help="the parts of one run"
     )
@@ -128,3 +117,11 @@ def _epilog() -> str:
         96,
     )
     return "\n".join(lines)
+
+
+COMMAND = Command(
+    description=DESCRIPTION,
+    run=run,
+    add_options=_add_options,
+    epilog=_epilog(),
+)

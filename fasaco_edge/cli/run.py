@@ -8,13 +8,8 @@ import os
 import sys
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.console import exits
-from fasaco_edge.cli.console.arguments import add_command
-
-if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
+from fasaco_edge.cli.console.arguments import Command, Exit
 
 EPILOG = """\
 Without a file the daemon answers at tcp/127.0.0.1:7447 (where a router listens
@@ -34,17 +29,7 @@ mission's patience) does; what cannot is named; a file that is wrong is kept out
 """
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "run",
-        run,
-        about="run the daemon: maps come in over Zenoh, paths go out",
-        description="Run the daemon until SIGTERM or SIGINT.",
-        epilog=EPILOG,
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", type=Path, metavar="FILE", help="YAML configuration")
     parser.add_argument(
         "--record", type=Path, metavar="DIR", help="start a recorder that writes to DIR"
@@ -74,4 +59,12 @@ def run(args: argparse.Namespace) -> int:
     # ever, now and then, where Zenoh's threads had been at work: a service must not.
     logging.shutdown()
     sys.stdout.flush()
-    os._exit(exits.OK)
+    os._exit(Exit.OK)
+
+
+COMMAND = Command(
+    description="Run the daemon until SIGTERM or SIGINT.",
+    run=run,
+    add_options=_add_options,
+    epilog=EPILOG,
+)

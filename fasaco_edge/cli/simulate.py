@@ -10,29 +10,17 @@ import numpy as np
 
 from fasaco_edge.cli.console.arguments import (
     DEFAULT_RADIUS_M,
-    add_command,
+    Command,
     add_robot_on_bus,
     client_settings,
     pair_of_floats,
 )
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.simulation.node import Progress
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "simulate",
-        run,
-        about="simulate a robot with a laser scanner on the bus",
-        description="A differential-drive robot with a 360-degree scanner in a building it does "
-        "not know. It publishes the map it has scanned so far and its pose, and follows the "
-        "newest path, until SIGTERM or SIGINT.",
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("map", metavar="MAP", help="map_server YAML, or a name from `maps`")
     parser.add_argument(
         "--speed", type=float, default=1.0, metavar="X", help="simulated seconds per second"
@@ -99,3 +87,12 @@ def _report(progress: Progress) -> None:
             f"\r{progress.sim_s:8.1f} s  x {progress.speed:5.1f}  ({pose.x:7.2f}, {pose.y:7.2f}) m"
             f"  {progress.distance_m:7.1f} m driven  {progress.collisions} collisions "
         )
+
+
+COMMAND = Command(
+    description="A differential-drive robot with a 360-degree scanner in a building it does "
+    "not know. It publishes the map it has scanned so far and its pose, and follows the "
+    "newest path, until SIGTERM or SIGINT.",
+    run=run,
+    add_options=_add_options,
+)

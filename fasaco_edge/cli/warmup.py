@@ -4,14 +4,9 @@ from __future__ import annotations
 
 import argparse
 import time
-from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.console import exits
-from fasaco_edge.cli.console.arguments import add_command
+from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
-
-if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
 
 EPILOG = """\
 The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Code in it is for
@@ -29,24 +24,14 @@ examples:
 """
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "warmup",
-        run,
-        about="compile the kernels into the cache, so that the first plan starts at once",
-        description="Compile the kernels into the cache, so that the first plan starts at once.",
-        epilog=EPILOG,
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--check", action="store_true", help="compile nothing, tell whether all is there"
     )
     parser.add_argument(
         "--prune", action="store_true", help="then remove what other versions have left there"
     )
-    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    add_json(parser, "the result")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -79,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         err().print(f"kernels {ready} in {folder}{to_do}", soft_wrap=True)
     if args.prune and not args.json:
         err().print(f"removed {removed} folders of other versions, {freed_mb} MB")
-    return exits.ERROR if missing and args.check else exits.OK
+    return Exit.ERROR if missing and args.check else Exit.OK
 
 
 def compile_kernels() -> float:
@@ -98,3 +83,11 @@ def compile_kernels() -> float:
 
         warm_up(report)
     return time.monotonic() - started
+
+
+COMMAND = Command(
+    description="Compile the kernels into the cache, so that the first plan starts at once.",
+    run=run,
+    add_options=_add_options,
+    epilog=EPILOG,
+)

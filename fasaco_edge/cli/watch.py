@@ -7,9 +7,9 @@ import os
 import sys
 from typing import TYPE_CHECKING, NoReturn
 
-from fasaco_edge.cli.console import exits
 from fasaco_edge.cli.console.arguments import (
-    add_command,
+    Command,
+    Exit,
     add_robot_on_bus,
     client_settings,
     seconds,
@@ -18,7 +18,6 @@ from fasaco_edge.cli.console.arguments import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fasaco_edge.cli.console.arguments import Subparsers
     from fasaco_edge.watch.feed import Feed
     from fasaco_edge.watch.robot_view import RobotView
 
@@ -38,18 +37,7 @@ exit codes: 0 ended as asked; 1 --once and nobody answered, or the terminal is g
 """
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "watch",
-        run,
-        about="watch a robot's mission live in this terminal",
-        description="Show map, coverage, the path ahead and the robot, with state, figures and "
-        "what happened lately, as they come over Zenoh; on the robot or on any other machine.",
-        epilog=EPILOG,
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--once", action="store_true", help="print one picture and end")
     parser.add_argument("--json", action="store_true", help="print each status as a line of JSON")
     parser.add_argument(
@@ -84,13 +72,13 @@ def run(args: argparse.Namespace) -> int:
             else:
                 live.watch_in_lines(feed, view)
             sys.stdout.flush()
-            code = exits.OK
+            code = Exit.OK
         except FasacoError as error:
             say_why(error)
-            code = exits.ERROR
+            code = Exit.ERROR
         except OSError:
             # The terminal is gone, or the reader of a pipe has seen enough.
-            code = exits.ERROR
+            code = Exit.ERROR
     return _leave(code)
 
 
@@ -105,7 +93,7 @@ def _leave(code: int) -> NoReturn:
 
 
 def _once(args: argparse.Namespace, feed: Feed, view: RobotView, console: Console) -> None:
-    from fasaco_edge.cli.console.asking import nobody_answers
+    from fasaco_edge.cli.ask import nobody_answers
     from fasaco_edge.errors import BusUnavailable
     from fasaco_edge.watch.live import look_once, print_json
     from fasaco_edge.watch.page import Page
@@ -123,3 +111,12 @@ def _once(args: argparse.Namespace, feed: Feed, view: RobotView, console: Consol
     for line in Page(console).lines(view, steady_now(), width, height):
         # Its colours have to go through; its texts are clean.
         console.file.write(f"{line.rstrip()}\n")
+
+
+COMMAND = Command(
+    description="Show map, coverage, the path ahead and the robot, with state, figures and "
+    "what happened lately, as they come over Zenoh; on the robot or on any other machine.",
+    run=run,
+    add_options=_add_options,
+    epilog=EPILOG,
+)

@@ -11,7 +11,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
+from fasaco_edge.bus import DEFAULT_ENDPOINT
+from fasaco_edge.bus.session import BusSettings
 from fasaco_edge.config.reading import Fault, read_text, section_faults, with_credentials
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.sections import MissionSettings, PlannerConfig, RecordingConfig, Section

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from fasaco_edge.bench.benchmark import Benchmark
-from fasaco_edge.cli import common_options, run_command
+from fasaco_edge.cli import run_command
 from fasaco_edge.cli.bench import EPILOG, add_benchmarks
 from tests.benchmarks.codec import CODEC
 from tests.benchmarks.ingest import INGEST
@@ -34,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    add_benchmarks(parser, BENCHMARKS, common_options())
+    add_benchmarks(parser, BENCHMARKS)
     return run_command(parser, sys.argv[1:] if argv is None else argv)
 
 

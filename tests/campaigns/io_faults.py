@@ -30,7 +30,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from fasaco_edge.cli.console import exits
+from fasaco_edge.cli.console.arguments import Exit
 from tests.campaigns.file_calls import Failure, Kind, Watch, why_not
 from tests.campaigns.io_scenarios import SCENARIOS, WrongError
 from tests.campaigns.services import show
@@ -110,13 +110,13 @@ def _told_by(log: str) -> str:
 def _check_end(code: int | None, log: str, said: str, failure: str) -> None:
     if code is None:
         raise WrongError(f"hangs: {log[-600:]}")
-    if code not in (exits.OK, exits.ERROR, exits.CONFIG):
+    if code not in (Exit.OK, Exit.ERROR, Exit.CONFIG):
         raise WrongError(f"ended with {code}: {log[-600:]}")
     if "Traceback" in log:
         raise WrongError(f"a traceback: {log[-900:]}")
-    if code == exits.CONFIG and "EACCES" not in failure and "EROFS" not in failure:
+    if code == Exit.CONFIG and "EACCES" not in failure and "EROFS" not in failure:
         raise WrongError(f"a service is not started again, for a fault that may pass: {said}")
-    if code != exits.OK and not said:
+    if code != Exit.OK and not said:
         raise WrongError(f"ended with {code} and not a word: {log[-600:]}")
 
 

@@ -1,4 +1,4 @@
-"""Arguments that several commands share: how they are declared, read, and checked early.
+"""A command: its description, its exit codes, and the arguments that several commands share.
 
 A file that a command writes is checked before the work begins, so that none is done in vain.
 """
@@ -8,50 +8,70 @@ from __future__ import annotations
 import argparse
 import os
 import re
-import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bus.session import DEFAULT_ENDPOINT, BusSettings
+from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.wire.limits import MAX_COORDINATE_M
 
 if TYPE_CHECKING:
-    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+    from fasaco_edge.bus.session import BusSettings
 
 DEFAULT_CELL_M = 0.3
 DEFAULT_RADIUS_M = 0.18
 
 
-def add_command(
-    commands: Subparsers,
-    common: argparse.ArgumentParser,
-    name: str,
-    run: Callable[[argparse.Namespace], int],
-    *,
-    about: str,
-    description: str,
-    epilog: str | None = None,
-) -> argparse.ArgumentParser:
-    """Add the command ``name``, which ``run`` carries out; return its parser.
+class Exit(IntEnum):
+    """Exit codes of commands."""
 
-    Args:
-        about: its line in the list of commands.
+    OK = 0
+    ERROR = 1
+    CONFIG = 78  # EX_CONFIG of sysexits.h: a service must not be started again
+    INTERRUPTED = 130  # 128 + SIGINT, as a shell tells it
+
+
+def add_nothing(parser: argparse.ArgumentParser) -> None:
+    """Declare no options."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One command of ``fasaco-edge``.
+
+    Attributes:
         description: what ``--help`` begins with.
-        epilog: what it ends with, printed as it stands.
+        run: carries it out, and returns the exit code.
+        add_options: declares the options it takes.
+        epilog: what ``--help`` ends with, printed as it stands.
+        is_group: whether it has commands of its own, which take the common options in its place.
     """
-    parser = commands.add_parser(
-        name,
-        parents=[common],
-        help=about,
-        description=textwrap.fill(description, 79),
-        epilog=epilog,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+
+    description: str
+    run: Callable[[argparse.Namespace], int]
+    add_options: Callable[[argparse.ArgumentParser], None] = add_nothing
+    epilog: str | None = None
+    is_group: bool = False
+
+
+def add_common(parser: argparse.ArgumentParser) -> None:
+    """Add the options that all commands take."""
+    parser.add_argument(
+        "--log-level",
+        choices=("debug", "info", "warning", "error"),
+        default="info",
+        help="how much to say on standard error (default: %(default)s)",
     )
-    parser.set_defaults(command=run)
-    return parser
+    # For the processes that other commands start: they end when those do.
+    parser.add_argument("--with-parent", type=int, metavar="PID", help=argparse.SUPPRESS)
+
+
+def add_json(parser: argparse._ActionsContainer, what: str) -> None:
+    """Add ``--json``, which prints ``what`` as JSON."""
+    parser.add_argument("--json", action="store_true", help=f"print {what} as JSON")
 
 
 def pair_of_ints(text: str) -> tuple[int, int]:
@@ -65,6 +85,8 @@ def pair_of_ints(text: str) -> tuple[int, int]:
 
 def pair_of_floats(text: str) -> tuple[float, float]:
     """Read ``X,Y``."""
+    from fasaco_edge.wire.limits import MAX_COORDINATE_M
+
     try:
         x, y = (float(part) for part in text.split(","))
     except ValueError:
@@ -130,6 +152,8 @@ def client_settings(args: argparse.Namespace) -> BusSettings:
     Raises:
         BadConfiguration: what shows who this is cannot be read.
     """
+    from fasaco_edge.bus.session import BusSettings
+
     connect = tuple(args.connect or (DEFAULT_ENDPOINT,))
     if args.security is None:
         return BusSettings("client", connect)

@@ -5,28 +5,18 @@ from __future__ import annotations
 import argparse
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.console.arguments import DEFAULT_CELL_M, DEFAULT_RADIUS_M, add_command
-
-if TYPE_CHECKING:
-    from fasaco_edge.cli.console.arguments import Subparsers
+from fasaco_edge.cli.console.arguments import (
+    DEFAULT_CELL_M,
+    DEFAULT_RADIUS_M,
+    Command,
+    add_json,
+)
 
 RUNS = Path("runs")
 
 
-def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        common,
-        "demo",
-        run,
-        about="watch a simulated robot map and cover a building",
-        description="Start daemon, recorder and a simulated robot as processes of their own that "
-        "talk Zenoh over loopback; show the mission; end when every reachable cell is covered. "
-        "Leaves a recording (.rrd), a picture and the figures in the output folder.",
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--map", default="flat", metavar="MAP", help="YAML or a name from `maps` (default: flat)"
     )
@@ -45,7 +35,7 @@ def add_to(commands: Subparsers, common: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder for the results (default: ./runs/<time>)"
     )
-    parser.add_argument("--json", action="store_true", help="print the summary as JSON")
+    add_json(parser, "the summary")
     parser.add_argument(
         "--timeout", type=float, default=1800.0, metavar="S", help="give up after so long [s]"
     )
@@ -79,3 +69,12 @@ def run(args: argparse.Namespace) -> int:
     summary = summarise(args, out, ending)
     print_summary(summary, as_json=args.json)
     return 0 if summary["complete"] else 1
+
+
+COMMAND = Command(
+    description="Start daemon, recorder and a simulated robot as processes of their own that "
+    "talk Zenoh over loopback; show the mission; end when every reachable cell is covered. "
+    "Leaves a recording (.rrd), a picture and the figures in the output folder.",
+    run=run,
+    add_options=_add_options,
+)
