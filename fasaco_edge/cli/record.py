@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from fasaco_edge.bus.session import BusSettings
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.config.ros import RosConfig
-    from fasaco_edge.recording.write.settings import RecorderSettings, RosInput
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
 
@@ -114,13 +113,14 @@ def _add_room(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record."""
+    from fasaco_edge.recording.write.quota import budget_of
     from fasaco_edge.recording.write.recorder import run_recorder
 
     if args.config is None:
         config, bus = config_of_options(args), client_settings(args)
     else:
         config, bus = read_config(args.config)
-    return run_recorder(recorder_settings(config, bus, args.out, args.serve))
+    return run_recorder(config, bus, args.out, budget_of(config), args.serve)
 
 
 def config_of_options(args: argparse.Namespace) -> DaemonConfig:
@@ -160,39 +160,6 @@ def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
     bus.security.warn_of_clock()
     endpoints = tuple(map(from_here, bus.listen or bus.connect))
     return config, BusSettings("client", endpoints, secured=bus.security.of_client())
-
-
-def recorder_settings(
-    config: DaemonConfig, bus: BusSettings, out: Path, serve: tuple[str, int] | None
-) -> RecorderSettings:
-    """Return a configuration as the recorder takes it."""
-    from fasaco_edge.recording.write.settings import MEGABYTE, RecorderSettings
-    from fasaco_edge.wire.transforms import DEFAULT_FRAMES
-
-    ros, limits = config.ros2, config.recording
-    return RecorderSettings(
-        out=out,
-        robot=config.robot.name,
-        base=config.bus.base,
-        bus=bus,
-        pose_schema=config.pose.schema,
-        ros=_ros_inputs(ros) if ros else (),
-        frames=(ros.frames.map, ros.frames.robot) if ros else DEFAULT_FRAMES,
-        part_bytes=limits.part_mb * MEGABYTE,
-        part_s=60.0 * limits.part_min,
-        quota_bytes=limits.quota_mb * MEGABYTE,
-        least_free_bytes=limits.least_free_mb * MEGABYTE,
-        serve=serve,
-    )
-
-
-def _ros_inputs(config: RosConfig) -> tuple[RosInput, ...]:
-    from fasaco_edge.recording.write.settings import RosInput
-
-    return tuple(
-        RosInput(name, config.input_key(topic), topic.schema, topic.latched, topic.depth)
-        for name, topic in config.inputs.items()
-    )
 
 
 COMMAND = Command(

@@ -11,6 +11,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.registry import PLANNER_NAMES
 
@@ -71,20 +72,12 @@ class PlannerConfig(Section, frozen=True):
         )
 
 
-class MissionSettings(Section, frozen=True):
-    """Whether to start without an order, how patient to be, and where progress is kept.
+class MissionSettings(Section, MissionPolicy, frozen=True):
+    """The mission's policy, and where progress is kept.
 
-    What is blocked or left over in the end is tried again ``retries`` times, each after
-    ``retry_s`` [s]. Without a pose for ``lost_pose_s`` [s], or a map or an update for
-    ``stale_map_s`` [s], the state is degraded; 0 for never. ``state_dir`` "" is the folder a
-    service manager or the user has for that.
+    ``state_dir`` "" is the folder a service manager or the user has for that.
     """
 
-    autostart: bool = True
-    retries: Annotated[int, Meta(ge=0, le=100)] = 2
-    retry_s: Annotated[float, Meta(ge=0, le=86_400)] = 30.0
-    lost_pose_s: Annotated[float, Meta(ge=0, le=86_400)] = 3.0
-    stale_map_s: Annotated[float, Meta(ge=0, le=86_400)] = 0.0
     state_dir: str = ""
 
     def state_folder(self, environ: Mapping[str, str] = os.environ) -> Path:

@@ -228,18 +228,16 @@ class Loader:
         )
         chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
-        patience = self._config.mission
         mission = MissionConfig(
             footprint,
             maps.max_lattice_cells,
             robot.cost(),
-            retries=patience.retries,
-            retry_s=patience.retry_s,
-            lost_pose_s=patience.lost_pose_s,
-            stale_map_s=patience.stale_map_s,
-            spare_share=planner.spare_share if isinstance(chosen, NearOptimal) else 0.0,
+            self._config.mission,
+            planner.spare_share if isinstance(chosen, NearOptimal) else 0.0,
         )
-        first = OrderState.autostart() if patience.autostart else OrderState.idle(NO_ORDER)
+        first = (
+            OrderState.autostart() if self._config.mission.autostart else OrderState.idle(NO_ORDER)
+        )
         return Mission(mission, first), worker
 
     def _report(self, stage: str) -> None:

@@ -15,9 +15,8 @@ from typing import Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Window
 from fasaco_edge.grid.lattice import (
-    MAX_LATTICE_CELLS,
     UNKNOWN,
     CoverageLattice,
     Footprint,

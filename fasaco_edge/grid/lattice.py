@@ -15,7 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import MapTooFar, MapTooLarge
-from fasaco_edge.grid.geometry import FARTHEST_M, GridGeometry, Raster, Window
+from fasaco_edge.grid.geometry import (
+    FARTHEST_M,
+    MAX_LATTICE_CELLS,
+    GridGeometry,
+    Raster,
+    Window,
+)
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.cells import BLOCKED, COVERABLE, EAST, NORTH, SOUTH, UNKNOWN, WEST
 from fasaco_edge.kernels.lattice.classification import Cells, classify_cells
@@ -24,8 +30,6 @@ from fasaco_edge.kernels.lattice.footprint import Pixels, Placement, Thresholds,
 __all__ = ["BLOCKED", "COVERABLE", "UNKNOWN", "Cell", "CoverageLattice", "Footprint"]
 
 Cell = tuple[int, int]
-
-MAX_LATTICE_CELLS = 4_000_000
 
 # Indices of cells are int32, and sums of two of them, too.
 MOST_INDEX = 2**30

@@ -3,23 +3,51 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
 
-from fasaco_edge.grid.lattice import MAX_LATTICE_CELLS, Footprint
+import msgspec
+from msgspec import Meta
+
+from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
+
+if TYPE_CHECKING:
+    # It loads the compiler; the configuration takes only the policy from here.
+    from fasaco_edge.grid.lattice import Footprint
+
+Period = Annotated[float, Meta(ge=0, le=86_400)]
+
+
+class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
+    """Whether a mission starts without an order, and how patient it is.
+
+    Attributes:
+        autostart: whether everything is covered once where nobody orders anything.
+        retries: how often what is blocked or left over in the end is tried again.
+        retry_s: pause before each retry [s].
+        lost_pose_s: the pose is lost after this time without one [s]; 0 for never.
+        stale_map_s: the map is stale after this time without a map or an update [s]; 0 for never.
+    """
+
+    autostart: bool = True
+    retries: Annotated[int, Meta(ge=0, le=100)] = 2
+    retry_s: Period = 30.0
+    lost_pose_s: Period = 3.0
+    stale_map_s: Period = 0.0
+
+
+NO_PATIENCE = MissionPolicy(retries=0, lost_pose_s=0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class MissionConfig:
-    """Robot, cost and limits of a mission.
+    """Robot, cost, limits and policy of a mission; by default it tries nothing again.
 
     Attributes:
         footprint: of robot and tool.
         max_lattice_cells: the most cells of a lattice it plans on.
         cost: of paths.
-        retries: how often what is blocked or left over in the end is tried again.
-        retry_s: pause before each retry [s].
-        lost_pose_s: the pose is lost after this time without one [s]; 0 for never.
-        stale_map_s: the map is stale after this time without a map or an update [s]; 0 for never.
+        policy: retries and patience.
         spare_share: share of a processor core for improving a path that need not change; 0 for
             none.
     """
@@ -27,8 +55,5 @@ class MissionConfig:
     footprint: Footprint
     max_lattice_cells: int = MAX_LATTICE_CELLS
     cost: CoverageCost = STEPS_ALONE
-    retries: int = 0
-    retry_s: float = 30.0
-    lost_pose_s: float = 0.0
-    stale_map_s: float = 0.0
+    policy: MissionPolicy = NO_PATIENCE
     spare_share: float = 0.0

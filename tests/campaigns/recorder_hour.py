@@ -24,6 +24,7 @@ import numpy as np
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import resident_mb, return_soon
@@ -32,8 +33,7 @@ from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
 from fasaco_edge.recording.write.input_log import InputLog
-from fasaco_edge.recording.write.quota import DiskBudget
-from fasaco_edge.recording.write.settings import RecorderSettings
+from fasaco_edge.recording.write.quota import budget_of
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.json_text import decode_tolerant, encode_json
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
@@ -188,8 +188,7 @@ class Desk:
     """What a recorder does with a sample, at any speed."""
 
     def __init__(self, folder: Path) -> None:
-        usual = RecorderSettings(folder)
-        room = DiskBudget(usual.part_bytes, usual.least_free_bytes, usual.part_s)
+        room = budget_of(DaemonConfig())
         self.writer = RecordingWriter(folder, "run", room, build_blueprint(None))
         self.writer.at(BEGAN_NS)
         self._inputs = InputLog(self.writer, BEGAN_NS)

@@ -120,7 +120,7 @@ class MissionTrial:
         known = {key: value for key, value in sections.items() if key != "ros2"}
         known["robot"] = self._robot | known.get("robot", {}) if keeps_site else self._robot
         config = msgspec.convert(known, DaemonConfig)
-        robot, planner, patience = config.robot, config.planner, config.mission
+        robot, planner = config.robot, config.planner
         self._footprint = Footprint(
             robot.tool_width_m,
             robot.radius_m,
@@ -133,11 +133,8 @@ class MissionTrial:
                 self._footprint,
                 MOST_CELLS,
                 robot.cost(),
-                retries=patience.retries,
-                retry_s=patience.retry_s,
-                lost_pose_s=patience.lost_pose_s,
-                stale_map_s=patience.stale_map_s,
-                spare_share=0.05 if isinstance(self._planner, NearOptimal) else 0.0,
+                config.mission,
+                0.05 if isinstance(self._planner, NearOptimal) else 0.0,
             )
         )
         self._poses = PoseDecoder(config.pose.schema)

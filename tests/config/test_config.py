@@ -14,13 +14,12 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.bus.session import BusSettings
-from fasaco_edge.cli.record import recorder_settings
 from fasaco_edge.config.config import DaemonConfig, decode_config, load_config
-from fasaco_edge.config.ros import RosConfig
+from fasaco_edge.config.ros import RosConfig, RosFrames
 from fasaco_edge.config.sections import MissionSettings
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.registry import PLANNER_NAMES
+from fasaco_edge.recording.write.quota import Quota, budget_of
 from tests.support.processes import PROGRAM
 
 
@@ -343,12 +342,12 @@ def test_the_recorder_gets_its_settings_from_the_configuration(tmp_path):
     config = load_config(file)
     handed = decode_config(msgspec.json.encode(config))
     assert handed == config
-    told = recorder_settings(handed, BusSettings(), tmp_path, None)
-    assert (told.part_bytes, told.part_s) == (10_000_000, 150.0)
-    assert (told.quota_bytes, told.least_free_bytes) == (100_000_000, 7_000_000)
-    assert (told.robot, told.pose_schema) == ("left", "nav_msgs/msg/Odometry")
-    assert told.frames == ("floor", "base_link")
-    assert [topic.topic for topic in told.ros] == ["map", "map_update", "tf_static", "pose"]
+    budget = budget_of(handed)
+    assert (budget.part_bytes, budget.part_s) == (10_000_000, 150.0)
+    assert (budget.quota, budget.least_free_bytes) == (Quota("left", 100_000_000), 7_000_000)
+    assert handed.pose.schema == "nav_msgs/msg/Odometry"
+    assert handed.ros2.frames == RosFrames(map="floor", robot="base_link")
+    assert list(handed.ros2.inputs) == ["map", "map_update", "tf_static", "pose"]
     with pytest.raises(BadConfiguration, match="unknown field `colour`"):
         decode_config(b'{"colour": 1}')
 

@@ -403,7 +403,7 @@ def test_a_pose_between_cells_counts_for_its_cell():
     drive.tell(PoseReceived(StampedPose(Pose2D(0.24, 0.12))))
     drive.tell(after=2.0)
     assert drive.mission.state is State.DONE
-    assert CONFIG.retries == 0
+    assert CONFIG.policy.retries == 0
 
 
 def test_keep_out_zones_outlive_the_daemon():

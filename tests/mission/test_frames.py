@@ -7,7 +7,7 @@ import pytest
 from fasaco_edge.errors import LedgerMismatchError, WrongFrame
 from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.map.inputs import PATIENCE_S
-from tests.mission.world import CONFIG, Drive, building, patch, pose_at, started
+from tests.mission.world import CONFIG, Drive, building, patch, pose_at, started, with_policy
 
 HALL = ("########", *("#......#",) * 4, "########")
 MAP, ODOM = MapReceived(building(*HALL)), MapReceived(building(*HALL, frame="odom"))
@@ -91,7 +91,7 @@ def test_the_state_says_which_frame_is_where():
 
 
 def test_a_lost_pose_is_told_with_the_frame_that_poses_come_in():
-    drive = Drive((1, 1), MAP, HERE, config=replace(CONFIG, lost_pose_s=3.0))
+    drive = Drive((1, 1), MAP, HERE, config=with_policy(CONFIG, lost_pose_s=3.0))
     drive.plan()
     told_for(drive, 5.0, THERE)
     assert drive.mission.state is State.DEGRADED

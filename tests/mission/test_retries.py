@@ -1,7 +1,5 @@
 """Cells that are blocked or left over: tried again later, and named in the end."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
@@ -16,9 +14,10 @@ from tests.mission.world import (
     patch,
     pose_at,
     rectangle,
+    with_policy,
 )
 
-RETRIES = replace(CONFIG, retries=2, retry_s=30.0)
+RETRIES = with_policy(CONFIG, retries=2, retry_s=30.0)
 # A room behind a door in column 4.
 ROOMS = ("....#....", "....#....", ".........", "....#....")
 DOOR = (1, 4)

@@ -1,7 +1,6 @@
 """What is not as it should be is a state with a reason: lost poses, jumps, stale maps."""
 
 import copy
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,12 +21,13 @@ from tests.mission.world import (
     placed,
     pose_at,
     rectangle,
+    with_policy,
 )
 
 ROOM = ("............",) * 4
 # A little longer than the mission is patient.
 A_WHILE_S = PATIENCE_S + 0.01
-WATCHFUL = replace(CONFIG, lost_pose_s=2.0, stale_map_s=60.0)
+WATCHFUL = with_policy(CONFIG, lost_pose_s=2.0, stale_map_s=60.0)
 
 
 def driving(*rows, steps=4, config=WATCHFUL):
@@ -207,7 +207,7 @@ def test_whatever_happens_it_is_a_state_with_a_reason_and_the_same_every_time(se
     """Commands, maps, jumps and silence in any order; and all of it once more."""
     random = np.random.default_rng(seed)
     truth = np.zeros((8, 20), np.int8)
-    config = replace(WATCHFUL, retries=1, retry_s=5.0)
+    config = with_policy(WATCHFUL, retries=1, retry_s=5.0)
     drive = Drive((0, 0), config=config, assignment=OrderState.idle("no order"))
     heard = [((), drive.now)]
     again = Mission(config, OrderState.idle("no order"))

@@ -5,7 +5,10 @@ else unknown. The last line is the southernmost. All lengths are powers of two, 
 that a cell's border is where it looks to be.
 """
 
+from dataclasses import replace
+
 import numpy as np
+from msgspec import structs
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
@@ -29,6 +32,11 @@ FOOTPRINT = Footprint(cell_m=CELL, robot_radius_m=CELL / 2)
 CONFIG = MissionConfig(FOOTPRINT)
 VALUES = {".": 0, "#": 100}
 TICK_S = 0.1
+
+
+def with_policy(config, **changes):
+    """``config`` with a mission's policy changed."""
+    return replace(config, policy=structs.replace(config.policy, **changes))
 
 
 def pixels(*rows):

@@ -29,11 +29,14 @@ from fasaco_edge.wire.keys import Keys
 RUN = """
 import json, pathlib, sys
 from fasaco_edge.bus.session import BusSettings
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.recorder import run_recorder
-from fasaco_edge.recording.write.settings import RecorderSettings
 told = json.loads(sys.argv[1])
 bus = BusSettings(connect=(told.pop("endpoint"),))
-sys.exit(run_recorder(RecorderSettings(pathlib.Path(told.pop("out")), bus=bus, **told)))
+out, serve = pathlib.Path(told.pop("out")), told.pop("serve", None)
+budget = DiskBudget(**{"part_bytes": 64_000_000, "least_free_bytes": 50_000_000} | told)
+sys.exit(run_recorder(DaemonConfig(), bus, out, budget, serve))
 """
 TIMEOUT_S = 120.0
 

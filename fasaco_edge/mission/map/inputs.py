@@ -218,19 +218,19 @@ class InputMonitor:
 
     def is_pose_lost(self, now: float) -> bool:
         """Tell whether poses have stopped coming."""
-        limit = self._config.lost_pose_s
+        limit = self._config.policy.lost_pose_s
         return self._pose is not None and 0 < limit < now - self._pose_at
 
     def trouble(self, now: float) -> str:
         """Return what is wrong with the inputs; "" for nothing."""
         if self.is_pose_lost(now):
             return (
-                f"no pose for {self._config.lost_pose_s:g} s: the path is kept, but nothing "
+                f"no pose for {self._config.policy.lost_pose_s:g} s: the path is kept, but nothing "
                 "counts as covered until one comes"
             )
         if self.doubt:
             return self.doubt
-        limit = self._config.stale_map_s
+        limit = self._config.policy.stale_map_s
         if 0 < limit < now - self._map_at:
             return f"no map or update for {limit:g} s: going on with the last one"
         return ""

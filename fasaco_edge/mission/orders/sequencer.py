@@ -270,9 +270,9 @@ class Sequencer:
             return
         # What is left is counted over all zones from here on.
         self.state = replace(state, stage=Stage.RETRYING)
-        if state.tries < self._config.retries and self._is_worth_trying():
+        if state.tries < self._config.policy.retries and self._is_worth_trying():
             if run.retry_at is None:
-                run.retry_at = now + self._config.retry_s
+                run.retry_at = now + self._config.policy.retry_s
         elif state.returns_home_next:
             run.retry_at = None
             self.state = replace(state, stage=Stage.RETURNING, begun=False)
@@ -286,10 +286,10 @@ class Sequencer:
 
     def waiting_reason(self) -> str:
         """Return in words what the robot waits for before it tries again."""
-        cells, config = self.unreached().cells, self._config
+        cells, policy = self.unreached().cells, self._config.policy
         return (
             f"{cells} {'cell' if cells == 1 else 'cells'} not reached: tried again after "
-            f"{config.retry_s:g} s ({self.state.tries + 1} of {config.retries})"
+            f"{policy.retry_s:g} s ({self.state.tries + 1} of {policy.retries})"
         )
 
     def unreached(self) -> Unreached:
@@ -302,7 +302,7 @@ class Sequencer:
         run.exploration.aim_at(self._viewpoints() - {cell})
         # In a retry, one path without progress is enough to give up.
         run.left_over, run.same_again = self._left(), MAX_SAME_LEFTOVERS
-        return f"tried again, {self.state.tries + 1} of {self._config.retries}"
+        return f"tried again, {self.state.tries + 1} of {self._config.policy.retries}"
 
     def _end(self) -> None:
         run, left, order = self._run, self._left(), self.state.order

@@ -16,8 +16,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadConfiguration
 
+MEGABYTE = 1_000_000
 NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
 TIME = "%Y%m%dT%H%M%SZ"
 # Free space beyond the least before recording goes on: the disk must not fill again at once.
@@ -132,14 +134,35 @@ class DiskBudget:
     Attributes:
         part_bytes: a part larger than this is followed by the next.
         least_free_bytes: what must stay free on the disk.
-        part_s: a part older than this is followed by the next [s]; 0 for never.
+        part_s: a part older than this is followed by the next [s]; 0 for never. Until the footer
+            of a part is written rerun's index of it grows by a megabyte a minute.
         quota: of all recordings of the robot.
+
+    Raises:
+        BadConfiguration: a size is impossible.
     """
 
     part_bytes: int
     least_free_bytes: int
     part_s: float = 0.0
     quota: Quota | None = None
+
+    def __post_init__(self) -> None:
+        quota_bytes = self.quota.most_bytes if self.quota else 0
+        for name, given, least in (
+            ("part_bytes", self.part_bytes, 1),
+            ("least_free_bytes", self.least_free_bytes, 0),
+            ("part_s", self.part_s, 0),
+            ("quota_bytes", quota_bytes, 0),
+        ):
+            # Negated, so that NaN is caught, too.
+            if not given >= least:
+                raise BadConfiguration(f"{name} must be at least {least}, got {given}")
+        if 0 < quota_bytes < 2 * self.part_bytes:
+            raise BadConfiguration(
+                f"quota_bytes must be 0 or at least two parts, {2 * self.part_bytes}, "
+                f"got {quota_bytes}"
+            )
 
     def is_full(self, folder: Path) -> bool:
         """Return whether less is free in ``folder`` than must be."""
@@ -160,6 +183,21 @@ class DiskBudget:
             return
         if deleted:
             LOG.info("deleted for the quota: %s", ", ".join(path.name for path in deleted))
+
+
+def budget_of(config: DaemonConfig) -> DiskBudget:
+    """Return the budget that a configuration states.
+
+    Raises:
+        BadConfiguration: a size is impossible, or the robot's name is no key.
+    """
+    limits, robot = config.recording, config.keys().robot
+    return DiskBudget(
+        limits.part_mb * MEGABYTE,
+        limits.least_free_mb * MEGABYTE,
+        60.0 * limits.part_min,
+        Quota(robot, limits.quota_mb * MEGABYTE),
+    )
 
 
 def _free_bytes(folder: Path) -> int:

@@ -16,7 +16,8 @@ from pathlib import Path
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.publisher import Publisher
-from fasaco_edge.bus.session import Bus, Sample, open_bus
+from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.host.processes import resident_mb, return_soon
 from fasaco_edge.host.signals import stop_event
@@ -27,8 +28,7 @@ from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
 from fasaco_edge.recording.write.inbox import Inbox, RunClock
 from fasaco_edge.recording.write.input_log import InputLog
-from fasaco_edge.recording.write.quota import DiskBudget, Quota, next_run
-from fasaco_edge.recording.write.settings import RecorderSettings
+from fasaco_edge.recording.write.quota import DiskBudget, next_run
 from fasaco_edge.recording.write.streams import serve_live
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire import topics
@@ -38,7 +38,7 @@ from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.status import PathAttachment, Status
 from fasaco_edge.wire.status import Recorder as RecorderReport
-from fasaco_edge.wire.transforms import PoseDecoder
+from fasaco_edge.wire.transforms import DEFAULT_FRAMES, PoseDecoder
 
 TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000
@@ -46,11 +46,26 @@ REPORT_PERIOD_NS = 1_000_000_000
 SILENCE_NS = 3_500_000_000
 # How long the samples that wait at the end may take to be written [ns].
 LAST_SAMPLES_NS = 300_000_000
+# Samples waiting to be written take at most this much memory.
+QUEUE_BYTES = 32_000_000
 EXIT_STALLED = 1
 
 
-def run_recorder(settings: RecorderSettings) -> int:
+def run_recorder(
+    config: DaemonConfig,
+    bus_settings: BusSettings,
+    out: Path,
+    budget: DiskBudget,
+    serve: tuple[str, int] | None = None,
+) -> int:
     """Record until SIGTERM or SIGINT; return the process's exit code.
+
+    Args:
+        config: the daemon's: robot, keys, poses and ROS 2 topics.
+        bus_settings: how to join the bus.
+        out: folder for the recordings; made if missing.
+        budget: of the disk.
+        serve: address and port to serve live viewers at; None for nowhere.
 
     Importing this module raises MissingExtra where rerun is not installed. After a disk
     failed, the process ends here (``os._exit``), because rerun would never let it.
@@ -60,9 +75,9 @@ def run_recorder(settings: RecorderSettings) -> int:
         BadConfiguration: the folder cannot be made or written to.
     """
     return_soon()
-    repairs = _repaired(settings.out)
-    with stop_event() as stop, open_bus(settings.bus) as bus:
-        recorder = Recorder(settings, bus)
+    repairs = _repaired(out)
+    with stop_event() as stop, open_bus(bus_settings) as bus:
+        recorder = Recorder(config, bus, out, budget, serve)
         for line in repairs:
             recorder.note(line)
         recorder.listen()
@@ -78,23 +93,28 @@ def run_recorder(settings: RecorderSettings) -> int:
 class Recorder:
     """Joins the bus to the writer: ``step`` takes what came, writes it, and reports."""
 
-    def __init__(self, settings: RecorderSettings, bus: Bus) -> None:
-        self._settings = settings
+    def __init__(
+        self,
+        config: DaemonConfig,
+        bus: Bus,
+        out: Path,
+        budget: DiskBudget,
+        serve: tuple[str, int] | None,
+    ) -> None:
+        self._config = config
         self._bus = bus
         self._clock = RunClock()
         began_ns = self._clock.now_ns()
         began = datetime.fromtimestamp(began_ns / 1e9, UTC)
-        name = next_run(settings.out, settings.robot, began)
-        quota = Quota(settings.robot, settings.quota_bytes)
-        budget = DiskBudget(settings.part_bytes, settings.least_free_bytes, settings.part_s, quota)
-        self._writer = RecordingWriter(settings.out, name, budget, build_blueprint(None))
+        name = next_run(out, config.robot.name, began)
+        self._writer = RecordingWriter(out, name, budget, build_blueprint(None))
         self._writer.at(began_ns)
-        if settings.serve is not None:
-            self._writer.serve(serve_live(name, *settings.serve))
+        if serve is not None:
+            self._writer.serve(serve_live(name, *serve))
         self._inputs = InputLog(self._writer, began_ns)
-        description = RunDescription(settings.robot, f"{began:%Y-%m-%d %H:%M:%S} UTC")
+        description = RunDescription(config.robot.name, f"{began:%Y-%m-%d %H:%M:%S} UTC")
         self._scene = Scene(self._writer, description)
-        self._inbox = Inbox(settings.queue_bytes, self._clock.arrival)
+        self._inbox = Inbox(QUEUE_BYTES, self._clock.arrival)
         self._drawers: dict[str, Callable[[Sample], None]] = {
             "map": lambda sample: self._scene.add_map(decode_occupancy_grid(sample.payload)),
             "map_update": lambda sample: self._scene.add_map_update(
@@ -110,19 +130,23 @@ class Recorder:
             "pheromone": lambda sample: self._scene.add_pheromone(decode_pheromone(sample.payload)),
             "status": self._draw_status,
         }
-        self._poses = PoseDecoder(settings.pose_schema, settings.frames)
+        frames = (ros.frames.map, ros.frames.robot) if (ros := config.ros2) else DEFAULT_FRAMES
+        self._poses = PoseDecoder(config.pose.schema, frames)
         self._messages = 0
         self._malformed = 0
         self._last_status_ns: int | None = None
         self._report: RecorderReport | None = None
         self._next_report_ns = 0
-        self._reporter: Publisher = bus.advertise(settings.keys, topics.RECORDER)
+        self._reporter: Publisher = bus.advertise(config.keys(), topics.RECORDER)
 
     def listen(self) -> None:
         """Subscribe to everything there is to record, and declare that the recorder is there."""
-        settings, keys = self._settings, self._settings.keys
-        for ros in settings.ros:
-            self._subscribe(ros.topic, ros.key, ros.latched, ros.depth, ros.schema)
+        keys = self._config.keys()
+        if ros := self._config.ros2:
+            for name, heard in ros.inputs.items():
+                self._subscribe(
+                    name, ros.input_key(heard), heard.latched, heard.depth, heard.schema
+                )
         for topic in topics.TOPICS:
             if topic.queues.recorder is not None:
                 self._subscribe(topic.name, keys.of(topic), topic.is_latched)
