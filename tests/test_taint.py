@@ -33,7 +33,7 @@ from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.part import Part
-from fasaco_edge.samples.codec import SampleEncoder
+from fasaco_edge.samples import SampleEncoder
 from fasaco_edge.text import json_line
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.paths import encode_path

@@ -27,10 +27,10 @@ from fasaco_edge.cli.console.terminal import figures, out
 from fasaco_edge.errors import FasacoError, NobodyAnswersError
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import phrases
-from fasaco_edge.wire import coverage, replies, schemas
+from fasaco_edge.wire import replies, schemas
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import decode_occupancy_grid
+from fasaco_edge.wire.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.topics import RPC_NAMES
@@ -227,13 +227,12 @@ def _path_figures(reply: Reply) -> dict[str, Any]:
 
 def _coverage_figures(reply: Reply) -> dict[str, Any]:
     grid = decode_occupancy_grid(reply.payload)
-    values = {name.lower(): value for name, value in vars(coverage).items() if name.isupper()}
     return {
         "frame": grid.frame,
         "rows": grid.geometry.rows,
         "cols": grid.geometry.cols,
         "cell_m": grid.geometry.resolution,
-        **{name: int(np.count_nonzero(grid.cells == value)) for name, value in values.items()},
+        **{value.name.lower(): int((grid.cells == value).sum()) for value in CoverageValue},
     }
 
 

@@ -16,7 +16,7 @@ from fasaco_edge.cli.console.arguments import (
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.colony import VISIBILITIES
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
-from fasaco_edge.simulation.config import SimulationConfig
+from fasaco_edge.simulation.robot import SimulationConfig
 
 ANYWHERE, HOME = "anywhere", "home"
 

@@ -16,11 +16,9 @@ from fasaco_edge.cli.console.streams import print_json
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.recording.read.run import RecordedSamples
-    from fasaco_edge.replay.cycle_record import CycleRecord
-    from fasaco_edge.replay.cycle_replay import CycleReplay, Difference
+    from fasaco_edge.replay.cycle_replay import CycleRecord, CycleReplay, Difference
     from fasaco_edge.replay.mission_drive import ReplayStep
-    from fasaco_edge.replay.recorded_run import RecordedRun
-    from fasaco_edge.replay.replay import Replay
+    from fasaco_edge.replay.replay import RecordedRun, Replay
 
 DESCRIPTION = """\
 Play the samples of a recording to the mission again, through the same code that the
@@ -65,10 +63,8 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.cli.console import terminal
     from fasaco_edge.config.config import load_config
     from fasaco_edge.recording.read.run import RecordedSamples
-    from fasaco_edge.replay.cycle_record import read_turns
-    from fasaco_edge.replay.cycle_replay import CycleReplay
-    from fasaco_edge.replay.recorded_run import read_run
-    from fasaco_edge.replay.replay import Replay
+    from fasaco_edge.replay.cycle_replay import CycleReplay, read_turns
+    from fasaco_edge.replay.replay import Replay, read_run
 
     samples = RecordedSamples(args.recordings)
     recorded = read_run(samples)

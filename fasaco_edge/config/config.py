@@ -22,7 +22,7 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
-from fasaco_edge.wire.transforms import PoseDecoder
+from fasaco_edge.wire.poses import PoseDecoder
 
 Metres = Annotated[float, Meta(gt=0, le=10)]
 Percent = Annotated[int, Meta(ge=0, le=100)]

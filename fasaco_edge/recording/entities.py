@@ -57,6 +57,6 @@ RECORDER_LOG: Final = "log/recorder"
 RUN_CARD: Final = "run/card"
 
 INPUTS: Final = "inputs"
-"""The inputs of the mission, in batches of samples (``samples.codec``)."""
+"""The inputs of the mission, in batches of samples (``samples``)."""
 INPUTS_ARCHETYPE: Final = "Inputs"
 INPUTS_COMPONENT: Final = "batch"

@@ -16,9 +16,9 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.orders.order import MissionOrder, read_command
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from fasaco_edge.wire.status import PathAttachment, Settings, Status, known_settings
-from fasaco_edge.wire.transforms import PoseDecoder
 from fasaco_edge.wire.turns import Cycle, TurnBatch, decode_turns
 
 # The reasons that the mission gives when it asks for a better path, and when it takes one.

@@ -1,19 +1,29 @@
-"""A differential drive that follows a polyline: straight runs, turns on the spot.
+"""The simulated robot: a differential drive that follows a polyline, and takes up new ones.
 
-The drive is ideal (no slip, no delay), so that what a run shows is the path's
-doing. It comes to rest at every corner, which is what makes turns cost time.
+It drives straight and turns on the spot. The drive is ideal (no slip, no delay), so that what
+a run shows is the path's doing. It comes to rest at every corner, which is what makes turns
+cost time.
+
+A path begins at the centre of the cell the robot was in when it was planned.
+Since then the robot has gone on: through the first waypoints, if the new path
+begins like the old one, or off to a side. Only what it has driven through may
+be left out. To ask merely where the robot is would not do: a path that goes
+into a dead end and comes back passes the same place twice.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.simulation.config import SimulationConfig
+
+Point = tuple[float, float]
 
 # Closer than this the robot is at a corner [m].
 ARRIVED_M = 1e-3
@@ -24,6 +34,74 @@ ALIGNED_RAD = 1e-4
 MISALIGNED_RAD = 0.05
 # A bend below this is none: it is steered, not stopped for [rad].
 STRAIGHT_RAD = 0.02
+# A waypoint is driven through if a point of the track is this near; it must not be less
+# than half the track's spacing [m].
+PASSED_WITHIN_M = 0.02
+# As a last resort the path is joined anywhere in this much of its beginning [m].
+JOIN_WITHIN_M = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationConfig:
+    """The robot, its scanner and its rates. Times and rates are in simulated time.
+
+    The defaults are a TurtleBot3 Waffle with an LDS-01 scanner, rounded.
+
+    Attributes:
+        speed_m_s: driving speed [m/s].
+        turn_rad_s: turning speed in place [rad/s].
+        acceleration_m_s2: of driving, up and down [m/s^2].
+        turn_acceleration_rad_s2: of turning, up and down [rad/s^2].
+        robot_radius_m: radius that the planner uses [m].
+        padding_m: what that radius has in excess of the hull [m]. The hull is what
+            collides: a robot as wide as its corridor would touch at the first rounding error.
+        range_m: reach of the scanner [m].
+        free_at_most: occupancy values up to this are free [percent].
+        map_chunk_m: the published map grows by blocks of about this size [m].
+        tick_s: the simulation's time step [s].
+        scan_hz, map_hz, pose_hz: rates [Hz]; their periods are rounded to whole ticks.
+    """
+
+    speed_m_s: float = 0.25
+    turn_rad_s: float = 1.8
+    acceleration_m_s2: float = 0.5
+    turn_acceleration_rad_s2: float = 3.2
+    robot_radius_m: float = 0.2
+    padding_m: float = 0.02
+    range_m: float = 3.5
+    free_at_most: int = 25
+    map_chunk_m: float = 1.0
+    tick_s: float = 0.02
+    scan_hz: float = 5.0
+    map_hz: float = 2.0
+    pose_hz: float = 10.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            may_be_zero = field.name in ("padding_m", "free_at_most")
+            if not math.isfinite(value) or value < 0 or (value == 0 and not may_be_zero):
+                least = "at least 0" if may_be_zero else "above 0"
+                raise BadConfiguration(f"{field.name} must be {least}, got {value}")
+        if self.padding_m >= self.robot_radius_m:
+            raise BadConfiguration(
+                f"padding_m must be below robot_radius_m ({self.robot_radius_m}), "
+                f"got {self.padding_m}"
+            )
+
+    @property
+    def hull_radius_m(self) -> float:
+        """Radius of the disc that collides [m]."""
+        return self.robot_radius_m - self.padding_m
+
+    @property
+    def tick_ns(self) -> int:
+        """The time step [ns]."""
+        return round(self.tick_s * 1e9)
+
+    def period_ticks(self, rate_hz: float) -> int:
+        """Return the period of a rate in ticks, at least 1."""
+        return max(1, round(1.0 / (rate_hz * self.tick_s)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +124,7 @@ class DriveState:
         return self.speed != 0.0 or self.turn_rate != 0.0
 
 
-def driven(
-    state: DriveState, goal: tuple[float, float] | None, config: SimulationConfig
-) -> DriveState:
+def driven(state: DriveState, goal: Point | None, config: SimulationConfig) -> DriveState:
     """Return the state a tick later, on the way to ``goal`` [m] and to rest there.
 
     Without a goal the robot brakes. It drives only while it points at the goal, and
@@ -73,7 +149,7 @@ def driven(
     return DriveState(moved, speed, turn_rate)
 
 
-def stopping_point(state: DriveState, config: SimulationConfig) -> tuple[float, float]:
+def stopping_point(state: DriveState, config: SimulationConfig) -> Point:
     """Return where (x, y) [m] the robot would come to rest if it braked now."""
     # (v - a dt) dt, (v - 2 a dt) dt, ... add up to v^2 / 2a - v dt / 2.
     reach = max(
@@ -125,3 +201,71 @@ def _stopping_rate(remaining: float, acceleration: float, dt: float) -> float:
 
 def _limited(rate: float, goal: float, step: float) -> float:
     return min(max(goal, rate - step), rate + step)
+
+
+def joined(
+    path: NDArray[np.float64],
+    track: NDArray[np.float64],
+    is_clear: Callable[[Point, Point], bool],
+) -> NDArray[np.float64] | None:
+    """Return the corners to drive through from the track's last point to the path's end.
+
+    Straight to the first waypoint not yet driven through, or to the one before it. If
+    neither way is clear, back along the track until one is; if none ever is, to the
+    nearest waypoint of the first metres that can be reached.
+
+    Args:
+        path: waypoints [m], float64 (n, 2).
+        track: points [m] the robot came through lately, float64 (m, 2), m >= 1; the last
+            is where it is, or can come to rest.
+        is_clear: tells whether the robot can move straight between two points.
+
+    Returns:
+        float64 (k, 2); (0, 2) if nothing is left to drive; None if there is no way now.
+    """
+    passed = passed_waypoints(path, track)
+    if passed == len(path):
+        return path[:0]
+    targets = [target for target in (passed, passed - 1) if target >= 0]
+    for gone_back in range(1, len(track) + 1):
+        here = track[-gone_back]
+        for target in targets:
+            if is_clear(_point(here), _point(path[target])):
+                return corners(np.vstack((track[: -gone_back - 1 : -1], path[target:])))[1:]
+    for target in _nearest_first(path, track[-1]):
+        if is_clear(_point(track[-1]), _point(path[target])):
+            return corners(np.vstack((track[-1], path[target:])))[1:]
+    return None
+
+
+def passed_waypoints(path: NDArray[np.float64], track: NDArray[np.float64]) -> int:
+    """Return how many of the first waypoints the robot drove through, in order.
+
+    Counted from its latest visit to the first one: visits before that belong to
+    paths before this one.
+
+    Args:
+        path: waypoints [m], float64 (n, 2).
+        track: points [m], float64 (m, 2), the latest last.
+    """
+    since = 0
+    for index, waypoint in enumerate(path):
+        offsets = track[since:] - waypoint
+        near = np.flatnonzero(np.hypot(offsets[:, 0], offsets[:, 1]) <= PASSED_WITHIN_M)
+        if len(near) == 0:
+            return index
+        since += int(near[-1 if index == 0 else 0])
+    return len(path)
+
+
+def _nearest_first(path: NDArray[np.float64], here: NDArray[np.float64]) -> Iterator[int]:
+    """Yield the waypoints of the path's first metres, the nearest first."""
+    steps = np.diff(path, axis=0)
+    way = np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))
+    head = path[: 1 + int(np.searchsorted(way, JOIN_WITHIN_M, side="right"))]
+    distances = np.hypot(head[:, 0] - here[0], head[:, 1] - here[1])
+    yield from (int(index) for index in np.argsort(distances, kind="stable"))
+
+
+def _point(row: NDArray[np.float64]) -> Point:
+    return float(row[0]), float(row[1])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Bounds, Pose2D, union_bounds
 from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
 from fasaco_edge.watch.robot_view import RobotView
-from fasaco_edge.wire import coverage as covering
+from fasaco_edge.wire.maps import CoverageValue
 from fasaco_edge.wire.status import known_settings
 
 LEAST_PIXEL_M = 0.01
@@ -160,7 +160,7 @@ def draw_robot(kinds: Kinds, frame: Frame, pose: Pose2D, radius_m: float) -> Non
 
 def _coverage(frame: Frame, coverage: OccupancyGrid, *, blocked: bool) -> Kinds:
     table = _COVERAGE_AND_BLOCKED_KINDS if blocked else _COVERAGE_KINDS
-    kinds: Kinds = table[frame.sampled(coverage, 1, covering.UNKNOWN).view(np.uint8)]
+    kinds: Kinds = table[frame.sampled(coverage, 1, CoverageValue.UNKNOWN).view(np.uint8)]
     return kinds
 
 
@@ -176,11 +176,11 @@ _MAP_KINDS = np.full(256, UNKNOWN, np.uint8)
 _MAP_KINDS[: FREE_AT_MOST + 1] = FLOOR
 _MAP_KINDS[OCCUPIED_AT_LEAST : 100 + 1] = WALL
 _COVERAGE_KINDS = np.full(256, UNKNOWN, np.uint8)
-_COVERAGE_KINDS[covering.TO_COVER] = TO_COVER
-_COVERAGE_KINDS[covering.COVERED] = COVERED
-_COVERAGE_KINDS[covering.RECOVERED] = RECOVERED
+_COVERAGE_KINDS[CoverageValue.TO_COVER] = TO_COVER
+_COVERAGE_KINDS[CoverageValue.COVERED] = COVERED
+_COVERAGE_KINDS[CoverageValue.RECOVERED] = RECOVERED
 _COVERAGE_AND_BLOCKED_KINDS = _COVERAGE_KINDS.copy()
-_COVERAGE_AND_BLOCKED_KINDS[covering.BLOCKED] = WALL
+_COVERAGE_AND_BLOCKED_KINDS[CoverageValue.BLOCKED] = WALL
 
 
 class MissionPicture:

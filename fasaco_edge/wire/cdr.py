@@ -1,8 +1,4 @@
-"""The one way a message is refused: which field, what was expected, what came.
-
-Strings as CDR has them: UTF-8 with one NUL, at the end.
-
-Plain CDR, little endian: what ROS 2 and its Zenoh bridges put on the wire.
+"""Plain CDR, little endian: what ROS 2 and its Zenoh bridges put on the wire.
 
 Sources: OMG DDS-RTPS 2.5, clause 10 (encapsulation header); OMG CORBA 3.4, clause 9.3
 (transfer syntax); OMG DDS-XTypes 1.3, clause 7.6.3.1.2 (the header's padding count).
@@ -21,6 +17,23 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
+
+ENCAPSULATION = b"\x00\x01\x00\x00"
+HEADER_SIZE = len(ENCAPSULATION)
+# The last byte counts padding.
+_FIXED_HEADER = ENCAPSULATION[:3]
+MAX_PADDING = 3
+
+_Cell = TypeVar("_Cell", np.int8, np.uint8)
+
+_UINT32 = struct.Struct("<I")
+_LENGTH = ("length of {}",)
+# What a number of a struct's format may be, and what it is called.
+_RANGES: dict[str, tuple[float, float, str]] = {
+    "i": (-(2**31), 2**31, "an int32"),
+    "I": (0, 2**32, "a uint32"),
+    "f": (-math.inf, math.inf, "a float32"),
+}
 
 
 def refuse(message: str, field: str, expected: str, got: object) -> NoReturn:
@@ -41,38 +54,6 @@ def encoded_string(value: str, message: str, field: str) -> bytes:
     if len(text) > MAX_STRING_BYTES or 0 in text:
         refuse(message, field, f"at most {MAX_STRING_BYTES} bytes without NUL", repr(value))
     return text + b"\0"
-
-
-def decoded_string(text: bytes, message: str, field: str) -> str:
-    """Return the string in ``text``, its NUL included.
-
-    Raises:
-        MalformedMessage: it has no NUL at its end, another before, or is no UTF-8.
-    """
-    if text.find(0) != len(text) - 1:
-        refuse(message, field, "a string with one NUL, at its end", repr(text))
-    try:
-        return text[:-1].decode()
-    except UnicodeDecodeError as error:
-        refuse(message, field, "UTF-8", f"{text!r} ({error.reason})")
-
-
-ENCAPSULATION = b"\x00\x01\x00\x00"
-HEADER_SIZE = len(ENCAPSULATION)
-# The last byte counts padding.
-_FIXED_HEADER = ENCAPSULATION[:3]
-MAX_PADDING = 3
-
-_Cell = TypeVar("_Cell", np.int8, np.uint8)
-
-_UINT32 = struct.Struct("<I")
-_LENGTH = ("length of {}",)
-# What a number of a struct's format may be, and what it is called.
-_RANGES: dict[str, tuple[float, float, str]] = {
-    "i": (-(2**31), 2**31, "an int32"),
-    "I": (0, 2**32, "a uint32"),
-    "f": (-math.inf, math.inf, "a float32"),
-}
 
 
 class CdrReader:
@@ -107,6 +88,15 @@ class CdrReader:
         """Number of bytes read since the header, what alignment is counted in."""
         return self._offset - HEADER_SIZE
 
+    def take(self, alignment: int, size: int, field: str) -> int:
+        """Step over ``size`` aligned bytes, whatever they are; return where in the payload they
+        begin."""
+        start = self._offset + ((HEADER_SIZE - self._offset) & (alignment - 1))
+        if start + size > self._size:
+            self._cut(field, size, start)
+        self._offset = start + size
+        return start
+
     def words(
         self, layout: struct.Struct, names: Sequence[str], field: str = ""
     ) -> tuple[Any, ...]:
@@ -127,26 +117,13 @@ class CdrReader:
 
     def doubles(self, layout: struct.Struct, field: str) -> tuple[Any, ...]:
         """Read 64-bit floats, as many as ``layout`` has; a tuple."""
-        return layout.unpack_from(self._payload, self._take(8, layout.size, field))
-
-    def float64s(self, count: int, field: str) -> NDArray[np.float64]:
-        """Read ``count`` 64-bit floats, float64 (count,), a read-only view of the payload."""
-        start = self._take(8, 8 * count, field)
-        return np.frombuffer(self._payload, "<f8", count, start)
-
-    def skip_float64s(self, count: int, field: str) -> None:
-        """Step over ``count`` 64-bit floats, whatever they are."""
-        self._take(8, 8 * count, field)
-
-    def octets(self, count: int, field: str) -> NDArray[np.uint8]:
-        """Read ``count`` bytes, uint8 (count,), a read-only view of the payload."""
-        return np.frombuffer(self._payload, np.uint8, count, self._take(1, count, field))
+        return layout.unpack_from(self._payload, self.take(8, layout.size, field))
 
     def cells(
         self, rows: int, cols: int, dtype: type[_Cell], field: str
     ) -> np.ndarray[tuple[int, int], np.dtype[_Cell]]:
         """Read rows * cols values of one byte, (rows, cols), a read-only view of the payload."""
-        start = self._take(1, rows * cols, field)
+        start = self.take(1, rows * cols, field)
         return np.ndarray((rows, cols), dtype, self._payload, start)
 
     def string(self, field: str) -> str:
@@ -157,12 +134,14 @@ class CdrReader:
         """Read a string whose ``length`` with the NUL was read already."""
         if not 1 <= length <= MAX_STRING_BYTES + 1:
             refuse(self.message, f"length of {field}", f"1..{MAX_STRING_BYTES + 1}", length)
-        start = self._offset
-        stop = start + length
-        if stop > self._size:
-            self._cut(field, length, start)
-        self._offset = stop
-        return decoded_string(self._payload[start:stop], self.message, field)
+        start = self.take(1, length, field)
+        text = self._payload[start : self._offset]
+        if text.find(0) != length - 1:
+            refuse(self.message, field, "a string with one NUL, at its end", repr(text))
+        try:
+            return text[:-1].decode()
+        except UnicodeDecodeError as error:
+            refuse(self.message, field, "UTF-8", f"{text!r} ({error.reason})")
 
     def length(self, field: str, least_bytes: int) -> int:
         """Read the length of a sequence whose items take at least ``least_bytes`` each."""
@@ -199,13 +178,6 @@ class CdrReader:
                 f"at its end after {self._offset} bytes, or {counted} counted ones of padding"
             )
             refuse(self.message, "payload", expected, f"{len(tail)} bytes more")
-
-    def _take(self, alignment: int, size: int, field: str) -> int:
-        start = self._offset + ((HEADER_SIZE - self._offset) & (alignment - 1))
-        if start + size > self._size:
-            self._cut(field, size, start)
-        self._offset = start + size
-        return start
 
     def _cut(self, field: str, size: int, start: int) -> NoReturn:
         expected = f"{size} bytes at offset {start}"
@@ -253,11 +225,6 @@ class CdrWriter:
     def doubles(self, layout: struct.Struct, *values: float) -> None:
         """Write 64-bit floats, as many as ``layout`` has."""
         self._put(8, layout.pack(*values))
-
-    def float64s(self, values: NDArray[np.float64]) -> None:
-        """Write 64-bit floats of any shape, in row order."""
-        self.align(8)
-        self.array(values.astype("<f8", copy=False))
 
     def array(self, values: NDArray[Any]) -> None:
         """Write an array's bytes as they are, in row order."""

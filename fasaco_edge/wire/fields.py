@@ -22,13 +22,11 @@ from fasaco_edge.wire.limits import (
 )
 
 SECOND_NS = 1_000_000_000
-POSE_FLOATS = 7
+POSE = struct.Struct("<7d")
 """A geometry_msgs/Pose: position x, y, z and quaternion x, y, z, w."""
-
 
 _Cell = TypeVar("_Cell", np.int8, np.uint8)
 
-_POSE = struct.Struct("<7d")
 _HEADER = struct.Struct("<iII")
 _HEADER_NAMES = ("{}.stamp.sec", "{}.stamp.nanosec", "length of {}.frame_id")
 _SENT_HEADER_NAMES = tuple(name.format("header") for name in _HEADER_NAMES)
@@ -98,7 +96,7 @@ def yaw_of_one(x: float, y: float, z: float, w: float) -> float:
 
 def planar_poses(xy: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return poses, float64 (n, 7), at points (n, 2) [m] with yaws (n,) [rad]."""
-    poses = np.zeros((len(xy), POSE_FLOATS))
+    poses = np.zeros((len(xy), 7))
     poses[:, :2] = xy
     with np.errstate(invalid="ignore"):
         poses[:, 5], poses[:, 6] = np.sin(yaw / 2), np.cos(yaw / 2)
@@ -107,7 +105,7 @@ def planar_poses(xy: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[n
 
 def read_pose(reader: CdrReader, field: str) -> Pose2D:
     """Read a geometry_msgs/Pose; return its place in the plane."""
-    pose = reader.doubles(_POSE, field)
+    pose = reader.doubles(POSE, field)
     _check_pose(pose, reader.message, field)
     return _planar(pose)
 
@@ -118,7 +116,7 @@ def write_pose(writer: CdrWriter, pose: Pose2D, field: str) -> None:
     half = pose.yaw / 2 if math.isfinite(pose.yaw) else math.nan
     floats = (pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
     _check_pose(floats, writer.message, field)
-    writer.doubles(_POSE, *floats)
+    writer.doubles(POSE, *floats)
 
 
 def read_grid_geometry(reader: CdrReader) -> GridGeometry:
@@ -128,7 +126,7 @@ def read_grid_geometry(reader: CdrReader) -> GridGeometry:
         _refuse_nanosec(reader, "info.map_load_time", nanosec)
     resolution = _shortest_decimal(edge)
     _check_resolution(resolution, reader.message)
-    origin = reader.doubles(_POSE, "info.origin")
+    origin = reader.doubles(POSE, "info.origin")
     _check_pose(origin, reader.message, "info.origin")
     if max(abs(origin[3]), abs(origin[4])) > MAX_GRID_TILT:
         refuse(

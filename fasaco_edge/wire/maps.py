@@ -1,14 +1,19 @@
-"""Maps: nav_msgs/OccupancyGrid and map_msgs/OccupancyGridUpdate."""
+"""Maps: nav_msgs/OccupancyGrid and map_msgs/OccupancyGridUpdate.
+
+How far the mission is comes as an occupancy grid on the lattice, too: any map viewer shows it.
+"""
 
 from __future__ import annotations
 
 import struct
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OCCUPIED, UNKNOWN, MapPatch, OccupancyGrid
+from fasaco_edge.kernels import cells as cell
 from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
 from fasaco_edge.wire.fields import (
     read_cells,
@@ -26,6 +31,16 @@ _PLACE = struct.Struct("<iiII")
 _PLACE_NAMES = ("x", "y", "width", "height")
 PATCH_CELLS = 4096
 """Fewer cells are looked through by calls that are quick to begin, but copy them."""
+
+
+class CoverageValue(IntEnum):
+    """Values of a coverage grid."""
+
+    UNKNOWN = -1
+    TO_COVER = 0
+    COVERED = 50
+    RECOVERED = 75
+    BLOCKED = 100
 
 
 def decode_occupancy_grid(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> OccupancyGrid:
@@ -110,3 +125,36 @@ def _least_and_most(cells: NDArray[np.int8]) -> tuple[int, int]:
         return UNKNOWN, OCCUPIED
     # A reduction takes a microsecond to begin. These do not, but copy what is read-only.
     return cells.item(cells.argmin()), cells.item(cells.argmax())
+
+
+def lattice_geometry(window: Window, cell_m: float) -> GridGeometry:
+    """Return the placement of a window of the coverage lattice, cells ``cell_m`` [m] wide."""
+    corner = Pose2D(window.col0 * cell_m, window.row0 * cell_m)
+    return GridGeometry(window.rows, window.cols, cell_m, corner)
+
+
+def coverage_grid(
+    window: Window,
+    cell_m: float,
+    states: NDArray[np.uint8],
+    visits: NDArray[np.uint16],
+    frame: str = "map",
+    stamp_ns: int = 0,
+) -> OccupancyGrid:
+    """Return the coverage of ``window``, to be sent by ``encode_occupancy_grid``.
+
+    Args:
+        window: which cells of the lattice.
+        cell_m: edge of a cell [m].
+        states: uint8 (rows, cols), the lattice's: UNKNOWN, BLOCKED or COVERABLE.
+        visits: uint16 (rows, cols), how often the robot has been in each cell.
+        frame: name of the map frame.
+        stamp_ns: time of the coverage [ns].
+    """
+    values = np.full(states.shape, CoverageValue.UNKNOWN, np.int8)
+    values[states == cell.BLOCKED] = CoverageValue.BLOCKED
+    coverable = states == cell.COVERABLE
+    values[coverable] = CoverageValue.TO_COVER
+    values[coverable & (visits == 1)] = CoverageValue.COVERED
+    values[coverable & (visits > 1)] = CoverageValue.RECOVERED
+    return OccupancyGrid(lattice_geometry(window, cell_m), values, frame, stamp_ns)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.wire.cdr import CdrReader, CdrWriter, encoded_string, refuse
 from fasaco_edge.wire.fields import (
-    POSE_FLOATS,
+    POSE,
     SECOND_NS,
     check_poses,
     planar_poses,
@@ -116,7 +116,7 @@ def _read_records(reader: CdrReader, frame: str, count: int) -> NDArray[np.float
     block = reader.peek(size) if count else None
     if block is None:
         return None
-    poses = np.empty((count, POSE_FLOATS))
+    poses = np.empty((count, 7))
     for some, to in (
         (block[: first.itemsize].view(first), poses[:1]),
         (block[first.itemsize :].view(rest), poses[1:]),
@@ -125,12 +125,12 @@ def _read_records(reader: CdrReader, frame: str, count: int) -> NDArray[np.float
         if not (same_frame and (some["nanosec"] < SECOND_NS).all()):
             return None
         to[:] = some["pose"]
-    reader.octets(size, "poses")
+    reader.take(1, size, "poses")
     return poses
 
 
 def _read_one_by_one(reader: CdrReader, frame: str, count: int) -> NDArray[np.float64]:
-    poses = np.empty((count, POSE_FLOATS))
+    poses = np.empty((count, 7))
     for index in range(count):
         field = f"poses[{index}].header"
         named, _ = read_header(reader, field)
@@ -138,7 +138,7 @@ def _read_one_by_one(reader: CdrReader, frame: str, count: int) -> NDArray[np.fl
             refuse(
                 reader.message, f"{field}.frame_id", f"{frame!r}, as the path's, or ''", repr(named)
             )
-        poses[index] = reader.float64s(POSE_FLOATS, _pose_field(index))
+        poses[index] = reader.doubles(POSE, _pose_field(index))
     return poses
 
 
@@ -150,9 +150,9 @@ def _record(start: int, frame_size: int) -> np.dtype[np.void]:
     return np.dtype(
         {
             "names": ["sec", "nanosec", "length", "frame", "pose"],
-            "formats": ["<i4", "<u4", "<u4", (np.uint8, frame_size), ("<f8", POSE_FLOATS)],
+            "formats": ["<i4", "<u4", "<u4", (np.uint8, frame_size), ("<f8", 7)],
             "offsets": [0, 4, 8, frame_at, pose_at],
-            "itemsize": pose_at + 8 * POSE_FLOATS,
+            "itemsize": pose_at + POSE.size,
         }
     )
 

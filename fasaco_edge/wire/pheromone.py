@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.coverage import lattice_geometry
 from fasaco_edge.wire.fields import (
     read_cells,
     read_grid_geometry,
@@ -27,6 +26,7 @@ from fasaco_edge.wire.fields import (
     write_header,
 )
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
+from fasaco_edge.wire.maps import lattice_geometry
 from fasaco_edge.wire.schemas import PHEROMONE_GRID
 
 TOP_STEP = 254

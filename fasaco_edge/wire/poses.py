@@ -1,20 +1,44 @@
-"""Poses of the robot: PoseStamped, PoseWithCovarianceStamped and Odometry."""
+"""Poses of the robot: messages of three types, or transforms (tf2_msgs/TFMessage).
+
+From transforms, the robot's pose is the product of the newest of each link between map and robot.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.errors import MalformedMessage, TransformLoop
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.fields import read_header, read_pose, write_header, write_pose
-from fasaco_edge.wire.schemas import ODOMETRY, POSE_STAMPED, POSE_WITH_COVARIANCE_STAMPED
+from fasaco_edge.wire.fields import (
+    POSE,
+    read_header,
+    read_pose,
+    write_header,
+    write_pose,
+    yaw_of_one,
+)
+from fasaco_edge.wire.limits import (
+    MAX_COORDINATE_M,
+    MAX_TRANSFORM_TILT,
+    MAX_TRANSFORMS,
+    QUATERNION_TOLERANCE,
+)
+from fasaco_edge.wire.schemas import (
+    ODOMETRY,
+    POSE_STAMPED,
+    POSE_WITH_COVARIANCE_STAMPED,
+    TF_MESSAGE,
+)
 
-COVARIANCE_FLOATS = 36
-TWIST_FLOATS = 6
+# What follows the pose in each type: how many 64-bit floats.
+_AFTER_POSE = {
+    POSE_STAMPED: {},
+    POSE_WITH_COVARIANCE_STAMPED: {"pose.covariance": 36},
+    ODOMETRY: {"pose.covariance": 36, "twist.twist": 6, "twist.covariance": 36},
+}
 
 
 def decode_pose(payload: bytes, schema: str) -> StampedPose:
@@ -26,11 +50,18 @@ def decode_pose(payload: bytes, schema: str) -> StampedPose:
     Raises:
         MalformedMessage: it is no such message, or poses do not come as ``schema``.
     """
-    decode = _DECODERS.get(schema)
-    if decode is None:
-        known = ", ".join(_DECODERS)
+    if schema not in _AFTER_POSE:
+        known = ", ".join(_AFTER_POSE)
         raise MalformedMessage(f"a pose must come as one of {known}, got {schema!r}")
-    return decode(payload)
+    reader = CdrReader(payload, schema)
+    frame, stamp_ns = read_header(reader)
+    if schema == ODOMETRY:
+        reader.string("child_frame_id")
+    pose = read_pose(reader, "pose" if schema == POSE_STAMPED else "pose.pose")
+    for field, floats in _AFTER_POSE[schema].items():
+        reader.take(8, 8 * floats, field)
+    reader.end()
+    return StampedPose(pose, frame, stamp_ns)
 
 
 def encode_pose_stamped(stamped: StampedPose) -> bytes:
@@ -39,107 +70,206 @@ def encode_pose_stamped(stamped: StampedPose) -> bytes:
     Raises:
         MalformedMessage: the message would be one that ``decode_pose`` refuses.
     """
-    return _begin(POSE_STAMPED, stamped).payload()
-
-
-def encode_pose_with_covariance_stamped(
-    stamped: StampedPose, covariance: NDArray[np.float64] | None = None
-) -> bytes:
-    """Return ``stamped`` as a geometry_msgs/PoseWithCovarianceStamped.
-
-    Args:
-        stamped: the pose.
-        covariance: float64 (36,), row-major over x, y, z [m] and the turns about x, y, z
-            [rad]; None for zeros.
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_pose`` refuses.
-    """
-    writer = _begin(POSE_WITH_COVARIANCE_STAMPED, stamped)
-    _write_floats(writer, covariance, COVARIANCE_FLOATS, "pose.covariance")
+    writer = CdrWriter(POSE_STAMPED)
+    write_header(writer, stamped.frame, stamped.stamp_ns)
+    write_pose(writer, stamped.pose, "pose")
     return writer.payload()
 
 
-def encode_odometry(
-    stamped: StampedPose,
-    child_frame: str = "base_link",
-    covariance: NDArray[np.float64] | None = None,
-    twist: NDArray[np.float64] | None = None,
-    twist_covariance: NDArray[np.float64] | None = None,
-) -> bytes:
-    """Return ``stamped`` as a nav_msgs/Odometry.
+LEAST_TRANSFORM_BYTES = 80
+"""Of a TransformStamped with empty names: stamp 8, twice length 4, NUL 1, padding 3, floats 56."""
 
-    Args:
-        stamped: the pose of ``child_frame``.
-        child_frame: name of the robot's own frame.
-        covariance: of the pose, float64 (36,), as in PoseWithCovarianceStamped; None for zeros.
-        twist: float64 (6,), velocity along x, y, z [m/s] and about x, y, z [rad/s] in
-            ``child_frame``; None for zeros.
-        twist_covariance: float64 (36,); None for zeros.
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """Where a frame lies in another one, as it came.
+
+    A robot sends the turns of its wheels and cameras, too, so that what ``placement`` holds is
+    looked at only by who needs it, in ``planar``.
+
+    Attributes:
+        frame: name of the frame it is told in.
+        child: name of the frame that lies there.
+        stamp_ns: time of the transform [ns], by its publisher's clock.
+        placement: translation x, y, z [m] and quaternion x, y, z, w.
+    """
+
+    frame: str
+    child: str
+    stamp_ns: int
+    placement: tuple[float, ...]
+
+    def planar(self) -> Pose2D:
+        """Return the pose of ``child`` in the plane of ``frame``.
+
+        Raises:
+            MalformedMessage: a number is not finite or too large, the quaternion is none, or it
+                tilts the plane.
+        """
+        which = f"of {self.child!r} in {self.frame!r}"
+        x, y, z, *turn = self.placement
+        # Negated comparisons, so that NaN is caught too.
+        for axis, value in zip("xyz", (x, y, z), strict=True):
+            if not abs(value) <= MAX_COORDINATE_M:
+                expected = f"within {MAX_COORDINATE_M:g} m of 0"
+                refuse(TF_MESSAGE, f"translation.{axis} {which}", expected, value)
+        norm = math.hypot(*turn)
+        if not abs(norm - 1.0) <= QUATERNION_TOLERANCE:
+            refuse(
+                TF_MESSAGE, f"norm of rotation {which}", f"1 within {QUATERNION_TOLERANCE}", norm
+            )
+        if max(abs(turn[0]), abs(turn[1])) > MAX_TRANSFORM_TILT:
+            expected = f"a turn about z (x and y within {MAX_TRANSFORM_TILT})"
+            refuse(TF_MESSAGE, f"rotation {which}", expected, turn)
+        return Pose2D(x, y, yaw_of_one(*turn))
+
+
+def decode_transforms(payload: bytes) -> tuple[Transform, ...]:
+    """Return the transforms in a tf2_msgs/TFMessage; there may be none.
 
     Raises:
-        MalformedMessage: the message would be one that ``decode_pose`` refuses.
+        MalformedMessage: it is no such message, or has over ``MAX_TRANSFORMS`` transforms.
     """
-    writer = CdrWriter(ODOMETRY)
-    write_header(writer, stamped.frame, stamped.stamp_ns)
-    writer.string(child_frame, "child_frame_id")
-    write_pose(writer, stamped.pose, "pose.pose")
-    _write_floats(writer, covariance, COVARIANCE_FLOATS, "pose.covariance")
-    _write_floats(writer, twist, TWIST_FLOATS, "twist.twist")
-    _write_floats(writer, twist_covariance, COVARIANCE_FLOATS, "twist.covariance")
-    return writer.payload()
-
-
-def _decode_pose_stamped(payload: bytes) -> StampedPose:
-    reader = CdrReader(payload, POSE_STAMPED)
-    frame, stamp_ns = read_header(reader)
-    pose = read_pose(reader, "pose")
+    reader = CdrReader(payload, TF_MESSAGE)
+    count = reader.length("transforms", LEAST_TRANSFORM_BYTES)
+    if count > MAX_TRANSFORMS:
+        refuse(reader.message, "length of transforms", f"at most {MAX_TRANSFORMS}", count)
+    transforms = tuple(_read_transform(reader, f"transforms[{index}]") for index in range(count))
     reader.end()
-    return StampedPose(pose, frame, stamp_ns)
+    return transforms
 
 
-def _decode_pose_with_covariance_stamped(payload: bytes) -> StampedPose:
-    reader = CdrReader(payload, POSE_WITH_COVARIANCE_STAMPED)
-    frame, stamp_ns = read_header(reader)
-    pose = read_pose(reader, "pose.pose")
-    reader.skip_float64s(COVARIANCE_FLOATS, "pose.covariance")
-    reader.end()
-    return StampedPose(pose, frame, stamp_ns)
+def _read_transform(reader: CdrReader, field: str) -> Transform:
+    frame, stamp_ns = read_header(reader, f"{field}.header")
+    child = reader.string(f"{field}.child_frame_id")
+    return Transform(frame, child, stamp_ns, reader.doubles(POSE, f"{field}.transform"))
 
 
-def _decode_odometry(payload: bytes) -> StampedPose:
-    reader = CdrReader(payload, ODOMETRY)
-    frame, stamp_ns = read_header(reader)
-    reader.string("child_frame_id")
-    pose = read_pose(reader, "pose.pose")
-    reader.skip_float64s(COVARIANCE_FLOATS, "pose.covariance")
-    reader.skip_float64s(TWIST_FLOATS, "twist.twist")
-    reader.skip_float64s(COVARIANCE_FLOATS, "twist.covariance")
-    reader.end()
-    return StampedPose(pose, frame, stamp_ns)
+class TransformTree:
+    """Remembers of each frame where it lies, and follows the robot's up to the map's.
+
+    Usually map, odom, base_link: a localiser publishes the first link, odometry the second.
+    Newest is what came last.
+
+    Args:
+        map_frame: the frame poses are wanted in.
+        robot_frame: the robot's own.
+    """
+
+    def __init__(self, map_frame: str, robot_frame: str) -> None:
+        self._map_frame = map_frame
+        self._robot_frame = robot_frame
+        # By child frame; whether it was said to hold for ever.
+        self._links: dict[str, tuple[Transform, bool]] = {}
+        self._told: StampedPose | None = None
+
+    def follow(self, map_frame: str, robot_frame: str) -> None:
+        """Want poses between other frames from now on; what is known of all of them stays."""
+        self._map_frame, self._robot_frame = map_frame, robot_frame
+
+    def take(self, transforms: Iterable[Transform], *, is_static: bool) -> StampedPose | None:
+        """Take transforms in; return the robot's pose if it is known and another than before.
+
+        Its stamp is that of the link nearest to the robot that moves: of odometry.
+
+        Args:
+            transforms: as they came.
+            is_static: whether they were said to hold for ever.
+
+        Raises:
+            TransformLoop: the frames hang on each other; their links are forgotten.
+            MalformedMessage: a link between map and robot has no place in the plane, and is
+                forgotten; or there are over ``MAX_TRANSFORMS`` frames.
+        """
+        for transform in transforms:
+            if transform.child not in self._links and len(self._links) >= MAX_TRANSFORMS:
+                refuse(TF_MESSAGE, "number of frames", f"at most {MAX_TRANSFORMS}", "one more")
+            self._links[transform.child] = transform, is_static
+        chain = self._chain()
+        if not chain:
+            return None
+        pose = Pose2D(0.0, 0.0)
+        for transform, _ in chain:
+            pose = _placed(self._planar(transform), pose)
+        moving = next((link for link, for_ever in chain if not for_ever), chain[0][0])
+        stamped = StampedPose(pose, self._map_frame, moving.stamp_ns)
+        if stamped == self._told:
+            return None
+        self._told = stamped
+        return stamped
+
+    def _planar(self, transform: Transform) -> Pose2D:
+        try:
+            return transform.planar()
+        except MalformedMessage:
+            del self._links[transform.child]  # else each message from now on would be refused
+            raise
+
+    def _chain(self) -> list[tuple[Transform, bool]]:
+        """Return the links from the robot's frame up to the map's; none where one is missing."""
+        chain: list[tuple[Transform, bool]] = []
+        frame = self._robot_frame
+        while frame != self._map_frame:
+            link = self._links.get(frame)
+            if link is None:
+                return []
+            chain.append(link)
+            if len(chain) > len(self._links):
+                raise self._loop(frame)
+            frame = link[0].frame
+        return chain
+
+    def _loop(self, frame: str) -> TransformLoop:
+        """Forget the links of the loop that ``frame`` is in; return the error that names them."""
+        names = []
+        while (link := self._links.pop(frame, None)) is not None:
+            names.append(frame)
+            frame = link[0].frame
+        return TransformLoop(f"tf: these frames hang on each other: {', '.join(names[:8])}")
 
 
-_DECODERS: dict[str, Callable[[bytes], StampedPose]] = {
-    POSE_STAMPED: _decode_pose_stamped,
-    POSE_WITH_COVARIANCE_STAMPED: _decode_pose_with_covariance_stamped,
-    ODOMETRY: _decode_odometry,
-}
+def _placed(frame: Pose2D, pose: Pose2D) -> Pose2D:
+    """Return ``pose``, given in a frame that lies at ``frame``, where that one is given."""
+    cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
+    return Pose2D(
+        frame.x + cos * pose.x - sin * pose.y,
+        frame.y + sin * pose.x + cos * pose.y,
+        math.remainder(frame.yaw + pose.yaw, math.tau),
+    )
 
 
-def _begin(schema: str, stamped: StampedPose) -> CdrWriter:
-    writer = CdrWriter(schema)
-    write_header(writer, stamped.frame, stamped.stamp_ns)
-    write_pose(writer, stamped.pose, "pose" if schema == POSE_STAMPED else "pose.pose")
-    return writer
+DEFAULT_FRAMES = ("map", "base_link")
 
 
-def _write_floats(
-    writer: CdrWriter, values: NDArray[np.float64] | None, count: int, field: str
-) -> None:
-    if values is None:
-        writer.align(8)
-        writer.octets(bytes(8 * count))
-        return
-    if values.shape != (count,):
-        refuse(writer.message, field, f"float64 ({count},)", f"{values.dtype} {values.shape}")
-    writer.float64s(values)
+class PoseDecoder:
+    """Decodes poses one after the other, be they messages of three types or transforms.
+
+    Args:
+        schema: type of those that come without one.
+        frames: the map's and the robot's, for transforms; None where none are taken.
+
+    Attributes:
+        schema: as above; may be changed.
+    """
+
+    def __init__(self, schema: str, frames: tuple[str, str] | None = DEFAULT_FRAMES) -> None:
+        self.schema = schema
+        self._transforms = TransformTree(*frames) if frames else None
+
+    def follow(self, frames: tuple[str, str]) -> None:
+        """Take poses out of the transforms between these frames from now on."""
+        if self._transforms is None:
+            self._transforms = TransformTree(*frames)
+        self._transforms.follow(*frames)
+
+    def decode(self, payload: bytes, schema: str, *, is_static: bool = False) -> StampedPose | None:
+        """Return the pose; None for transforms that tell no new one.
+
+        Raises:
+            MalformedMessage: it is none of these.
+            TransformLoop: the frames hang on each other.
+        """
+        schema = schema or self.schema
+        if self._transforms is None or schema != TF_MESSAGE:
+            return decode_pose(payload, schema)
+        return self._transforms.take(decode_transforms(payload), is_static=is_static)

@@ -120,7 +120,7 @@ class TurnBatch(msgspec.Struct, frozen=True, omit_defaults=True):
         times: when each was, by the daemon's steady clock [s].
         turns: those cycles in which something came in or was decided.
         beginning: in the first batch alone.
-        told: poses and small maps received in these cycles, in order, as ``samples.codec`` encodes
+        told: poses and small maps received in these cycles, in order, as ``samples`` encodes
             them: on a busy link a recorder may miss some.
         kernels: names the compiled kernels; in the first batch with a mission alone.
     """

@@ -32,14 +32,10 @@ from fasaco_edge.wire.maps import (
     encode_occupancy_grid,
 )
 from fasaco_edge.wire.paths import decode_path, encode_path
-from fasaco_edge.wire.poses import (
-    decode_pose,
-    encode_odometry,
-    encode_pose_stamped,
-    encode_pose_with_covariance_stamped,
-)
+from fasaco_edge.wire.poses import decode_pose, encode_pose_stamped
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID_UPDATE, PHEROMONE_GRID
 from fasaco_edge.wire.topics import POSE_SCHEMAS
+from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 
 
 class RosbagsCodec:

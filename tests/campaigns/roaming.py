@@ -13,8 +13,8 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
-from fasaco_edge.simulation.config import SimulationConfig
 from fasaco_edge.simulation.node import Pace
+from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Emission, World
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys

@@ -42,17 +42,17 @@ from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.planners.registry import planner_of
 from fasaco_edge.planners.stopping import SearchProgress, StopRecorder
-from fasaco_edge.wire.coverage import coverage_grid
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import (
+    coverage_grid,
     decode_map_update,
     decode_occupancy_grid,
     encode_occupancy_grid,
 )
 from fasaco_edge.wire.paths import decode_path, encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
+from fasaco_edge.wire.poses import PoseDecoder
 from fasaco_edge.wire.schemas import TF_MESSAGE
-from fasaco_edge.wire.transforms import PoseDecoder
 from tests.campaigns import raw_messages
 from tests.campaigns.senseless import Event, pixels_of
 

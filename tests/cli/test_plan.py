@@ -15,7 +15,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.map_files import write_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.registry import PLANNER_NAMES
-from fasaco_edge.simulation.config import SimulationConfig
+from fasaco_edge.simulation.robot import SimulationConfig
 from tests.support.processes import fasaco_edge
 from tests.support.rooms import coverable_cells, pillared_room
 

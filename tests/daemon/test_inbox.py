@@ -21,8 +21,8 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
-from fasaco_edge.wire.transforms import PoseDecoder
 from tests.support.processes import free_endpoint
 from tests.support.rooms import (
     RADIUS_M,

@@ -25,7 +25,7 @@ from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.recording.sdk import RrdReader, rr
 from fasaco_edge.recording.write.part import Part
 from fasaco_edge.review.review import read_review
-from fasaco_edge.samples.codec import _HEAD, WHOLE, SampleEncoder, _Lane
+from fasaco_edge.samples import _HEAD, WHOLE, SampleEncoder, _Lane
 from tests.samples.test_codec import arrival
 
 RUN_ID = "20260101T000000Z-robot"

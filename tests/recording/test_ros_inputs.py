@@ -14,8 +14,7 @@ from fasaco_edge.cli.record import ros_config
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.replay.recorded_run import read_run
-from fasaco_edge.replay.replay import Replay
+from fasaco_edge.replay.replay import Replay, read_run
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, TF_MESSAGE
 from tests.support.outsider import Outsider

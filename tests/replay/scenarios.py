@@ -19,8 +19,7 @@ from fasaco_edge.grid.lattice import COVERABLE
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.replay.mission_drive import ReplayStep
-from fasaco_edge.replay.recorded_run import read_run
-from fasaco_edge.replay.replay import Replay
+from fasaco_edge.replay.replay import Replay, read_run
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.poses import decode_pose

@@ -21,8 +21,7 @@ from fasaco_edge.daemon.ledger.file import LedgerFile
 pytest.importorskip("rerun")
 
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.replay.recorded_run import read_run
-from fasaco_edge.replay.replay import Replay
+from fasaco_edge.replay.replay import Replay, read_run
 
 DATA = Path(__file__).parents[1] / "data"
 

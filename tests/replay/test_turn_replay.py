@@ -12,9 +12,8 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.replay.cycle_record import read_turns
-from fasaco_edge.replay.cycle_replay import CycleReplay
-from fasaco_edge.replay.recorded_run import read_run
+from fasaco_edge.replay.cycle_replay import CycleReplay, read_turns
+from fasaco_edge.replay.replay import read_run
 from fasaco_edge.wire.turns import decode_turns, encode_turns
 from tests.replay.scenarios import changed, places, without
 from tests.support.recorded_mission import record_mission

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.samples.codec import LARGE_BYTES, SampleDecoder, SampleEncoder, place_of
+from fasaco_edge.samples import LARGE_BYTES, SampleDecoder, SampleEncoder, place_of
 
 RUN = 1_700_000_000_000_000_000
 

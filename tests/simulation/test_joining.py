@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fasaco_edge.simulation.joining import joined, passed_waypoints
+from fasaco_edge.simulation.robot import joined, passed_waypoints
 from tests.simulation.rooms import CELL, centres
 
 

@@ -16,8 +16,8 @@ import pytest
 from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.errors import BadConfiguration, BusUnavailable
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.simulation.config import SimulationConfig
 from fasaco_edge.simulation.node import run_simulation
+from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
@@ -30,7 +30,7 @@ ROBOT = """
 import json, sys
 from fasaco_edge.bus.session import BusSettings
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.simulation.config import SimulationConfig
+from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.node import run_simulation
 from fasaco_edge.simulation.world import World
 from fasaco_edge.wire.keys import Keys

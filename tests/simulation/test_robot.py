@@ -9,8 +9,14 @@ from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.simulation.config import SimulationConfig
-from fasaco_edge.simulation.robot import ARRIVED_M, DriveState, corners, driven, stopping_point
+from fasaco_edge.simulation.robot import (
+    ARRIVED_M,
+    DriveState,
+    SimulationConfig,
+    corners,
+    driven,
+    stopping_point,
+)
 
 CONFIG = SimulationConfig()
 

@@ -5,7 +5,7 @@ import pytest
 
 from fasaco_edge.errors import StartBlocked, StartOutsideMap
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.simulation.config import SimulationConfig
+from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
 from tests.simulation.rooms import building, centres, distances_to, serpentine
 

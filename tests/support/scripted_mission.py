@@ -23,10 +23,16 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.coverage import BLOCKED, COVERED, RECOVERED, TO_COVER, UNKNOWN
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import encode_occupancy_grid
+from fasaco_edge.wire.maps import (
+    BLOCKED,
+    COVERED,
+    RECOVERED,
+    TO_COVER,
+    UNKNOWN,
+    encode_occupancy_grid,
+)
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
 from fasaco_edge.wire.poses import encode_pose_stamped

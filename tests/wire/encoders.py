@@ -14,11 +14,8 @@ from fasaco_edge.wire import schemas
 from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
 from fasaco_edge.wire.paths import PathMessage, encode_path
 from fasaco_edge.wire.pheromone import PheromoneMessage, encode_pheromone
-from fasaco_edge.wire.poses import (
-    encode_odometry,
-    encode_pose_stamped,
-    encode_pose_with_covariance_stamped,
-)
+from fasaco_edge.wire.poses import encode_pose_stamped
+from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 
 
 def _path(path: PathMessage) -> bytes:

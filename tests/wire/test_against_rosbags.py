@@ -17,13 +17,8 @@ from fasaco_edge.wire.maps import (
 )
 from fasaco_edge.wire.paths import decode_path, encode_path
 from fasaco_edge.wire.pheromone import decode_pheromone, encode_pheromone
-from fasaco_edge.wire.poses import (
-    decode_pose,
-    encode_odometry,
-    encode_pose_stamped,
-    encode_pose_with_covariance_stamped,
-)
-from fasaco_edge.wire.transforms import Transform, decode_transforms
+from fasaco_edge.wire.poses import Transform, decode_pose, decode_transforms, encode_pose_stamped
+from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 from tests.wire import oracle
 
 STAMP_NS = 1_700_000_000_987_654_321

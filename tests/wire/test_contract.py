@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, NothingToCover
 from fasaco_edge.host.resources import folder
-from fasaco_edge.wire import coverage, limits, schemas, topics
+from fasaco_edge.wire import limits, schemas, topics
 from fasaco_edge.wire.json_text import decode_json, encode_json
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.maps import CoverageValue
 from fasaco_edge.wire.replies import encode_error
 from fasaco_edge.wire.topics import POSE_SCHEMAS
 
@@ -50,7 +51,7 @@ def test_payloads_are_those_of_the_table() -> None:
 
 def test_the_readme_has_the_values_of_coverage() -> None:
     shown = re.findall(r"^\| (-?\d+) \|", README, re.MULTILINE)
-    assert [int(value) for value in shown] == sorted(constants(coverage).values())
+    assert [int(value) for value in shown] == sorted(CoverageValue)
 
 
 @pytest.mark.parametrize(
@@ -167,7 +168,7 @@ def test_error_reply() -> None:
 def test_reading_the_bus_needs_no_compiler() -> None:
     import subprocess
 
-    modules = ["maps", "poses", "transforms", "paths", "pheromone", "coverage", "keys", "json_text"]
+    modules = ["maps", "poses", "paths", "pheromone", "keys", "json_text"]
     program = "; ".join(f"import fasaco_edge.wire.{module}" for module in modules)
     check = f"{program}; import sys; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0

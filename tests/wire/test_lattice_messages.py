@@ -14,7 +14,7 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid import lattice
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.planners.planner import ColonySnapshot
-from fasaco_edge.wire import coverage
+from fasaco_edge.wire import maps
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.pheromone import decode_pheromone, encode_pheromone
 
@@ -38,7 +38,7 @@ def test_coverage_values() -> None:
     )
     # A cell that became blocked after it was covered shows as blocked.
     visits = np.array([[0, 3, 0], [1, 2, 65535]], np.uint16)
-    grid = coverage.coverage_grid(Window(-1, 2, 1, 5), 0.4, states, visits, "floor", 7)
+    grid = maps.coverage_grid(Window(-1, 2, 1, 5), 0.4, states, visits, "floor", 7)
     assert grid.cells.tolist() == [[-1, 100, 0], [50, 75, 75]]
     assert (grid.frame, grid.stamp_ns) == ("floor", 7)
     assert grid.geometry.origin == Pose2D(0.8, -0.4)
@@ -50,7 +50,7 @@ def test_coverage_values() -> None:
 def test_coverage_lies_where_the_lattice_says() -> None:
     free = np.ones((4, 5), bool)
     plan = lattice.CoverageLattice.from_free(free, 0.25)
-    geometry = coverage.lattice_geometry(plan.window, plan.cell_m)
+    geometry = maps.lattice_geometry(plan.window, plan.cell_m)
     for cell in ((0, 0), (3, 4), (2, 1)):
         (centre,) = plan.centres(np.array([cell], np.int32))
         col, row = geometry.to_pixels(*centre)

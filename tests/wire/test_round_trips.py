@@ -22,12 +22,8 @@ from fasaco_edge.wire.maps import (
     encode_occupancy_grid,
 )
 from fasaco_edge.wire.paths import decode_path, encode_path
-from fasaco_edge.wire.poses import (
-    decode_pose,
-    encode_odometry,
-    encode_pose_stamped,
-    encode_pose_with_covariance_stamped,
-)
+from fasaco_edge.wire.poses import decode_pose, encode_pose_stamped
+from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 from tests.wire import oracle
 
 coordinates = st.floats(-2e7, 2e7)

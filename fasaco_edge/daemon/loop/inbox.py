@@ -20,7 +20,7 @@ from fasaco_edge.mission.core.events import (
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
-from fasaco_edge.wire.transforms import PoseDecoder
+from fasaco_edge.wire.poses import PoseDecoder
 
 MAPS = ("map", "map_update")
 # Updates without their map come in swarms; the map is asked for no more often than this [s].

@@ -21,10 +21,9 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import command_document
 from fasaco_edge.wire import schemas, topics
-from fasaco_edge.wire.coverage import coverage_grid
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import encode_occupancy_grid
+from fasaco_edge.wire.maps import coverage_grid, encode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
 from fasaco_edge.wire.status import PathAttachment, Status

@@ -27,7 +27,7 @@ from fasaco_edge.kernels.cache import sources_digest
 from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanBroken, PlanReady
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.orders.order import command_document
-from fasaco_edge.samples.codec import SampleEncoder
+from fasaco_edge.samples import SampleEncoder
 from fasaco_edge.wire.turns import (
     Cycle,
     Decided,

@@ -20,7 +20,7 @@ from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecord
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.frames import HINT, Chunk, chunks, column, open_part
 from fasaco_edge.recording.sdk import pa
-from fasaco_edge.samples.codec import Place, SampleDecoder, place_of
+from fasaco_edge.samples import Place, SampleDecoder, place_of
 
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
 

@@ -19,7 +19,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.wire.coverage import BLOCKED, COVERED, RECOVERED, TO_COVER
+from fasaco_edge.wire.maps import CoverageValue
 from fasaco_edge.wire.pheromone import PheromoneMessage
 
 Colour = tuple[int, int, int]
@@ -66,9 +66,9 @@ def map_archetype(grid: OccupancyGrid) -> rr.GridMap:
 def coverage_archetype(grid: OccupancyGrid) -> rr.GridMap:
     """Return a coverage grid to lie over the map: covered, re-covered and blocked cells tinted."""
     tints = np.zeros((256, 4), np.uint8)
-    tints[COVERED] = (*COVERED_COLOUR, 120)
-    tints[RECOVERED] = (*RECOVERED_COLOUR, 140)
-    tints[BLOCKED] = (*BLOCKED_COLOUR, 40)
+    tints[CoverageValue.COVERED] = (*COVERED_COLOUR, 120)
+    tints[CoverageValue.RECOVERED] = (*RECOVERED_COLOUR, 140)
+    tints[CoverageValue.BLOCKED] = (*BLOCKED_COLOUR, 40)
     return _grid(grid.geometry, tints[grid.cells.view(np.uint8)], None, COVERAGE_ORDER)
 
 
@@ -159,9 +159,9 @@ def box_archetype(bounds: Bounds, style: LineStyle) -> rr.LineStrips3D:
 def coverage_fractions(grid: OccupancyGrid) -> tuple[float, float]:
     """Return which fractions of the coverable cells are covered, and covered more than once."""
     counts = np.bincount(grid.cells.view(np.uint8).ravel(), minlength=256)
-    recovered = int(counts[RECOVERED])
-    covered = int(counts[COVERED]) + recovered
-    coverable = int(counts[TO_COVER]) + covered
+    recovered = int(counts[CoverageValue.RECOVERED])
+    covered = int(counts[CoverageValue.COVERED]) + recovered
+    coverable = int(counts[CoverageValue.TO_COVER]) + covered
     return (covered / coverable, recovered / coverable) if coverable else (0.0, 0.0)
 
 

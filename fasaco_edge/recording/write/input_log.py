@@ -16,7 +16,7 @@ from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.samples.codec import Numbered, SampleEncoder
+from fasaco_edge.samples import Numbered, SampleEncoder
 from fasaco_edge.wire.json_text import decode_tolerant
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.status import Status

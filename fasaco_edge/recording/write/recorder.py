@@ -36,9 +36,9 @@ from fasaco_edge.wire.json_text import decode_json, decode_tolerant, encode_json
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
+from fasaco_edge.wire.poses import DEFAULT_FRAMES, PoseDecoder
 from fasaco_edge.wire.status import PathAttachment, Status
 from fasaco_edge.wire.status import Recorder as RecorderReport
-from fasaco_edge.wire.transforms import DEFAULT_FRAMES, PoseDecoder
 
 TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000

@@ -1,1 +1,0 @@
-"""Samples of the bus as bytes: the file format of recorded inputs."""
