@@ -8,10 +8,15 @@ samples, or within one, and still gets the report on those there are.
 from __future__ import annotations
 
 import argparse
+import os
+import platform
+import resource
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
+
+from fasaco_edge import __version__
 
 Sample = TypeVar("Sample")
 
@@ -165,3 +170,27 @@ def add_grid_options(parser: argparse.ArgumentParser, default_maps: tuple[str, .
 def grid_names(args: argparse.Namespace, default_maps: tuple[str, ...]) -> tuple[str, ...]:
     """Return the grids and maps asked for, else the default ones."""
     return (*args.grids, *args.maps) or default_maps
+
+
+def machine() -> dict[str, Any]:
+    """Return processor, cores, load, Python and package version as JSON values."""
+    return {
+        "processor": _processor(),
+        "cores": len(os.sched_getaffinity(0)),
+        "load_1min": round(os.getloadavg()[0], 2),
+        "python": platform.python_version(),
+        "version": __version__,
+    }
+
+
+def peak_mb() -> float:
+    """Return the most memory this process was ever resident with [MB]."""
+    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6, 1)
+
+
+def _processor() -> str:
+    for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+        name, _, value = line.partition(":")
+        if name.strip() in ("model name", "Model"):
+            return value.strip()
+    return platform.machine()

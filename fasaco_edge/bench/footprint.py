@@ -12,12 +12,12 @@ from fasaco_edge.bench.benchmark import (
     Goal,
     Report,
     Say,
+    peak_mb,
     positive,
     seconds,
     seconds_above_zero,
 )
-from fasaco_edge.bench.machine import cpu_seconds, machine, peak_mb
-from fasaco_edge.bench.processes import DaemonProcess, warm_kernels
+from fasaco_edge.bench.processes import DaemonProcess, cpu_seconds, warm_kernels
 from fasaco_edge.bench.robot import MapSource, building, robot_pose, with_crate
 from fasaco_edge.drawing.spread import Spread, document, median, text
 from fasaco_edge.host.processes import has_loaded, resident_mb
@@ -155,8 +155,6 @@ def _report(args: argparse.Namespace, starts: Sequence[DaemonStart]) -> Report:
             "starts": len(starts),
             **{name: document(spread) for name, spread in spreads.items()},
             "loaded": loaded if starts else None,
-            "peak_rss_mb": peak_mb(),
-            "machine": machine(),
         },
         goals=_goals(spreads, loaded if starts else None),
         remarks=(

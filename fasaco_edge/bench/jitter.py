@@ -15,11 +15,11 @@ from fasaco_edge.bench.benchmark import (
     Benchmark,
     Report,
     Say,
+    peak_mb,
     positive,
     seconds_above_zero,
 )
-from fasaco_edge.bench.machine import cpu_seconds, machine, peak_mb, place, weighed
-from fasaco_edge.bench.processes import DaemonProcess, warm_kernels
+from fasaco_edge.bench.processes import DaemonProcess, cpu_seconds, place, warm_kernels, weighed
 from fasaco_edge.bench.robot import CoveringRobot, robot_beside
 from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.errors import ProcessEnded
@@ -187,8 +187,6 @@ def _report(args: argparse.Namespace, blocks: Sequence[Block]) -> Report:
             "niceness": NICENESS,
             "control_group": group or None,
             "cases": cases,
-            "peak_rss_mb": peak_mb(),
-            "machine": machine(),
         },
         remarks=(
             f"the daemon: nice {NICENESS}, {group or 'no control group of its own here'}; its "

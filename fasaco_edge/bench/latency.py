@@ -9,8 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seconds
-from fasaco_edge.bench.machine import machine, peak_mb
+from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, peak_mb, positive, seconds
 from fasaco_edge.bench.processes import DaemonProcess, recorder_beside, warm_kernels
 from fasaco_edge.bench.robot import MapSource, building, robot_pose, with_crate
 from fasaco_edge.drawing.spread import percentile
@@ -147,8 +146,6 @@ def _report(args: argparse.Namespace, all_trips: Sequence[RoundTrip]) -> Report:
             "recorded_total_ms": beside if args.recorder else None,
             "recorder_ratio": ratio,
             "daemon_peak_rss_mb": daemon_mb,
-            "peak_rss_mb": peak_mb(),
-            "machine": machine(),
         },
         goals=tuple(goals),
         remarks=(f"peak memory of {of_daemon}this process {peak_mb()} MB",),

@@ -16,14 +16,14 @@ from fasaco_edge.bench.benchmark import (
     Say,
     add_grid_options,
     grid_names,
+    peak_mb,
     positive,
 )
-from fasaco_edge.bench.machine import machine, peak_mb
 from fasaco_edge.drawing.spread import Spread, document
 
 if TYPE_CHECKING:
-    from fasaco_edge.bench.grids import NamedGrid
     from fasaco_edge.planners.fasaco import Fasaco
+    from fasaco_edge.planners.grids import NamedGrid
     from fasaco_edge.planners.path import CoveragePath
     from fasaco_edge.planners.problem import CoverageProblem
 
@@ -83,9 +83,9 @@ def _count(args: argparse.Namespace) -> int:
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[Timing, None, None]:
     # Here, so that to list the benchmarks does not load the compiler.
-    from fasaco_edge.bench.grids import read_grid  # noqa: PLC0415
     from fasaco_edge.planners.colony import ColonyConfig, parse_velocities  # noqa: PLC0415
     from fasaco_edge.planners.fasaco import Fasaco  # noqa: PLC0415
+    from fasaco_edge.planners.grids import read_grid  # noqa: PLC0415
     from fasaco_edge.planners.problem import CoverageProblem  # noqa: PLC0415
     from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
@@ -133,8 +133,6 @@ def _report(args: argparse.Namespace, timings: Sequence[Timing]) -> Report:
             "seed": args.seed,
             "return_home": args.return_home,
             "grids": grids,
-            "peak_rss_mb": peak_mb(),
-            "machine": machine(),
         },
         goals=tuple(goal for figures in grids for goal in _goals(figures)),
         remarks=(

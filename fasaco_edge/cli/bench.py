@@ -60,14 +60,22 @@ def run(args: argparse.Namespace) -> int:
     if args.benchmark is None:
         args.usage.print_help()
         return 0
+    from fasaco_edge.bench.benchmark import machine, peak_mb
     from fasaco_edge.cli.console import terminal
 
     samples, interrupted = _measure(args.benchmark, args)
     report: Report = args.benchmark.report(args, samples)
     if args.json:
         goals = [goal.document() for goal in report.goals]
-        document = {"benchmark": args.benchmark.name, **report.figures, "goals": goals}
-        print_json({**document, "interrupted": interrupted})
+        document = {
+            "benchmark": args.benchmark.name,
+            **report.figures,
+            "peak_rss_mb": peak_mb(),
+            "machine": machine(),
+            "goals": goals,
+            "interrupted": interrupted,
+        }
+        print_json(document)
     else:
         _print(report, interrupted)
     for file in args.benchmark.write(args, samples):

@@ -21,15 +21,15 @@ from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
 from fasaco_edge.host.signals import ctrl_c_asks
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.planner import ignore
-from fasaco_edge.planners.registry import planner_of
-from fasaco_edge.planners.stopping import (
+from fasaco_edge.planners.planner import (
     GapReached,
     Interrupt,
     SearchProgress,
     StoppingCriterion,
     TimeBudget,
+    ignore,
 )
+from fasaco_edge.planners.registry import planner_of
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.lattice import Cell, CoverageLattice
@@ -90,7 +90,7 @@ def _pose(args: argparse.Namespace, lattice: CoverageLattice, file: Path) -> Cov
 
 
 def _start(args: argparse.Namespace, lattice: CoverageLattice, file: Path) -> Cell:
-    from fasaco_edge.planners.start import start_cell
+    from fasaco_edge.planners.grids import start_cell
 
     if args.start is not None:
         cell: Cell = args.start
@@ -107,7 +107,7 @@ def _plan(
 
     A planner that knows no lower bound is given one, for its path and for ``--target-gap``.
     """
-    from fasaco_edge.planners.graph import lower_bound_steps
+    from fasaco_edge.planners.problem import lower_bound_steps
 
     planner = planner_of(args.planner, colony, args.threads, args.local_search)
     bound = 0 if args.local_search else lower_bound_steps(problem)

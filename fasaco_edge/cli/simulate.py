@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.cli.console.arguments import check_output, writing
     from fasaco_edge.grid.geometry import Pose2D
     from fasaco_edge.grid.map_files import find_map, read_map
-    from fasaco_edge.planners.start import start_point
+    from fasaco_edge.planners.grids import start_point
     from fasaco_edge.simulation.node import run_simulation
     from fasaco_edge.simulation.robot import SimulationConfig
     from fasaco_edge.simulation.world import World

@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
@@ -27,11 +29,19 @@ from fasaco_edge.grid.geometry import (
     GridGeometry,
     Pose2D,
 )
-from fasaco_edge.grid.map_image import MapImage, check_size, read_image
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.host.plain_yaml import PlainYamlError, load, read_bounded
 from fasaco_edge.host.resources import folder
 from fasaco_edge.text import shown
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+MAX_PIXELS = 64_000_000
+
+# nav2's three recommended formats; PPM is Pillow's name for the PGM family.
+FORMATS = ("PPM", "PNG", "BMP")
+
 
 MODES = ("trinary", "scale", "raw")
 
@@ -40,17 +50,6 @@ MODES = ("trinary", "scale", "raw")
 UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 205, 254, 0
 WRITTEN_THRESHOLDS = {"occupied_thresh": 0.65, "free_thresh": 0.196}
 FREE_AT_MOST, OCCUPIED_AT_LEAST = 25, 65
-
-
-@dataclass(frozen=True, slots=True)
-class _MapYaml:
-    image: Path
-    mode: str
-    resolution: float
-    origin: Pose2D
-    negate: bool
-    free_thresh: float
-    occupied_thresh: float
 
 
 def read_map(path: str | Path) -> OccupancyGrid:
@@ -64,11 +63,19 @@ def read_map(path: str | Path) -> OccupancyGrid:
             missing or its value impossible.
     """
     path = Path(path)
-    described = _read_yaml(path)
+    keys = _YamlKeys(path, _load_yaml(path))
+    thresholds = keys.number("free_thresh", 0, 1), keys.number("occupied_thresh", 0, 1)
+    if thresholds[0] >= thresholds[1]:
+        raise keys.error("free_thresh", f"less than occupied_thresh, {thresholds[1]}")
+    resolution = keys.number("resolution", MIN_RESOLUTION_M, MAX_RESOLUTION_M, " [m/pixel]")
+    file, mode, origin, negate = keys.image(), keys.mode(), keys.origin(), keys.negate()
+    image = _read_image(file)
     # Images run from the top down, maps from the smallest y up.
-    cells = np.ascontiguousarray(_occupancy(described, read_image(described.image))[::-1])
+    cells = _values(mode, thresholds, image.white, negate)[image.levels[::-1]]
+    if image.transparent is not None and mode != "raw":
+        cells[image.transparent[::-1]] = UNKNOWN
     rows, cols = cells.shape
-    return OccupancyGrid(GridGeometry(rows, cols, described.resolution, described.origin), cells)
+    return OccupancyGrid(GridGeometry(rows, cols, resolution, origin), cells)
 
 
 def write_map(grid: OccupancyGrid, path: str | Path) -> None:
@@ -118,7 +125,7 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
         raise MapFileError(
             f"{path}: expected a bool array of two dimensions, got {array.dtype} {array.shape}"
         )
-    check_size(path, array.shape[1], array.shape[0])
+    _check_size(path, array.shape[1], array.shape[0])
     # A bool of another program may be any byte but 0; kernels read its lowest bit alone.
     cells: NDArray[np.bool_] = np.ascontiguousarray(array).view(np.uint8) != 0
     return cells
@@ -189,24 +196,6 @@ def _load_yaml(path: Path) -> dict[str, object]:
     return loaded
 
 
-def _read_yaml(path: Path) -> _MapYaml:
-    keys = _YamlKeys(path, _load_yaml(path))
-    free_thresh, occupied_thresh = keys.number("free_thresh"), keys.number("occupied_thresh")
-    for key, value in (("free_thresh", free_thresh), ("occupied_thresh", occupied_thresh)):
-        if not 0 <= value <= 1:
-            raise keys.error(key, "a number from 0 to 1")
-    if free_thresh >= occupied_thresh:
-        raise keys.error("free_thresh", f"less than occupied_thresh, {occupied_thresh}")
-    resolution = keys.number("resolution")
-    if not MIN_RESOLUTION_M <= resolution <= MAX_RESOLUTION_M:
-        limits = f"{MIN_RESOLUTION_M:g} to {MAX_RESOLUTION_M:g} [m/pixel]"
-        raise keys.error("resolution", f"a number from {limits}")
-    return _MapYaml(
-        keys.image(), keys.mode(), resolution, keys.origin(), keys.negate(), free_thresh,
-        occupied_thresh,
-    )  # fmt: skip
-
-
 @dataclass(frozen=True, slots=True)
 class _YamlKeys:
     path: Path
@@ -216,8 +205,11 @@ class _YamlKeys:
         got = f"got {shown(self.values[key])}" if key in self.values else "the key is missing"
         return MapFileError(f"{self.path}: {key} must be {expected}; {got}")
 
-    def number(self, key: str) -> float:
-        return self._finite(key, self.values.get(key), "a number")
+    def number(self, key: str, low: float, high: float, unit: str = "") -> float:
+        number = self._finite(key, self.values.get(key), "a number")
+        if not low <= number <= high:
+            raise self.error(key, f"a number from {low:g} to {high:g}{unit}")
+        return number
 
     def _finite(self, key: str, value: object, expected: str) -> float:
         # YAML 1.1 takes 5e-2 for a string, yaml-cpp and with it ROS for a number.
@@ -263,23 +255,77 @@ class _YamlKeys:
         return found
 
 
-def _occupancy(described: _MapYaml, image: MapImage) -> NDArray[np.int8]:
-    cells = _occupancy_of_levels(described, image.white)[image.levels]
-    if image.transparent is not None and described.mode != "raw":
-        cells[image.transparent] = UNKNOWN
-    return cells
+@dataclass(frozen=True, slots=True, eq=False)
+class _Image:
+    """An image as a map is read from it.
+
+    Attributes:
+        levels: uint8 or uint16 (rows, cols), top row first: brightness, 0 black to
+            ``white``; the mean over the colour channels, alpha is none of them.
+        white: the brightest level.
+        transparent: bool (rows, cols), or None where the image has no alpha channel.
+    """
+
+    levels: NDArray[np.uint8] | NDArray[np.uint16]
+    white: int
+    transparent: NDArray[np.bool_] | None = None
 
 
-def _occupancy_of_levels(described: _MapYaml, white: int) -> NDArray[np.int8]:
+def _read_image(path: Path) -> _Image:
+    """Return the pixels of a PGM, PNG or BMP file.
+
+    Raises:
+        MapFileError: it is missing, no such image, damaged, empty or too large.
+    """
+    # Pillow is loaded with the first image: a daemon that never reads one does without.
+    from PIL import Image, UnidentifiedImageError  # noqa: PLC0415
+
+    try:
+        with warnings.catch_warnings():
+            # _check_size has the smaller limit.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(path, formats=FORMATS)
+        with image:
+            _check_size(path, *image.size)
+            return _decoded(path, image)
+    except Image.DecompressionBombError as error:
+        raise MapFileError(f"{path}: more than {MAX_PIXELS} pixels: {error}") from error
+    except UnidentifiedImageError as error:
+        raise MapFileError(f"{path}: not an image (PGM, PNG or BMP)") from error
+    except (OSError, ValueError, SyntaxError) as error:
+        raise MapFileError(f"{path}: not readable as an image: {error}") from error
+
+
+def _check_size(path: str | Path, cols: int, rows: int) -> None:
+    """Raise MapFileError unless there is at least one pixel and at most MAX_PIXELS."""
+    if not 0 < rows * cols <= MAX_PIXELS:
+        raise MapFileError(f"{path}: expected 1 to {MAX_PIXELS} pixels, got {cols} x {rows}")
+
+
+def _decoded(path: Path, image: Image.Image) -> _Image:
+    if image.mode.startswith("I"):
+        return _Image(np.asarray(image).astype(np.uint16), 65535)
+    if image.mode in ("1", "L") and "transparency" not in image.info:
+        return _Image(np.asarray(image.convert("L")), 255)
+    if image.mode not in ("1", "L", "LA", "P", "RGB", "RGBA"):
+        raise MapFileError(f"{path}: expected grey, palette or RGB pixels, got {image.mode}")
+    pixels = np.asarray(image.convert("RGBA"))
+    levels = pixels[:, :, :3].sum(axis=2, dtype=np.uint16)
+    return _Image(levels, 3 * 255, pixels[:, :, 3] < 255)
+
+
+def _values(
+    mode: str, thresholds: tuple[float, float], white: int, negate: bool
+) -> NDArray[np.int8]:
     """Return the cell value, int8 (white + 1,), of every level of brightness."""
     brightness = np.arange(white + 1) / white
-    if described.mode == "raw":
+    if mode == "raw":
         value = np.rint(brightness * 255)
         return np.where(value <= OCCUPIED, value, UNKNOWN).astype(np.int8)
-    occupied = brightness if described.negate else 1 - brightness
-    free_thresh, occupied_thresh = described.free_thresh, described.occupied_thresh
+    occupied = brightness if negate else 1 - brightness
+    free_thresh, occupied_thresh = thresholds
     between = np.full(white + 1, float(UNKNOWN))
-    if described.mode == "scale":
+    if mode == "scale":
         between = np.rint((occupied - free_thresh) / (occupied_thresh - free_thresh) * 100)
     below, above = occupied < free_thresh, occupied > occupied_thresh
     return np.select([below, above], [FREE, OCCUPIED], between).astype(np.int8)

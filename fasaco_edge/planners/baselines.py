@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
@@ -23,21 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.ants.baselines import spanning_tree_walk, sweep
-from fasaco_edge.kernels.ants.colony import FEWEST_OPEN, ColonyState, Rules, walk_ants
 from fasaco_edge.kernels.ants.graph import Graph
-from fasaco_edge.kernels.costs import walk_cost
-from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk
-from fasaco_edge.planners.graph import (
-    cells_of,
-    flat_end,
-    flat_start,
-    graph_of,
-    scratch_for,
-)
+from fasaco_edge.kernels.lattice.reach import reachable_from
+from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.fasaco import Colony
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import Observer, ignore
-from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import StoppingCriterion, never
+from fasaco_edge.planners.planner import Observer, StoppingCriterion, ignore, never
+from fasaco_edge.planners.problem import CoverageProblem, graph_of, scratch_for
 
 # Directions in the order they are tried. From the heading: to the right, straight on, to the
 # left, back.
@@ -46,8 +39,6 @@ RIGHT_HAND = (3, 0, 1, 2)
 ROWS_FIRST = (2, 0, 3, 1)
 # An ant of this velocity goes straight on as long as it can.
 STRAIGHT_ON = 64
-# Initial capacity for a walk.
-STEPS_PER_CELL = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +58,7 @@ class FixedRule:
     ) -> CoveragePath:
         """Return the walk; it takes too little time to be stopped."""
         began = time.perf_counter()
-        cells = cells_of(problem, self.walk(problem, graph_of(problem)))
+        cells = problem.cells_of(self.walk(problem, graph_of(problem)))
         return CoveragePath(
             cells,
             planner=self.name,
@@ -82,44 +73,27 @@ def _around_tree(problem: CoverageProblem, graph: Graph) -> NDArray[np.int32]:
     lattice = problem.lattice
     # The tree spans covered cells too: those to cover need not be connected.
     reachable = reachable_from(lattice.steps, *lattice.local(problem.start))
-    walk = spanning_tree_walk(lattice.steps, reachable, flat_start(problem))
+    walk = spanning_tree_walk(lattice.steps, reachable, problem.flat_start)
     if problem.end is None:
-        return walk[: _last_needed(problem, walk) + 1]
+        return _needed_part(problem, walk)
     if problem.closed:
         return walk
-    readings = (_led_to_end(problem, walk), _led_to_end(problem, walk[::-1]))
-    return min(readings, key=_price(problem))
+    readings = (problem.led_to_end(_needed_part(problem, way)) for way in (walk, walk[::-1]))
+    return min(readings, key=problem.cost_us)
 
 
-def _price(problem: CoverageProblem) -> Callable[[NDArray[np.int32]], int]:
-    """Return the function that gives a walk's cost [us]."""
-    step_us, quarter_turn_us = problem.cost.step_us, problem.cost.quarter_turn_us
-    return lambda walk: walk_cost(walk, step_us, quarter_turn_us)
-
-
-def _led_to_end(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return a walk, flat cells int32 (n,), up to the last cell needed and on to the end."""
-    assert problem.end is not None
-    needed = walk[: _last_needed(problem, walk) + 1]
-    lattice = problem.lattice
-    cols = lattice.window.cols
-    # Plain integers, or the kernel is compiled a second time for numpy's.
-    way = shortest_walk(lattice.steps, divmod(int(needed[-1]), cols), lattice.local(problem.end))
-    return np.concatenate((needed, way[1:, 0] * np.int32(cols) + way[1:, 1]))
-
-
-def _last_needed(problem: CoverageProblem, walk: NDArray[np.int32]) -> int:
-    """Return the index of the walk's last first visit to a cell that is to be covered."""
+def _needed_part(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the walk up to the last cell of those to be covered that it comes to."""
     first_visits = np.unique(walk, return_index=True)[1]
     needed = problem.to_cover.ravel()[walk[first_visits]]
-    return int(first_visits[needed].max())
+    return walk[: int(first_visits[needed].max()) + 1]
 
 
 def _sweep(
     order: tuple[int, int, int, int], turns_along: bool, problem: CoverageProblem, graph: Graph
 ) -> NDArray[np.int32]:
     """Return the walk that tries directions in an order; see ``kernels.ants.baselines``."""
-    scratch, start, end = scratch_for(graph), flat_start(problem), flat_end(problem)
+    scratch, start, end = scratch_for(graph), problem.flat_start, problem.flat_end
     length = capacity = 2 * problem.cells
     while length >= capacity:
         capacity = 2 * length
@@ -143,20 +117,14 @@ def zigzag(*unused: object) -> FixedRule:
     return FixedRule("zigzag", partial(_sweep, ROWS_FIRST, False))
 
 
-def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[tuple[NDArray[np.int32], int]]:
-    """Yield complete walks, flat cells int32 (n,), each with its cost [us].
+def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.int32]]:
+    """Yield complete walks, flat cells int32 (n,).
 
     The first is that of an ant which always goes where the fewest open neighbours
     are left, Warnsdorff's rule. Where turns count, there follow an ant that goes
     straight on, the spiral, the zigzag and the walk around a spanning tree: each is
     best on some grids.
     """
-    price = _price(problem)
-    for walk in _walks(problem, graph):
-        yield walk, price(walk)
-
-
-def _walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.int32]]:
     yield _ant(problem, graph, velocity=1)
     if problem.cost.quarter_turn_us:
         yield _ant(problem, graph, velocity=STRAIGHT_ON)
@@ -166,24 +134,9 @@ def _walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.int32]
 
 def _ant(problem: CoverageProblem, graph: Graph, velocity: int) -> NDArray[np.int32]:
     """Let one ant walk without a trail and without chance."""
-    cost = problem.cost
-    rules = Rules(
-        q0=1.0,
-        alpha=0.0,
-        tau0=1.0,
-        start=flat_start(problem),
-        end=flat_end(problem),
-        step_us=cost.step_us,
-        quarter_turn_us=cost.quarter_turn_us,
-        visibility=FEWEST_OPEN,
-        powers=1.0 / np.arange(1.0, max(velocity, 4) + 1.0),
+    config = ColonyConfig(
+        ants=1, velocities=(velocity,), q0=1.0, tau0=1.0, visibility="fewest-open", beta=1.0
     )
-    colony = ColonyState(graph, np.ones((graph.steps.size, 4)), rules)
-    lengths = np.full(1, STEPS_PER_CELL * problem.cells + 2)
-    walks = np.empty((1, 0), np.int32)
-    while walks.shape[1] < lengths[0]:
-        # The first try, or a walk that did not fit: the same ant again, with more memory.
-        walks = np.empty((1, int(lengths[0])), np.int32)
-        stream = np.ones((1, 4), np.int64)
-        walk_ants(colony, scratch_for(graph), velocity, stream, walks, lengths)
-    return walks[0, : lengths[0]].copy()
+    with ThreadPoolExecutor(1) as pool:
+        walk, _ = Colony(config, problem, graph, pool, 1).walk(velocity, np.ones((1, 4), np.int64))
+    return walk

@@ -16,8 +16,10 @@ ants go there by a shortest way when all is covered.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +28,17 @@ from fasaco_edge.kernels.ants.colony import ColonyState, Rules, deposit, settle,
 from fasaco_edge.kernels.ants.graph import Graph
 from fasaco_edge.planners.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.cost import MICROSECONDS
-from fasaco_edge.planners.graph import cells_of, flat_end, flat_start, graph_of, scratch_for
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import ColonySnapshot, Observer, ignore
-from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import SearchProgress, SearchWork, StoppingCriterion, never
+from fasaco_edge.planners.planner import (
+    ColonySnapshot,
+    Observer,
+    SearchProgress,
+    SearchWork,
+    StoppingCriterion,
+    ignore,
+    never,
+)
+from fasaco_edge.planners.problem import CoverageProblem, graph_of, scratch_for
 
 # Ants of a group walk at the same time. Larger groups keep more threads busy,
 # smaller ones end the search sooner when it is to stop: a group covers
@@ -54,7 +62,6 @@ class Colony:
         pool: ThreadPoolExecutor,
         threads: int,
     ) -> None:
-        self.group = group_size(problem.cells)
         self.trail = np.full((graph.steps.size, 4), config.tau0)
         self.best = np.empty(0, np.int32)
         self.best_us = 0
@@ -62,14 +69,15 @@ class Colony:
         self._state = ColonyState(graph, self.trail, _rules(config, problem))
         self._pool = pool
         self._scratches = [scratch_for(graph) for _ in range(threads)]
-        self._walks = np.empty((self.group, STEPS_PER_CELL * problem.cells + 2), np.int32)
+        shape = group_size(problem.cells), STEPS_PER_CELL * problem.cells + 2
+        self._walks = np.empty(shape, np.int32)
 
     def walk(self, velocity: int, streams: NDArray[np.int64]) -> tuple[NDArray[np.int32], int]:
         """Let a group walk and update the trail by equation (7).
 
         Args:
             velocity: cells an ant keeps straight on for.
-            streams: the ants' random streams, int64 (ants, 4), no more than ``group``.
+            streams: the ants' random streams, int64 (ants, 4), of a group at most.
 
         Returns:
             The group's cheapest walk, flat cells int32 (n,), and its cost [us].
@@ -80,7 +88,7 @@ class Colony:
         self._walk_on_threads(velocity, streams, lengths)
         while lengths.max() > self._walks.shape[1]:
             # A walk did not fit: the same ants again, with more memory.
-            self._walks = np.empty((self.group, 2 * int(lengths.max())), np.int32)
+            self._walks = np.empty((len(self._walks), 2 * int(lengths.max())), np.int32)
             streams[:] = before
             self._walk_on_threads(velocity, streams, lengths)
         ant, cost_us = settle(self._state, self._walks, lengths)
@@ -127,34 +135,53 @@ class Colony:
             other.result()
 
 
+class Group(NamedTuple):
+    """Ants that walk at the same time.
+
+    Attributes:
+        cohort: number of their cohort.
+        velocity: of theirs [cells/step].
+        streams: a random stream for each, int64 (ants, 4), independent of all others.
+        is_last: whether it is the last group of the cohort.
+    """
+
+    cohort: int
+    velocity: int
+    streams: NDArray[np.int64]
+    is_last: bool
+
+
 def group_size(cells: int) -> int:
     """Return how many ants walk at the same time over so many cells."""
     return min(max(CELLS_PER_GROUP // cells, SMALLEST_GROUP), LARGEST_GROUP)
+
+
+def groups_of(config: ColonyConfig, cells: int) -> Iterator[Group]:
+    """Yield all ants of a colony over so many cells, group by group."""
+    size = group_size(cells)
+    for number, cohort in enumerate(config.cohorts()):
+        words = np.random.SeedSequence((config.seed, number)).generate_state(4 * cohort.ants)
+        streams = words.astype(np.int64).reshape(-1, 4)
+        for end in range(size, cohort.ants + size, size):
+            yield Group(number, cohort.velocity, streams[end - size : end], end >= cohort.ants)
 
 
 def _rules(config: ColonyConfig, problem: CoverageProblem) -> Rules:
     # An ant goes as far as it is fast; a cell has three open neighbours at most.
     reach = max(*config.velocities, 4)
     powers = np.array([(1.0 / (index + 1)) ** config.beta for index in range(reach)])
-    visibility = VISIBILITIES.index(config.visibility)
     cost = problem.cost
     return Rules(
         q0=config.q0,
         alpha=config.alpha,
         tau0=config.tau0,
-        start=flat_start(problem),
-        end=flat_end(problem),
+        start=problem.flat_start,
+        end=problem.flat_end,
         step_us=cost.step_us,
         quarter_turn_us=cost.quarter_turn_us,
-        visibility=visibility,
+        visibility=VISIBILITIES.index(config.visibility),
         powers=powers,
     )
-
-
-def streams_of(seed: int, cohort: int, ants: int) -> NDArray[np.int64]:
-    """Return a random stream for each ant, int64 (ants, 4), independent of all others."""
-    words = np.random.SeedSequence((seed, cohort)).generate_state(4 * ants)
-    return words.astype(np.int64).reshape(ants, 4)
 
 
 def snapshot_of(
@@ -183,10 +210,8 @@ def snapshot_of(
         into[there] += trail[..., direction][here] * legal[here]
         # A step is legal both ways or not at all, so moves in are as many as moves out.
         moves += legal
-    mean = np.divide(into, moves, out=into, where=moves > 0)
-    return ColonySnapshot(
-        lattice.window, lattice.cell_m, mean.astype(np.float32), cohort, velocity, ants, steps
-    )
+    mean = np.divide(into, moves, out=into, where=moves > 0).astype(np.float32)
+    return ColonySnapshot(lattice.window, lattice.cell_m, mean, cohort, velocity, ants, steps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,36 +229,23 @@ class Fasaco:
         observe: Observer = ignore,
     ) -> CoveragePath:
         """Return the cheapest walk the colony found; see ``CoveragePlanner.plan``."""
-        began = time.perf_counter()
-        config = self.config
-        graph = graph_of(problem)
-        first_walk_s = 0.0
+        began, first_walk_s, walked = time.perf_counter(), 0.0, 0
         with ThreadPoolExecutor(self.threads) as pool:
-            colony = Colony(config, problem, graph, pool, self.threads)
-            walked = 0
-            for number, cohort in enumerate(config.cohorts()):
-                streams = streams_of(config.seed, number, cohort.ants)
-                for first in range(0, cohort.ants, colony.group):
-                    ants = streams[first : first + colony.group]
-                    colony.walk(cohort.velocity, ants)
-                    first_walk_s = first_walk_s or time.perf_counter() - began
-                    walked += len(ants)
-                    if stop(colony.progress(walked)):
-                        return self._path(problem, colony, walked, first_walk_s)
-                colony.strengthen()
-                if observe is not ignore:
-                    steps = colony.best.size - 1
-                    observe(
-                        snapshot_of(problem, colony.trail, number, cohort.velocity, walked, steps)
-                    )
-            return self._path(problem, colony, walked, first_walk_s)
-
-    def _path(
-        self, problem: CoverageProblem, colony: Colony, walked: int, first_walk_s: float
-    ) -> CoveragePath:
+            colony = Colony(self.config, problem, graph_of(problem), pool, self.threads)
+            for cohort, velocity, streams, is_last in groups_of(self.config, problem.cells):
+                colony.walk(velocity, streams)
+                first_walk_s = first_walk_s or time.perf_counter() - began
+                walked += len(streams)
+                if stop(colony.progress(walked)):
+                    break
+                if is_last:
+                    colony.strengthen()
+                    if observe is not ignore:
+                        trail, steps = colony.trail, colony.best.size - 1
+                        observe(snapshot_of(problem, trail, cohort, velocity, walked, steps))
         progress = colony.progress(walked)
         return CoveragePath(
-            cells_of(problem, colony.best),
+            problem.cells_of(colony.best),
             planner=self.name,
             seed=self.config.seed,
             work=progress.work,

@@ -20,24 +20,29 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fasaco_edge.kernels.costs import walk_cost
-from fasaco_edge.kernels.local_search.regions import Box
-from fasaco_edge.kernels.local_search.walk_array import Prices
 from fasaco_edge.planners.baselines import first_walks
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import MICROSECONDS
 from fasaco_edge.planners.effort import effort_for
-from fasaco_edge.planners.fasaco import Colony, group_size, snapshot_of, streams_of
-from fasaco_edge.planners.graph import FramedGround, cells_of, graph_of, lower_bound_steps
-from fasaco_edge.planners.patch import Patch
+from fasaco_edge.planners.fasaco import Colony, Group, groups_of, snapshot_of
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import Observer, ignore
-from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.regions import EDGE, is_one_region, regions_of
+from fasaco_edge.planners.planner import (
+    Observer,
+    SearchProgress,
+    SearchWork,
+    StoppingCriterion,
+    ignore,
+    never,
+)
+from fasaco_edge.planners.problem import (
+    CoverageProblem,
+    FramedGround,
+    graph_of,
+    lower_bound_steps,
+)
+from fasaco_edge.planners.regions import EDGE, Patch, is_one_region, regions_of, stream_of
 from fasaco_edge.planners.repair import can_repair, repaired
-from fasaco_edge.planners.stopping import SearchProgress, SearchWork, StoppingCriterion, never
 
 # Proposals between two pauses: about a millisecond.
 PROPOSALS_AT_ONCE = 30_000
@@ -136,11 +141,10 @@ class Search:
         self._planner, self._problem, self._pool, self._observe = planner, problem, pool, observe
         self._graph = graph_of(problem)
         self._framed = FramedGround.of(problem)
-        cost = problem.cost
-        self._prices = Prices(cost.step_us, cost.quarter_turn_us, problem.end is None)
-        self._effort = effort_for(cost)
+        self._prices = self._framed.prices
+        self._effort = effort_for(problem.cost)
         self._is_whole = is_one_region(self._framed.rows, self._framed.cols, problem.cells)
-        self._random = _stream(planner.config.seed)
+        self._random = stream_of(planner.config.seed, LOCAL_SEARCH)
         self._ants = 0
         self._first_walk_s = 0.0
         self._bound = 0
@@ -149,11 +153,10 @@ class Search:
         self._best, self._best_us = self._walk, 0
         self._since_gain = self._perturbed_in_pass = 0
         self._passes = 0
-        self._groups = _groups(planner.config, problem.cells)
+        self._groups = groups_of(planner.config, problem.cells)
         self._colony: Colony | None = None
         self._cohort, self._velocity = 0, planner.config.velocities[0]
         self._patch = Patch(0, 0, 0, 0)
-        self._loaded: Box | None = None
 
     def run(self) -> Iterator[None]:
         """Search until nothing is left to do; pause after each piece of work."""
@@ -172,7 +175,7 @@ class Search:
                 group = next(self._groups, None) if may_restart else None
                 if group is None:
                     return
-                yield from self._restart(*group)
+                yield from self._restart(group)
 
     def progress(self) -> SearchProgress:
         """Return how far the search is.
@@ -182,7 +185,7 @@ class Search:
         """
         best_us, steps = self._best_us, self._best.size - 1
         exact = self._is_whole or not self._prices.quarter_turn_us
-        if self._loaded is not None and exact:
+        if self._patch.is_loaded and exact:
             here_us = self._walk_us + self._patch.gain_us
             if here_us < best_us:
                 best_us, steps = here_us, self._walk.size - 1 + self._patch.longer_by
@@ -194,7 +197,7 @@ class Search:
         # A search that was stopped at once has no bound yet.
         self._bound = self._bound or lower_bound_steps(self._problem)
         return CoveragePath(
-            cells_of(self._problem, self._framed.unframed(self._best)),
+            self._problem.cells_of(self._framed.unframed(self._best)),
             planner=self._planner.name,
             seed=self._planner.config.seed,
             work=self._work,
@@ -222,7 +225,8 @@ class Search:
         return Patch(EDGE, EDGE, VISITS_PER_CELL * EDGE * EDGE, JUMPS)
 
     def _begin(self) -> Iterator[None]:
-        for walk, cost_us in first_walks(self._problem, self._graph):
+        for walk in first_walks(self._problem, self._graph):
+            cost_us = self._problem.cost_us(walk)
             self._ants += 1
             if not self._first_walk_s:
                 self._first_walk_s = time.perf_counter() - self._began
@@ -233,22 +237,20 @@ class Search:
         self._patch = self._new_patch()
         self._bound = lower_bound_steps(self._problem)
 
-    def _regions(self) -> Iterator[Box]:
+    def _regions(self) -> Iterator[None]:
         """Load each region of the next pass in turn."""
         for box in regions_of(self._framed, self._problem.cells, self._passes):
-            if self._patch.load(self._framed.ground, self._walk, box, self._prices):
-                self._loaded = box
-                yield box
+            if self._patch.load(self._framed, self._walk, box):
+                yield
                 self._unload()
         self._passes += 1
 
     def _unload(self) -> None:
         """Put the region's best walk back, if that is a gain or costs nothing."""
-        if self._loaded is None:
+        if not self._patch.is_loaded:
             return
-        walk = self._patch.put_back(self._framed.ground, self._walk, self._loaded)
-        self._loaded = None
-        cost_us = walk_cost(walk, self._prices.step_us, self._prices.quarter_turn_us)
+        walk = self._patch.put_back()
+        cost_us = self._problem.cost_us(walk)
         if cost_us < self._walk_us:
             self._since_gain = 0
         if cost_us <= self._walk_us:
@@ -287,16 +289,16 @@ class Search:
                 if self._is_proven():
                     return
 
-    def _restart(self, cohort: int, velocity: int, streams: NDArray[np.int64]) -> Iterator[None]:
+    def _restart(self, group: Group) -> Iterator[None]:
         """Let the next ants walk, on a trail strengthened along the best walk; improve theirs."""
         colony = self._colony_of_ants()
         if self._planner.restarts == ANTS:
             self._strengthen(colony)
-        walk, self._walk_us = colony.walk(velocity, streams)
+        walk, self._walk_us = colony.walk(group.velocity, group.streams)
         self._walk = self._framed.framed(walk)
-        self._ants += len(streams)
+        self._ants += len(group.streams)
         self._since_gain = 0
-        self._cohort, self._velocity = cohort, velocity
+        self._cohort, self._velocity = group.cohort, group.velocity
         yield
         yield from self._improve()
 
@@ -324,18 +326,3 @@ def _pieces(total: int, largest: int) -> Iterator[int]:
     """Yield whole numbers up to ``largest`` that add up to ``total``."""
     for begun in range(0, total, largest):
         yield min(largest, total - begun)
-
-
-def _groups(config: ColonyConfig, cells: int) -> Iterator[tuple[int, int, NDArray[np.int64]]]:
-    """Yield the colony's ants in groups: number of their cohort, velocity, random streams."""
-    size = group_size(cells)
-    for number, cohort in enumerate(config.cohorts()):
-        streams = streams_of(config.seed, number, cohort.ants)
-        for first in range(0, cohort.ants, size):
-            yield number, cohort.velocity, streams[first : first + size]
-
-
-def _stream(seed: int) -> NDArray[np.uint64]:
-    """Return the state of the local search's random stream, uint64 (1,), not 0."""
-    word = np.random.SeedSequence((seed, LOCAL_SEARCH)).generate_state(1, np.uint64)
-    return np.maximum(word, np.uint64(1))

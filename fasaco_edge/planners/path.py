@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.planners.cost import count_turns
-from fasaco_edge.planners.stopping import NO_WORK, SearchWork, gap_to
+from fasaco_edge.planners.planner import NO_WORK, SearchWork, gap_to
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,8 @@
-"""The coverage problem: which cells to cover, from where, at what cost."""
+"""The coverage problem: which cells to cover, from where, at what cost; its arrays for the kernels.
+
+In these a cell is a flat index. Ants walk on ``Graph``, the lattice as it is; local search
+on ``FramedGround``, the lattice with a frame around it.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,11 @@ from fasaco_edge.errors import (
     StartOutsideMap,
 )
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
-from fasaco_edge.kernels.lattice.reach import reachable_from
+from fasaco_edge.kernels.ants.graph import Graph, Scratch
+from fasaco_edge.kernels.bound.covering import covering_bound
+from fasaco_edge.kernels.costs import walk_cost
+from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk
+from fasaco_edge.kernels.local_search.walk_array import FRAME, Ground, Prices
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 
 
@@ -140,6 +148,40 @@ class CoverageProblem:
         """Whether the walk ends where it begins."""
         return self.end == self.start
 
+    @property
+    def flat_start(self) -> int:
+        """The start as an index ``row * cols + col`` of the lattice's arrays, flattened."""
+        return self._flat(self.start)
+
+    @property
+    def flat_end(self) -> int:
+        """The end as such an index, -1 for anywhere."""
+        return -1 if self.end is None else self._flat(self.end)
+
+    def _flat(self, cell: Cell) -> int:
+        row, col = self.lattice.local(cell)
+        return row * self.lattice.window.cols + col
+
+    def cells_of(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return a walk of flat indices, int32 (n,), as cells (row, col), int32 (n, 2)."""
+        window = self.lattice.window
+        rows, cols = np.divmod(walk, window.cols)
+        return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
+
+    def cost_us(self, walk: NDArray[np.int32]) -> int:
+        """Return what a walk of flat or framed indices, int32 (n,), costs [us]."""
+        return int(walk_cost(walk, self.cost.step_us, self.cost.quarter_turn_us))
+
+    def led_to_end(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return a walk of flat indices, int32 (n,), led on to the end by a shortest way."""
+        if self.end is None:
+            return walk
+        cols = self.lattice.window.cols
+        # Plain integers, or the kernel is compiled a second time for numpy's.
+        here, end = divmod(int(walk[-1]), cols), self.lattice.local(self.end)
+        way = shortest_walk(self.lattice.steps, here, end)
+        return np.concatenate((walk, way[1:, 0] * np.int32(cols) + way[1:, 1]))
+
 
 def _check_cell(
     lattice: CoverageLattice,
@@ -158,3 +200,84 @@ def _check_cell(
     if state != COVERABLE:
         why = "is unknown" if state == UNKNOWN else "is blocked: the robot does not fit there"
         raise blocked(f"{role} cell {cell} {why}")
+
+
+def graph_of(problem: CoverageProblem) -> Graph:
+    """Return the problem's lattice and cells to cover, as flat indices ``row * cols + col``."""
+    steps = problem.lattice.steps
+    cols = steps.shape[1]
+    offsets = np.array([1, cols, -1, -cols], np.int64)
+    wanted = problem.to_cover.astype(np.uint8)
+    open_steps = np.zeros(steps.size + 2 * cols, np.uint8)
+    inner = open_steps[cols : cols + steps.size].reshape(steps.shape)
+    beside = np.pad(wanted, 1)
+    ahead = (beside[1:-1, 2:], beside[2:, 1:-1], beside[1:-1, :-2], beside[:-2, 1:-1])
+    for direction, neighbour in enumerate(ahead):
+        inner |= steps & (neighbour << direction)
+    return Graph(steps.ravel(), wanted.ravel(), open_steps, offsets)
+
+
+def scratch_for(graph: Graph) -> Scratch:
+    """Return working memory for one thread."""
+    size = graph.steps.size
+    return Scratch(
+        open_steps=np.empty_like(graph.open_steps),
+        seen=np.zeros(size, np.int32),
+        came_from=np.zeros(size, np.int8),
+        queue=np.empty(size, np.int32),
+        searches=np.zeros(1, np.int32),
+        weights=np.zeros((1, 4)),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FramedGround:
+    """The problem's steps and cells to cover, framed, and conversion of flat indices.
+
+    Attributes:
+        rows, cols: shape of the lattice, without the frame.
+        ground: cells as flat indices of the framed lattice.
+        prices: of the problem's walks.
+    """
+
+    rows: int
+    cols: int
+    ground: Ground
+    prices: Prices
+
+    @classmethod
+    def of(cls, problem: CoverageProblem) -> FramedGround:
+        """Frame a problem's lattice."""
+        rows, cols = problem.to_cover.shape
+        steps = np.pad(problem.lattice.steps, FRAME)
+        needed = np.pad(problem.to_cover.astype(np.int32), FRAME)
+        width = cols + 2 * FRAME
+        offsets = np.array([1, width, -1, -width], np.int64)
+        ground = Ground(steps.ravel(), needed.ravel(), offsets, steps.size)
+        cost = problem.cost
+        prices = Prices(cost.step_us, cost.quarter_turn_us, problem.end is None)
+        return cls(rows, cols, ground, prices)
+
+    @property
+    def width(self) -> int:
+        """Cells from one row to the next."""
+        return self.cols + 2 * FRAME
+
+    def framed(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return flat cells of the lattice, int32 (n,), as those of the framed one."""
+        row, col = np.divmod(walk, np.int32(self.cols))
+        return ((row + FRAME) * self.width + col + FRAME).astype(np.int32)
+
+    def unframed(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return flat cells of the framed lattice, int32 (n,), as those of the lattice."""
+        row, col = np.divmod(walk, np.int32(self.width))
+        return ((row - FRAME) * self.cols + col - FRAME).astype(np.int32)
+
+
+def lower_bound_steps(problem: CoverageProblem) -> int:
+    """Return a number of steps that no walk which solves ``problem`` can beat.
+
+    Turns do not count. The proof is in ``kernels.bound.covering``.
+    """
+    required = problem.to_cover.astype(np.uint8)
+    return covering_bound(problem.lattice.steps, required, problem.flat_start, problem.flat_end)

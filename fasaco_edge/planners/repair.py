@@ -17,19 +17,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.costs import walk_cost
-from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.kernels.local_search.regions import changed_cells
 from fasaco_edge.kernels.local_search.repair import keep_legal, put_in_new
-from fasaco_edge.kernels.local_search.walk_array import Prices
 from fasaco_edge.planners.cost import MICROSECONDS
 from fasaco_edge.planners.effort import repair_for
-from fasaco_edge.planners.graph import FramedGround, cells_of, flat_start, lower_bound_steps
-from fasaco_edge.planners.patch import Patch
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.regions import Neighbourhood, neighbourhoods, spot
-from fasaco_edge.planners.stopping import NO_WORK, SearchProgress, StoppingCriterion
+from fasaco_edge.planners.planner import NO_WORK, SearchProgress, StoppingCriterion
+from fasaco_edge.planners.problem import CoverageProblem, FramedGround, lower_bound_steps
+from fasaco_edge.planners.regions import Neighbourhood, Patch, neighbourhoods, spot, stream_of
 
 
 def completed(
@@ -46,14 +41,14 @@ def completed(
     Returns:
         Framed cells, int32 (m,).
     """
-    start = int(framed.framed(np.array([flat_start(problem)], np.int32))[0])
+    start = int(framed.framed(np.array([problem.flat_start], np.int32))[0])
     cells = framed_cells(problem, framed, before)
     kept = np.empty(cells.size + 2 * framed.ground.bound, np.int32)
     length = keep_legal(framed.ground, cells, start, kept)
     whole = np.empty(length + 2 * framed.ground.bound, np.int32)
     size = put_in_new(framed.ground, kept[:length], problem.end is None, held, whole)
     walk = whole[:size].copy()
-    return walk if problem.end is None else _with_end(problem, framed, walk)
+    return framed.framed(problem.led_to_end(framed.unframed(walk)))
 
 
 def framed_cells(
@@ -64,18 +59,6 @@ def framed_cells(
     rows, cols = before[:, 0] - window.row0, before[:, 1] - window.col0
     inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
     return framed.framed((rows[inside] * window.cols + cols[inside]).astype(np.int32))
-
-
-def _with_end(
-    problem: CoverageProblem, framed: FramedGround, walk: NDArray[np.int32]
-) -> NDArray[np.int32]:
-    """Lead a walk on to the problem's end by a shortest way."""
-    assert problem.end is not None
-    lattice = problem.lattice
-    row, col = divmod(int(framed.unframed(walk[-1:])[0]), framed.cols)
-    way = shortest_walk(lattice.steps, (row, col), lattice.local(problem.end))
-    flat = (way[1:, 0] * framed.cols + way[1:, 1]).astype(np.int32)
-    return np.concatenate((walk, framed.framed(flat)))
 
 
 # Perturbations between two pauses.
@@ -129,29 +112,26 @@ class _Repair:
     def __init__(self, problem: CoverageProblem, seed: int) -> None:
         assert problem.before is not None
         began = time.perf_counter()
-        cost = problem.cost
         self._problem = problem
         self._framed = FramedGround.of(problem)
-        self._prices = Prices(cost.step_us, cost.quarter_turn_us, problem.end is None)
-        self._effort = repair_for(cost)
+        self._effort = repair_for(problem.cost)
         self._walk = completed(problem, self._framed, problem.before, HELD_CELLS)
         self._first_walk_s = time.perf_counter() - began
         before = framed_cells(problem, self._framed, problem.before)
         self._changed = _changed(self._framed, before, self._walk)
-        self._cost_us = self._count_cost()
+        self._cost_us = problem.cost_us(self._walk)
         self._bound = lower_bound_steps(problem)
-        word = np.random.SeedSequence((seed, len(self._walk))).generate_state(1, np.uint64)
-        self._random = np.maximum(word, np.uint64(1))
+        self._random = stream_of(seed, len(self._walk))
+        # Work on the patches before, and the patch that is being improved.
         self._work = NO_WORK
-        # The patch that is being improved, and where it lies.
-        self._loaded: tuple[Patch, Neighbourhood] | None = None
+        self._patch: Patch | None = None
 
     def run(self) -> Iterator[None]:
         """Improve the walk, one neighbourhood after the other; pause after each piece of work."""
         for place in self._places():
             patch = place.patch(self._walk)
-            if patch.load(self._framed.ground, self._walk, place.box, self._prices):
-                self._loaded = patch, place
+            if patch.load(self._framed, self._walk, place.box):
+                self._patch = patch
                 yield from self._improve(patch, place)
                 self._unload()
 
@@ -188,29 +168,23 @@ class _Repair:
 
     def _is_proven(self) -> bool:
         """Return whether no walk can be better."""
-        return not self._prices.quarter_turn_us and self.progress().steps == self._bound
+        return not self._framed.prices.quarter_turn_us and self.progress().steps == self._bound
 
     def _unload(self) -> None:
         """Put the patch that is being improved back into the walk."""
-        if self._loaded is None:
+        if self._patch is None:
             return
-        patch, place = self._loaded
-        self._walk = patch.put_back(self._framed.ground, self._walk, place.box)
-        self._cost_us, self._work = self._count_cost(), self._work + patch.work
-        self._loaded = None
-
-    def _count_cost(self) -> int:
-        prices = self._prices
-        return int(walk_cost(self._walk, prices.step_us, prices.quarter_turn_us))
+        self._walk, self._work = self._patch.put_back(), self._work + self._patch.work
+        self._cost_us = self._problem.cost_us(self._walk)
+        self._patch = None
 
     def progress(self) -> SearchProgress:
         """Return how far it is."""
         cost_us, steps, work = self._cost_us, self._walk.size - 1, self._work
-        if self._loaded is not None:
-            patch, _ = self._loaded
-            cost_us += patch.gain_us
-            steps += patch.longer_by
-            work += patch.work
+        if self._patch is not None:
+            cost_us += self._patch.gain_us
+            steps += self._patch.longer_by
+            work += self._patch.work
         return SearchProgress(work, cost_us / MICROSECONDS, steps, self._bound)
 
     def path(self, name: str, seed: int) -> CoveragePath:
@@ -218,7 +192,7 @@ class _Repair:
         self._unload()
         progress = self.progress()
         return CoveragePath(
-            cells_of(self._problem, self._framed.unframed(self._walk)),
+            self._problem.cells_of(self._framed.unframed(self._walk)),
             planner=name,
             seed=seed,
             work=progress.work,

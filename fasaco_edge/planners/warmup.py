@@ -18,14 +18,12 @@ from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.kernels.lattice.reach import update_reach
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.graph import lower_bound_steps
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
-from fasaco_edge.planners.planner import ignore
-from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.planner import SearchProgress, ignore, never
+from fasaco_edge.planners.problem import CoverageProblem, lower_bound_steps
 from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
 from fasaco_edge.planners.repair import repaired
-from fasaco_edge.planners.stopping import SearchProgress, never
 
 LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
 WALKS, BOUND = "shortest walks", "lower bound"

@@ -24,8 +24,7 @@ from fasaco_edge.daemon.loop.loop import TICK_S
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.mission.core.events import CommandReceived, PathUpdate, PlanReady, PlanRequest
 from fasaco_edge.mission.orders.order import read_command
-from fasaco_edge.planners.planner import CoveragePlanner, ignore
-from fasaco_edge.planners.stopping import AnyOf, SearchWork, WorkLimit
+from fasaco_edge.planners.planner import AnyOf, CoveragePlanner, SearchWork, WorkLimit, ignore
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.status import PathAttachment, Settings, Status

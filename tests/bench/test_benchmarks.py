@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fasaco_edge.bench import machine as placement
+from fasaco_edge.bench import processes as placement
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report
 from fasaco_edge.cli import bench, main
 from fasaco_edge.cli.bench import BENCHMARKS

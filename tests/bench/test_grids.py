@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.grids import MAP_FOOTPRINT, read_grid
 from fasaco_edge.bench.robot import building, robot_pose, with_crate
 from fasaco_edge.errors import MapFileError, NothingToCover
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import reachable_from
+from fasaco_edge.planners.grids import MAP_FOOTPRINT, read_grid
 
 
 def saved(folder, *rows):

@@ -18,9 +18,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.grids import MAP_FOOTPRINT, NamedGrid
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.lattice.reach import reachable_from
+from fasaco_edge.planners.grids import MAP_FOOTPRINT, NamedGrid
 
 # What a cell of a floor plan is.
 SOLID, ROOM, CORRIDOR = 0, 1, 2

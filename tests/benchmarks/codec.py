@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive
-from fasaco_edge.bench.machine import machine, peak_mb
+from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, peak_mb, positive
 from fasaco_edge.drawing.spread import Spread, document
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
@@ -261,7 +260,7 @@ def _report(args: argparse.Namespace, samples: Sequence[CodecTiming]) -> Report:
         title="one call [us]",
         header=HEADER,
         rows=tuple(_row(kind) for kind in figures),
-        figures={"codecs": figures, "peak_rss_mb": peak_mb(), "machine": machine()},
+        figures={"codecs": figures},
         goals=tuple(_goals(args, figures)),
         remarks=(
             "medians, below them the range; ratio: how much faster ours is, median of the pairs; "

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive
-from fasaco_edge.bench.machine import machine, peak_mb
+from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, peak_mb, positive
 from fasaco_edge.bench.robot import building, with_crate
 from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.grid.changes import LatticeChange
@@ -186,7 +185,7 @@ def _report(args: argparse.Namespace, samples: Sequence[Ingest]) -> Report:
         title="from a decoded message to what it changes [ms]",
         header=HEADER,
         rows=tuple(_row(kind) for kind in figures),
-        figures={"maps": figures, "peak_rss_mb": peak_mb(), "machine": machine()},
+        figures={"maps": figures},
         goals=tuple(_goals(figures)),
         remarks=(
             "side: of the map [pixels]; changed: share of them, and how many cells; change: median "

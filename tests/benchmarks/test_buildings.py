@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.grids import MAP_FOOTPRINT
 from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.planners.grids import MAP_FOOTPRINT
 from tests.benchmarks import buildings
 from tests.benchmarks.buildings import CORRIDOR, SOLID, TOLERANCE, building, floor_plan
 from tests.benchmarks.judge import reachable

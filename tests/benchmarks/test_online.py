@@ -7,11 +7,11 @@ import time
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.grids import NamedGrid
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived
+from fasaco_edge.planners.grids import NamedGrid
 from tests.benchmarks.__main__ import main
 from tests.benchmarks.online.buildings import BUILDING, MAZE, BuildingChoice, maze, of_grid
 from tests.benchmarks.online.cases import CASES

@@ -12,8 +12,8 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import NO_WORK
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import NO_WORK
 from tests.benchmarks.__main__ import main
 from tests.benchmarks.harness import WrongWalkError, judged, planner_for
 from tests.benchmarks.quality.benchmark import report

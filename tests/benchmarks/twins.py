@@ -19,14 +19,12 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds_above_zero,
 )
-from fasaco_edge.bench.grids import NamedGrid, read_grid
-from fasaco_edge.bench.machine import machine, peak_mb
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.fasaco import Fasaco
-from fasaco_edge.planners.planner import CoveragePlanner, ignore
+from fasaco_edge.planners.grids import NamedGrid, read_grid
+from fasaco_edge.planners.planner import CoveragePlanner, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
-from fasaco_edge.planners.stopping import never
 from fasaco_edge.planners.warmup import warm_up
 from tests import naive
 
@@ -171,8 +169,6 @@ def _report(args: argparse.Namespace, comparisons: Sequence[Comparison]) -> Repo
             "seed": args.seed,
             "return_home": args.return_home,
             "comparisons": [_document(one) for one in comparisons],
-            "peak_rss_mb": peak_mb(),
-            "machine": machine(),
         },
         goals=tuple(_goals(comparisons)),
         remarks=(

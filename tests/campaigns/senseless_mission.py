@@ -39,9 +39,8 @@ from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.planner import ColonySnapshot
+from fasaco_edge.planners.planner import ColonySnapshot, SearchProgress, StopRecorder
 from fasaco_edge.planners.registry import planner_of
-from fasaco_edge.planners.stopping import SearchProgress, StopRecorder
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import (
     coverage_grid,

@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from fasaco_edge.bench import machine as placement
+from fasaco_edge.bench import processes as placement
 from fasaco_edge.cli import main
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge, free_endpoint
 

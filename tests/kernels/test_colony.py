@@ -12,8 +12,7 @@ from fasaco_edge.kernels.ants.colony import (
     walk_ants,
 )
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.graph import graph_of, scratch_for
-from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.problem import CoverageProblem, graph_of, scratch_for
 from tests import naive
 from tests.support.grids import lattice
 

@@ -9,10 +9,10 @@ from fasaco_edge.daemon.loop.status import path_attachment
 from fasaco_edge.mission.core.events import MapReceived, PlanReady
 from fasaco_edge.mission.core.route import SKIPPED_S, Attempt
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.graph import lower_bound_steps
 from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.planner import SearchWork, WorkLimit, never
+from fasaco_edge.planners.problem import lower_bound_steps
 from fasaco_edge.planners.repair import HELD_CELLS
-from fasaco_edge.planners.stopping import SearchWork, WorkLimit, never
 from tests.benchmarks.judge import check_walk
 from tests.mission.world import CONFIG, Drive, building, patch, pose_at
 

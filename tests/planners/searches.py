@@ -7,10 +7,9 @@ import numpy as np
 from fasaco_edge.planners import near_optimal, regions
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
-from fasaco_edge.planners.graph import lower_bound_steps
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import SearchWork, WorkLimit, never
+from fasaco_edge.planners.planner import SearchWork, WorkLimit, never
+from fasaco_edge.planners.problem import CoverageProblem, lower_bound_steps
 from tests.benchmarks.buildings import building
 from tests.benchmarks.judge import check_walk
 

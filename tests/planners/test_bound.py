@@ -5,11 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.grids import read_grid
 from fasaco_edge.grid.map_files import builtin_maps
 from fasaco_edge.planners.baselines import spiral_stc, stc, zigzag
-from fasaco_edge.planners.graph import lower_bound_steps
-from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.grids import read_grid
+from fasaco_edge.planners.problem import CoverageProblem, lower_bound_steps
 from tests.support.grids import REFERENCE, lattice, placed, reference
 
 MAPS = [name for name, _ in builtin_maps()]

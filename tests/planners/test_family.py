@@ -13,10 +13,9 @@ from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
-from fasaco_edge.planners.planner import ignore
+from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
-from fasaco_edge.planners.stopping import never
 from tests import naive
 from tests.support.grids import ENDS, ROOMS, end_of, lattice, problems, reference
 

@@ -13,8 +13,8 @@ from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fasaco import LARGEST_GROUP, Fasaco
 from fasaco_edge.planners.path import walk_figures
+from fasaco_edge.planners.planner import SearchProgress, SearchWork, TimeBudget, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import SearchProgress, SearchWork, TimeBudget, WorkLimit, never
 from tests import naive
 from tests.support.grids import ENDS, ROOMS, end_of, lattice, problems, reference
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.grids import read_grid
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.map_files import builtin_maps
 from fasaco_edge.planners import near_optimal, regions
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
+from fasaco_edge.planners.grids import read_grid
 from fasaco_edge.planners.problem import CoverageProblem
 from tests import naive
 from tests.kernels.test_bound import drawn_task, shortest_walks

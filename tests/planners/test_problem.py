@@ -19,10 +19,9 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, CoverageLattice
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import ignore
+from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
-from fasaco_edge.planners.stopping import never
 from fasaco_edge.planners.warmup import STAGES, warm_up
 from tests.support.grids import lattice, placed
 

@@ -12,10 +12,9 @@ from fasaco_edge.kernels.local_search.walk_array import FRAME
 from fasaco_edge.planners import regions
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
-from fasaco_edge.planners.graph import FramedGround
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import AnyOf, GapReached, Interrupt, WorkLimit, never
+from fasaco_edge.planners.planner import AnyOf, GapReached, Interrupt, WorkLimit, never
+from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from tests.benchmarks.buildings import building
 from tests.planners.searches import (
     FEW_ANTS,

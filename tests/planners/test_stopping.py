@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from fasaco_edge.planners.stopping import (
+from fasaco_edge.planners.planner import (
     AnyOf,
     GapReached,
     Interrupt,

@@ -9,8 +9,8 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.planner import SearchWork
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import SearchWork
 from tests import naive
 from tests.support.grids import ENDS, ROOMS, end_of, problems
 

@@ -15,7 +15,7 @@ from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
-from fasaco_edge.planners.stopping import SearchWork, WorkLimit
+from fasaco_edge.planners.planner import SearchWork, WorkLimit
 from fasaco_edge.planners.warmup import STAGES, warm_up
 from fasaco_edge.wire.maps import (
     decode_map_update,

@@ -12,8 +12,15 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.daemon.loop.batch import PlanSnapshot
 from fasaco_edge.errors import PlanFailed
 from fasaco_edge.mission.core.events import PlanBroken, PlanReady, PlanRequest
-from fasaco_edge.planners.planner import ColonySnapshot, CoveragePlanner
-from fasaco_edge.planners.stopping import AnyOf, Interrupt, SearchProgress, StopRecorder, TimeBudget
+from fasaco_edge.planners.planner import (
+    AnyOf,
+    ColonySnapshot,
+    CoveragePlanner,
+    Interrupt,
+    SearchProgress,
+    StopRecorder,
+    TimeBudget,
+)
 
 LOG = logging.getLogger(__name__)
 

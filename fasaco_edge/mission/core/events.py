@@ -57,7 +57,7 @@ class PlanReady:
         number: of the request.
         path: the plan.
         seconds: how long planning took [s].
-        stops: where it was stopped, see ``planners.stopping.StopRecorder``.
+        stops: where it was stopped, see ``planners.planner.StopRecorder``.
     """
 
     number: int

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.random import PCG64, Generator
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.grids import MAP_FOOTPRINT, NamedGrid, read_grid
 from fasaco_edge.errors import MapFileError
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid
+from fasaco_edge.planners.grids import MAP_FOOTPRINT, NamedGrid, read_grid
 from tests.benchmarks.buildings import building
 from tests.benchmarks.harness import check_names, grid_name
 from tests.benchmarks.judge import reachable

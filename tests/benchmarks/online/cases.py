@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.grids import MAP_FOOTPRINT, NamedGrid
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED
+from fasaco_edge.planners.grids import MAP_FOOTPRINT, NamedGrid
 from tests.benchmarks.online.buildings import CASE, Building, of_grid
 from tests.benchmarks.online.mission import OnlineMission
 from tests.benchmarks.online.sight import Point

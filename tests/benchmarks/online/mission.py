@@ -35,8 +35,8 @@ from fasaco_edge.mission.core.events import (
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import SearchWork, WorkLimit
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import SearchWork, WorkLimit
 from tests.benchmarks.harness import planner_for
 from tests.benchmarks.judge import MOVES
 from tests.benchmarks.online.buildings import Building

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
-from fasaco_edge.bench.benchmark import Report, ResultTable
-from fasaco_edge.bench.machine import machine, peak_mb
+from fasaco_edge.bench.benchmark import Report, ResultTable, peak_mb
 from tests.benchmarks.online.buildings import BUILDING, CASE, KINDS, MAZE
 from tests.benchmarks.online.figures import Summary, goals, steps_ratio, time_ratio
 from tests.benchmarks.online.judge import MILESTONES, MissionRun
@@ -76,8 +75,6 @@ def report(
                 for group in beside
             },
             "runs": [run.document() for run in runs],
-            "peak_rss_mb": peak_mb(),
-            "machine": machine(),
         },
         goals=tuple(goals(buildings, misread, with_turns=with_turns)),
         remarks=(*REMARKS, *_complaints(runs), f"peak memory of this process {peak_mb()} MB"),

@@ -16,11 +16,11 @@ from fasaco_edge.bench.benchmark import (
     Say,
     add_grid_options,
     grid_names,
+    peak_mb,
     positive,
     seconds,
     seconds_above_zero,
 )
-from fasaco_edge.bench.machine import machine, peak_mb
 from fasaco_edge.drawing.spread import Spread
 from tests.benchmarks.harness import check_writable
 from tests.benchmarks.quality.figures import VARIANTS, GridFigures, by_grid, goals
@@ -157,8 +157,6 @@ def report(turn_s: float, seeds: int, runs: Sequence[QualityRun]) -> Report:
             "seeds": seeds,
             "turn_s": turn_s,
             "grids": [grid.document(turn_s) for grid in figures],
-            "peak_rss_mb": peak_mb(),
-            "machine": machine(),
         },
         goals=tuple(goals(figures, turn_s)),
         remarks=(*REMARKS, f"peak memory of this process {peak_mb()} MB"),

@@ -15,10 +15,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fasaco_edge.bench.grids import NamedGrid, read_grid
 from fasaco_edge.host.processes import peak_mb, resident_mb
+from fasaco_edge.planners.grids import NamedGrid, read_grid
+from fasaco_edge.planners.planner import SearchProgress
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.stopping import SearchProgress
 from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.harness import judged, planner_for
 

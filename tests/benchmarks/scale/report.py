@@ -12,7 +12,6 @@ from typing import Any
 from PIL import Image
 
 from fasaco_edge.bench.benchmark import Goal, Report
-from fasaco_edge.bench.machine import machine, peak_mb
 from fasaco_edge.drawing.chart import COLOURS, Axis, Line, Panel, draw_panels
 from fasaco_edge.drawing.spread import Spread
 from tests.benchmarks.scale.process import TARGETS, ScaleRun, SizedRun
@@ -122,8 +121,6 @@ def report(seeds: int, runs: Sequence[SizedRun]) -> Report:
             "seeds": seeds,
             "sizes": [size.document() for size in sizes],
             "exponents": exponents,
-            "peak_rss_mb": peak_mb(),
-            "machine": machine(),
         },
         goals=tuple(_goals(sizes, exponents)),
         remarks=tuple(_remarks(exponents)),

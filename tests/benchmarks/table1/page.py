@@ -12,8 +12,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from fasaco_edge.bench.benchmark import Goal, Report, ResultTable
-from fasaco_edge.bench.grids import NamedGrid, read_grid
+from fasaco_edge.bench.benchmark import Goal, Report, ResultTable, machine
+from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.planners.problem import CoverageProblem
@@ -157,7 +157,7 @@ def _parts(
         "Path Planning*, 2022. Made by\n"
     )
     yield f"```sh\n{command}\n```\n"
-    yield _where(report)
+    yield _where()
     if missing:
         yield f"**Interrupted: {missing} runs are missing.**\n"
     yield f"## In short\n\n{summary.title}; medians.\n"
@@ -178,8 +178,8 @@ def _parts(
     yield from _figures(file, pictures)
 
 
-def _where(report: Report) -> str:
-    made = report.figures["machine"]
+def _where() -> str:
+    made = machine()
     return (
         f"on {made['processor']}, {made['cores']} cores, load {made['load_1min']} over a minute, "
         f"Python {made['python']}, fasaco-edge {made['version']}. Counts are the same on every "

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from fasaco_edge.bench.benchmark import Goal, Report, ResultTable
-from fasaco_edge.bench.machine import machine, peak_mb
 from fasaco_edge.drawing.spread import Spread, document
 from tests.benchmarks.table1.paper import (
     CLAIMS,
@@ -125,8 +124,6 @@ def report(ants: int, seeds: int, runs: Sequence[Run]) -> Report:
                 claim.text: f"{verdict(claim, findings)} {contradiction(claim)}".strip()
                 for claim in CLAIMS
             },
-            "peak_rss_mb": peak_mb(),
-            "machine": machine(),
         },
         goals=tuple(goal for grid in grids for goal in _goals(grid, ants)),
         remarks=REMARKS,

@@ -7,14 +7,13 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 from fasaco_edge.bench.benchmark import Say
-from fasaco_edge.bench.grids import NamedGrid, read_grid
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.path import CoveragePath, WalkFigures, walk_figures
-from fasaco_edge.planners.planner import Observer, ignore
+from fasaco_edge.planners.planner import Observer, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
-from fasaco_edge.planners.stopping import never
 from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.harness import check_names, grid_name
 
