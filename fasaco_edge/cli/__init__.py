@@ -19,7 +19,7 @@ from fasaco_edge.cli.console.arguments import Command, Exit, add_common, with_ne
 from fasaco_edge.cli.console.logs import begin_logging, say_why
 from fasaco_edge.cli.console.streams import clean_streams
 from fasaco_edge.errors import BadConfiguration, DiskFailed, FasacoError
-from fasaco_edge.host.signals import end_with_parent
+from fasaco_edge.host.processes import end_with_parent
 
 COMMANDS = {
     "demo": "watch a simulated robot map and cover a building",

@@ -18,7 +18,7 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.plan_options import ANYWHERE, EPILOG, HOME, add_options, check, settle
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
-from fasaco_edge.host.signals import ctrl_c_asks
+from fasaco_edge.host.processes import ctrl_c_asks
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.planner import (

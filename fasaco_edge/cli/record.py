@@ -152,7 +152,7 @@ def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
     """
     from fasaco_edge.bus.session import BusSettings
     from fasaco_edge.config.config import decode_config, load_config
-    from fasaco_edge.config.endpoints import from_here
+    from fasaco_edge.config.security import from_here
 
     on_input = str(file) == "-"
     config = decode_config(sys.stdin.buffer.read()) if on_input else load_config(file)

@@ -16,7 +16,7 @@ from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.queries import Shared
 from fasaco_edge.bus.session import Bus, Sample
 from fasaco_edge.config.ros import RosConfig
-from fasaco_edge.daemon.loop.batch import poster
+from fasaco_edge.daemon.loop.inbox import poster
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, attachment, gid_of
 from fasaco_edge.wire.topics import VOLATILE, Topic

@@ -14,10 +14,8 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.compiling import KernelCompiler
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter, open_ledger
-from fasaco_edge.daemon.loop.answers import serve_about
-from fasaco_edge.daemon.loop.batch import make_mailbox
-from fasaco_edge.daemon.loop.commands import Commands
-from fasaco_edge.daemon.loop.inbox import Inbox
+from fasaco_edge.daemon.loop.answers import Commands, serve_about
+from fasaco_edge.daemon.loop.inbox import Inbox, make_mailbox
 from fasaco_edge.daemon.loop.loop import BusPorts, Host, Loop
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
@@ -27,8 +25,7 @@ from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
-from fasaco_edge.host.processes import return_soon
-from fasaco_edge.host.signals import call_on
+from fasaco_edge.host.processes import call_on, return_soon
 from fasaco_edge.wire import topics
 
 LOG = logging.getLogger(__name__)

@@ -15,7 +15,7 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger
-from fasaco_edge.daemon.loop.batch import Batch, Received
+from fasaco_edge.daemon.loop.inbox import Batch, Received
 from fasaco_edge.daemon.loop.turn_log import (
     POSE_BYTES,
     DecisionFilter,

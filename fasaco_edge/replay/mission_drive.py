@@ -1,4 +1,4 @@
-"""Inbox, startup and mission of a daemon without its bus, disk and planning thread."""
+"""Inbox and mission of a daemon without its bus, disk and planning thread."""
 
 from __future__ import annotations
 
@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fasaco_edge.bus.latched import Subscription
-from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import ClaimState
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
-from fasaco_edge.daemon.loop.batch import Batch, make_mailbox
-from fasaco_edge.daemon.loop.inbox import Inbox
-from fasaco_edge.daemon.loop.mission_runner import MissionRunner
-from fasaco_edge.daemon.startup import Loader
+from fasaco_edge.daemon.loop.inbox import Batch, Inbox, make_mailbox
+from fasaco_edge.daemon.loop.mission_runner import Loader, MissionRunner
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanReady
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
@@ -83,7 +80,7 @@ class MissionDrive:
         keeper = LedgerKeeper(
             _NoDisk(ledger), config.robot.tool_width_m, autostart=config.mission.autostart
         )
-        self._runner = _LoadedRunner(config, keeper, self.mailbox, loader)
+        self._runner = MissionRunner(config, keeper, self.mailbox, lambda *_: loader)
         self.began: float | None = None
         self.state = ""
 
@@ -122,19 +119,6 @@ class MissionDrive:
         before, self.state = self.state, str(mission.state)
         changed = self.state != before
         return ReplayStep(at_s, self.state, mission.reason, changed, decision, refused)
-
-
-class _LoadedRunner(MissionRunner):
-    """A mission runner whose mission is loaded before its first map."""
-
-    def __init__(
-        self, config: DaemonConfig, keeper: LedgerKeeper, mailbox: Mailbox[object], loader: Loader
-    ) -> None:
-        self._loader = loader
-        super().__init__(config, keeper, mailbox)
-
-    def _load(self) -> Loader:
-        return self._loader
 
 
 class _NoBus(Bus):

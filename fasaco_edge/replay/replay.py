@@ -19,7 +19,7 @@ import msgspec
 
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.loop.batch import Received, take_batch
+from fasaco_edge.daemon.loop.inbox import Received, take_batch
 from fasaco_edge.daemon.loop.loop import TICK_S
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.mission.core.events import CommandReceived, PathUpdate, PlanReady, PlanRequest

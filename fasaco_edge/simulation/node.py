@@ -14,7 +14,7 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.host.signals import stop_event
+from fasaco_edge.host.processes import stop_event
 from fasaco_edge.simulation.world import Activity, Emission, World
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys

@@ -20,8 +20,8 @@ import numpy as np
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
-from fasaco_edge.daemon.loop.mission_report import mission_report
 from fasaco_edge.daemon.loop.outbox import headings
+from fasaco_edge.daemon.loop.status import mission_report
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.mission.config import MissionConfig

@@ -11,7 +11,7 @@ import pytest
 import zenoh
 import zenoh.ext
 
-from fasaco_edge.daemon.loop.batch import MAP_SPACING_S
+from fasaco_edge.daemon.loop.inbox import MAP_SPACING_S
 from tests.support.outsider import Ear, Outsider, open_client
 from tests.support.processes import PROGRAM, daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, room

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fasaco_edge.daemon.ledger.writer import LedgerKeeper
-from fasaco_edge.daemon.startup import Startup
+from fasaco_edge.daemon.loop.mission_runner import HeldEvents
 from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
@@ -13,16 +12,6 @@ from fasaco_edge.mission.core.events import MapReceived, PatchesLost, PatchRecei
 
 SIDE = 8
 GEOMETRY = GridGeometry(SIDE, SIDE, 0.1, Pose2D(0.0, 0.0))
-
-
-class NoDisk:
-    """A ledger that is kept nowhere."""
-
-    restored = None
-
-
-def beginning():
-    return Startup(LedgerKeeper(NoDisk(), 0.3, autostart=True), lambda: None)
 
 
 def a_map(frame="map"):
@@ -41,28 +30,28 @@ def maps(held):
 
 
 def test_updates_are_laid_over_their_map_and_take_no_more_than_it():
-    before = beginning()
+    before = HeldEvents()
     before.take([a_map()])
     for place in range(SIDE * SIDE):
         assert before.take([update(place)]) == []
-        assert len(before.held) == 1
-    assert (maps(before.held)["map"] == 100).all()
+        assert len(before.events) == 1
+    assert (maps(before.events)["map"] == 100).all()
 
 
 def test_each_update_finds_the_map_of_its_frame():
     """Which of two frames counts is not known yet: neither map may be lost, or wrong."""
-    before = beginning()
+    before = HeldEvents()
     before.take([a_map("map"), a_map("odom")])
     pose = PoseReceived(StampedPose(Pose2D(0.0, 0.0), "map"))
     faults = before.take([update(1, "map"), update(2, "odom"), pose, update(3, "map")])
     assert faults == []
-    found = {frame: np.flatnonzero(cells).tolist() for frame, cells in maps(before.held).items()}
+    found = {frame: np.flatnonzero(cells).tolist() for frame, cells in maps(before.events).items()}
     assert found == {"map": [1, 3], "odom": [2]}
-    assert before.held[-1] is pose
+    assert before.events[-1] is pose
 
 
 def test_what_misfits_is_told_at_once():
-    before = beginning()
+    before = HeldEvents()
     assert [str(fault) for fault in before.take([update(0)])] == [
         "map update refused: there is no map yet"
     ]
@@ -70,11 +59,11 @@ def test_what_misfits_is_told_at_once():
     beyond = PatchReceived(MapPatch(Window(0, 0, 1, SIDE + 1), np.zeros((1, SIDE + 1), np.int8)))
     faults = before.take([beyond, update(0, "odom"), update(7)])
     assert [type(fault) for fault in faults] == [PatchWithoutBase] * 2
-    assert np.flatnonzero(maps(before.held)["map"]).tolist() == [7]
+    assert np.flatnonzero(maps(before.events)["map"]).tolist() == [7]
 
 
 def test_after_lost_updates_only_another_map_counts():
-    before = beginning()
+    before = HeldEvents()
     before.take([a_map()])
     for _ in range(100):
         (fault,) = before.take([PatchesLost(3)])
@@ -82,7 +71,7 @@ def test_after_lost_updates_only_another_map_counts():
     (fault,) = before.take([update(0)])
     assert str(fault) == "map update refused: updates before it were lost"
     # The mission is to hear of it, too: once.
-    assert [type(held) for held in before.held] == [MapReceived, PatchesLost]
+    assert [type(held) for held in before.events] == [MapReceived, PatchesLost]
     before.take([a_map()])
     assert before.take([update(0)]) == []
-    assert [type(held) for held in before.held] == [MapReceived]
+    assert [type(held) for held in before.events] == [MapReceived]

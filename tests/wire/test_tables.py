@@ -9,7 +9,7 @@ import re
 import pytest
 
 import fasaco_edge
-from fasaco_edge.daemon.loop.commands import REPLAN_PERIOD_S
+from fasaco_edge.daemon.loop.answers import REPLAN_PERIOD_S
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.coverage.ledger import MOST_TILES
 from fasaco_edge.mission.orders import order

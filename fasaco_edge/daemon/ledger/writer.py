@@ -38,30 +38,31 @@ class LedgerKeeper:
     """Keeps coverage and order in the ledger; also before there is a mission.
 
     Attributes:
-        first: the order to begin with: the one that was under way, if any.
+        assignment: the order to begin with: the one that was under way, if any.
     """
 
     def __init__(self, writer: LedgerWriter, cell_m: float, *, autostart: bool) -> None:
         self._faults: list[FasacoError] = []
         self._writer = writer
         self._before = writer.restored or LedgerSnapshot(cell_m, "", 0, {})
-        self.first = self._first_assignment(autostart)
-        self._kept = self._before.total, self.first
+        self.assignment = self._first_assignment(autostart)
+        self._kept = self._before.total, self.assignment
         self._kept_at = float("-inf")
 
-    def restore(self, mission: Mission, assignment: OrderState) -> None:
+    def restore(self, mission: Mission) -> None:
         """Let a mission go on where the former one ended."""
         if self._before.cells:
             mission.restore_ledger(self._before)
-        mission.restore_order(assignment)
+        mission.restore_order(self.assignment)
 
     def take_back(self, mission: Mission) -> None:
         """Take what a mission has done, for the one that replaces it."""
-        self._before, self.first = mission.snapshot(), mission.order_state
+        self._before, self.assignment = mission.snapshot(), mission.order_state
 
-    def keep(self, mission: Mission | None, assignment: OrderState, now: float) -> None:
+    def keep(self, mission: Mission | None, now: float) -> None:
         """Have changes written: an order at once, coverage once a period."""
         total = mission.ledger.total if mission else self._before.total
+        assignment = mission.order_state if mission else self.assignment
         kept_total, kept_assignment = self._kept
         if total == kept_total and assignment == kept_assignment:
             return

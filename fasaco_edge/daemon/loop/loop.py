@@ -14,9 +14,8 @@ from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
-from fasaco_edge.daemon.loop.batch import Batch, take_batch
-from fasaco_edge.daemon.loop.commands import Commands
-from fasaco_edge.daemon.loop.inbox import MAPS, Inbox
+from fasaco_edge.daemon.loop.answers import Commands
+from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Inbox, take_batch
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.daemon.loop.outbox import CoveragePublisher, Outbox
 from fasaco_edge.daemon.loop.status import StatusBoard, path_attachment
@@ -106,7 +105,7 @@ class Loop:
         decision = self._step(events, commands, batch, now)
         self._log_cycle(TurnNote(now, batch, commands, decision))
         self._bus.outbox.commands(commands, decision.answers)
-        self._keeper.keep(self._runner.mission, self._runner.assignment, now)
+        self._keeper.keep(self._runner.mission, now)
         self._guard.attempt("status", partial(self._publish_status, now))
         self._answer(decision.answers, now)
         ended = time.monotonic()
@@ -120,7 +119,7 @@ class Loop:
     def close(self, timeout_s: float) -> None:
         """Hand over what turn log and ledger hold, and end the planning thread."""
         self._guard.attempt("turns", self._bus.turns.publish)
-        self._keeper.keep(self._runner.mission, self._runner.assignment, float("inf"))
+        self._keeper.keep(self._runner.mission, float("inf"))
         self._runner.close(timeout_s)
 
     # Before the step: who plans, which configuration is in force, what is only to be noted.
@@ -287,7 +286,7 @@ class Loop:
         commands, runner = self._bus.commands, self._runner
         commands.note(answers, now)
         if commands.are_asked:
-            report = self._status.reply(runner.mission, runner.assignment, runner.loading)
+            report = self._status.reply(runner)
             is_kept = self._keeper.is_kept(time.monotonic())
             self._guard.attempt("@rpc/mission", partial(commands.answer, report, is_kept=is_kept))
 
@@ -299,7 +298,7 @@ class Loop:
         status.ledger = self._keeper.report(now)
         status.faults.count(self._keeper.take_faults(), is_logged=True)
         status.faults.count(self._guard.take_faults(), is_logged=True)
-        due = status.due(runner.mission, runner.assignment, runner.loading, now)
+        due = status.due(runner, now)
         if due is not None:
             self._bus.outbox.status(due)
             self._host.watchdog.tell(due)

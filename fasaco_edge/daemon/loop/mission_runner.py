@@ -1,23 +1,122 @@
-"""The mission runner: owner of the mission and its planning thread, from startup to replacement."""
+"""The mission runner: owner of the mission and its planning thread, from startup to replacement.
+
+The first map starts the loading of kernels; until then the daemon is small. Importing numba costs
+60 MB, and compiling on a new machine takes many seconds: a thread of its own does both, so that
+the loop keeps answering. What arrives meanwhile is held.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import ClaimState
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
-from fasaco_edge.daemon.startup import Loader, Startup, map_and_pose_of
-from fasaco_edge.errors import FasacoError
-from fasaco_edge.mission.core.events import Answer, CommandReceived, Event
+from fasaco_edge.errors import CommandError, FasacoError, PatchWithoutBase
+from fasaco_edge.grid.occupancy import MapPatch, without_base
+from fasaco_edge.host.processes import release_unused
+from fasaco_edge.mission.core.events import (
+    Answer,
+    CommandReceived,
+    Event,
+    MapReceived,
+    PatchesLost,
+    PatchRun,
+    PoseReceived,
+    in_runs,
+)
 from fasaco_edge.mission.orders.order_state import OrderState
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker
     from fasaco_edge.mission.core.events import PlanRequest
     from fasaco_edge.mission.core.mission import Mission
+
+_LOST = (PatchesLost, "")
+
+
+class HeldEvents:
+    """The events that a mission begins with; however long it takes to load, they do not grow.
+
+    Held are the newest map, with its updates applied, and the newest pose of each of the newest
+    two frames: which frame counts is for the mission to decide. That updates were lost stays
+    until the next map.
+    """
+
+    def __init__(self, events: Sequence[Event] = ()) -> None:
+        # By type and frame, in order of arrival.
+        self._held: dict[tuple[type, str], Event] = {}
+        for event in events:
+            self._held[type(event), _frame(event)] = event
+
+    @property
+    def events(self) -> list[Event]:
+        """The events, in order of arrival."""
+        return list(self._held.values())
+
+    @property
+    def has_map(self) -> bool:
+        """Whether there is a map."""
+        return any(kind is MapReceived for kind, _ in self._held)
+
+    def take(self, events: Sequence[Event]) -> list[FasacoError]:
+        """Hold events; return why some are of no use."""
+        faults: list[FasacoError] = []
+        for event in in_runs(events):
+            match event:
+                case MapReceived():
+                    self._held.pop(_LOST, None)
+                    self._hold(event)
+                case PoseReceived():
+                    self._hold(event)
+                case PatchRun(patches):
+                    faults += self._apply(patches)
+                case PatchesLost(count):
+                    faults.append(PatchWithoutBase(f"{count} map updates were lost"))
+                    if self.has_map:
+                        self._held.setdefault(_LOST, event)
+        return faults
+
+    def _hold(self, event: Event) -> None:
+        """Hold an event in place of those of its type, but for the newest in another frame."""
+        frame = _frame(event)
+        before = [other for kind, other in self._held if kind is type(event)]
+        kept = [other for other in before if other not in ("", frame)][-1:]
+        for other in before:
+            if other not in kept:
+                del self._held[type(event), other]
+        self._held[type(event), frame] = event
+
+    def _apply(self, patches: Sequence[MapPatch]) -> list[FasacoError]:
+        """Apply updates to the maps held; return why some cannot be."""
+        maps = {
+            held.grid.frame: held.grid
+            for held in self._held.values()
+            if isinstance(held, MapReceived)
+        }
+        if not maps or _LOST in self._held:
+            return without_base(patches, updates_lost=bool(maps))
+        faults: list[FasacoError] = []
+        newest = next(reversed(maps))
+        for frame, grid in maps.items():
+            # An update of neither frame is a misfit of the newest map.
+            theirs = [p for p in patches if (p.frame if p.frame in maps else newest) == frame]
+            updated = grid.with_updates(theirs)
+            self._held[MapReceived, frame] = MapReceived(updated.grid)
+            faults += updated.faults
+        return faults
+
+
+def _frame(event: Event) -> str:
+    match event:
+        case MapReceived(grid):
+            return grid.frame
+        case PoseReceived(pose):
+            return pose.frame
+    return ""  # it has none
 
 
 class MissionRunner:
@@ -30,27 +129,30 @@ class MissionRunner:
     """
 
     def __init__(
-        self, config: DaemonConfig, keeper: LedgerKeeper, mailbox: Mailbox[object]
+        self,
+        config: DaemonConfig,
+        keeper: LedgerKeeper,
+        mailbox: Mailbox[object],
+        load: Callable[[DaemonConfig, Mailbox[object]], Loader] | None = None,
     ) -> None:
         self.config = config
         self.mission: Mission | None = None
         self.worker: PlanningWorker | None = None
         self._keeper = keeper
         self._mailbox = mailbox
-        self._startup = Startup(keeper, self._load)
-
-    def _load(self) -> Loader:
-        return Loader(self.config, self._mailbox)
+        self._load = load or Loader
+        self._loader: Loader | None = None
+        self._held = HeldEvents()
 
     @property
     def assignment(self) -> OrderState:
         """What the mission does, or will do."""
-        return self.mission.order_state if self.mission else self._startup.assignment
+        return self.mission.order_state if self.mission else self._keeper.assignment
 
     @property
     def loading(self) -> str:
         """What startup is loading; "" for nothing."""
-        return "" if self.mission else self._startup.stage
+        return self._loader.stage if self._loader else ""
 
     def start(
         self, events: list[Event], claim: ClaimState
@@ -62,32 +164,58 @@ class MissionRunner:
         """
         if self.mission is not None:
             return self.mission, events, []
-        faults = self._startup.take(events)
-        if not claim.is_waiting:
-            self._startup.load()
-        if claim is ClaimState.PLANS and (loaded := self._startup.loaded()) is not None:
+        faults = self._held.take(events)
+        if self._loader is None and self._held.has_map and not claim.is_waiting:
+            self._loader = self._load(self.config, self._mailbox)
+        loaded = self._loader.poll() if self._loader and claim is ClaimState.PLANS else None
+        held = self._held.events
+        if loaded is not None:
             self.mission, self.worker = loaded
-        return self.mission, self._startup.held, faults
+            self._keeper.restore(self.mission)
+            self._held = HeldEvents()
+        return self.mission, held, faults
 
-    def answer(self, commands: Sequence[CommandReceived], rival: str) -> tuple[Answer, ...]:
-        """Take commands during startup; ``rival``: why another daemon takes them, or ""."""
-        return tuple(self._startup.answer(commands, rival))
+    def answer(self, commands: Sequence[CommandReceived], rival: str = "") -> tuple[Answer, ...]:
+        """Take commands during startup as the mission would, and return the answers.
 
-    def held(self) -> Sequence[Event]:
+        ``rival`` says why another daemon is to be commanded; "" for none.
+        """
+        return tuple(Answer(asked.number, self._refusal(asked, rival)) for asked in commands)
+
+    def _refusal(self, asked: CommandReceived, rival: str) -> FasacoError | None:
+        """Take a command; return why it is refused."""
+        try:
+            if rival:
+                raise CommandError(rival, hint="command the one that plans")
+            self._keeper.assignment = self.assignment.commanded(asked.command, asked.order)
+            if asked.command == "replan":
+                raise CommandError("nothing to plan: the first plan is still to come")
+        except FasacoError as error:
+            return error
+        if asked.command == "reset":
+            self._keeper.forget()
+        return None
+
+    def held(self) -> list[Event]:
         """Return the events that tell another mission map and pose."""
-        return map_and_pose_of(self.mission) if self.mission else self._startup.held
+        if self.mission is None:
+            return self._held.events
+        grid, pose = self.mission.grid, self.mission.pose
+        return [
+            *([MapReceived(grid)] if grid is not None else []),
+            *([PoseReceived(pose)] if pose is not None else []),
+        ]
 
     def restart(self, config: DaemonConfig, held: Sequence[Event]) -> None:
         """Go back to startup, with these events; coverage and order go on from the ledger."""
         if self.mission is not None and self.worker is not None:
             self.worker.disown()
             self._keeper.take_back(self.mission)
-        else:
-            self._keeper.first = self._startup.assignment
-            self._startup.end()
+        elif self._loader is not None:
+            self._loader.drop()
         self.config = config
-        self.mission = self.worker = None
-        self._startup = Startup(self._keeper, self._load, held)
+        self.mission = self.worker = self._loader = None
+        self._held = HeldEvents(held)
 
     def submit(self, request: PlanRequest) -> None:
         """Have a plan made."""
@@ -103,3 +231,75 @@ class MissionRunner:
         """End the planning thread."""
         if self.worker is not None:
             self.worker.close(timeout_s)
+
+
+class Loader:
+    """Imports the planner, warms its kernels up, and makes mission and worker, in a thread.
+
+    Attributes:
+        stage: what is being loaded; "" once that has ended, well or not.
+    """
+
+    def __init__(self, config: DaemonConfig, mailbox: Mailbox[object]) -> None:
+        self.stage = "importing"
+        self._error: BaseException | None = None
+        self._config = config
+        self._mailbox = mailbox
+        self._loaded: tuple[Mission, PlanningWorker] | None = None
+        self._is_dropped = False
+        threading.Thread(target=self._run, name="loader", daemon=True).start()
+
+    def poll(self) -> tuple[Mission, PlanningWorker] | None:
+        """Return what was loaded, None until then; raise what went wrong."""
+        if self._error is not None:
+            raise self._error
+        return self._loaded
+
+    def drop(self) -> None:
+        """End the worker, now or once it is loaded: nobody will ask for it."""
+        self._is_dropped = True
+        if self._loaded is not None:
+            self._loaded[1].disown()
+
+    def _run(self) -> None:
+        try:
+            self._loaded = self._load()
+            if self._is_dropped:
+                self._loaded[1].disown()
+        except BaseException as error:
+            self._error = error
+        self.stage = ""
+        self._mailbox.post("loaded", None)
+
+    def _load(self) -> tuple[Mission, PlanningWorker]:
+        from fasaco_edge.daemon.loop.worker import PlanningWorker  # noqa: PLC0415
+        from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
+        from fasaco_edge.mission.config import MissionConfig  # noqa: PLC0415
+        from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415
+        from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState  # noqa: PLC0415
+        from fasaco_edge.planners.near_optimal import NearOptimal  # noqa: PLC0415
+        from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
+        from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
+
+        warm_up(self._report)
+        release_unused()
+        robot, maps, planner = self._config.robot, self._config.map, self._config.planner
+        footprint = Footprint(
+            robot.tool_width_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least
+        )
+        chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
+        worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
+        mission = MissionConfig(
+            footprint,
+            maps.max_lattice_cells,
+            robot.cost(),
+            self._config.mission,
+            planner.spare_share if isinstance(chosen, NearOptimal) else 0.0,
+        )
+        first = (
+            OrderState.autostart() if self._config.mission.autostart else OrderState.idle(NO_ORDER)
+        )
+        return Mission(mission, first), worker
+
+    def _report(self, stage: str) -> None:
+        self.stage = f"kernels: {stage}"

@@ -15,7 +15,7 @@ from fasaco_edge.bus.queries import Reply, Shared
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.faults import PublishGuard
 from fasaco_edge.daemon.loop.answers import LastSamples
-from fasaco_edge.daemon.loop.batch import PlanSnapshot
+from fasaco_edge.daemon.loop.inbox import PlanSnapshot
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived

@@ -1,4 +1,7 @@
-"""The daemon's status: one JSON document, published on change and once a second."""
+"""The daemon's status: one JSON document, published on change and once a second.
+
+The order in a status, and in the answer to a command: what it is, and how far.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,6 @@ from fasaco_edge import __version__
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.faults import log_fault
 from fasaco_edge.daemon.loop.answers import config_document
-from fasaco_edge.daemon.loop.mission_report import mission_report
 from fasaco_edge.daemon.loop.watchdog import CycleTimes
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.host.processes import resident_mb, thread_count
@@ -37,10 +39,27 @@ from fasaco_edge.wire.status import (
 )
 
 if TYPE_CHECKING:
+    from fasaco_edge.daemon.loop.mission_runner import MissionRunner
     from fasaco_edge.grid.geometry import Window
     from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.mission.core.mission import Mission
     from fasaco_edge.planners.path import CoveragePath
+
+
+from typing import TYPE_CHECKING
+
+from fasaco_edge.wire.replies import (
+    MissionReport,
+    Point,
+    UnreachedArea,
+    UnreachedReport,
+    ZoneReport,
+)
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.loop.mission_runner import MissionRunner
+    from fasaco_edge.mission.core.mission import Mission
+
 
 LOG = logging.getLogger(__name__)
 
@@ -99,14 +118,13 @@ class StatusBoard:
         """Show this configuration as the one in force."""
         self._shown_config = config_document(config)
 
-    def due(
-        self, mission: Mission | None, assignment: OrderState, loading: str, now: float
-    ) -> Status | None:
+    def due(self, runner: MissionRunner, now: float) -> Status | None:
         """Return the status if it changed or a second has passed, else None.
 
         A daemon that waits for another one leaves the heartbeat to that one.
         """
-        state, reason = self._state(mission, assignment, loading)
+        mission, assignment = runner.mission, runner.assignment
+        state, reason = self._state(runner)
         recorder = self.recorder and self.recorder.state
         revision = self.path and self.path.revision
         claim = self.claim.stand
@@ -141,24 +159,23 @@ class StatusBoard:
             mission=mission_report(mission, assignment),
         )
 
-    def reply(self, mission: Mission | None, assignment: OrderState, loading: str) -> Reply:
+    def reply(self, runner: MissionRunner) -> Reply:
         """Return the answer to a command."""
-        state, reason = self._state(mission, assignment, loading)
+        state, reason = self._state(runner)
         return Reply(
             robot=self._config.robot.name,
             state=state,
             reason=reason,
-            coverage=_coverage(mission),
-            mission=mission_report(mission, assignment),
+            coverage=_coverage(runner.mission),
+            mission=mission_report(runner.mission, runner.assignment),
         )
 
-    def _state(
-        self, mission: Mission | None, assignment: OrderState, loading: str
-    ) -> tuple[str, str]:
+    def _state(self, runner: MissionRunner) -> tuple[str, str]:
         if self.stands_back:
             return "blocked", self.stands_back
-        if mission is not None:
+        if (mission := runner.mission) is not None:
             return str(mission.state), mission.reason
+        assignment, loading = runner.assignment, runner.loading
         if assignment.order is None:
             return "idle", assignment.why
         if assignment.paused:
@@ -260,14 +277,65 @@ def _coverage(mission: Mission | None) -> CoverageReport | None:
 def _plans(mission: Mission | None) -> PlanCounts:
     if mission is None:
         return PlanCounts()
-    return PlanCounts(
-        plans=mission.route.plans,
-        unchanged=mission.route.unchanged,
-        outdated=mission.route.outdated,
-        attempts=mission.route.attempts,
-        planning=mission.route.is_planning,
-    )
+    route = mission.route
+    counts = (route.plans, route.unchanged, route.outdated, route.attempts)
+    return PlanCounts(*counts, planning=route.is_planning)
 
 
 def _ms(seconds: float | None) -> float | None:
     return None if seconds is None else round(1e3 * seconds, 3)
+
+
+def mission_report(mission: Mission | None, assignment: OrderState) -> MissionReport:
+    """Return this part of the status."""
+    order, zone = assignment.order, assignment.current_zone
+    home = assignment.home
+    lattice = mission.lattice if mission else None
+    return MissionReport(
+        ordered=None if order is None else ("itself" if assignment.automatic else "command"),
+        stage=None if order is None else str(assignment.stage),
+        paused=assignment.paused,
+        zone=None if zone is None or zone.polygon is None else zone.name,
+        pass_number=None if zone is None else assignment.pass_number,
+        passes=None if zone is None else zone.passes,
+        zones=_zones(mission, assignment),
+        keep_out=0 if order is None else len(order.keep_out),
+        return_home=bool(order and order.return_home),
+        home=None if home is None or lattice is None else Point(*_centre(home, lattice.cell_m)),
+        tries=assignment.tries,
+        unreached=_unreached(mission),
+    )
+
+
+def _zones(mission: Mission | None, assignment: OrderState) -> tuple[ZoneReport, ...]:
+    if mission is None:
+        zones = assignment.order.zones if assignment.order else ()
+        return tuple(
+            ZoneReport(zone.name, zone.passes) for zone in zones if zone.polygon is not None
+        )
+    return tuple(
+        ZoneReport(zone.name, zone.passes, zone.begun, zone.cells, zone.covered)
+        for zone in mission.zone_progress()
+    )
+
+
+def _unreached(mission: Mission | None) -> UnreachedReport:
+    if mission is None or mission.lattice is None:
+        return UnreachedReport()
+    found, cell_m = mission.unreached(), mission.lattice.cell_m
+    areas = tuple(
+        UnreachedArea(
+            area.cells,
+            round(area.cells * cell_m**2, 3),
+            *_centre(area.cell, cell_m),
+            reason=area.reason,
+        )
+        for area in found.areas
+    )
+    m2 = round(found.cells * cell_m**2, 3)
+    return UnreachedReport(found.cells, m2, areas, found.areas_left_out)
+
+
+def _centre(cell: tuple[int, int], cell_m: float) -> tuple[float, float]:
+    row, col = cell
+    return round((col + 0.5) * cell_m, 3), round((row + 0.5) * cell_m, 3)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import partial
 
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.daemon.loop.batch import PlanSnapshot
+from fasaco_edge.daemon.loop.inbox import PlanSnapshot
 from fasaco_edge.errors import PlanFailed
 from fasaco_edge.mission.core.events import PlanBroken, PlanReady, PlanRequest
 from fasaco_edge.planners.planner import (

@@ -19,8 +19,7 @@ from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
-from fasaco_edge.host.processes import resident_mb, return_soon
-from fasaco_edge.host.signals import stop_event
+from fasaco_edge.host.processes import resident_mb, return_soon, stop_event
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.recording.scene.blueprint import build_blueprint
