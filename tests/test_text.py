@@ -14,9 +14,9 @@ from fasaco_edge.text import MOST, Html, element, html, json_line, lines, one_li
 SEEN = {0x600, 0x601, 0x602, 0x603, 0x604, 0x605, 0x6DD, 0x70F, 0x890, 0x891, 0x8E2}
 SEEN |= {0x110BD, 0x110CD} | set(range(0x13430, 0x13440))
 HIDDEN = [
-    chr(code)
-    for code in range(0x110000)
-    if unicodedata.category(chr(code)) in ("Cc", "Cf", "Cs", "Zl", "Zp") and code not in SEEN
+    mark
+    for mark in map(chr, range(0x110000))
+    if unicodedata.category(mark) in ("Cc", "Cf", "Cs", "Zl", "Zp") and ord(mark) not in SEEN
 ]
 
 
