@@ -73,8 +73,16 @@ class Installation:
 
     def __init__(self, root: Path, cache: Path) -> None:
         self.root, self.cache = root, cache
-        self.package = package_in(root)
-        (self.package / "seven.py").write_text(KERNELS)
+        self.package = root / "fasaco_edge" / "kernels"
+        if not root.exists():
+            package_in(root)
+            (self.package / "seven.py").write_text(KERNELS)
+
+    def copy_to(self, folder: Path) -> Installation:
+        """Return a copy of it, and of its cache as it is, in another folder."""
+        for place in (self.root, self.cache):
+            shutil.copytree(place, folder / place.name)
+        return Installation(folder / self.root.name, folder / self.cache.name)
 
     def tell(self, code: str = "seven.tell()", **process) -> Told:
         """Run both kernels, and tell what came of it."""

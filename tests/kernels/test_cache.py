@@ -12,14 +12,9 @@ import pytest
 
 from fasaco_edge.kernels import cache
 from tests.kernels.harm import NOBODY, needs_root
-from tests.kernels.installations import ALL_LOADED, Installation, told_by
+from tests.kernels.installations import ALL_LOADED, told_by
 
 HOMES = ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR", "RUNTIME_DIRECTORY")
-
-
-@pytest.fixture
-def installed(tmp_path):
-    return Installation(tmp_path / "root", tmp_path / "cache")
 
 
 @pytest.fixture
@@ -171,11 +166,10 @@ OF_OTHERS = {
         *(pytest.param(harm, id=name, marks=needs_root) for name, harm in OF_OTHERS.items()),
     ],
 )
-def test_a_folder_that_others_could_have_filled_is_never_used(installed, tmp, harm):
+def test_a_folder_that_others_could_have_filled_is_never_used(compiled, tmp, harm):
     """A cache is code: what lies in a folder somebody else may write to is not to be run."""
-    installed.tell()
-    harm(installed.folder)
-    told = installed.tell()
+    harm(compiled.folder)
+    told = compiled.tell()
     assert (told.loaded, told.compiled) == (0, 2)
     assert Path(told.folder).parent == tmp
     (warning,) = told.warnings
@@ -278,17 +272,16 @@ print(__import__("json").dumps(["", "", *[0, 0], seven.said, None]))
 
 
 @needs_mounts
-def test_a_folder_that_cannot_be_written_is_read(installed, tmp):
-    installed.tell()
-    bound = f"mount --bind {installed.cache} {installed.cache}"
-    read_only = mounted(f"{bound}; mount -o remount,ro,bind {installed.cache}")
-    told = installed.tell(words=read_only)
+def test_a_folder_that_cannot_be_written_is_read(compiled, tmp):
+    bound = f"mount --bind {compiled.cache} {compiled.cache}"
+    read_only = mounted(f"{bound}; mount -o remount,ro,bind {compiled.cache}")
+    told = compiled.tell(words=read_only)
     assert (told.missing, told.loaded, told.compiled, told.warnings) == ("", *ALL_LOADED)
-    assert told.folder == str(installed.folder)
-    next(installed.folder.glob("*.kernel")).unlink()
-    told = installed.tell(words=read_only)
+    assert told.folder == str(compiled.folder)
+    next(compiled.folder.glob("*.kernel")).unlink()
+    told = compiled.tell(words=read_only)
     assert (told.loaded, told.compiled) == (0, 2)
     assert Path(told.folder).parent == tmp
     assert told.warnings == [
-        f"{installed.folder} cannot be written: compiled kernels are kept in {told.folder}"
+        f"{compiled.folder} cannot be written: compiled kernels are kept in {told.folder}"
     ]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge.kernels import cache
-from tests.kernels.installations import ALL_LOADED, Installation, package_in
+from tests.kernels.installations import ALL_LOADED, package_in
 from tests.support.processes import ENVIRONMENT
 
 ROOT = Path(__file__).parents[2]
@@ -74,11 +74,6 @@ def test_other_compilers_have_a_folder_of_their_own():
         assert len({now, one, cache.code_digest(versions.__getitem__)}) == 3
 
 
-@pytest.fixture
-def installed(tmp_path):
-    return Installation(tmp_path / "root", tmp_path / "cache")
-
-
 def test_what_is_said_to_be_there_is_loaded(installed):
     first = installed.tell()
     assert first.missing == "they were never all compiled for this version"
@@ -88,48 +83,44 @@ def test_what_is_said_to_be_there_is_loaded(installed):
     assert (again.loaded, again.compiled, again.warnings) == ALL_LOADED
 
 
-def test_code_of_another_processor_is_not_run(installed):
+def test_code_of_another_processor_is_not_run(compiled):
     """As in a folder that was copied from another robot."""
-    installed.tell()
-    told = installed.tell(env={"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""})
+    told = compiled.tell(env={"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""})
     assert told.missing.startswith("they were compiled for another processor")
     assert (told.loaded, told.compiled) == (0, 2)
     # Both are kept from then on.
     for env in ({}, {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}):
-        told = installed.tell(env=env)
+        told = compiled.tell(env=env)
         assert told.missing == ""
         assert (told.loaded, told.compiled, told.warnings) == ALL_LOADED
 
 
-def test_an_installation_elsewhere_has_the_code_of_the_same_sources(installed, tmp_path):
-    installed.tell()
-    shutil.move(installed.root, tmp_path / "moved")
-    installed.root = tmp_path / "moved"
-    told = installed.tell()
+def test_an_installation_elsewhere_has_the_code_of_the_same_sources(compiled, tmp_path):
+    shutil.move(compiled.root, tmp_path / "moved")
+    compiled.root = tmp_path / "moved"
+    told = compiled.tell()
     assert told.missing == ""
     assert (told.loaded, told.compiled, told.warnings) == ALL_LOADED
 
 
-def test_more_code_than_was_noted_is_no_change(installed):
+def test_more_code_than_was_noted_is_no_change(compiled):
     """Another process compiles for other types: what was there is there."""
-    installed.tell()
-    more = installed.tell("seven.tell(1.5, note=False)")
+    more = compiled.tell("seven.tell(1.5, note=False)")
     assert (more.missing, more.loaded, more.compiled) == ("", 0, 2)
-    assert installed.tell().missing == ""
-    again = installed.tell("seven.tell(1.5, note=False)")
+    assert compiled.tell().missing == ""
+    again = compiled.tell("seven.tell(1.5, note=False)")
     assert (again.missing, again.loaded, again.compiled) == ("", 1, 0)
 
 
-def test_code_for_other_types_under_the_same_name_is_not_run(installed):
+def test_code_for_other_types_under_the_same_name_is_not_run(compiled):
     """Should the digest in a file's name ever meet another one's."""
-    for number in ("1", "1.5"):
-        installed.tell(f"seven.tell({number})")
-    of_eight = sorted(installed.folder.glob("seven.eight-*.kernel"))
+    compiled.tell("seven.tell(1.5)")
+    of_eight = sorted(compiled.folder.glob("seven.eight-*.kernel"))
     assert len(of_eight) == 2
     one, other = (file.read_bytes() for file in of_eight)
     of_eight[0].write_bytes(other)
     of_eight[1].write_bytes(one)
-    told = installed.tell()
+    told = compiled.tell()
     assert (told.loaded, told.compiled, told.warnings) == (1, 1, [])
 
 

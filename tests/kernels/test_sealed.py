@@ -18,7 +18,7 @@ from tests.kernels.harm import (
     mark_of,
     needs_root,
 )
-from tests.kernels.installations import ALL_LOADED, Installation, fill_with
+from tests.kernels.installations import ALL_LOADED, fill_with
 
 POSSIBLE = HARMS | MISDEEDS | (TAKEN if os.geteuid() == 0 else {})
 ALL = [
@@ -108,9 +108,8 @@ def test_what_a_killed_process_has_begun_is_cleared_away(tmp_path):
     assert list(note.parent.glob("*.partial-*")) == [living]
 
 
-def test_a_process_compiles_again_what_is_harmed_and_says_so_once(tmp_path):
+def test_a_process_compiles_again_what_is_harmed_and_says_so_once(installed):
     """Each harm to one kernel of many: none is run, nothing ends, the next start finds all."""
-    installed = Installation(tmp_path / "root", tmp_path / "cache")
     more = "\n@jit.kernel\ndef k{0}(x):\n    return x + {0}\n"
     with (installed.package / "seven.py").open("a") as file:
         file.writelines(more.format(number) for number in range(len(POSSIBLE)))
@@ -134,13 +133,11 @@ def test_a_process_compiles_again_what_is_harmed_and_says_so_once(tmp_path):
     assert again.warnings == []
 
 
-def test_a_cache_of_which_nothing_is_left_whole_is_compiled_again(tmp_path):
-    installed = Installation(tmp_path / "root", tmp_path / "cache")
-    installed.tell()
-    for file in kernel_files(installed.cache):
+def test_a_cache_of_which_nothing_is_left_whole_is_compiled_again(compiled):
+    for file in kernel_files(compiled.cache):
         cut(0)(file)
-    told = installed.tell()
+    told = compiled.tell()
     assert told.missing == "the list of them is empty"
     assert (told.loaded, told.compiled, len(told.warnings)) == (0, 2, 1)
-    again = installed.tell()
+    again = compiled.tell()
     assert (again.missing, again.loaded, again.compiled, again.warnings) == ("", *ALL_LOADED)
