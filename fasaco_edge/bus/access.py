@@ -16,12 +16,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
+from msgspec import Meta
+
+from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_JSON_BYTES
 from fasaco_edge.wire.topics import QUERIES, RPC_NAMES, TOPICS, Query, Topic
 
 SPEAK = ("put", "reply", "declare_queryable", "liveliness_token")
 LISTEN = ("declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query")
+
+# Beside its cells a map holds some numbers and the name of a frame, a path's attachment less still.
+HEADER_BYTES = 1024
+# The largest pose is a nav_msgs/Odometry with two covariances and two names.
+POSE_BYTES = 4096
+JSON_BYTES = MAX_JSON_BYTES + HEADER_BYTES
+Hertz = Annotated[float, Meta(gt=0, le=10_000)]
 
 Entry = Topic | Query
 ENTRIES: tuple[Entry, ...] = (*TOPICS, *QUERIES)
@@ -95,20 +106,17 @@ class Grant:
         return f"{self.role} of {self.of}" if self.of else self.role
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
+class Limits(msgspec.Struct, frozen=True):
     """Largest size [bytes] and rate [1/s] of what each sender may send.
 
     Zenoh drops what is larger; of what is more frequent it passes the first of each period and
     drops the others. Map updates have no rate: a lost one would spoil the map unnoticed.
     """
 
-    map_bytes: int
-    pose_bytes: int
-    json_bytes: int
-    maps_hz: float
-    poses_hz: float
-    queries_hz: float
+    map_bytes: Annotated[int, Meta(ge=HEADER_BYTES)] = MAX_GRID_CELLS + HEADER_BYTES
+    maps_hz: Hertz = 100.0
+    poses_hz: Hertz = 200.0
+    queries_hz: Hertz = 100.0
 
 
 def access_control(grants: Sequence[Grant], attribute: str) -> dict[str, Any]:
@@ -147,9 +155,9 @@ def limits(prefix: str, most: Limits) -> dict[str, Any]:
     answered = [topic.suffix for topic in TOPICS if topic.name in RPC_NAMES]
     sizes = (
         ("grids and paths", published, classes["large"], most.map_bytes),
-        ("poses", published, classes["pose"], most.pose_bytes),
-        ("JSON", published, classes["json"], most.json_bytes),
-        ("queries", ["query"], EVERYTHING, most.json_bytes),
+        ("poses", published, classes["pose"], POSE_BYTES),
+        ("JSON", published, classes["json"], JSON_BYTES),
+        ("queries", ["query"], EVERYTHING, JSON_BYTES),
     )
     queries = (*answered, *(query.suffix for query in QUERIES))
     rates = (

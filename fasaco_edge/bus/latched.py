@@ -18,16 +18,15 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import zenoh
+
+from fasaco_edge.bus.queries import ask_for_tokens
 
 # Period of queries to a publisher for a lost last sample [s].
 ASK_PERIOD_S = 1.0
 # Timeout of an answer [s]: a large map on a slow link takes long. No query is repeated meanwhile.
 ANSWER_S = 10.0
-# Timeout of a query for tokens, which routers answer [s].
-TOKENS_S = 2.0
 # Most tokens that are looked at.
 MOST_TOKENS = 1024
 # Most publishers of a key that are queried; what others publish is received all the same.
@@ -174,24 +173,12 @@ class LatchedSubscription(Subscription):
             if now < self._look_at or self._is_looking:
                 return
             self._look_at, self._is_looking = now + ASK_PERIOD_S, True
-        found, wrong = dict[str, str](), list[zenoh.Reply]()
-
-        def take(reply: zenoh.Reply) -> None:
-            if reply.ok is None:
-                wrong.append(reply)
-            elif len(found) < MOST_TOKENS:
-                key = str(reply.ok.key_expr)
-                found["/".join(key.rpartition("/@adv/pub/")[2].split("/")[:2])] = key
-
-        answered: Any = zenoh.handlers.Callback
-        end = answered(take, lambda: self._see(found, is_whole=not wrong), indirect=False)
-        try:
-            self._session.liveliness().get(self._tokens, end, timeout=TOKENS_S)
-        except zenoh.ZError:  # a session that ends
+        if not ask_for_tokens(self._session, self._tokens, MOST_TOKENS, self._see):
             self._is_looking = False
 
-    def _see(self, found: dict[str, str], *, is_whole: bool) -> None:
+    def _see(self, tokens: list[str], is_whole: bool) -> None:
         """Take account of who is there, and of who is gone if all were told."""
+        found = {"/".join(key.rpartition("/@adv/pub/")[2].split("/")[:2]): key for key in tokens}
         with self._lock:
             self._is_looking = False
             for name in [name for name in self._there if is_whole and name not in found]:

@@ -67,10 +67,6 @@ class Queue:
     size: float = math.inf
 
 
-def _no_size(_: object) -> int:
-    return 0
-
-
 class Mailbox(Generic[Item]):
     """Collects items of several kinds until the loop takes them all.
 
@@ -82,7 +78,7 @@ class Mailbox(Generic[Item]):
         self,
         queued: Mapping[str, Queue],
         spacing: Spacing | None = None,
-        size_of: Callable[[Item], int] = _no_size,
+        size_of: Callable[[Item], int] = lambda _: 0,
     ) -> None:
         self._changed = threading.Condition()
         self._newest: dict[str, Item] = {}

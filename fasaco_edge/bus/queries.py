@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,8 +20,33 @@ from fasaco_edge.bus.publisher import encoding_of, schema_of
 
 # Of a flood of tokens no more are remembered.
 MOST_TOKENS = 16_384
-# So long an answer may take [s]; one that does not come in time changes nothing.
+# So long routers may take to answer [s]; what does not come in time changes nothing.
 ANSWER_S = 2.0
+
+
+def ask_for_tokens(
+    session: zenoh.Session, key: str, most: int, end: Callable[[list[str], bool], None]
+) -> bool:
+    """Ask for the tokens that match a key; return whether the session, which may end, could ask.
+
+    ``end`` is called with their keys, ``most`` at most, and whether all answers were good, on a
+    Zenoh thread, within ``ANSWER_S``.
+    """
+    found, wrong = dict[str, None](), list[zenoh.Reply]()
+
+    def take(reply: zenoh.Reply) -> None:
+        if reply.ok is None:
+            wrong.append(reply)
+        elif len(found) < most:
+            found[str(reply.ok.key_expr)] = None
+
+    answered: Any = zenoh.handlers.Callback
+    handler = answered(take, lambda: end(list(found), not wrong), indirect=False)
+    try:
+        session.liveliness().get(key, handler, timeout=ANSWER_S)
+    except zenoh.ZError:
+        return False
+    return True
 
 
 class Roll:
@@ -51,20 +76,9 @@ class Roll:
             if self._is_asking or now - self._asked_at < period_s:
                 return
             self._is_asking, self._asked_at = True, now
-        found, wrong = set[str](), list[zenoh.Reply]()
+        ask_for_tokens(self._session, self._key, MOST_TOKENS, self._take)
 
-        def take(reply: zenoh.Reply) -> None:
-            if reply.ok is None:
-                wrong.append(reply)
-            elif len(found) < MOST_TOKENS:
-                found.add(str(reply.ok.key_expr))
-
-        answered: Any = zenoh.handlers.Callback
-        end = answered(take, lambda: self._take(found, is_whole=not wrong), indirect=False)
-        with contextlib.suppress(zenoh.ZError):  # a session that ends
-            self._session.liveliness().get(self._key, end, timeout=ANSWER_S)
-
-    def _take(self, found: set[str], *, is_whole: bool) -> None:
+    def _take(self, found: list[str], is_whole: bool) -> None:
         with self._lock:
             self._is_asking = False
             # The first counts as it is: to wait for one that is frozen may take for ever.

@@ -320,13 +320,8 @@ def open_bus(settings: BusSettings) -> Bus:
         if not taken or settings.secured:
             raise BusUnavailable(_first_line(error)) from error
     # Another process listens there: connect to it as a client.
-    joining = replace(
-        settings, mode="client", connect=settings.connect + settings.listen, listen=()
-    )
-    try:
-        return Bus(zenoh.open(_config(joining)))
-    except zenoh.ZError as error:
-        raise BusUnavailable(_first_line(error)) from error
+    connect = settings.connect + settings.listen
+    return open_bus(replace(settings, mode="client", connect=connect, listen=()))
 
 
 def check_settings(settings: BusSettings) -> None:

@@ -127,8 +127,13 @@ def config_of_options(args: argparse.Namespace) -> DaemonConfig:
     """Return the configuration that the options state; the bus is in ``client_settings``."""
     import msgspec
 
-    from fasaco_edge.config.config import BusConfig, DaemonConfig, PoseConfig, RobotConfig
-    from fasaco_edge.config.sections import RecordingConfig
+    from fasaco_edge.config.config import (
+        BusConfig,
+        DaemonConfig,
+        PoseConfig,
+        RecordingConfig,
+        RobotConfig,
+    )
 
     return DaemonConfig(
         robot=RobotConfig(name=args.robot),

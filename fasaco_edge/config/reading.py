@@ -1,4 +1,4 @@
-"""Reading a configuration: YAML with the line of each key, and all faults of a document."""
+"""Reading of configurations: sections, YAML with the line of each key, all faults of a document."""
 
 from __future__ import annotations
 
@@ -14,12 +14,15 @@ from typing import Any, Literal, get_args, get_origin
 import msgspec
 import yaml
 
-from fasaco_edge.config.sections import Section
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.plain_yaml import PlainYamlError, compose, read_bounded
 from fasaco_edge.text import shown
 
 FOLDER = "CREDENTIALS_DIRECTORY"
+
+
+class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A section of a configuration, in which unknown keys are errors."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from fasaco_edge.bus.access import Role, ros_rights
-from fasaco_edge.config.sections import Section
+from fasaco_edge.config.reading import Section
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
 from fasaco_edge.wire.ros_keys import RosTopic, graph_key

@@ -18,10 +18,9 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.bus import access
-from fasaco_edge.config.sections import Section
+from fasaco_edge.config.reading import Section
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate, OpenToEveryone
 from fasaco_edge.host.plain_yaml import load, read_bounded
-from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_JSON_BYTES
 
 LOG = logging.getLogger(__name__)
 
@@ -75,13 +74,8 @@ def from_here(endpoint: str) -> str:
     return endpoint.replace(f"/{shown}:", "/localhost:", 1)
 
 
-# Beside its cells a map holds some numbers and the name of a frame, a path's attachment less still.
-HEADER_BYTES = 1024
-# The largest pose is a nav_msgs/Odometry with two covariances and two names.
-POSE_BYTES = 4096
 ATTRIBUTES = {"tls": "cert_common_names", "user": "usernames"}
 
-Hertz = Annotated[float, Meta(gt=0, le=10_000)]
 Name = Annotated[str, Meta(min_length=1)]
 
 
@@ -115,13 +109,8 @@ class RolesConfig(Section, frozen=True):
     router: tuple[Name, ...] = ()
 
 
-class LimitsConfig(Section, frozen=True):
-    """Limits on each sender [bytes, 1/s]; see ``bus.access.Limits``."""
-
-    map_bytes: Annotated[int, Meta(ge=HEADER_BYTES)] = MAX_GRID_CELLS + HEADER_BYTES
-    maps_hz: Hertz = 100.0
-    poses_hz: Hertz = 200.0
-    queries_hz: Hertz = 100.0
+class LimitsConfig(Section, access.Limits, frozen=True):
+    """Limits on each sender."""
 
 
 class SecurityConfig(Section, frozen=True):
@@ -214,18 +203,7 @@ class SecurityConfig(Section, frozen=True):
 
     def thinned(self, prefix: str) -> dict[str, Any]:
         """Return the limits, as a part of Zenoh's configuration."""
-        most = self.limits
-        return access.limits(
-            prefix,
-            access.Limits(
-                map_bytes=most.map_bytes,
-                pose_bytes=POSE_BYTES,
-                json_bytes=MAX_JSON_BYTES + HEADER_BYTES,
-                maps_hz=most.maps_hz,
-                poses_hz=most.poses_hz,
-                queries_hz=most.queries_hz,
-            ),
-        )
+        return access.limits(prefix, self.limits)
 
 
 def files(security: SecurityConfig) -> Iterator[tuple[str, str]]:

@@ -133,13 +133,13 @@ class Claim:
             self.state, self._calm_s = ClaimState.PLANS, SETTLE_S
 
 
-class NameClaim:
+class NameClaim(Claim):
     """The claim of this daemon, and its token on the bus."""
 
     def __init__(self, bus: Bus, keys: Keys) -> None:
+        super().__init__(bus.id)
         self._bus = bus
         self._keys = keys
-        self._claim = Claim(bus.id)
         self._roll = bus.roll(keys.of(topics.CLAIM))
         self._token = bus.token(keys.claim(bus.id, ClaimState.WAITS))
         self._others: dict[str, ClaimState] = {}
@@ -147,36 +147,22 @@ class NameClaim:
         self._is_settled = False
         self._was_waiting = False
 
-    @property
-    def state(self) -> ClaimState:
-        """What this daemon does."""
-        return self._claim.state
-
     def report(self) -> ClaimReport:
         """Return this part of the status."""
-        return ClaimReport(self._bus.id, str(self._claim.state))
+        return ClaimReport(self._bus.id, str(self.state))
 
     @property
     def reason(self) -> str:
         """Why it waits."""
-        return f"another daemon of this name plans: Zenoh id {self._claim.rival}"
-
-    @property
-    def rival_yielded(self) -> bool:
-        """See ``Claim.rival_yielded``."""
-        return self._claim.rival_yielded
-
-    def is_uncertain(self, now: float) -> bool:
-        """See ``Claim.is_uncertain``."""
-        return self._claim.is_uncertain(now)
+        return f"another daemon of this name plans: Zenoh id {self.rival}"
 
     def update(self, now: float) -> bool:
         """Look for the others; tell whether the state of this daemon has changed.
 
         The token follows with ``announce``, once the former path is withdrawn.
         """
-        before = self._claim.state
-        is_settled = self._is_settled and not self._claim.is_uncertain(now)
+        before = self.state
+        is_settled = self._is_settled and not self.is_uncertain(now)
         self._roll.ask(ASK_PERIOD_S if is_settled else 0.0)
         if not self._roll.version:
             return False
@@ -185,15 +171,15 @@ class NameClaim:
             self._others = claims_in(self._roll.there())
             self._others.pop(self._bus.id, None)
             # Where nobody plans, somebody soon will.
-            self._is_settled = ClaimState.PLANS in (self._claim.state, *self._others.values())
-        self._claim.decide(self._others, now, in_touch=self._bus.is_in_touch())
-        if self._claim.rival_yielded:
+            self._is_settled = ClaimState.PLANS in (self.state, *self._others.values())
+        self.decide(self._others, now, in_touch=self._bus.is_in_touch())
+        if self.rival_yielded:
             LOG.warning("another daemon of this name planned, too, and has yielded to this one")
-        return self._claim.state is not before
+        return self.state is not before
 
     def announce(self) -> None:
         """Show the state by the token, and log it once."""
-        state, before = self._claim.state, self._token
+        state, before = self.state, self._token
         if self._was_waiting is not state.is_waiting:
             self._was_waiting = state.is_waiting
             self._bus.let_others_answer(state.is_waiting)
@@ -201,8 +187,8 @@ class NameClaim:
         self._bus.withdraw(before)
         if state.is_waiting:
             LOG.warning("%s; this one waits", self.reason, extra={"event": "name_taken"})
-        elif self._claim.rival:
-            LOG.warning("%s is gone: this daemon plans", self._claim.rival)
+        elif self.rival:
+            LOG.warning("%s is gone: this daemon plans", self.rival)
 
 
 def claims_in(keys: Iterable[str]) -> dict[str, ClaimState]:

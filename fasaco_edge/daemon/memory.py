@@ -30,9 +30,9 @@ from pathlib import Path
 
 from msgspec import structs
 
+from fasaco_edge.bus.access import HEADER_BYTES
 from fasaco_edge.bus.mailbox import Queue
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.config.security import HEADER_BYTES
 from fasaco_edge.wire.limits import MAX_POSE_BYTES
 from fasaco_edge.wire.topics import QUEUE_LENGTHS
 

@@ -6,6 +6,7 @@ import os
 import stat
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from fasaco_edge.doctor.finding import CheckContext, Finding, Level, fail, ok, warn, worst
@@ -20,12 +21,11 @@ def disk(context: CheckContext) -> Finding:
     """Check the free space where the daemon writes."""
     least_mb = LEAST_MB | {"recordings": float(context.config.recording.least_free_mb)}
     rooms = [_room(name, folder, least_mb[name]) for name, folder in _folders(context).items()]
-    level = worst([room.level for room in rooms])
-    bad = next((room for room in rooms if room.level is level), rooms[0])
+    bad = worst(rooms)
     details = tuple(room.found for room in rooms)
-    if level is Level.OK:
+    if bad.level is Level.OK:
         return ok("there is space in each folder", details)
-    return Finding(level, bad.found, bad.to_do, details)
+    return replace(bad, details=details)
 
 
 def _folders(context: CheckContext) -> dict[str, Path]:
@@ -62,9 +62,8 @@ def permissions(context: CheckContext) -> Finding:
     faults = [*_config_faults(context), *_state_faults(context)]
     if not faults:
         return ok("others may neither change the configuration nor the state")
-    first = max(faults, key=lambda fault: list(Level).index(fault.level))
-    details = tuple(fault.found for fault in faults if fault is not first)
-    return Finding(first.level, first.found, first.to_do, details)
+    first = worst(faults)
+    return replace(first, details=tuple(fault.found for fault in faults if fault is not first))
 
 
 def _config_faults(context: CheckContext) -> list[Finding]:

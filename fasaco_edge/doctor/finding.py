@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import subprocess
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -156,6 +156,6 @@ def fail(found: str, to_do: str, details: Iterable[str] = ()) -> Finding:
     return Finding(Level.FAIL, found, to_do, tuple(details))
 
 
-def worst(levels: list[Level]) -> Level:
-    """Return the worst level, ok for none."""
-    return max(levels, key=list(Level).index, default=Level.OK)
+def worst(findings: Sequence[Finding]) -> Finding:
+    """Return the first finding of the worst level."""
+    return max(findings, key=lambda finding: list(Level).index(finding.level))

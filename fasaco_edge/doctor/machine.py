@@ -32,7 +32,7 @@ def system(context: CheckContext) -> Finding:
     cores = len(os.sched_getaffinity(0))
     python = platform.python_version()
     found = f"{_model(context.root) or machine}, {cores} cores; Python {python}"
-    name = _os_name(context.root) or "Linux"
+    name = _field(context.root / "etc/os-release", "PRETTY_NAME=").strip('"') or "Linux"
     details = [
         f"{name}, kernel {platform.release()}, {machine}, {bits} bits; {_features(context.root)}"
     ]
@@ -98,15 +98,8 @@ def kernel_clock() -> tuple[bool, float] | None:
 
 def _model(root: Path) -> str:
     """Return what the computer is called: a board by its name, a PC by its processor's."""
-    try:
-        board = (root / "proc/device-tree/model").read_text(encoding="utf-8")
-        return board.rstrip("\0\n")
-    except OSError:
-        return _cpuinfo(root, "model name")
-
-
-def _os_name(root: Path) -> str:
-    return _field(root / "etc/os-release", "PRETTY_NAME=").strip('"')
+    board = _read(root / "proc/device-tree/model").rstrip("\0\n")
+    return board or _cpuinfo(root, "model name")
 
 
 def _features(root: Path) -> str:
@@ -121,10 +114,7 @@ def _cpuinfo(root: Path, name: str) -> str:
 
 def _field(file: Path, before: str) -> str:
     """Return what follows in the first line that begins so; "" where there is none."""
-    try:
-        match = re.search(f"^{before}(.*)$", file.read_text(encoding="utf-8"), re.MULTILINE)
-    except OSError:
-        return ""
+    match = re.search(f"^{before}(.*)$", _read(file), re.MULTILINE)
     return match[1].strip() if match else ""
 
 
@@ -205,8 +195,8 @@ def _how_to_enable(root: Path) -> str:
 
 
 def _meminfo_mb(root: Path, name: str) -> float:
-    match = re.search(rf"^Mem{name}:\s+(\d+) kB", _read(root / "proc/meminfo"), re.MULTILINE)
-    return int(match[1]) * 1024 / 1e6 if match else 0.0
+    kilobytes = _field(root / "proc/meminfo", rf"Mem{name}:\s+").partition(" ")[0]
+    return int(kilobytes or 0) * 1024 / 1e6
 
 
 def _read(file: Path) -> str:

@@ -11,7 +11,7 @@ from fasaco_edge.config.certificates import read_certificate
 from fasaco_edge.config.config import BusConfig
 from fasaco_edge.config.security import UNIX, is_local, protocol_of
 from fasaco_edge.daemon.loop.inbox import MAP_SPACING_S
-from fasaco_edge.doctor.finding import CheckContext, Finding, Level, fail, ok, warn, worst
+from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
 
 SHOWS = {
@@ -132,20 +132,20 @@ def secret_files(context: CheckContext) -> Finding:
         return ok("there are none")
     section = getattr(security, security.kind)
     paths = [Path(file) for name in SECRETS[security.kind] if (file := getattr(section, name))]
-    levels, details = [], []
+    modes, details = 0, []
     for path in paths:
         try:
             mode = path.stat().st_mode
         except OSError as error:
             return fail(f"{path}: {error.strerror}", HOW_TO)
-        levels.append(_level(mode))
+        modes |= mode
         details.append(f"{path}: {stat.filemode(mode)}")
-    level = worst(levels)
-    if level is Level.OK:
-        return ok("read by their owner alone", details)
-    whom = "everybody on this computer" if level is Level.FAIL else "their group"
     command = "chmod 600 " + " ".join(map(str, paths))
-    return Finding(level, f"can be read by {whom}", command, tuple(details))
+    if modes & (stat.S_IROTH | stat.S_IWOTH):
+        return fail("can be read by everybody on this computer", command, details)
+    if modes & (stat.S_IRGRP | stat.S_IWGRP):
+        return warn("can be read by their group", command, details)
+    return ok("read by their owner alone", details)
 
 
 def _login(bus: BusConfig) -> Finding:
@@ -173,9 +173,3 @@ def _recording(bus: BusConfig, name: str) -> str:
         return "a recorder that it starts itself (--record) may receive everything"
     where = "bus.security.roles.recorder" if bus.listen else "the recorders of the router"
     return f"to record with --record, add {name!r} to {where}"
-
-
-def _level(mode: int) -> Level:
-    if mode & (stat.S_IROTH | stat.S_IWOTH):
-        return Level.FAIL
-    return Level.WARN if mode & (stat.S_IRGRP | stat.S_IWGRP) else Level.OK

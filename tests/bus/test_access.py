@@ -15,7 +15,7 @@ README = (folder("protocol") / "README.md").read_text()
 PREFIX = "fasaco/@v1/robot"
 TABLE = yaml.safe_load((folder("protocol") / "keys.yaml").read_text())
 KEYS, QUERIES = TABLE["keys"], TABLE["queries"]
-MOST = access.Limits(64_001_024, 4096, 1_049_600, 20.0, 200.0, 20.0)
+MOST = access.Limits(64_001_024, 20.0, 200.0, 20.0)
 
 
 def granted(control, role, message, flow):

@@ -14,9 +14,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.config.config import DaemonConfig, decode_config, load_config
+from fasaco_edge.config.config import DaemonConfig, MissionSettings, decode_config, load_config
 from fasaco_edge.config.ros import RosConfig, RosFrames
-from fasaco_edge.config.sections import MissionSettings
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.recording.write.quota import Quota, budget_of

@@ -14,6 +14,7 @@ import fcntl
 import os
 import re
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,6 +47,7 @@ class LedgerFile:
         self.path = folder / f"{robot}.ledger"
         self._new = folder / f"{robot}.ledger.new"
         self._previous = folder / f"{robot}.ledger.previous"
+        self._generations = (self._new, self.path, self._previous)
         self._lock: int | None = None
         self._exclusive = False
         # Files to be renamed before anything is written; why is in their new names.
@@ -70,22 +72,27 @@ class LedgerFile:
         Args:
             cell_m: edge of the cells it has to have [m].
         """
-        broken: list[tuple[Path, FasacoError]] = []
-        for path in (self._new, self.path, self._previous):
+        broken: dict[Path, str] = {}
+        for path in self._generations:
             try:
                 ledger = decode_ledger(_read(path), cell_m)
             except (FileNotFoundError, NotADirectoryError):
                 continue
             except LedgerMismatchError as error:
-                return LoadedLedger(fault=self._refused(error))
+                fault = self._after_aside(error, self._generations, "mismatch")
+                return LoadedLedger(fault=fault)
             except (OSError, LedgerFileError) as error:
                 # A write that was cut short is no fault: what was there before still is.
                 if path != self._new:
-                    broken.append((path, LedgerFileError(reason_of(error))))
+                    broken[path] = reason_of(error)
                 continue
-            return self._taken(path, ledger, broken)
+            return LoadedLedger(ledger, self._taken(path, broken))
         if broken:
-            return LoadedLedger(fault=self._lost(broken))
+            lost = LedgerFileError(
+                f"no ledger could be read ({_reasons(broken)}): begun anew",
+                hint="everything is to be covered again; check the disk",
+            )
+            return LoadedLedger(fault=self._after_aside(lost, broken, "broken"))
         # What appears later, on a disk that is mounted late, was not read: not overwritten either.
         self._unwanted = [(path, "unread") for path in (self.path, self._previous)]
         return LoadedLedger()
@@ -125,7 +132,7 @@ class LedgerFile:
         Raises:
             OSError: it could not be renamed yet; that is done before the next write.
         """
-        self._unwanted = [(path, why) for path in (self._new, self.path, self._previous)]
+        self._unwanted = [(path, why) for path in self._generations]
         return self._rename_unwanted()
 
     def _take_lock(self) -> None:
@@ -144,39 +151,24 @@ class LedgerFile:
             pass  # there are no locks on this disk
         self._lock = lock
 
-    def _taken(
-        self, path: Path, ledger: LedgerSnapshot, broken: list[tuple[Path, FasacoError]]
-    ) -> LoadedLedger:
-        self._moving = path == self._new
-        try:
-            if self._moving:
+    def _taken(self, path: Path, broken: dict[Path, str]) -> FasacoError | None:
+        """Make the ledger that was read the newest; return what was wrong before."""
+        if path == self._new:
+            self._moving = True
+            try:
                 self._move_on()
-        except OSError as error:
-            return LoadedLedger(
-                ledger, LedgerFileError(f"cannot write {self.path}: {reason_of(error)}")
-            )
-        if path in (self.path, self._new):
-            return LoadedLedger(ledger)
-        why = "; ".join(f"{bad.name}: {error}" for bad, error in broken) or f"no {self.path.name}"
+            except OSError as error:
+                return LedgerFileError(f"cannot write {self.path}: {reason_of(error)}")
+        if path != self._previous:
+            return None
         fault = LedgerFileError(
-            f"gone on from the ledger before the newest ({why})",
+            f"gone on from the ledger before the newest "
+            f"({_reasons(broken) or f'no {self.path.name}'})",
             hint="the last second or two before the end may be lost; check the disk",
         )
-        return LoadedLedger(ledger, self._after_aside(fault, [bad for bad, _ in broken], "broken"))
+        return self._after_aside(fault, broken, "broken")
 
-    def _refused(self, error: LedgerMismatchError) -> FasacoError:
-        everything = [self._new, self.path, self._previous]
-        return self._after_aside(error, everything, "mismatch")
-
-    def _lost(self, broken: list[tuple[Path, FasacoError]]) -> FasacoError:
-        why = "; ".join(f"{bad.name}: {error}" for bad, error in broken)
-        fault = LedgerFileError(
-            f"no ledger could be read ({why}): begun anew",
-            hint="everything is to be covered again; check the disk",
-        )
-        return self._after_aside(fault, [bad for bad, _ in broken], "broken")
-
-    def _after_aside(self, fault: FasacoError, paths: list[Path], why: str) -> FasacoError:
+    def _after_aside(self, fault: FasacoError, paths: Iterable[Path], why: str) -> FasacoError:
         """Return ``fault`` with where the files were kept."""
         self._unwanted = [(path, why) for path in paths]
         try:
@@ -215,6 +207,10 @@ class LedgerFile:
         os.replace(self._new, self.path)
         self._moving = False
         sync_folder(self.path.parent)
+
+
+def _reasons(broken: dict[Path, str]) -> str:
+    return "; ".join(f"{path.name}: {why}" for path, why in broken.items())
 
 
 def _read(path: Path) -> bytes:

@@ -253,14 +253,11 @@ class LedgerWriter:
             del self._unwanted[: len(unwanted)]
             self._waiting = None if self._waiting is ledger else self._waiting
         if ledger is not None:
-            self._note_success()
+            self._written_at = time.monotonic()
+            if self._trouble:
+                LOG.warning("ledger %s: written again", self._file.path)
+                self._trouble = ""
         return True
-
-    def _note_success(self) -> None:
-        self._written_at = time.monotonic()
-        if self._trouble:
-            LOG.warning("ledger %s: written again", self._file.path)
-            self._trouble = ""
 
 
 def _cannot_write(file: LedgerFile, error: Exception) -> LedgerFileError:

@@ -104,10 +104,7 @@ class Outbox:
         self._command.put(encode_json(command_document(asked.command, asked.order)))
 
     def coverage(self, grid: OccupancyGrid) -> None:
-        """Publish the coverage, a grid on the lattice."""
-        self.guard.attempt("coverage", lambda: self._say_coverage(grid))
-
-    def _say_coverage(self, grid: OccupancyGrid) -> None:
+        """Publish the coverage, a grid on the lattice; the caller guards that."""
         coverage = Shared.of(encode_occupancy_grid(grid), schemas.OCCUPANCY_GRID)
         self._last.keep("coverage", coverage)
         self._coverage.put(coverage.payload)

@@ -61,6 +61,7 @@ FULL_BYTES = 4_000_000
 # Time until a new listener surely gets all samples itself [s].
 MARGIN_S = 0.2
 POSE = "pose"
+NOBODY = "nobody listens to it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,7 @@ class TurnLog:
         self._config = config
         self._restored = restored
         self._is_open = True
-        self._listened_at = self._embed_until = float("inf")
+        self._embed_until = float("inf")
         self._published_at = float("-inf")
         self._first, self._times = 1, list[float]()
         self._turns: list[Cycle] = []
@@ -102,7 +103,8 @@ class TurnLog:
         """Add a cycle to the log; it is published some cycles later."""
         if not self._is_open:
             return
-        self._listen(turn.now)
+        if self._is_waiting and self._publisher.has_listeners():
+            self._embed_until = time.monotonic() + MARGIN_S
         batch = turn.batch
         if any(isinstance(plan, PlanBroken) for plan in batch.plans):
             self.end("a plan broke, which no replay repeats")
@@ -140,31 +142,34 @@ class TurnLog:
         """Publish the batch, if somebody listens."""
         if not self._is_open or not self._times:
             return
-        if self._listened_at == float("inf"):
+        if self._is_waiting:
             if len(self._times) > WAITING_TURNS or self._samples.waiting_bytes > POSES_BYTES:
-                self._close()
+                self.end(NOBODY)
             return
         if not self._publisher.has_listeners():
-            self._close()
+            self.end(NOBODY)
             return
+        start, kernels = None, ""
+        if self._first == 1:
+            ledger = encode_ledger(self._restored) if self._restored else b""
+            start = LogStart(__version__, config_document(self._config), ledger)
+        if self._has_begun and not self._kernels_named:
+            self._kernels_named, kernels = True, kernels_name()
         batch = TurnBatch(
             first=self._first,
             times=self._times,
             turns=self._turns,
-            beginning=self._beginning() if self._first == 1 else None,
+            beginning=start,
             told=self._samples.take(),
-            kernels=self._kernels(),
+            kernels=kernels,
         )
         self._publisher.put(encode_turns(batch))
         self._first, self._times, self._turns = self._first + len(self._times), [], []
 
-    def _listen(self, now: float) -> None:
-        """Find out whether somebody listens by now."""
-        if self._listened_at == float("inf") and self._publisher.has_listeners():
-            self._listened_at, self._embed_until = now, time.monotonic() + MARGIN_S
-
-    def _close(self) -> None:
-        self.end("nobody listens to it")
+    @property
+    def _is_waiting(self) -> bool:
+        """Whether nobody has listened yet."""
+        return self._embed_until == float("inf")
 
     def end(self, why: str) -> None:
         """End the log: what follows could not be replayed."""
@@ -197,24 +202,16 @@ class TurnLog:
         self._deflated_room -= len(deflated)
         return EarlySample(sample.key, sample.schema, deflated)
 
-    def _forget_poses(self, newest: Sequence[Sample]) -> None:
+    def _forget_poses(self, samples: Sequence[Sample]) -> None:
         """Keep only the newest pose as long as there is nothing but poses."""
-        is_waiting = self._listened_at == float("inf") and not self._has_begun
-        if is_waiting and len(self._turns) > 1 and all(map(_is_pose, self._turns)):
-            self._times, self._turns = self._times[-1:], [_numbered(self._turns[-1], self._first)]
+        is_early = self._is_waiting and not self._has_begun
+        if is_early and len(self._turns) > 1 and all(map(_is_pose, self._turns)):
+            newest = self._turns[-1]
+            self._times = self._times[-1:]
+            self._turns = [Cycle(self._first, newest.is_begun, newest.samples)]
             self._samples = SampleEncoder(run=0)
-            for sample in newest:
+            for sample in samples:
                 self._samples.add(Arrival(POSE, sample, 0, 0))
-
-    def _beginning(self) -> LogStart:
-        ledger = encode_ledger(self._restored) if self._restored else b""
-        return LogStart(__version__, config_document(self._config), ledger)
-
-    def _kernels(self) -> str:
-        if self._kernels_named or not self._has_begun:
-            return ""
-        self._kernels_named = True
-        return kernels_name()
 
 
 def _plan_taken(ready: PlanReady) -> PlanTaken:
@@ -232,10 +229,6 @@ def _is_pose(turn: Cycle) -> bool:
     return (
         not turn.commands and not turn.patches_lost and all(s.topic == POSE for s in turn.samples)
     )
-
-
-def _numbered(turn: Cycle, number: int) -> Cycle:
-    return Cycle(number, turn.is_begun, turn.samples)
 
 
 class DecisionFilter:
