@@ -6,7 +6,7 @@ import logging
 import threading
 from collections.abc import Callable
 
-import msgspec
+from msgspec import structs
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.notify import ServiceManager
@@ -80,28 +80,23 @@ def is_changeable(key: str) -> bool:
 def changed_keys(before: DaemonConfig, after: DaemonConfig) -> list[str]:
     """Return the keys whose values differ, each as ``section.key``."""
     first, second = _flat(before), _flat(after)
-    return sorted(key for key in first | second if first.get(key) != second.get(key))
+    return sorted(key for key in first if first[key] != second[key])
 
 
 def with_changeable(running: DaemonConfig, written: DaemonConfig) -> DaemonConfig:
     """Return ``running`` with the values of ``written`` for each changeable key."""
-    sections = {}
-    for name in running.__struct_fields__:
-        section, other = getattr(running, name), getattr(written, name)
-        if isinstance(section, msgspec.Struct) and isinstance(other, msgspec.Struct):
-            keys = [k for k in section.__struct_fields__ if is_changeable(f"{name}.{k}")]
-            taken = {key: getattr(other, key) for key in keys}
-            sections[name] = msgspec.structs.replace(section, **taken)
-    return msgspec.structs.replace(running, **sections)
+    for key in filter(is_changeable, changed_keys(running, written)):
+        section, name = key.split(".")
+        taken = {name: getattr(getattr(written, section), name)}
+        changed = structs.replace(getattr(running, section), **taken)
+        running = structs.replace(running, **{section: changed})
+    return running
 
 
 def _flat(config: DaemonConfig) -> dict[str, object]:
     """Return the values by ``section.key``; a section that may be left out counts as one value."""
-    flat: dict[str, object] = {}
-    for name in config.__struct_fields__:
-        section = getattr(config, name)
-        if name == "ros2":
-            flat[name] = section
-        else:
-            flat |= {f"{name}.{key}": getattr(section, key) for key in section.__struct_fields__}
+    sections = structs.asdict(config)
+    flat: dict[str, object] = {"ros2": sections.pop("ros2")}
+    for name, section in sections.items():
+        flat |= {f"{name}.{key}": value for key, value in structs.asdict(section).items()}
     return flat

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from fasaco_edge.config.config import DaemonConfig, load_config
-from fasaco_edge.doctor import files, machine, security, session
+from fasaco_edge.doctor import machine, security, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, fail, find_unit, ok, warn
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
@@ -17,9 +17,9 @@ CHECKS = (
     Check("C library", machine.c_library, of_machine=True),
     Check("memory", machine.memory, of_machine=True),
     Check("clock", machine.clock, of_machine=True),
-    Check("kernels", files.kernels, of_machine=True),
-    Check("disk", files.disk),
-    Check("permissions", files.permissions),
+    Check("kernels", machine.kernels, of_machine=True),
+    Check("disk", machine.disk),
+    Check("permissions", machine.permissions),
     Check("session", session.session),
     Check("peers", session.peers),
     Check("endpoints", security.endpoints),

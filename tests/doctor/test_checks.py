@@ -13,10 +13,7 @@ import pytest
 
 from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.config.config import BusConfig, DaemonConfig, MissionSettings, RobotConfig
-from fasaco_edge.doctor import files as folders
-from fasaco_edge.doctor import files as kernels
 from fasaco_edge.doctor import machine, report, session
-from fasaco_edge.doctor import machine as memory
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
 from fasaco_edge.kernels.sealed import write_sealed
 from fasaco_edge.wire.topics import QOS
@@ -54,14 +51,14 @@ def test_a_raspberry_pi_without_the_memory_controller_is_told_how_to_have_it(tmp
         "boot__firmware__cmdline.txt": "console=tty1 root=PARTUUID=1 rootwait\n",
     }
     pi = computer(tmp_path, **files)
-    found = memory.memory(pi)
+    found = machine.memory(pi)
     assert found.level is Level.WARN
     assert found.found.startswith("3072 MB of 3978 MB free; the memory controller is off")
     assert found.to_do == (
         "add cgroup_enable=memory to the one line of /boot/firmware/cmdline.txt, and reboot"
     )
     limited = CheckContext(pi.config, unit=Unit({"MemoryMax": "536870912"}), root=tmp_path)
-    assert "limits of the unit do not hold" in memory.memory(limited).found
+    assert "limits of the unit do not hold" in machine.memory(limited).found
 
 
 @pytest.mark.parametrize(
@@ -81,7 +78,7 @@ def test_a_raspberry_pi_without_the_memory_controller_is_told_how_to_have_it(tmp
 )
 def test_both_versions_of_control_groups_are_known(tmp_path, files, version):
     computer(tmp_path, **files)
-    assert memory.controller(tmp_path) == version
+    assert machine.controller(tmp_path) == version
 
 
 @pytest.mark.parametrize(
@@ -94,7 +91,7 @@ def test_memory_is_short_or_limited(tmp_path, free_kb, limit, level):
         "proc__meminfo": MEMINFO.format(free_kb),
     }
     pc = computer(tmp_path, **files)
-    found = memory.memory(CheckContext(pc.config, unit=Unit({"MemoryMax": limit}), root=tmp_path))
+    found = machine.memory(CheckContext(pc.config, unit=Unit({"MemoryMax": limit}), root=tmp_path))
     assert found.level == level
     assert bool(found.to_do) == (level == "warn")
 
@@ -155,21 +152,21 @@ def test_folders_and_who_may_write_there(tmp_path):
         bus=BusConfig(connect=("tcp/127.0.0.1:1#key=secret",)),
     )
     context = CheckContext(config, file, recordings=tmp_path / "later" / "recordings")
-    disk = folders.disk(context)
+    disk = machine.disk(context)
     assert disk.level is Level.OK
     assert [line.partition(":")[0] for line in disk.details] == [
         "state",
         "kernel cache",
         "recordings",
     ]
-    assert folders.permissions(context).level is Level.WARN
-    assert "secret" not in folders.permissions(context).found
+    assert machine.permissions(context).level is Level.WARN
+    assert "secret" not in machine.permissions(context).found
     file.chmod(0o640)
-    assert folders.permissions(context).level is Level.OK
+    assert machine.permissions(context).level is Level.OK
     state.chmod(0o777)
-    assert folders.permissions(context).to_do == f"chmod o-w {state}"
+    assert machine.permissions(context).to_do == f"chmod o-w {state}"
     file.chmod(0o666)
-    both = folders.permissions(context)
+    both = machine.permissions(context)
     assert both.level is Level.FAIL
     assert len(both.details) == 2
     # Nothing was made.
@@ -186,17 +183,17 @@ def test_a_read_only_disk_is_told(tmp_path):
         ),
         None,
     )
-    assert folders.disk(CheckContext(config)).level is not Level.OK
+    assert machine.disk(CheckContext(config)).level is not Level.OK
     if read_only is None:
         pytest.skip("nothing is mounted read-only here")
     config = DaemonConfig(mission=MissionSettings(state_dir=f"{read_only}/x"))
-    assert "read-only" in folders.disk(CheckContext(config)).found
+    assert "read-only" in machine.disk(CheckContext(config)).found
 
 
 def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch):
     told = {"Environment": f"NUMBA_CACHE_DIR={tmp_path}", "DynamicUser": "yes"}
     context = CheckContext(DaemonConfig(), unit=Unit(told | {"CacheDirectory": "fasaco-edge"}))
-    found = kernels.kernels(context)
+    found = machine.kernels(context)
     assert found.level is Level.WARN
     assert found.found.startswith("not compiled for this version")
     # As root it would make a folder that the daemon does not trust.
@@ -209,30 +206,30 @@ def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch)
     from fasaco_edge.kernels.cache import cache_folder
 
     folder = cache_folder()
-    assert "never all compiled" in kernels.kernels(context).found
+    assert "never all compiled" in machine.kernels(context).found
     folder.chmod(0o770)
-    found = kernels.kernels(CheckContext(DaemonConfig()))
+    found = machine.kernels(CheckContext(DaemonConfig()))
     assert found.level is Level.WARN
     assert found.found.startswith(f"{folder} may be written by its group: the daemon takes no")
     folder.chmod(0o700)
     if os.geteuid() != 0:
         return
     os.chown(folder, 4242, 4242)
-    found = kernels.kernels(CheckContext(DaemonConfig()))
+    found = machine.kernels(CheckContext(DaemonConfig()))
     assert found.found.startswith(f"{folder} belongs to user 4242: the daemon takes no")
 
 
 def test_kernels_that_are_damaged_or_were_written_by_several(tmp_path, monkeypatch):
     *files, note = fill_with(tmp_path, 3)
-    monkeypatch.setattr(kernels, "wanted_folder", lambda environ: note.parent)
-    assert kernels.kernels(CheckContext(DaemonConfig())).level is Level.OK
+    monkeypatch.setattr(machine, "wanted_folder", lambda environ: note.parent)
+    assert machine.kernels(CheckContext(DaemonConfig())).level is Level.OK
     # By another process, that compiles at the same time.
     write_sealed(files[1], b"the same, compiled again")
-    assert kernels.kernels(CheckContext(DaemonConfig())).level is Level.OK
+    assert machine.kernels(CheckContext(DaemonConfig())).level is Level.OK
     for harm in HARMS.values():
         before = files[1].read_bytes()
         harm(files[1])
-        found = kernels.kernels(CheckContext(DaemonConfig()))
+        found = machine.kernels(CheckContext(DaemonConfig()))
         assert found.level is Level.WARN
         assert found.found.startswith(f"{files[1].name} ")
         assert found.to_do == "fasaco-edge warmup"
