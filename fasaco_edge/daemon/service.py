@@ -20,12 +20,12 @@ from fasaco_edge.daemon.loop.loop import BusPorts, Host, Loop
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.daemon.loop.watchdog import Watchdog
-from fasaco_edge.daemon.memory import afforded, memory_limit, needed_bytes
+from fasaco_edge.daemon.memory import afforded, needed_bytes
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
-from fasaco_edge.host.processes import call_on, return_soon
+from fasaco_edge.host.processes import call_on, memory_limit, return_soon
 from fasaco_edge.wire import topics
 
 LOG = logging.getLogger(__name__)

@@ -43,6 +43,38 @@ def peak_mb(pid: int) -> float:
     return _field_mb(pid, "VmHWM")
 
 
+def memory_limit(root: Path = Path("/")) -> int | None:
+    """Return the limit that control groups set this process [bytes]; None for none, or no telling.
+
+    That of the group itself and of those above it, as far as they can be seen from inside.
+    """
+    try:
+        groups = (root / "proc/self/cgroup").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return None
+    found = []
+    for line in groups:
+        _, controllers, place = line.split(":", 2)
+        if controllers not in ("", "memory"):
+            continue
+        top, name = ("sys/fs/cgroup/memory", "memory.limit_in_bytes") if controllers else (
+            "sys/fs/cgroup", "memory.max"
+        )  # fmt: skip
+        folder = root / top / place.lstrip("/")
+        for group in (folder, *folder.parents):
+            if group == root / "sys/fs":
+                break
+            try:
+                text = (group / name).read_text(encoding="ascii").strip()
+            except OSError:
+                continue
+            if text.isdecimal():
+                found.append(int(text))
+    # Version 1 says "none" as a number near 2^63.
+    limits = [limit for limit in found if limit < 1 << 60]
+    return min(limits, default=None)
+
+
 def thread_count() -> int:
     """Return how many threads this process has."""
     return len(os.listdir("/proc/self/task"))

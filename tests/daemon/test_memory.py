@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec import structs
@@ -19,7 +18,6 @@ from fasaco_edge.daemon.memory import (
     MIB,
     afforded,
     limits_mib,
-    memory_limit,
     most_bytes,
     needed_bytes,
     queues,
@@ -77,46 +75,3 @@ def test_under_any_limit_no_more_is_taken_than_it_affords(limit, pixels, cells):
     if needed_bytes(config) <= limit:
         assert smaller is config
     assert afforded(config, None) is config
-
-
-def written(root, files):
-    for path, text in files.items():
-        (root / path).parent.mkdir(parents=True, exist_ok=True)
-        (root / path).write_text(text)
-    return root
-
-
-@pytest.mark.parametrize(
-    ("files", "limit"),
-    [
-        ({}, None),
-        ({"proc/self/cgroup": "0::/a.slice/b.service\n"}, None),
-        (
-            {
-                "proc/self/cgroup": "0::/a.slice/b.service\n",
-                "sys/fs/cgroup/a.slice/b.service/memory.max": "max\n",
-                "sys/fs/cgroup/a.slice/memory.max": "800000000\n",
-            },
-            800_000_000,
-        ),
-        (
-            {
-                "proc/self/cgroup": "4:memory:/b.service\n3:cpu:/\n0::/\n",
-                "sys/fs/cgroup/memory/b.service/memory.limit_in_bytes": "671088640\n",
-                "sys/fs/cgroup/memory/memory.limit_in_bytes": "9223372036854771712\n",
-            },
-            671_088_640,
-        ),
-        # Inside a namespace of control groups the root is one's own group.
-        (
-            {
-                "proc/self/cgroup": "4:memory:/\n",
-                "sys/fs/cgroup/memory/memory.limit_in_bytes": "671088640\n",
-            },
-            671_088_640,
-        ),
-    ],
-    ids=["nowhere", "no files", "version 2", "version 1", "namespace"],
-)
-def test_the_limit_is_that_of_the_group_and_those_above(tmp_path, files, limit):
-    assert memory_limit(written(tmp_path, files)) == limit

@@ -1,10 +1,12 @@
-"""Processes that others start import nothing of the working folder."""
+"""Processes: what a child imports, and the memory limits of control groups."""
 
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from fasaco_edge.host.processes import memory_limit
 
 TELL = """\
 import subprocess
@@ -30,3 +32,46 @@ def test_nobody_starts_a_module_otherwise():
         if '"-m"' in file.read_text() and file.name != "processes.py"
     ]
     assert found == []
+
+
+def written(root, files):
+    for path, text in files.items():
+        (root / path).parent.mkdir(parents=True, exist_ok=True)
+        (root / path).write_text(text)
+    return root
+
+
+@pytest.mark.parametrize(
+    ("files", "limit"),
+    [
+        ({}, None),
+        ({"proc/self/cgroup": "0::/a.slice/b.service\n"}, None),
+        (
+            {
+                "proc/self/cgroup": "0::/a.slice/b.service\n",
+                "sys/fs/cgroup/a.slice/b.service/memory.max": "max\n",
+                "sys/fs/cgroup/a.slice/memory.max": "800000000\n",
+            },
+            800_000_000,
+        ),
+        (
+            {
+                "proc/self/cgroup": "4:memory:/b.service\n3:cpu:/\n0::/\n",
+                "sys/fs/cgroup/memory/b.service/memory.limit_in_bytes": "671088640\n",
+                "sys/fs/cgroup/memory/memory.limit_in_bytes": "9223372036854771712\n",
+            },
+            671_088_640,
+        ),
+        # Inside a namespace of control groups the root is one's own group.
+        (
+            {
+                "proc/self/cgroup": "4:memory:/\n",
+                "sys/fs/cgroup/memory/memory.limit_in_bytes": "671088640\n",
+            },
+            671_088_640,
+        ),
+    ],
+    ids=["nowhere", "no files", "version 2", "version 1", "namespace"],
+)
+def test_the_limit_is_that_of_the_group_and_those_above(tmp_path, files, limit):
+    assert memory_limit(written(tmp_path, files)) == limit

@@ -9,7 +9,17 @@ from hypothesis import strategies as st
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Sample
-from fasaco_edge.recording.write.inbox import BEHIND_SAMPLES, Inbox, RunClock
+from fasaco_edge.recording.write.inbox import (
+    BASE_BYTES,
+    BEHIND_SAMPLES,
+    LEAST_QUEUE_BYTES,
+    QUEUE_BYTES,
+    Inbox,
+    RunClock,
+    afforded_bytes,
+    needed_bytes,
+)
+from tests.support.service_manager import UNIT, unit_limit
 
 TOPICS = ["map", "map_update", "pose", "path", "coverage", "pheromone", "status"]
 
@@ -92,3 +102,17 @@ def test_a_waiting_reader_wakes():
     inbox = inbox_of(100)
     threading.Timer(0.05, inbox.post, ["pose", sample()]).start()
     assert len(inbox.take(5.0)) == 1
+
+
+def test_the_unit_has_what_the_recorder_needs():
+    unit = UNIT.with_name("fasaco-edge-recorder.service")
+    high, most = unit_limit("MemoryHigh", unit), unit_limit("MemoryMax", unit)
+    assert needed_bytes() <= high <= most / 1.07
+    assert afforded_bytes(most) == QUEUE_BYTES == afforded_bytes(None)
+
+
+@given(st.integers(0, 1 << 31))
+def test_what_waits_fits_into_the_limit(limit):
+    capacity = afforded_bytes(limit)
+    assert LEAST_QUEUE_BYTES <= capacity <= QUEUE_BYTES
+    assert needed_bytes(capacity) <= max(limit, BASE_BYTES + 15 * LEAST_QUEUE_BYTES)

@@ -19,13 +19,13 @@ from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
-from fasaco_edge.host.processes import resident_mb, return_soon, stop_event
+from fasaco_edge.host.processes import memory_limit, resident_mb, return_soon, stop_event
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
-from fasaco_edge.recording.write.inbox import Inbox, RunClock
+from fasaco_edge.recording.write.inbox import QUEUE_BYTES, Inbox, RunClock, afforded_bytes
 from fasaco_edge.recording.write.input_log import InputLog
 from fasaco_edge.recording.write.quota import DiskBudget, next_run
 from fasaco_edge.recording.write.streams import serve_live
@@ -45,8 +45,6 @@ REPORT_PERIOD_NS = 1_000_000_000
 SILENCE_NS = 3_500_000_000
 # How long the samples that wait at the end may take to be written [ns].
 LAST_SAMPLES_NS = 300_000_000
-# Samples waiting to be written take at most this much memory.
-QUEUE_BYTES = 32_000_000
 EXIT_STALLED = 1
 
 
@@ -113,7 +111,10 @@ class Recorder:
         self._inputs = InputLog(self._writer, began_ns)
         description = RunDescription(config.robot.name, f"{began:%Y-%m-%d %H:%M:%S} UTC")
         self._scene = Scene(self._writer, description)
-        self._inbox = Inbox(QUEUE_BYTES, self._clock.arrival)
+        capacity = afforded_bytes(memory_limit())
+        self._inbox = Inbox(capacity, self._clock.arrival)
+        if capacity < QUEUE_BYTES:
+            self.note(f"memory is limited: samples above {capacity / 1e6:.1f} MB are not recorded")
         self._drawers: dict[str, Callable[[Sample], None]] = {
             "map": lambda sample: self._scene.add_map(decode_occupancy_grid(sample.payload)),
             "map_update": lambda sample: self._scene.add_map_update(
