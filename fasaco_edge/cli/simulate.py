@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     )
     if args.trail_out is not None:
         with writing(args.trail_out):
-            np.savetxt(args.trail_out, result.track, "%.4f", ",", header="x,y", comments="")
+            np.savetxt(args.trail_out, world.track, "%.4f", ",", header="x,y", comments="")
     print(
         f"drove {result.distance_m:.1f} m in {result.sim_s:.0f} simulated s, "
         f"{result.collisions} collisions"

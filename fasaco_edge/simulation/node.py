@@ -7,9 +7,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
@@ -81,23 +78,6 @@ class Progress:
     speed: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SimulationResult:
-    """Result of a simulation.
-
-    Attributes:
-        track: float64 (n, 2): where the robot was, points (x, y) [m], the start first.
-        distance_m: distance driven [m].
-        sim_s: simulated time [s].
-        collisions: how often a path led into an obstacle.
-    """
-
-    track: NDArray[np.float64]
-    distance_m: float
-    sim_s: float
-    collisions: int
-
-
 def run_simulation(
     world: World,
     keys: Keys,
@@ -106,12 +86,12 @@ def run_simulation(
     speed: float = 1.0,
     should_stop: Callable[[], bool] = lambda: False,
     report: Callable[[Progress], None] = lambda _progress: None,
-) -> SimulationResult:
+) -> Progress:
     """Run the robot of ``world`` on the bus until it has to stop.
 
     It publishes its map (latched) and its pose with simulated time as the stamp, and
     drives along the newest path. In the main thread, SIGINT and SIGTERM end it too.
-    Its last map and pose are published before it returns.
+    Its last map and pose are published before it returns its last progress.
 
     Args:
         world: the building and the robot.
@@ -130,7 +110,6 @@ def run_simulation(
         raise BadConfiguration(f"speed must be above 0, got {speed}")
     with open_bus(settings) as bus, stop_event() as stop:
         robot = _RobotOnBus(world, keys, bus)
-        meter = _Meter(robot, report)
         pace = Pace(speed, world.config.tick_s, time.monotonic())
         while not (stop.is_set() or should_stop()):
             behind_s = pace.behind_s(time.monotonic())
@@ -139,18 +118,21 @@ def run_simulation(
             while pace.behind_s(now_s := time.monotonic()) >= 0.0 and now_s < cycle_ends_s:
                 robot.publish(world.tick())
                 pace.ticked(now_s)
-            meter.report_if_due(now_s)
+            if now_s - robot.reported_s >= REPORT_EVERY_S:
+                report(robot.progress(now_s))
         robot.publish(world.emission())
-        meter.report(time.monotonic())
-    return SimulationResult(world.track, world.distance_m, world.stamp_ns * 1e-9, world.collisions)
+        report(last := robot.progress(time.monotonic()))
+    return last
 
 
 class _RobotOnBus:
-    """The world's publishers and its one subscription."""
+    """The world's publishers and its one subscription; ``reported_s``: when progress was asked."""
 
     def __init__(self, world: World, keys: Keys, bus: Bus) -> None:
-        self.world = world
-        self.refused_paths = 0
+        self._world = world
+        self.reported_s = time.monotonic()
+        self._reported_sim_s = world.stamp_ns * 1e-9
+        self._refused_paths = 0
         self._map = bus.advertise(keys, topics.MAP)
         self._pose = bus.advertise(keys, topics.POSE)
         self._newest_path: LatestSlot[Sample] = LatestSlot()
@@ -169,45 +151,26 @@ class _RobotOnBus:
         if sample is None:
             return
         try:
-            self.world.follow(_waypoints(sample, self.world.frame))
+            path = decode_path(sample.payload)
+            if path.frame != self._world.frame:
+                raise WrongFrame(f"path in frame {path.frame!r}, map in {self._world.frame!r}")
+            self._world.follow(path.xy)
         except (MalformedMessage, WrongFrame) as error:
-            self.refused_paths += 1
+            self._refused_paths += 1
             log.warning("path refused: %s", error)
 
-
-class _Meter:
-    """Reports progress, with the speed achieved since the report before."""
-
-    def __init__(self, robot: _RobotOnBus, report: Callable[[Progress], None]) -> None:
-        self._robot = robot
-        self._report = report
-        self._last_s = time.monotonic()
-        self._last_sim_s = robot.world.stamp_ns * 1e-9
-
-    def report_if_due(self, now_s: float) -> None:
-        if now_s - self._last_s >= REPORT_EVERY_S:
-            self.report(now_s)
-
-    def report(self, now_s: float) -> None:
-        world = self._robot.world
-        sim_s = world.stamp_ns * 1e-9
-        elapsed_s = max(now_s - self._last_s, 1e-9)
-        self._report(
-            Progress(
-                sim_s=sim_s,
-                pose=world.pose,
-                activity=world.activity,
-                distance_m=world.distance_m,
-                collisions=world.collisions,
-                refused_paths=self._robot.refused_paths,
-                speed=(sim_s - self._last_sim_s) / elapsed_s,
-            )
+    def progress(self, now_s: float) -> Progress:
+        """Return the progress, with the speed achieved since it was asked for before."""
+        world = self._world
+        sim_s, elapsed_s = world.stamp_ns * 1e-9, max(now_s - self.reported_s, 1e-9)
+        speed = (sim_s - self._reported_sim_s) / elapsed_s
+        self.reported_s, self._reported_sim_s = now_s, sim_s
+        return Progress(
+            sim_s,
+            world.pose,
+            world.activity,
+            world.distance_m,
+            world.collisions,
+            self._refused_paths,
+            speed,
         )
-        self._last_s, self._last_sim_s = now_s, sim_s
-
-
-def _waypoints(sample: Sample, frame: str) -> NDArray[np.float64]:
-    path = decode_path(sample.payload)
-    if path.frame != frame:
-        raise WrongFrame(f"path in frame {path.frame!r}, map in {frame!r}")
-    return path.xy

@@ -38,7 +38,7 @@ from tests.simulation.rooms import building
 
 world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
 result = run_simulation(world, Keys("r1"), BusSettings(connect=(sys.argv[1],)), speed=40.0)
-print(json.dumps({"track": result.track.tolist(), "distance_m": result.distance_m,
+print(json.dumps({"track": world.track.tolist(), "distance_m": result.distance_m,
                   "sim_s": result.sim_s, "collisions": result.collisions}))
 """
 
@@ -158,7 +158,7 @@ def test_bad_paths_cost_only_themselves(planner):
     )
     assert stage[0] is None
     assert reports[-1].refused_paths == 2
-    assert result.track[-1] == pytest.approx(centres((2, 5))[0], abs=2e-3)
+    assert world.track[-1] == pytest.approx(centres((2, 5))[0], abs=2e-3)
     assert result.distance_m == pytest.approx(reports[-1].distance_m)
     assert all(0.0 < report.speed < 40.0 for report in reports[1:])
 
