@@ -145,7 +145,7 @@ class SampleEncoder:
             last = None
         self._last[first.topic] = samples[-1]
         payloads = [arrival.sample.payload for arrival in arrivals]
-        residual = residual_of(payloads, last.arrival.sample.payload if last else b"")
+        sparse, body = _residual(payloads, last.arrival.sample.payload if last else b"")
         attachments = [arrival.sample.attachment for arrival in arrivals]
         return _Lane(
             topic=first.topic,
@@ -158,8 +158,8 @@ class SampleEncoder:
             attachments=attachments if any(attachments) else [],
             against=last.number if last else WHOLE,
             checksum=_checksum(payloads),
-            sparse=residual.sparse,
-            body=residual.body,
+            sparse=sparse,
+            body=body,
         )
 
 
@@ -187,7 +187,7 @@ class SampleDecoder:
         return sorted(samples, key=lambda numbered: numbered.number)
 
     def _samples(self, lane: _Lane) -> list[Numbered]:
-        numbers, before = _sums(lane.numbers), b""
+        numbers, before = list(accumulate(lane.numbers)), b""
         if lane.against != WHOLE:
             last = self._last.get(lane.topic)
             if last is None or last.number != lane.against:
@@ -196,8 +196,7 @@ class SampleDecoder:
                     "which is missing"
                 )
             before = last.arrival.sample.payload
-        residual = Residual(lane.body, lane.sparse)
-        payloads = payloads_of(residual, before, len(numbers), lane.length)
+        payloads = _payloads(lane, before)
         if _checksum(payloads) != lane.checksum:
             raise MalformedMessage(f"sample {numbers[0]}, or one after it, is not what it was")
         attachments = lane.attachments or [b""] * len(numbers)
@@ -205,8 +204,8 @@ class SampleDecoder:
             Numbered(number, Arrival(lane.topic, sample, at_ns, at_ns + ahead_ns))
             for number, at_ns, ahead_ns, sample in zip(
                 numbers,
-                _sums(lane.at_ns),
-                _sums(lane.ahead_ns),
+                accumulate(lane.at_ns),
+                accumulate(lane.ahead_ns),
                 (
                     Sample(lane.key, payload, lane.schema, attachment)
                     for payload, attachment in zip(payloads, attachments, strict=True)
@@ -282,20 +281,8 @@ def _differences(values: Sequence[int]) -> list[int]:
     return [after - before for before, after in pairwise((0, *values))]
 
 
-def _sums(differences: Sequence[int]) -> list[int]:
-    return list(accumulate(differences))
-
-
-@dataclass(frozen=True, slots=True)
-class Residual:
-    """Differences of payloads; ``sparse``: stored as runs."""
-
-    body: bytes
-    sparse: bool
-
-
-def residual_of(payloads: Sequence[bytes], before: bytes) -> Residual:
-    """Return the differences of payloads, at least one, all of one length.
+def _residual(payloads: Sequence[bytes], before: bytes) -> tuple[bool, bytes]:
+    """Return the differences of payloads, and whether they are stored as runs.
 
     Args:
         payloads: in order.
@@ -314,24 +301,24 @@ def residual_of(payloads: Sequence[bytes], before: bytes) -> Residual:
         flat = differences.T.ravel()
     changed = flat != 0
     if SPARSE * np.count_nonzero(changed) > flat.size:
-        return Residual(flat.tobytes(), sparse=False)
+        return False, flat.tobytes()
     edges = np.flatnonzero(changed[1:] != changed[:-1]) + 1
     ends = [0] * int(changed[:1].any()), [flat.size] * int(changed[-1:].any())
     edges = np.concatenate((ends[0], edges, ends[1])).astype(np.int64)
     # How many zeros, how many others, how many zeros ...; the low bytes of all stand together.
     runs = np.diff(edges, prepend=0).astype("<u4").view(np.uint8).reshape(-1, 4).T
-    body = _COUNT.pack(len(edges)) + runs.tobytes() + flat[changed].tobytes()
-    return Residual(body, sparse=True)
+    return True, _COUNT.pack(len(edges)) + runs.tobytes() + flat[changed].tobytes()
 
 
-def payloads_of(residual: Residual, before: bytes, count: int, length: int) -> list[bytes]:
-    """Return ``count`` payloads of ``length`` bytes; ``before`` as it was given.
+def _payloads(lane: _Lane, before: bytes) -> list[bytes]:
+    """Return the payloads of a lane; ``before`` as it was given.
 
     Raises:
-        ValueError, IndexError, struct.error: these are no such residual.
+        ValueError, IndexError, struct.error: its residual is none.
     """
-    flat = _flat(residual, count * length)
-    rows = np.ascontiguousarray(flat.reshape(length, count).T)
+    count = len(lane.numbers)
+    flat = _flat(lane, count * lane.length)
+    rows = np.ascontiguousarray(flat.reshape(lane.length, count).T)
     if before:
         rows[0] ^= np.frombuffer(before, np.uint8)
     for index in range(1, count):
@@ -339,11 +326,11 @@ def payloads_of(residual: Residual, before: bytes, count: int, length: int) -> l
     return [row.tobytes() for row in rows]
 
 
-def _flat(residual: Residual, size: int) -> NDArray[np.uint8]:
-    body = np.frombuffer(residual.body, np.uint8)
-    if not residual.sparse:
+def _flat(lane: _Lane, size: int) -> NDArray[np.uint8]:
+    body = np.frombuffer(lane.body, np.uint8)
+    if not lane.sparse:
         return body.copy()
-    end = _COUNT.size + 4 * _COUNT.unpack_from(residual.body)[0]
+    end = _COUNT.size + 4 * _COUNT.unpack_from(lane.body)[0]
     runs = np.ascontiguousarray(body[_COUNT.size : end].reshape(4, -1).T).view("<u4").ravel()
     edges = np.cumsum(runs, dtype=np.int64)
     starts, lengths = edges[0::2], runs[1::2]
