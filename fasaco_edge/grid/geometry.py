@@ -8,9 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+_Value = TypeVar("_Value", np.uint8, np.bool_)
 
 # A raster's corner is rounded to this part of a pixel: a map that grows by whole pixels stays on
 # its raster, also where its origin is rounded to float32.
@@ -111,6 +114,19 @@ class Window:
             Window(common.row1, self.col0, self.row1, self.col1),
         )
         return tuple(part for part in parts if part.rows > 0 and part.cols > 0)
+
+    def values_at(
+        self, values: NDArray[_Value], cells: NDArray[np.int32], beyond: int
+    ) -> NDArray[_Value]:
+        """Return the values, (rows, cols) on this window, of cells (row, col), (n, 2).
+
+        Those outside have the value ``beyond``.
+        """
+        rows, cols = cells[:, 0] - self.row0, cells[:, 1] - self.col0
+        inside = (rows >= 0) & (rows < self.rows) & (cols >= 0) & (cols < self.cols)
+        found = np.full(len(cells), beyond, values.dtype)
+        found[inside] = values[rows[inside], cols[inside]]
+        return found
 
     def slices_in(self, outer: Window) -> tuple[slice, slice]:
         """Return the index of this window in an array that spans ``outer``."""

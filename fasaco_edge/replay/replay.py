@@ -239,12 +239,6 @@ class Replay:
         return digest(mission.lattice.centres(update.cells).tobytes()) == recorded.digest
 
 
-@dataclass(frozen=True, slots=True)
-class _UnderWay:
-    ready: PlanReady
-    due: float
-
-
 class ReplayPlanner:
     """Takes the place of the daemon's planning thread.
 
@@ -253,6 +247,9 @@ class ReplayPlanner:
         run: what was recorded.
         budget_s: the time its plans had [s].
         work: proposals of each plan; None for what was recorded.
+
+    Attributes:
+        due: when the plan under way will be there [s]; None where there is none.
     """
 
     def __init__(
@@ -262,28 +259,21 @@ class ReplayPlanner:
         self._run = run
         self._budget_s = budget_s
         self._work = work
-        self._under_way: _UnderWay | None = None
-
-    @property
-    def due(self) -> float | None:
-        """When the plan under way will be there; None where there is none."""
-        return self._under_way.due if self._under_way else None
+        self.due: float | None = None
+        self._ready: PlanReady | None = None
 
     def ask(self, request: PlanRequest, revision: int, now: float) -> None:
         """Make a plan that would be published as path ``revision``."""
         recorded = self._recorded(request, revision, now)
-        due = now + self._budget_s
-        if recorded is not None:
-            due = max(1e-9 * recorded.at_ns, now)
-        limit = self._limit(recorded)
-        path = self._planner.plan(request.problem, limit, ignore)
-        self._under_way = _UnderWay(PlanReady(request.number, path, due - now), due)
+        due = now + self._budget_s if recorded is None else max(1e-9 * recorded.at_ns, now)
+        path = self._planner.plan(request.problem, self._limit(recorded), ignore)
+        self.due, self._ready = due, PlanReady(request.number, path, due - now)
 
     def take(self, now: float) -> list[PlanReady]:
         """Return the plan that is there by ``now``, if any."""
-        if self._under_way is None or self._under_way.due > now:
+        if self._ready is None or self.due is None or self.due > now:
             return []
-        ready, self._under_way = self._under_way.ready, None
+        ready, self.due, self._ready = self._ready, None, None
         return [ready]
 
     def _recorded(self, request: PlanRequest, revision: int, now: float) -> RecordedPath | None:
@@ -295,10 +285,9 @@ class ReplayPlanner:
         return path if abs(after) <= self._budget_s + LATE_S else None
 
     def _limit(self, recorded: RecordedPath | None) -> AnyOf:
-        if self._work is not None:
-            return AnyOf(WorkLimit(SearchWork(proposals=self._work)))
-        if recorded is None or recorded.work is None:
-            return AnyOf(WorkLimit(SearchWork(proposals=PROPOSALS)))
+        if self._work is not None or recorded is None or recorded.work is None:
+            proposals = PROPOSALS if self._work is None else self._work
+            return AnyOf(WorkLimit(SearchWork(proposals=proposals)))
         # On another ground the same counts may never be met.
         most = SearchWork(proposals=2 * recorded.work.proposals + PROPOSALS)
         return AnyOf(WorkLimit(recorded.work), WorkLimit(most))

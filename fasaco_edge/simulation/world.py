@@ -187,9 +187,12 @@ class World:
         pose = self._drive.pose
         return np.array([*self._track, (pose.x, pose.y)], np.float64)
 
-    def emission(self) -> Emission:
+    def emission(self, *, with_map: bool = True, with_pose: bool = True) -> Emission:
         """Return map and pose as they are now; there is no map before the first tick."""
-        return self._emission(with_map=True, with_pose=True)
+        return Emission(
+            self._mapper.snapshot(self.stamp_ns) if with_map else None,
+            StampedPose(self.pose, self.frame, self.stamp_ns) if with_pose else None,
+        )
 
     def follow(self, path: NDArray[np.float64]) -> None:
         """Drive along ``path``, waypoints (x, y) [m], float64 (n, 2); an empty one halts.
@@ -211,13 +214,7 @@ class World:
                 self._join()
         map_is_due = since_first % config.period_ticks(config.map_hz) == 0
         pose_is_due = since_first % config.period_ticks(config.pose_hz) == 0
-        return self._emission(with_map=map_is_due, with_pose=pose_is_due)
-
-    def _emission(self, *, with_map: bool, with_pose: bool) -> Emission:
-        return Emission(
-            self._mapper.snapshot(self.stamp_ns) if with_map else None,
-            StampedPose(self.pose, self.frame, self.stamp_ns) if with_pose else None,
-        )
+        return self.emission(with_map=map_is_due, with_pose=pose_is_due)
 
     def _join(self) -> None:
         if self._path is None:
@@ -238,7 +235,8 @@ class World:
         return np.vstack((behind, np.linspace(here, rest, points)))
 
     def _move(self) -> None:
-        while self._corners and self._is_at(self._corners[-1]):
+        here = (self.pose.x, self.pose.y)
+        while self._corners and math.dist(here, self._corners[-1]) < ARRIVED_M:
             self._corners.pop()
         if not self._corners:
             if self.activity is Activity.DRIVING:
@@ -252,9 +250,6 @@ class World:
         self._extend_track(ahead)
         self.distance_m += ahead.speed * self.config.tick_s
         self._drive = ahead
-
-    def _is_at(self, corner: Point) -> bool:
-        return math.dist((self.pose.x, self.pose.y), corner) < ARRIVED_M
 
     def _collide(self) -> None:
         self._drive = DriveState(self.pose)

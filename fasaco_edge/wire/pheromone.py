@@ -116,16 +116,7 @@ def decode_pheromone(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> Pheromo
         expected = "finite with 0 < trail_min <= trail_max, or 0 where no level is above 0"
         refuse(reader.message, "trail_min, trail_max", expected, (trail_min, trail_max))
     return PheromoneMessage(
-        geometry,
-        levels,
-        trail_min,
-        trail_max,
-        cohort,
-        velocity,
-        ants,
-        best_steps,
-        frame,
-        stamp_ns,
+        geometry, levels, trail_min, trail_max, cohort, velocity, ants, best_steps, frame, stamp_ns
     )
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import msgspec
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.status import Settings
 
 
@@ -131,15 +130,6 @@ class TurnBatch(msgspec.Struct, frozen=True, omit_defaults=True):
     beginning: LogStart | None = None
     told: bytes = b""
     kernels: str = ""
-
-
-def encode_turns(batch: TurnBatch) -> bytes:
-    """Return a batch as JSON.
-
-    Raises:
-        MalformedMessage: a number in it is not finite.
-    """
-    return encode_json(batch)
 
 
 def decode_turns(payload: bytes) -> TurnBatch:

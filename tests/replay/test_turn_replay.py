@@ -14,7 +14,8 @@ from fasaco_edge.cli import main
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.cycle_replay import CycleReplay, read_turns
 from fasaco_edge.replay.replay import read_run
-from fasaco_edge.wire.turns import decode_turns, encode_turns
+from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.turns import decode_turns
 from tests.replay.scenarios import changed, places, without
 from tests.support.recorded_mission import record_mission
 from tests.wire.schemas import check
@@ -126,7 +127,7 @@ def test_a_decision_that_is_another_is_found_at_its_turn(samples):
 
     def lie(payload):
         batch = decode_turns(payload)
-        plain = json.loads(encode_turns(batch))
+        plain = json.loads(encode_json(batch))
         told = next(t for t in plain["turns"] if t["number"] == turn.number)
         told["decided"]["path"][2] ^= 1
         return json.dumps(plain).encode()

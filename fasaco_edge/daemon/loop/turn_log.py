@@ -27,6 +27,7 @@ from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanBroke
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.orders.order import command_document
 from fasaco_edge.samples import SampleEncoder
+from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.turns import (
     Cycle,
     Decided,
@@ -35,7 +36,6 @@ from fasaco_edge.wire.turns import (
     PlanTaken,
     TakenSample,
     TurnBatch,
-    encode_turns,
 )
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ class TurnLog:
             told=self._samples.take(),
             kernels=kernels,
         )
-        self._publisher.put(encode_turns(batch))
+        self._publisher.put(encode_json(batch))
         self._first, self._times, self._turns = self._first + len(self._times), [], []
 
     @property

@@ -11,6 +11,7 @@ from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.core.events import (
     Answer,
     CommandReceived,
+    Decision,
     Event,
     MapReceived,
     PatchesLost,
@@ -29,23 +30,6 @@ from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
 
-@dataclass(slots=True)
-class Effects:
-    """What the events of a step lead to at once.
-
-    Attributes:
-        path: the newest path published; None for none.
-        faults: what went wrong, also with events that took effect all the same.
-        answers: to the commands among the events.
-        forgotten: whether one of them was to forget what is covered.
-    """
-
-    path: PathUpdate | None = None
-    faults: list[FasacoError] = field(default_factory=list)
-    answers: list[Answer] = field(default_factory=list)
-    forgotten: bool = False
-
-
 @dataclass(slots=True, eq=False)
 class EventHandler:
     """Applies events, one after the other, to map, ledger, monitor, orders and route."""
@@ -55,19 +39,32 @@ class EventHandler:
     monitor: InputMonitor
     orders: Sequencer
     route: Route
-    _effects: Effects = field(default_factory=Effects, init=False)
     _now: float = field(default=0.0, init=False)
+    # What the events of a step lead to.
+    _path: PathUpdate | None = field(default=None, init=False)
+    _faults: list[FasacoError] = field(default_factory=list, init=False)
+    _answers: list[Answer] = field(default_factory=list, init=False)
+    _is_forgotten: bool = field(default=False, init=False)
 
-    def handle(self, events: Iterable[Event], now: float) -> Effects:
-        """Apply events at ``now`` [s]; one that cannot be used is a fault and changes nothing."""
-        self._effects, self._now = Effects(), now
+    def handle(self, events: Iterable[Event], now: float) -> Decision:
+        """Apply events at ``now`` [s]; return what they lead to at once.
+
+        One that cannot be used is a fault and changes nothing.
+        """
+        self._now, self._path, self._is_forgotten = now, None, False
+        self._faults, self._answers = [], []
         for event in in_runs(events):
             try:
                 self._apply(event)
             except FasacoError as error:
                 # Its traceback would hold the map until garbage is collected.
-                self._effects.faults.append(error.with_traceback(None))
-        return self._effects
+                self._faults.append(error.with_traceback(None))
+        return Decision(
+            path=self._path,
+            faults=tuple(self._faults),
+            answers=tuple(self._answers),
+            forgotten=self._is_forgotten,
+        )
 
     def begin_order(self, order: OrderState) -> None:
         """Begin with another order, or with none; ``update_area`` has to follow."""
@@ -111,7 +108,7 @@ class EventHandler:
 
     def _take_patches(self, patches: Sequence[MapPatch]) -> None:
         has_changed, faults = self.map.take_patches(patches)
-        self._effects.faults += faults
+        self._faults += faults
         if has_changed:
             self._map_changed()
 
@@ -154,7 +151,7 @@ class EventHandler:
 
     def _leave_map(self, why: str) -> None:
         """Stop the robot: its path leads through another map."""
-        self._effects.path = self.route.stop(why, self._now) or self._effects.path
+        self._path = self.route.stop(why, self._now) or self._path
         self.route.abandon()
         self.monitor.forget_pose()
 
@@ -186,11 +183,11 @@ class EventHandler:
         if lattice.contains(lattice.cell_at(pose.x, pose.y)):
             full = self.ledger.record(pose)
             if full is not None:
-                self._effects.faults.append(full)
+                self._faults.append(full)
 
     def _take_plan(self, event: PlanReady) -> None:
         request = self.route.pending
-        self._effects.path = self.route.accept(event, self._now) or self._effects.path
+        self._path = self.route.accept(event, self._now) or self._path
         if request is not None and self.route.pending is None and not self.route.wanted:
             self.monitor.note_plan(request.number)
 
@@ -203,9 +200,9 @@ class EventHandler:
             after = before.commanded(event.command, event.order)
             plan = self._replan() if event.command == "replan" else None
         except FasacoError as error:
-            self._effects.answers.append(Answer(event.number, error))
+            self._answers.append(Answer(event.number, error))
             return
-        self._effects.answers.append(Answer(event.number, plan=plan))
+        self._answers.append(Answer(event.number, plan=plan))
         if event.command == "reset":
             self._reset()
         if after.order is not before.order:
@@ -219,7 +216,7 @@ class EventHandler:
 
     def _reset(self) -> None:
         """Forget what is covered but where the tool is now, and which frame is active."""
-        self._effects.forgotten = True
+        self._is_forgotten = True
         self.map.frames.reset()
         if self.map.switch_frame():
             self._leave_map("reset")

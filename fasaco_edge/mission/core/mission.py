@@ -71,16 +71,10 @@ class Mission:
                 reported as a fault and changes nothing.
             now: time [s] of any steady clock.
         """
-        effects = self._handler.handle(events, now)
-        decision = self._executive.decide(now)
+        happened = self._handler.handle(events, now)
+        decided = self._executive.decide(now)
         self.state, self.reason = self._executive.status()
-        return replace(
-            decision,
-            path=decision.path or effects.path,
-            faults=tuple(effects.faults),
-            answers=tuple(effects.answers),
-            forgotten=effects.forgotten,
-        )
+        return replace(happened, plan=decided.plan, path=decided.path or happened.path)
 
     def coverage(self) -> Coverage | None:
         """Return how much is covered; None before there is a map."""

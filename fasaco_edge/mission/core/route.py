@@ -284,11 +284,7 @@ class Route:
         visit. Empty where no path leads there: the robot was carried elsewhere.
         """
         window = area.lattice.window
-        open_cells = self._orders.open_cells(window)
-        rows, cols = cells[:, 0] - window.row0, cells[:, 1] - window.col0
-        inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
-        still_open = np.ones(len(cells), bool)
-        still_open[inside] = open_cells[rows[inside], cols[inside]]
+        still_open = window.values_at(self._orders.open_cells(window), cells, True)
         first = int(np.argmax(still_open)) if still_open.any() else len(cells) - 1
         lead = area.shortest_path(here, (int(cells[first, 0]), int(cells[first, 1])))
         return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead

@@ -122,11 +122,6 @@ class FrameSelector:
         held = self._poses.get(frame)
         return held[0] if held else None
 
-    def check_map(self, grid: OccupancyGrid) -> None:
-        """Raise WrongFrame where another frame is active than the map's."""
-        if self.active and grid.frame != self.active:
-            raise WrongFrame(f"map in frame {grid.frame!r}, the mission's is {self.active!r}")
-
     def why_no_map(self) -> str:
         """Return why there is no map in the active frame."""
         others = [frame for frame in self._maps if frame != self.active]

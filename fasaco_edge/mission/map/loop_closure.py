@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
+from fasaco_edge.grid.lattice import UNKNOWN
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 
 # This many cells change between free and blocked in one map, and this share of those that were
@@ -34,22 +34,15 @@ def has_moved(change: LatticeChange) -> bool:
     """Tell whether a map shows walls elsewhere all over."""
     if change.before is None or len(change.cells) < LEAST_CELLS:
         return False
-    then, now = _states(change.before, change.cells), _states(change.after, change.cells)
+    then, now = (
+        lattice.window.values_at(lattice.states, change.cells, UNKNOWN)
+        for lattice in (change.before, change.after)
+    )
     changed = int(np.count_nonzero((then != UNKNOWN) & (now != UNKNOWN) & (then != now)))
     # The whole lattice is counted only where that may matter: this runs at every map.
     return changed >= LEAST_CELLS and changed >= LEAST_SHARE * int(
         np.count_nonzero(change.before.states != UNKNOWN)
     )
-
-
-def _states(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """Return the states of cells (row, col), (n, 2); those beyond the lattice are UNKNOWN."""
-    window = lattice.window
-    rows, cols = cells[:, 0] - window.row0, cells[:, 1] - window.col0
-    inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
-    states = np.full(len(cells), UNKNOWN, np.uint8)
-    states[inside] = lattice.states[rows[inside], cols[inside]]
-    return states
 
 
 @dataclass(frozen=True, slots=True)

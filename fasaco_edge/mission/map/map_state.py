@@ -73,7 +73,8 @@ class MapState:
                 grid.geometry, self._config.footprint.cell_m, self._config.max_lattice_cells
             )
             is_active_now = self.frames.note_map(grid)
-            self.frames.check_map(grid)
+            if grid.frame != (active := self.frames.active):
+                raise WrongFrame(f"map in frame {grid.frame!r}, the mission's is {active!r}")
         try:
             self._take_map(grid)
         except (MapTooLarge, MapTooFar) as error:

@@ -124,14 +124,10 @@ class ReachableArea:
         lattice, first = self.lattice, (int(cells[0, 0]), int(cells[0, 1]))
         if not lattice.contains(first) or lattice.states[lattice.local(first)] != COVERABLE:
             return 0
-        window, steps = lattice.window, lattice.steps
-        rows, cols = cells[:-1, 0] - window.row0, cells[:-1, 1] - window.col0
-        inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
-        allowed = np.zeros(len(rows), np.uint8)
-        allowed[inside] = steps[rows[inside], cols[inside]]
+        allowed = lattice.window.values_at(lattice.steps, cells[:-1], 0)
         # Column by column: this runs at every pose, over tens of thousands of cells.
         row_moves, col_moves = np.diff(cells[:, 0]), np.diff(cells[:, 1])
-        legal = np.zeros(len(rows), bool)
+        legal = np.zeros(len(allowed), bool)
         for direction, (row_step, col_step) in enumerate(zip(ROW_STEP, COL_STEP, strict=True)):
             heading = (row_moves == row_step) & (col_moves == col_step)
             legal |= heading & (allowed >> direction & 1).astype(bool)

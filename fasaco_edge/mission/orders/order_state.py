@@ -6,7 +6,7 @@ is one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import Annotated, Literal
 
@@ -22,8 +22,6 @@ from fasaco_edge.mission.orders.order import (
     order_document,
     order_of,
 )
-
-VERSION = 1
 
 # Why a daemon without autostart is idle.
 NO_ORDER = "no order yet: start a mission"
@@ -162,20 +160,9 @@ class OrderState:
 
     def to_json(self) -> str:
         """Return it as JSON, to be kept with the ledger."""
-        plain = {
-            "version": VERSION,
-            "order": None if self.order is None else order_document(self.order),
-            "standing": self.automatic,
-            "stage": str(self.stage),
-            "zone": self.zone,
-            "pass": self.pass_number,
-            "begun": self.begun,
-            "tries": self.tries,
-            "home": self.home,
-            "paused": self.paused,
-            "why": self.why,
-        }
-        return msgspec.json.encode(plain).decode()
+        state = {field.name: getattr(self, field.name) for field in fields(self)}
+        order = None if self.order is None else order_document(self.order)
+        return msgspec.json.encode(_Note(**state | {"version": 1, "order": order})).decode()
 
     @classmethod
     def from_json(cls, note: str) -> OrderState:
@@ -198,9 +185,9 @@ class OrderState:
             raise OrderError(
                 f"the order kept has no zone {kept.zone} with a pass {kept.pass_number}"
             )
-        fields = msgspec.structs.asdict(kept) | {"order": order, "stage": Stage(kept.stage)}
-        del fields["version"]
-        return cls(**fields)
+        state = msgspec.structs.asdict(kept) | {"order": order}
+        del state["version"]
+        return cls(**state)
 
 
 class _Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -209,7 +196,7 @@ class _Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     version: Literal[1]
     order: OrderDocument | None
     automatic: bool = msgspec.field(name="standing")
-    stage: Literal["covering", "retrying", "returning", "over"]
+    stage: Stage
     zone: Annotated[int, Meta(ge=0)]
     pass_number: Annotated[int, Meta(ge=1)] = msgspec.field(name="pass")
     begun: bool
