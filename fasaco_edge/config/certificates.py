@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import ssl
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Protocol
@@ -59,8 +58,9 @@ def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
         listening, connecting = _context(files, server=True), _context(files, server=False)
         if not listens:
             connecting.verify_mode = ssl.CERT_NONE
-        said = _handshake(listening, connecting)
-        chain = [said, *listening.get_ca_certs()]
+        said: dict[str, Any] | None = _handshake(listening, connecting).getpeercert()
+        assert said is not None
+        chain: list[dict[str, Any]] = [said, *listening.get_ca_certs()]
     except ssl.SSLCertVerificationError as error:
         raise BadConfiguration(f"{files.certificate}: {error.verify_message}") from error
     except ssl.SSLError as error:
@@ -72,7 +72,11 @@ def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
         raise BadConfiguration(
             f"{error.filename or files.certificate}: {error.strerror}"
         ) from error
-    begins, ends = max(_times(chain, "notBefore")), min(_times(chain, "notAfter"))
+
+    def moments(name: str) -> list[datetime]:
+        return [datetime.fromtimestamp(ssl.cert_time_to_seconds(one[name]), UTC) for one in chain]
+
+    begins, ends = max(moments("notBefore")), min(moments("notAfter"))
     now = datetime.now(UTC)
     if now < begins:
         raise ClockBeforeCertificate(
@@ -90,10 +94,6 @@ def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
     )
 
 
-def _times(chain: Sequence[Mapping[str, Any]], name: str) -> list[datetime]:
-    return [datetime.fromtimestamp(ssl.cert_time_to_seconds(one[name]), UTC) for one in chain]
-
-
 def _context(files: TlsFiles, *, server: bool) -> ssl.SSLContext:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER if server else ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname = False
@@ -106,8 +106,8 @@ def _context(files: TlsFiles, *, server: bool) -> ssl.SSLContext:
     return context
 
 
-def _handshake(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> dict[str, Any]:
-    """Return the certificate that the listening side is shown."""
+def _handshake(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> ssl.SSLObject:
+    """Return the listening side, which was shown the certificate."""
     there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
     client = connecting.wrap_bio(back, there)
     server = listening.wrap_bio(there, back, server_side=True)
@@ -115,6 +115,4 @@ def _handshake(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> dict[st
         for side in (client, server):
             with contextlib.suppress(ssl.SSLWantReadError):
                 side.do_handshake()
-    shown: dict[str, Any] | None = server.getpeercert()
-    assert shown is not None
-    return shown
+    return server

@@ -1,4 +1,4 @@
-"""Notifications to the service manager by the protocol of sd_notify(3), one datagram each."""
+"""Notifications to the service manager by the protocol of sd_notify(3), and its watchdog."""
 
 from __future__ import annotations
 
@@ -7,8 +7,13 @@ import os
 import socket
 import time
 from collections.abc import MutableMapping
+from typing import TYPE_CHECKING
 
 from fasaco_edge.text import one_line
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.loop.worker import PlanningWorker
+    from fasaco_edge.wire.status import Status
 
 LOG = logging.getLogger(__name__)
 
@@ -17,10 +22,14 @@ LOG = logging.getLogger(__name__)
 PATIENCE_S = 1.0
 # `systemctl status` shows one line [characters].
 MOST_SAID = 500
+# Of the longest silence allowed: a cycle may be late, and a message may get lost.
+SHARE = 0.25
 
 
 class ServiceManager:
     """The manager that started this process; outside of a service there is none.
+
+    Each notification is one datagram.
 
     Attributes:
         is_there: whether there is one.
@@ -82,3 +91,57 @@ class ServiceManager:
             )
             return False
         return True
+
+
+class Watchdog:
+    """Notifies the service manager's watchdog, from the loop and only while planning progresses.
+
+    A thread of its own would go on beside a loop that hangs.
+
+    Attributes:
+        remark: added to the status line of the service; "" for nothing.
+    """
+
+    def __init__(self, manager: ServiceManager) -> None:
+        self.remark = ""
+        self._manager = manager
+        self._period_s = SHARE * manager.watchdog_s
+        self._notified_at = float("-inf")
+        self._progress = -1
+        self._state = ""
+
+    def beat(self, worker: PlanningWorker | None, now: float) -> None:
+        """Notify the watchdog if that is due, and the worker, if any, has made progress."""
+        if not self._period_s or now - self._notified_at < self._period_s:
+            return
+        if worker is not None:
+            if worker.progress == self._progress:
+                return
+            self._progress = worker.progress
+        self._notified_at = now
+        self._manager.alive()
+
+    def tell(self, status: Status) -> None:
+        """Show a status as the service's status line; log it when the state changes."""
+        if status.state != self._state:
+            self._state = status.state
+            LOG.info("%s", _doing(status), extra={"event": "state", "state": self._state})
+        remark = f"; {self.remark}" if self.remark else ""
+        self._manager.status(status_line(status) + remark)
+
+
+def status_line(status: Status) -> str:
+    """Return a status as a line: its state and why, how much is covered, what is wrong."""
+    parts = [_doing(status)]
+    if coverage := status.coverage:
+        area = f"{coverage.covered_m2:.0f} of {coverage.to_cover_m2:.0f} m2"
+        parts.append(f"{100 * coverage.fraction:.0f} % covered, {area}")
+    if path := status.path:
+        parts.append(f"path {path.revision} with {path.remaining_steps} steps to go")
+    if fault := status.ledger.fault:
+        parts.append(fault)
+    return "; ".join(parts)
+
+
+def _doing(status: Status) -> str:
+    return f"{status.state}: {status.reason}" if status.reason else status.state

@@ -19,9 +19,8 @@ from fasaco_edge.daemon.loop.inbox import Inbox, make_mailbox
 from fasaco_edge.daemon.loop.loop import BusPorts, Host, Loop
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
-from fasaco_edge.daemon.loop.watchdog import Watchdog
 from fasaco_edge.daemon.memory import afforded, needed_bytes
-from fasaco_edge.daemon.notify import ServiceManager
+from fasaco_edge.daemon.notify import ServiceManager, Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor

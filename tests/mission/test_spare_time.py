@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.daemon.loop.status import path_attachment
+from fasaco_edge.daemon.loop.outbox import path_attachment
 from fasaco_edge.mission.core.events import MapReceived, PlanReady
 from fasaco_edge.mission.core.route import SKIPPED_S, Attempt
 from fasaco_edge.planners.cost import CoverageCost

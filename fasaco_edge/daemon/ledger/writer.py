@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.daemon.faults import fault_text, log_fault
+from fasaco_edge.daemon.figures import fault_text, log_fault
 from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger, reason_of
 from fasaco_edge.errors import FasacoError, LedgerFileError, LedgerMismatchError, OrderError
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot

@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
+from fasaco_edge.daemon.figures import MapLatency
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.answers import Commands
 from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Inbox, take_batch
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.daemon.loop.outbox import CoveragePublisher, Outbox
-from fasaco_edge.daemon.loop.status import StatusBoard, path_attachment
+from fasaco_edge.daemon.loop.status import StatusBoard
 from fasaco_edge.daemon.loop.turn_log import TurnLog, TurnNote
-from fasaco_edge.daemon.loop.watchdog import MapLatency, Watchdog
+from fasaco_edge.daemon.notify import Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.errors import BadConfiguration, FasacoError, MissionBroke, PatchWithoutBase
@@ -267,11 +268,7 @@ class Loop:
     # What leaves for the bus.
 
     def _publish_path(self, mission: Mission, update: PathUpdate) -> None:
-        assert mission.grid is not None
-        assert mission.lattice is not None
-        xy = mission.lattice.centres(update.cells)
-        about = path_attachment(mission, update)
-        self._bus.outbox.path(xy, mission.grid.frame, mission.grid.stamp_ns, about)
+        self._bus.outbox.path(mission, update)
         self._status.path = update
         if update.plan is not None and (seconds := self._latency.answer()) is not None:
             self._status.map_to_path_s = seconds

@@ -8,14 +8,15 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from msgspec.structs import replace
+from msgspec.structs import asdict, replace
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.queries import Reply, Shared
 from fasaco_edge.bus.session import Bus
-from fasaco_edge.daemon.faults import PublishGuard
+from fasaco_edge.daemon.figures import PublishGuard
 from fasaco_edge.daemon.loop.answers import LastSamples
 from fasaco_edge.daemon.loop.inbox import PlanSnapshot
+from fasaco_edge.daemon.loop.status import plan_figures
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived
@@ -26,9 +27,11 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import coverage_grid, encode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
-from fasaco_edge.wire.status import PathAttachment, Status
+from fasaco_edge.wire.status import PathAttachment, Rectangle, Status
 
 if TYPE_CHECKING:
+    from fasaco_edge.grid.geometry import Window
+    from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.mission.core.mission import Mission
 
 PERIOD_S = 0.5
@@ -51,26 +54,25 @@ class Outbox:
         self._status = bus.advertise(keys, topics.STATUS)
         self._command = bus.advertise(keys, topics.COMMAND)
 
-    def path(
-        self,
-        xy: NDArray[np.float64],
-        frame: str,
-        stamp_ns: int,
-        about: PathAttachment,
-    ) -> None:
-        """Publish a path through ``xy`` [m], float64 (n, 2), facing along the way.
+    def path(self, mission: Mission, update: PathUpdate) -> None:
+        """Publish a path through the centres of cells, facing along the way.
 
         Where that fails an empty one is published: the robot must not follow the former path.
         """
-        if not self.guard.attempt("path", lambda: self._say_path(xy, frame, stamp_ns, about)):
+        assert mission.grid is not None
+        assert mission.lattice is not None
+        grid, xy = mission.grid, mission.lattice.centres(update.cells)
+        about = path_attachment(mission, update)
+        if not self.guard.attempt("path", lambda: self._say_path(xy, grid, about)):
             nothing = replace(about, steps=0)
-            self.guard.attempt("path", lambda: self._say_path(xy[:0], frame, stamp_ns, nothing))
+            self.guard.attempt("path", lambda: self._say_path(xy[:0], grid, nothing))
 
     def _say_path(
-        self, xy: NDArray[np.float64], frame: str, stamp_ns: int, about: PathAttachment
+        self, xy: NDArray[np.float64], grid: OccupancyGrid, about: PathAttachment
     ) -> None:
         attachment = encode_json(about)
-        path = Shared.of(encode_path(xy, headings(xy), frame, stamp_ns), schemas.PATH, attachment)
+        payload = encode_path(xy, headings(xy), grid.frame, grid.stamp_ns)
+        path = Shared.of(payload, schemas.PATH, attachment)
         self._last.keep("path", path)
         self._path.put(path.payload, attachment)
         if self._ros is not None:
@@ -130,6 +132,30 @@ def headings(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     ahead = np.diff(xy, axis=0)
     yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
     return np.append(yaw, yaw[-1])
+
+
+def path_attachment(mission: Mission, update: PathUpdate) -> PathAttachment:
+    """Return what is sent with a path."""
+    assert mission.grid is not None
+    assert mission.lattice is not None
+    return PathAttachment(
+        revision=update.revision,
+        map_stamp_ns=mission.grid.stamp_ns,
+        map_revision=mission.map_revision,
+        reason=update.reason,
+        steps=max(len(update.cells) - 1, 0),
+        plan_ms=round(1e3 * update.plan_s, 3),
+        changed=rectangle(update.changed, mission.lattice.cell_m),
+        **asdict(plan_figures(update.plan)),
+    )
+
+
+def rectangle(window: Window | None, cell_m: float) -> Rectangle | None:
+    """Return where a window of the lattice lies in the map's frame [m]; None without one."""
+    if window is None:
+        return None
+    edges = (window.col0, window.row0, window.col1, window.row1)
+    return Rectangle(*(round(edge * cell_m, 3) for edge in edges))
 
 
 class CoveragePublisher:

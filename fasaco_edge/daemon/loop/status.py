@@ -5,42 +5,33 @@ The order in a status, and in the answer to a command: what it is, and how far.
 
 from __future__ import annotations
 
-import logging
 import time
-from collections import Counter
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from msgspec.structs import asdict
 
 from fasaco_edge import __version__
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.faults import log_fault
+from fasaco_edge.daemon.figures import CycleTimes, Faults
 from fasaco_edge.daemon.loop.answers import config_document
-from fasaco_edge.daemon.loop.watchdog import CycleTimes
-from fasaco_edge.errors import FasacoError
 from fasaco_edge.host.processes import resident_mb, thread_count
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.wire.replies import CoverageReport, Reply
 from fasaco_edge.wire.status import (
     ClaimReport,
-    ErrorCounts,
     Latencies,
     LedgerReport,
     MapReport,
-    PathAttachment,
     PathReport,
     PlanCounts,
     PlanFigures,
     PoseReport,
-    Rectangle,
     Status,
     SupervisedRecorder,
 )
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.mission_runner import MissionRunner
-    from fasaco_edge.grid.geometry import Window
     from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.mission.core.mission import Mission
     from fasaco_edge.planners.path import CoveragePath
@@ -61,31 +52,9 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
 
 
-LOG = logging.getLogger(__name__)
-
 HEARTBEAT_S = 1.0
 # Changes closer together than this go out as one.
 LEAST_INTERVAL_S = 0.05
-
-
-class Faults:
-    """Counts what was refused, by code, and logs it."""
-
-    def __init__(self) -> None:
-        self._by_code: Counter[str] = Counter()
-        self._last = ""
-
-    def count(self, faults: Sequence[FasacoError], *, is_logged: bool = False) -> None:
-        """Note refused events, and log them if that is not done already."""
-        for fault in faults:
-            if not is_logged:
-                log_fault(LOG, fault)
-            self._by_code[fault.code] += 1
-            self._last = str(fault)
-
-    def counts(self) -> ErrorCounts:
-        """Return the counts as part of a status."""
-        return ErrorCounts(self._by_code.total(), self._last, dict(self._by_code))
 
 
 class StatusBoard:
@@ -195,22 +164,6 @@ class StatusBoard:
         )
 
 
-def path_attachment(mission: Mission, update: PathUpdate) -> PathAttachment:
-    """Return what is sent with a path."""
-    assert mission.grid is not None
-    assert mission.lattice is not None
-    return PathAttachment(
-        revision=update.revision,
-        map_stamp_ns=mission.grid.stamp_ns,
-        map_revision=mission.map_revision,
-        reason=update.reason,
-        steps=max(len(update.cells) - 1, 0),
-        plan_ms=round(1e3 * update.plan_s, 3),
-        changed=rectangle(update.changed, mission.lattice.cell_m),
-        **asdict(plan_figures(update.plan)),
-    )
-
-
 def plan_figures(plan: CoveragePath | None) -> PlanFigures:
     """Return what is known of the plan a path follows."""
     if plan is None:
@@ -226,14 +179,6 @@ def plan_figures(plan: CoveragePath | None) -> PlanFigures:
         lower_bound_steps=plan.lower_bound_steps or None,
         gap=None if plan.gap is None else round(plan.gap, 6),
     )
-
-
-def rectangle(window: Window | None, cell_m: float) -> Rectangle | None:
-    """Return where a window of the lattice lies in the map's frame [m]; None without one."""
-    if window is None:
-        return None
-    edges = (window.col0, window.row0, window.col1, window.row1)
-    return Rectangle(*(round(edge * cell_m, 3) for edge in edges))
 
 
 def _map(mission: Mission | None) -> MapReport | None:

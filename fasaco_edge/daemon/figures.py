@@ -1,0 +1,155 @@
+"""Figures of the loop: faults by code, failures to publish, durations of cycles and plans."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+
+from fasaco_edge.errors import FasacoError, NotPublished
+from fasaco_edge.wire.status import ErrorCounts, LoopTimes
+
+LOG = logging.getLogger(__name__)
+
+# Of what fails again and again one is logged in so long [s].
+PERIOD_S = 10.0
+# So many wait to be counted at most.
+MOST_FAULTS = 100
+# A cycle longer than this [s] makes what arrives meanwhile late.
+LATE_S = 0.1
+# Durations are counted to within 10 %, in logarithmic buckets, the last for all beyond 18 minutes:
+# so the figures of a year take as much memory as those of a minute.
+LEAST_S, PER_DOUBLING, BUCKETS = 1e-6, 8, 8 * 30
+
+
+def log_fault(log: logging.Logger, fault: FasacoError) -> str:
+    """Log a fault; return its text."""
+    text = fault_text(fault)
+    log.warning("%s", text, extra={"event": "fault", "code": fault.code})
+    return text
+
+
+def fault_text(fault: FasacoError) -> str:
+    """Return a fault with what to do."""
+    return f"{fault}: {fault.hint}" if fault.hint else str(fault)
+
+
+class Faults:
+    """Counts what was refused, by code, and logs it."""
+
+    def __init__(self) -> None:
+        self._by_code: Counter[str] = Counter()
+        self._last = ""
+
+    def count(self, faults: Sequence[FasacoError], *, is_logged: bool = False) -> None:
+        """Note refused events, and log them if that is not done already."""
+        for fault in faults:
+            if not is_logged:
+                log_fault(LOG, fault)
+            self._by_code[fault.code] += 1
+            self._last = str(fault)
+
+    def counts(self) -> ErrorCounts:
+        """Return the counts as part of a status."""
+        return ErrorCounts(self._by_code.total(), self._last, dict(self._by_code))
+
+
+class PublishGuard:
+    """Publishes what the loop sends: a failure costs that message alone.
+
+    All failures are counted; of each topic one in ``PERIOD_S`` is logged.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._faults: list[FasacoError] = []
+        self._logged_at: dict[str, float] = {}
+
+    def attempt(self, topic: str, publish: Callable[[], None]) -> bool:
+        """Make and send a message; tell whether that went well."""
+        try:
+            publish()
+        except Exception as error:
+            why = (
+                str(error) if isinstance(error, FasacoError) else f"{type(error).__name__}: {error}"
+            )
+            fault = NotPublished(f"{topic} was not published: {why}")
+            now = self._clock()
+            if now - self._logged_at.get(topic, float("-inf")) >= PERIOD_S:
+                self._logged_at[topic] = now
+                log_fault(LOG, fault)
+                if not isinstance(error, FasacoError):
+                    LOG.exception("%s", topic)
+            if len(self._faults) < MOST_FAULTS:
+                self._faults.append(fault)
+            return False
+        return True
+
+    def take_faults(self) -> list[FasacoError]:
+        """Return what was not published since the last call; it is logged already."""
+        faults, self._faults = self._faults, []
+        return faults
+
+
+class CycleTimes:
+    """Durations of the cycles of the loop since its start."""
+
+    def __init__(self) -> None:
+        self._counts = [0] * BUCKETS
+        self._turns = self._late = 0
+        self._longest_s = 0.0
+
+    def note(self, seconds: float) -> None:
+        """Count a cycle."""
+        doublings = math.log2(max(seconds, LEAST_S) / LEAST_S)
+        self._counts[min(int(doublings * PER_DOUBLING), BUCKETS - 1)] += 1
+        self._turns += 1
+        self._late += seconds > LATE_S
+        self._longest_s = max(self._longest_s, seconds)
+
+    def report(self) -> LoopTimes:
+        """Return the figures as part of a status [ms]; None before the first cycle."""
+        if not self._turns:
+            return LoopTimes()
+        shares = (0.5, 0.99, 0.999, 1.0)
+        within_ms = (round(1e3 * self._within(share), 3) for share in shares)
+        return LoopTimes(self._turns, self._late, *within_ms)
+
+    def _within(self, share: float) -> float:
+        """Return the duration that this share of the cycles did not exceed [s]."""
+        missing = math.ceil(share * self._turns)
+        for bucket, count in enumerate(self._counts[:-1]):
+            missing -= count
+            if missing <= 0:
+                most_s = LEAST_S * math.exp2((bucket + 1) / PER_DOUBLING)
+                return min(most_s, self._longest_s)
+        return self._longest_s
+
+
+class MapLatency:
+    """Time from the arrival of a map that calls for a plan to that plan's path.
+
+    Attributes:
+        arrived: when the newest map of this cycle arrived [s, monotonic]; None without one.
+    """
+
+    def __init__(self) -> None:
+        self.arrived: float | None = None
+        # Arrival of the oldest map that no plan was asked for yet, and of the one
+        # that the plan under way was asked for.
+        self._unanswered: float | None = None
+        self._asked: float | None = None
+
+    def call_for_plan(self) -> None:
+        """Note that the newest map calls for a plan."""
+        self._unanswered = self._unanswered or self.arrived
+
+    def ask(self) -> None:
+        """Note that a plan was asked for."""
+        self._asked, self._unanswered = self._unanswered, None
+
+    def answer(self) -> float | None:
+        """Return how long it took until now [s]; None where no map had called for the plan."""
+        return None if self._asked is None else time.monotonic() - self._asked
