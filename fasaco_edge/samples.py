@@ -26,8 +26,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bus.arrival import Arrival
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 

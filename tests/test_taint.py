@@ -26,8 +26,7 @@ import zenoh.ext
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, Sample
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.recording import entities

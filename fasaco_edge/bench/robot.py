@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bench.processes import LOOK_EVERY_S, START_TIMEOUT_S, DaemonProcess
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.publisher import Publisher
-from fasaco_edge.bus.session import Bus, Sample
+from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import BusUnavailable, NotYet
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid

@@ -1,16 +1,76 @@
-"""Arrival: a sample from the bus, with the time at which it came."""
+"""Samples from the bus, and when they arrived."""
 
 from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from fasaco_edge.bus.session import Sample
+if TYPE_CHECKING:
+    import zenoh
 
 PATH_DIGEST = "path_digest"
 """Topic that stands for a path in a recording: with its attachment and, as payload, the ``digest``
 of its points, float64 x, y [m]."""
 DIGEST_BYTES = 16
+
+
+class Sample:
+    """A message from the bus.
+
+    Payload and attachment stay in Zenoh's buffers until they are read: a message that a newer one
+    replaces before is never copied.
+
+    Attributes:
+        key: its key.
+        schema: message type in its encoding; "" for none.
+        size: of payload and attachment together [bytes].
+    """
+
+    __slots__ = ("_attachment", "_payload", "key", "schema", "size")
+
+    def __init__(
+        self,
+        key: str,
+        payload: bytes | zenoh.ZBytes,
+        schema: str = "",
+        attachment: bytes | zenoh.ZBytes = b"",
+    ) -> None:
+        self.key = key
+        self.schema = schema
+        self.size = len(payload) + len(attachment)
+        self._payload = payload
+        self._attachment = attachment
+
+    @property
+    def payload(self) -> bytes:
+        """The message itself."""
+        if not isinstance(self._payload, bytes):
+            self._payload = self._payload.to_bytes()
+        return self._payload
+
+    @property
+    def attachment(self) -> bytes:
+        """What came beside it."""
+        if not isinstance(self._attachment, bytes):
+            self._attachment = self._attachment.to_bytes()
+        return self._attachment
+
+    def as_type(self, schema: str) -> Sample:
+        """Return it as a message of another type."""
+        return Sample(self.key, self._payload, schema, self._attachment)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sample) and self._told() == other._told()
+
+    def __hash__(self) -> int:
+        return hash(self._told())
+
+    def __repr__(self) -> str:
+        return f"Sample({self.key!r}, {self.size} bytes, {self.schema!r})"
+
+    def _told(self) -> tuple[str, bytes, str, bytes]:
+        return self.key, self.payload, self.schema, self.attachment
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ Choices that hold for every process, and why:
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import metadata
@@ -21,6 +22,7 @@ from typing import Any, Self
 import zenoh
 
 from fasaco_edge.bus import DEFAULT_ENDPOINT
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Asker, LatchedSubscription, Subscription
 from fasaco_edge.bus.publisher import JSON, Publisher, schema_of
 from fasaco_edge.bus.queries import (
@@ -34,12 +36,19 @@ from fasaco_edge.bus.queries import (
     send,
     size_of,
 )
-from fasaco_edge.bus.session_config import session_config
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 from fasaco_edge.wire.topics import VOLATILE, Qos, Topic
 
 ZENOH_VERSION = metadata.version("eclipse-zenoh")
+
+
+# Timeout of the handshake of an incoming connection [ms], and how many may be pending.
+ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
+# A map or a path is many packets of 64 kB. Where two of them fill the queue, as by default, a
+# computer that is busy for 50 ms drops the map; these take a megabyte, and only when there is one.
+QUEUED_BATCHES = dict.fromkeys(("interactive_high", "data_high", "data", "data_low"), 16)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,64 +68,6 @@ class BusSettings:
     connect: tuple[str, ...] = (DEFAULT_ENDPOINT,)
     listen: tuple[str, ...] = ()
     secured: Mapping[str, Any] = field(default_factory=dict, repr=False)
-
-
-class Sample:
-    """A message from the bus.
-
-    Payload and attachment stay in Zenoh's buffers until they are read: a message that a newer one
-    replaces before is never copied.
-
-    Attributes:
-        key: its key.
-        schema: message type in its encoding; "" for none.
-        size: of payload and attachment together [bytes].
-    """
-
-    __slots__ = ("_attachment", "_payload", "key", "schema", "size")
-
-    def __init__(
-        self,
-        key: str,
-        payload: bytes | zenoh.ZBytes,
-        schema: str = "",
-        attachment: bytes | zenoh.ZBytes = b"",
-    ) -> None:
-        self.key = key
-        self.schema = schema
-        self.size = len(payload) + len(attachment)
-        self._payload = payload
-        self._attachment = attachment
-
-    @property
-    def payload(self) -> bytes:
-        """The message itself."""
-        if not isinstance(self._payload, bytes):
-            self._payload = self._payload.to_bytes()
-        return self._payload
-
-    @property
-    def attachment(self) -> bytes:
-        """What came beside it."""
-        if not isinstance(self._attachment, bytes):
-            self._attachment = self._attachment.to_bytes()
-        return self._attachment
-
-    def as_type(self, schema: str) -> Sample:
-        """Return it as a message of another type."""
-        return Sample(self.key, self._payload, schema, self._attachment)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Sample) and self._told() == other._told()
-
-    def __hash__(self) -> int:
-        return hash(self._told())
-
-    def __repr__(self) -> str:
-        return f"Sample({self.key!r}, {self.size} bytes, {self.schema!r})"
-
-    def _told(self) -> tuple[str, bytes, str, bytes]:
-        return self.key, self.payload, self.schema, self.attachment
 
 
 @dataclass(slots=True)
@@ -313,7 +264,7 @@ def open_bus(settings: BusSettings) -> Bus:
         BusUnavailable: nothing listens at the endpoints, or an address is wrong.
     """
     try:
-        return Bus(zenoh.open(_config(settings)), bool(settings.listen))
+        return Bus(zenoh.open(session_config(settings)), bool(settings.listen))
     except zenoh.ZError as error:
         # A secured session connects only to what is configured.
         taken = settings.listen and "Address already in use" in str(error)
@@ -331,13 +282,55 @@ def check_settings(settings: BusSettings) -> None:
         BusUnavailable: Zenoh does not take it.
     """
     try:
-        _config(settings)
+        session_config(settings)
     except zenoh.ZError as error:
         raise BusUnavailable(_first_line(error)) from error
 
 
-def _config(settings: BusSettings) -> zenoh.Config:
-    return session_config(settings.mode, settings.connect, settings.listen, settings.secured)
+def session_config(settings: BusSettings) -> zenoh.Config:
+    """Return Zenoh's configuration of a session: what all have in common, and what secures one.
+
+    Raises:
+        zenoh.ZError: it has unknown keys or impossible values.
+    """
+    is_client = settings.mode == "client"
+    own = {
+        "mode": settings.mode,
+        "connect": {
+            "endpoints": list(settings.connect),
+            # A client without its router fails at once; a peer keeps trying.
+            "timeout_ms": 0 if is_client else -1,
+            "exit_on_failure": is_client,
+            "retry": {"period_init_ms": 200, "period_max_ms": 1000},
+        },
+        "listen": {"endpoints": list(settings.listen)},
+        "scouting": {"multicast": {"enabled": False}},
+        # Advanced publishers need timestamps for their cache.
+        "timestamping": {"enabled": True},
+        "transport": {
+            "shared_memory": {"enabled": False},
+            # Connections without a handshake must not keep others out: by default a hundred of
+            # them do, for twelve seconds.
+            "unicast": {"accept_timeout": ACCEPT_TIMEOUT_MS, "accept_pending": ACCEPT_PENDING},
+            "link": {
+                "rx": {"max_message_size": MAX_MESSAGE_BYTES},
+                "tx": {"queue": {"size": QUEUED_BATCHES}},
+            },
+        },
+    }
+    return zenoh.Config.from_json5(json.dumps(_merged(own, settings.secured)))
+
+
+def _merged(own: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return both; where both have a mapping, that of both."""
+    merged = dict(own)
+    for key, value in more.items():
+        before = own.get(key)
+        if isinstance(before, Mapping) and isinstance(value, Mapping):
+            merged[key] = _merged(before, value)
+        else:
+            merged[key] = value
+    return merged
 
 
 def _sample(sample: zenoh.Sample) -> Sample:

@@ -10,11 +10,12 @@ from __future__ import annotations
 import time
 from typing import Literal
 
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.queries import Shared
-from fasaco_edge.bus.session import Bus, Sample
+from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.daemon.loop.inbox import poster
 from fasaco_edge.wire import topics

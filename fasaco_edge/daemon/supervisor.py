@@ -11,8 +11,9 @@ from pathlib import Path
 import msgspec
 from msgspec.structs import asdict
 
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.session import Bus, Sample
+from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.host.processes import python_program

@@ -11,8 +11,7 @@ from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
-from fasaco_edge.bus.arrival import Arrival
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.loop.inbox import Batch, Received

@@ -15,7 +15,7 @@ from typing import Any, Self, TextIO
 
 from rich.console import Console
 
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.host.processes import stop_event
 from fasaco_edge.text import json_line, one_line
 from fasaco_edge.watch import phrases

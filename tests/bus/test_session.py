@@ -14,8 +14,9 @@ import zenoh
 import zenoh.ext
 
 from fasaco_edge.bus import queries as roll_module
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.queries import Reply
-from fasaco_edge.bus.session import BusSettings, Sample, open_bus
+from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.topics import QOS
 from tests.support.outsider import Ear, open_client

@@ -10,7 +10,7 @@ import yaml
 import zenoh
 
 from fasaco_edge.bus import access
-from fasaco_edge.bus.session_config import session_config
+from fasaco_edge.bus.session import BusSettings, session_config
 from fasaco_edge.config.config import load_config
 from fasaco_edge.config.security import read_client_security
 from fasaco_edge.host.resources import folder
@@ -74,7 +74,7 @@ def test_a_robots_is_what_the_daemon_makes_of_its_configuration(here, name):
     file = here / "config.yaml"
     file.write_text(words)
     settings = load_config(file).bus.settings("fasaco/@v1/robot")
-    ours = session_config(settings.mode, settings.connect, settings.listen, settings.secured)
+    ours = session_config(settings)
     assert parts(config) == parts(ours)
 
 
@@ -85,7 +85,7 @@ def test_a_clients_is_what_our_programs_make_of_their_options(here, name, monkey
     (here / "me.yaml").write_text(words)
     connect = json.loads(config.get_json("connect/endpoints"))
     security = read_client_security(str(here / "me.yaml"), connect)
-    ours = session_config("client", connect, (), security.of_client())
+    ours = session_config(BusSettings("client", tuple(connect), (), security.of_client()))
     assert parts(config) == parts(ours)
 
 
@@ -105,7 +105,7 @@ def test_the_routers_grants_each_robot_its_own_keys(here):
     file = here / "r1.yaml"
     file.write_text(words)
     settings = load_config(file).bus.settings("fasaco/@v1/r1")
-    session_config(settings.mode, settings.connect, settings.listen, settings.secured)
+    session_config(settings)
     assert yaml.safe_load(words)["bus"]["security"]["roles"] == {"router": ["router"]}
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import yaml
 
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.errors import LedgerFileError, UnreadableRecording

@@ -7,7 +7,8 @@ import weakref
 
 import pytest
 
-from fasaco_edge.bus.session import BusSettings, Sample, open_bus
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.daemon.loop.inbox import Inbox, Received, make_mailbox, take_batch
 from fasaco_edge.errors import MalformedMessage, PatchWithoutBase, PlanFailed
 from fasaco_edge.grid.lattice import Footprint

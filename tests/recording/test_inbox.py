@@ -7,8 +7,7 @@ import threading
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.bus.arrival import Arrival
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.recording.write.inbox import (
     BASE_BYTES,
     BEHIND_SAMPLES,

@@ -11,8 +11,7 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.bus.arrival import DIGEST_BYTES, PATH_DIGEST, Arrival, digest
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import DIGEST_BYTES, PATH_DIGEST, Arrival, Sample, digest
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid

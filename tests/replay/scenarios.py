@@ -10,8 +10,7 @@ from itertools import pairwise
 import numpy as np
 from msgspec.structs import asdict
 
-from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, Sample, digest
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.loop.status import plan_figures
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.bus.arrival import Arrival
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.samples import LARGE_BYTES, SampleDecoder, SampleEncoder, place_of
 

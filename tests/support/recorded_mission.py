@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.bus.session import Bus, BusSettings, open_bus
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.session import Bus, BusSettings, open_bus
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import scan_recording

@@ -25,14 +25,7 @@ from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import (
-    BLOCKED,
-    COVERED,
-    RECOVERED,
-    TO_COVER,
-    UNKNOWN,
-    encode_occupancy_grid,
-)
+from fasaco_edge.wire.maps import CoverageValue, encode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
 from fasaco_edge.wire.poses import encode_pose_stamped
@@ -153,10 +146,13 @@ class Mission:
         """Publish how often the robot was where, as far as the building is known."""
         grid = coverage(self.visits, blocked_cells(done))
         values = grid.cells.copy()
-        values[:, self.seen_cells :] = UNKNOWN
-        recovered, covered = np.count_nonzero(values == RECOVERED), np.count_nonzero(values > 0)
-        covered -= np.count_nonzero(values == BLOCKED)
-        coverable = covered + np.count_nonzero(values == TO_COVER)
+        values[:, self.seen_cells :] = CoverageValue.UNKNOWN
+        recovered, covered = (
+            np.count_nonzero(values == CoverageValue.RECOVERED),
+            np.count_nonzero(values > 0),
+        )
+        covered -= np.count_nonzero(values == CoverageValue.BLOCKED)
+        coverable = covered + np.count_nonzero(values == CoverageValue.TO_COVER)
         self.covered, self.recovered = covered / coverable, recovered / coverable
         self._coverage.put(
             encode_occupancy_grid(OccupancyGrid(grid.geometry, values, "map", _stamp()))
@@ -214,11 +210,11 @@ def blocked_cells(done: float = 0.0) -> np.ndarray:
 
 def coverage(visits: np.ndarray, blocked: np.ndarray) -> OccupancyGrid:
     """Return the coverage for numbers of visits, and what is blocked, per lattice cell."""
-    values = np.full(visits.shape, TO_COVER, np.int8)
-    values[visits == 1] = COVERED
-    values[visits > 1] = RECOVERED
-    values[blocked] = BLOCKED
-    values[18:, 27:] = UNKNOWN
+    values = np.full(visits.shape, CoverageValue.TO_COVER, np.int8)
+    values[visits == 1] = CoverageValue.COVERED
+    values[visits > 1] = CoverageValue.RECOVERED
+    values[blocked] = CoverageValue.BLOCKED
+    values[18:, 27:] = CoverageValue.UNKNOWN
     geometry = GridGeometry(*visits.shape, CELL_M, Pose2D(*ORIGIN))
     return OccupancyGrid(geometry, values, "map", _stamp())
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.watch.robot_view import RobotView, Token

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.watch.feed import SUBSCRIBED

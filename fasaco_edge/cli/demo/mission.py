@@ -17,8 +17,9 @@ from typing import Any, Self
 import yaml
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.session import Bus, BusSettings, Sample, open_bus
+from fasaco_edge.bus.session import Bus, BusSettings, open_bus
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.errors import BusUnavailable, ProcessEnded
 from fasaco_edge.grid.map_files import find_map

@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Spacing
 from fasaco_edge.bus.queries import Question
-from fasaco_edge.bus.session import Bus, Sample
+from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.memory import most_bytes, queues
 from fasaco_edge.errors import FasacoError, MalformedMessage, MapTooLarge
 from fasaco_edge.grid.occupancy import OccupancyGrid

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from fasaco_edge import __version__
-from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.publisher import Publisher
-from fasaco_edge.bus.session import Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import encode_ledger
 from fasaco_edge.daemon.loop.answers import config_document

@@ -19,8 +19,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 
-from fasaco_edge.bus.arrival import Arrival
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.wire.topics import NEWEST, TOPICS
 
 

@@ -12,8 +12,7 @@ from collections import Counter
 from dataclasses import replace
 from typing import Final
 
-from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
-from fasaco_edge.bus.session import Sample
+from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, Sample, digest
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.samples import Numbered, SampleEncoder
