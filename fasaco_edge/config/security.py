@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
-from msgspec import Meta
+from msgspec import Meta, structs
 
 from fasaco_edge.bus import access
 from fasaco_edge.config.reading import Section
@@ -75,6 +75,11 @@ def from_here(endpoint: str) -> str:
 
 
 ATTRIBUTES = {"tls": "cert_common_names", "user": "usernames"}
+# The protocols over which a session shows who it is.
+CARRIERS = {
+    "tls": (("tls",), "only tls/<host>:<port> carries certificates"),
+    "user": (("tcp", "ws", *UNIX), "user and password are shown over tcp, ws or a unix socket"),
+}
 
 Name = Annotated[str, Meta(min_length=1)]
 
@@ -124,7 +129,7 @@ class SecurityConfig(Section, frozen=True):
 
     def names(self) -> dict[str, tuple[str, ...]]:
         """Return the names with each role."""
-        return {role: getattr(self.roles, role) for role in self.roles.__struct_fields__}
+        return structs.asdict(self.roles)
 
     def warn_of_clock(self) -> None:
         """Warn where the clock is before the certificate, so that no connection can be made.
@@ -208,12 +213,10 @@ class SecurityConfig(Section, frozen=True):
 
 def files(security: SecurityConfig) -> Iterator[tuple[str, str]]:
     """Yield the files that the chosen kind needs: the key under ``bus.security``, and the path."""
-    if security.kind == "none":
-        return
-    section = getattr(security, security.kind)
-    for name in section.__struct_fields__:
+    section = {"tls": security.tls, "user": security.user}.get(security.kind)
+    for name, file in structs.asdict(section).items() if section else ():
         if name != "name":
-            yield f"{security.kind}.{name}", getattr(section, name)
+            yield f"{security.kind}.{name}", file
 
 
 def security_faults(
@@ -245,9 +248,14 @@ def security_faults(
             f"bus.open_to_everyone: contradicts bus.security.kind {security.kind}"
         )
     yield from _missing(security, listen)
+    protocols, carries = CARRIERS[security.kind]
     for key, endpoints in (("listen", listen), ("connect", connect)):
         for endpoint in endpoints:
-            yield from _protocol_faults(security.kind, key, endpoint)
+            if protocol_of(endpoint) not in protocols:
+                yield BadConfiguration(
+                    f"bus.{key}: {endpoint}: {carries}",
+                    hint="correct the endpoint, or bus.security.kind",
+                )
 
 
 def _missing(security: SecurityConfig, listen: Sequence[str]) -> Iterator[BadConfiguration]:
@@ -260,20 +268,6 @@ def _missing(security: SecurityConfig, listen: Sequence[str]) -> Iterator[BadCon
             yield BadConfiguration(
                 f"bus.security.{name}: needed with bus.security.kind {security.kind}"
             )
-
-
-def _protocol_faults(kind: str, key: str, endpoint: str) -> Iterator[BadConfiguration]:
-    protocol = protocol_of(endpoint)
-    if kind == "tls" and protocol != "tls":
-        yield BadConfiguration(
-            f"bus.{key}: {endpoint}: only tls/<host>:<port> carries certificates",
-            hint="correct the endpoint, or bus.security.kind",
-        )
-    if kind == "user" and protocol not in ("tcp", "ws", *UNIX):
-        yield BadConfiguration(
-            f"bus.{key}: {endpoint}: user and password are shown over tcp, ws or a unix socket",
-            hint="correct the endpoint, or bus.security.kind",
-        )
 
 
 def _read(name: str, file: str) -> str:

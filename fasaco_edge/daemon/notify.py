@@ -82,13 +82,8 @@ class ServiceManager:
                 out.settimeout(patience_s)
                 out.sendto(text.encode(), self._address)
         except OSError as error:
-            word = text.partition("=")[0]
-            LOG.warning(
-                "the service manager does not accept %s: %s",
-                word,
-                error,
-                extra={"event": "unheard"},
-            )
+            why = "the service manager does not accept %s: %s"
+            LOG.warning(why, text.partition("=")[0], error, extra={"event": "unheard"})
             return False
         return True
 
