@@ -157,7 +157,7 @@ class PlannerConfig(Section, frozen=True):
         )
 
 
-class MissionSettings(Section, MissionPolicy, frozen=True):
+class MissionSettings(Section, MissionPolicy, frozen=True, kw_only=True):
     """The mission's policy, and where progress is kept.
 
     ``state_dir`` "" is the folder a service manager or the user has for that.

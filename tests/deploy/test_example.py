@@ -1,5 +1,6 @@
 """What lies in deploy/ says what is true."""
 
+import json
 from pathlib import Path
 
 import msgspec
@@ -14,7 +15,10 @@ EXAMPLE = Path(__file__).parents[2] / "deploy" / "fasaco-edge.yaml"
 def test_example_configuration_holds_every_key_with_its_default():
     written = yaml.safe_load(EXAMPLE.read_text(encoding="utf-8"))
     assert load_config(EXAMPLE) == DaemonConfig()
-    assert written == msgspec.json.decode(msgspec.json.encode(DaemonConfig()))
+    shown = msgspec.json.decode(msgspec.json.encode(DaemonConfig()))
+    assert written == shown
+    # `check-config --show` has the keys in the same order.
+    assert json.dumps(written) == json.dumps(shown)
 
 
 def test_the_block_for_ros_holds_every_key_with_its_default_once_it_is_no_comment(tmp_path):
