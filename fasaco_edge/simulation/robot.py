@@ -14,7 +14,7 @@ into a dead end and comes back passes the same place twice.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -227,14 +227,15 @@ def joined(
     if passed == len(path):
         return path[:0]
     targets = [target for target in (passed, passed - 1) if target >= 0]
-    for gone_back in range(1, len(track) + 1):
-        here = track[-gone_back]
-        for target in targets:
-            if is_clear(_point(here), _point(path[target])):
-                return corners(np.vstack((track[: -gone_back - 1 : -1], path[target:])))[1:]
-    for target in _nearest_first(path, track[-1]):
-        if is_clear(_point(track[-1]), _point(path[target])):
-            return corners(np.vstack((track[-1], path[target:])))[1:]
+    back = range(1, len(track) + 1)
+    ways = [(gone_back, target) for gone_back in back for target in targets]
+    way = np.cumsum(np.hypot(*np.diff(path, axis=0).T))
+    head = path[: 1 + int(np.searchsorted(way, JOIN_WITHIN_M, side="right"))]
+    nearest = np.argsort(np.hypot(*(head - track[-1]).T), kind="stable")
+    ways += [(1, target) for target in nearest.tolist()]
+    for gone_back, target in ways:
+        if is_clear(track[-gone_back].tolist(), path[target].tolist()):
+            return corners(np.vstack((track[: -gone_back - 1 : -1], path[target:])))[1:]
     return None
 
 
@@ -256,16 +257,3 @@ def passed_waypoints(path: NDArray[np.float64], track: NDArray[np.float64]) -> i
             return index
         since += int(near[-1 if index == 0 else 0])
     return len(path)
-
-
-def _nearest_first(path: NDArray[np.float64], here: NDArray[np.float64]) -> Iterator[int]:
-    """Yield the waypoints of the path's first metres, the nearest first."""
-    steps = np.diff(path, axis=0)
-    way = np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))
-    head = path[: 1 + int(np.searchsorted(way, JOIN_WITHIN_M, side="right"))]
-    distances = np.hypot(head[:, 0] - here[0], head[:, 1] - here[1])
-    yield from (int(index) for index in np.argsort(distances, kind="stable"))
-
-
-def _point(row: NDArray[np.float64]) -> Point:
-    return float(row[0]), float(row[1])

@@ -155,7 +155,14 @@ class World:
     def __init__(self, truth: OccupancyGrid, start: Pose2D, config: SimulationConfig) -> None:
         self._truth = truth
         self.config = config
-        _check_start(truth, start, config)
+        col, row = truth.geometry.to_pixels(start.x, start.y)
+        if not (0 <= row < truth.geometry.rows and 0 <= col < truth.geometry.cols):
+            raise StartOutsideMap(f"start ({start.x:g}, {start.y:g}) m is not on the map")
+        if not _fits(truth, start, config):
+            raise StartBlocked(
+                f"a robot of radius {config.robot_radius_m:g} m does not fit at the start "
+                f"({start.x:g}, {start.y:g}) m"
+            )
         self._drive = DriveState(start)
         self._mapper = Mapper(truth, config)
         self._path: NDArray[np.float64] | None = None
@@ -270,14 +277,3 @@ def _fits(truth: OccupancyGrid, pose: Pose2D, config: SimulationConfig) -> bool:
     x, y = truth.geometry.to_pixels(pose.x, pose.y)
     radius = config.hull_radius_m / truth.geometry.resolution
     return bool(disc_is_free(truth.cells, x, y, radius, config.free_at_most))
-
-
-def _check_start(truth: OccupancyGrid, start: Pose2D, config: SimulationConfig) -> None:
-    col, row = truth.geometry.to_pixels(start.x, start.y)
-    if not (0 <= row < truth.geometry.rows and 0 <= col < truth.geometry.cols):
-        raise StartOutsideMap(f"start ({start.x:g}, {start.y:g}) m is not on the map")
-    if not _fits(truth, start, config):
-        raise StartBlocked(
-            f"a robot of radius {config.robot_radius_m:g} m does not fit at the start "
-            f"({start.x:g}, {start.y:g}) m"
-        )

@@ -203,10 +203,6 @@ class CdrWriter:
         """Number of bytes written since the header, what alignment is counted in."""
         return self._size
 
-    def align(self, alignment: int) -> None:
-        """Write zeros up to a multiple of ``alignment``."""
-        self._put(alignment, b"")
-
     def words(self, layout: struct.Struct, names: Sequence[str], *values: float) -> None:
         """Write 32-bit numbers, as ``CdrReader.words`` reads them; ``names`` are theirs."""
         try:
@@ -233,8 +229,7 @@ class CdrWriter:
 
     def octets(self, values: bytes) -> None:
         """Write bytes as they are."""
-        self._parts.append(values)
-        self._size += len(values)
+        self._put(1, values)
 
     def string(self, value: str, field: str) -> None:
         """Write a string: its length with the NUL, UTF-8, NUL."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,5 +72,4 @@ def _write_floats(
     values = np.zeros(count) if values is None else values
     if values.shape != (count,):
         refuse(writer.message, field, f"float64 ({count},)", f"{values.dtype} {values.shape}")
-    writer.align(8)
-    writer.array(values.astype("<f8", copy=False))
+    writer.doubles(struct.Struct(f"<{count}d"), *values)

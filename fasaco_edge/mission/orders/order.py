@@ -164,16 +164,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
         document.return_home,
         document.keep_covered,
     )
-    _check(order)
-    return order
-
-
-def _check(order: MissionOrder) -> None:
-    """Check what the types of a document do not say, and no map is needed for.
-
-    Raises:
-        OrderError: naming the member, what is wrong with it, and what is allowed.
-    """
+    # What the types of a document do not say, and no map is needed for.
     names = [zone.name for zone in order.zones]
     for index, name in enumerate(names):
         where = f"zones[{index}].name"
@@ -201,6 +192,7 @@ def _check(order: MissionOrder) -> None:
                 )
         if why := polygon_flaw(polygon):
             raise OrderError(f"{where} {why}")
+    return order
 
 
 def _converted(document: object, kind: type[_Read]) -> _Read:
