@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from fasaco_edge.errors import CommandError, FasacoError, LedgerMismatchError
 from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.core.events import (
     Answer,
     CommandReceived,
@@ -93,7 +92,10 @@ class EventHandler:
                     self._enter_frame(grid.frame)
                 self._map_changed()
             case PatchRun(patches):
-                self._take_patches(patches)
+                has_changed, faults = self.map.take_patches(patches)
+                self._faults += faults
+                if has_changed:
+                    self._map_changed()
             case PatchesLost(count):
                 self.map.lose_patches(count)
             case PoseReceived(pose):
@@ -105,12 +107,6 @@ class EventHandler:
                 raise event.why
             case CommandReceived():
                 self._obey(event)
-
-    def _take_patches(self, patches: Sequence[MapPatch]) -> None:
-        has_changed, faults = self.map.take_patches(patches)
-        self._faults += faults
-        if has_changed:
-            self._map_changed()
 
     def _map_changed(self) -> None:
         """Follow a new map; raise LedgerMismatchError where it shows another building."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import Decision, PathUpdate, PlanRequest, State
+from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.inputs import InputMonitor
@@ -69,7 +69,9 @@ class Executive:
         if route.wanted and route.pending is None:
             if why := route.why_not_yet(now):
                 return self._rest(State.BLOCKED, why)
-            return Decision(path=update) if self._is_too_soon() else self._request(cell, update)
+            # A robot that had to stop waits a moment.
+            is_too_soon = self._state is State.BLOCKED and not self._has_waited()
+            return Decision(path=update) if is_too_soon else self._request(cell, update)
         if orders.state.stage is Stage.RETURNING and cell == orders.state.home:
             orders.advance(now)
         if orders.state.stage is Stage.OVER or (
@@ -77,13 +79,8 @@ class Executive:
         ):
             return self._settle(update)
         self._report_driving()
-        return Decision(path=update, plan=self._use_spare_time())
-
-    def _use_spare_time(self) -> PlanRequest | None:
-        """Request a better path, if nothing else is to be done."""
-        route = self.route
         is_free = self._state is State.COVERING and route.pending is None and not route.wanted
-        return route.request_improvement(self._now) if is_free else None
+        return Decision(path=update, plan=route.request_improvement(now) if is_free else None)
 
     def _why_resting(self) -> tuple[State, str] | None:
         """Return the state and reason of a robot with nothing to decide on; None where there is."""
@@ -124,10 +121,6 @@ class Executive:
 
     def _has_waited(self) -> bool:
         return self._now - self.route.published_at >= PATIENCE_S
-
-    def _is_too_soon(self) -> bool:
-        """Tell whether a robot that had to stop should wait a moment before a new plan."""
-        return self._state is State.BLOCKED and not self._has_waited()
 
     def _check_deviation(self, cell: Cell) -> None:
         """Want a new plan for a robot that is off its path, or at the end of it."""

@@ -114,19 +114,6 @@ def _near(indices: NDArray[np.intp]) -> slice:
     return slice(max(int(indices.min()) - AROUND_CELLS, 0), int(indices.max()) + 1 + AROUND_CELLS)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Resumed:
-    """A ledger from before a restart that no map has confirmed yet.
-
-    Attributes:
-        before: the ledger as it was.
-        since: what was covered since: that is true in any building.
-    """
-
-    before: LedgerSnapshot
-    since: CoverageLedger
-
-
 class MissionLedger:
     """Keeps the ledger; one from before a restart only as long as no map contradicts it.
 
@@ -139,17 +126,19 @@ class MissionLedger:
         self._cell_m = cell_m
         self.current = CoverageLedger(cell_m)
         self.first_plan_reason = "first plan"
-        self._resumed: _Resumed | None = None
+        # A ledger from before a restart that no map has confirmed yet, and what was covered since:
+        # that is true in any building.
+        self._resumed: tuple[LedgerSnapshot, CoverageLedger] | None = None
         # The robot's last pose on a map that has moved since.
         self._pose_before_motion: Pose2D | None = None
 
     @property
     def _all(self) -> tuple[CoverageLedger, ...]:
-        return (self.current,) if self._resumed is None else (self.current, self._resumed.since)
+        return (self.current,) if self._resumed is None else (self.current, self._resumed[1])
 
     def resume(self, before: LedgerSnapshot) -> None:
         """Go on with the ledger from before a restart."""
-        self._resumed = _Resumed(before, CoverageLedger(before.cell_m))
+        self._resumed = before, CoverageLedger(before.cell_m)
         self.current = CoverageLedger.restored(before)
         self.first_plan_reason = f"first plan, {before.cells} cells were covered before"
 
@@ -211,20 +200,19 @@ class MissionLedger:
 
     def check(self, lattice: CoverageLattice, frame: str) -> LedgerMismatchError | None:
         """Begin anew, and say so, where a map shows the ledger to be of another building."""
-        resumed = self._resumed
-        if resumed is None:
+        if self._resumed is None:
             return None
-        verdict = Fit.of(resumed.before, lattice).verdict
+        before, since = self._resumed
+        verdict = Fit.of(before, lattice).verdict
         if verdict is Verdict.OPEN:
             return None
         self._resumed = None
         if verdict is Verdict.SAME:
             return None
-        self.current = resumed.since
+        self.current = since
         self.current.move_to(frame)
         return self._begun_anew(
-            f"the ledger of {resumed.before.cells} covered cells is of another building than the "
-            "map"
+            f"the ledger of {before.cells} covered cells is of another building than the map"
         )
 
     def _replace(self, ledger: CoverageLedger) -> None:

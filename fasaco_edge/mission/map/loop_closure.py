@@ -83,7 +83,11 @@ def uncertain_cells(
         doubt = np.zeros(rows.shape, bool)
         for share in BETWEEN:
             doubt |= ~_covered(before, *motion.back(share, x, y))
-        return doubt | _between_cells(before.cell_m, *motion.back(1.0, x, y))
+        # A round tool that was in the middle of each cell may have missed what is far from it.
+        x, y = motion.back(1.0, x, y)
+        row, col = y / before.cell_m - 0.5, x / before.cell_m - 0.5
+        between: NDArray[np.bool_] = np.hypot(row - np.rint(row), col - np.rint(col)) >= 0.5
+        return doubt | between
 
     return inside
 
@@ -103,12 +107,3 @@ def _covered(
         for cols in (low_col, high_col):
             covered &= visited[rows - row0, cols - col0]
     return covered
-
-
-def _between_cells(
-    cell_m: float, x: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Tell which points [m] a round tool may have missed that was in the middle of each cell."""
-    row, col = y / cell_m - 0.5, x / cell_m - 0.5
-    away: NDArray[np.bool_] = np.hypot(row - np.rint(row), col - np.rint(col)) >= 0.5
-    return away
