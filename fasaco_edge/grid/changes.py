@@ -25,9 +25,9 @@ from fasaco_edge.grid.lattice import (
     placement_of,
 )
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.kernels.lattice.changes import Box, mark_stale
+from fasaco_edge.kernels.lattice.changes import mark_stale
 from fasaco_edge.kernels.lattice.classification import Cells, classify_cells
-from fasaco_edge.kernels.lattice.footprint import Placement, Thresholds, reach_of
+from fasaco_edge.kernels.lattice.footprint import Box, Placement, Thresholds, reach_of
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -118,30 +118,24 @@ class LatticeChange:
             if not len(changed):
                 return cls(lattice, lattice, changed)
         else:
-            changed = np.concatenate((changed, _known_outside(lattice, window)))
+            lost = (lattice.states != UNKNOWN) & _new_to(window, lattice.window)
+            changed = np.concatenate((changed, _cells_where(lost, lattice.window)))
         return cls(lattice, CoverageLattice(window, footprint.cell_m, states, steps), changed)
 
 
-def regions_to_compare(
-    before: OccupancyGrid,
-    after: OccupancyGrid,
+def _regions_to_compare(
+    grids: tuple[OccupancyGrid, OccupancyGrid],
     window: Window,
     placement: Placement,
-    within: Window | None = None,
+    within: Window | None,
 ) -> tuple[Window, ...] | None:
     """Return rectangles of the raster that hold all pixels in which two maps may differ.
 
-    Each is shown by both maps or by one of them alone. None where the maps do not lie on
-    one raster.
-
-    Args:
-        before, after: the maps.
-        window: of what the old map showed beyond the new one, only pixels that matter for
-            these lattice cells are of interest.
-        placement: where the lattice's cells lie.
-        within: see ``LatticeChange.between``.
+    Each is shown by both maps or by one of them alone. Of what the old map showed beyond the
+    new one, only pixels that matter for the cells of ``window`` are of interest. None where the
+    maps do not lie on one raster.
     """
-    (old_raster, old), (raster, new) = before.geometry.on_raster(), after.geometry.on_raster()
+    (old_raster, old), (raster, new) = (grid.geometry.on_raster() for grid in grids)
     if raster != old_raster:
         return None
     if old == new:
@@ -176,15 +170,15 @@ def _stale_cells(
     within: Window | None,
 ) -> NDArray[np.bool_]:
     """Return which cells of the new window must be classified anew, bool (rows, cols)."""
-    before, after = grids
-    regions = regions_to_compare(before, after, window, placement, within)
+    regions = _regions_to_compare(grids, window, placement, within)
     if regions is None:
         return np.ones((window.rows, window.cols), np.bool_)
     stale = _new_to(lattice.window, window)
+    before, after = (pixels_of(grid) for grid in grids)
     for region in regions:
         mark_stale(
-            pixels_of(before),
-            pixels_of(after),
+            before,
+            after,
             Box(region.row0, region.col0, region.row1, region.col1),
             thresholds,
             placement,
@@ -202,11 +196,7 @@ def _new_to(old: Window, new: Window) -> NDArray[np.bool_]:
     where the old lattice did not reach. Of the others none has a step there, unless pixels
     have changed near by: what lies beyond a window lies beyond its map, and is unknown.
     """
-    lacking = np.ones((new.rows, new.cols), np.bool_)
-    common = new.intersection(old)
-    if common is not None:
-        lacking[common.slices_in(new)] = False
-    return lacking
+    return ~carried(np.ones((old.rows, old.cols), np.bool_), old, new)
 
 
 def _pixels_around(window: Window, placement: Placement) -> Window:
@@ -224,15 +214,6 @@ def _pixels_around(window: Window, placement: Placement) -> Window:
         math.ceil(max(ys) + reach),
         math.ceil(max(xs) + reach),
     )
-
-
-def _known_outside(lattice: CoverageLattice, window: Window) -> NDArray[np.int32]:
-    """Return the cells (row, col), int32 (n, 2), that are known and lie outside ``window``."""
-    known = lattice.states != UNKNOWN
-    common = lattice.window.intersection(window)
-    if common is not None:
-        known[common.slices_in(lattice.window)] = False
-    return _cells_where(known, lattice.window)
 
 
 def _cells_where(mask: NDArray[np.bool_], window: Window) -> NDArray[np.int32]:

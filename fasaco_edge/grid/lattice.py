@@ -23,7 +23,7 @@ from fasaco_edge.grid.geometry import (
     Window,
 )
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.kernels.cells import BLOCKED, COVERABLE, EAST, NORTH, SOUTH, UNKNOWN, WEST
+from fasaco_edge.kernels import BLOCKED, COVERABLE, EAST, NORTH, SOUTH, UNKNOWN, WEST
 from fasaco_edge.kernels.lattice.classification import Cells, classify_cells
 from fasaco_edge.kernels.lattice.footprint import Pixels, Placement, Thresholds, reach_of
 

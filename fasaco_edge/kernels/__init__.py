@@ -1,1 +1,13 @@
-"""Compiled inner loops: arrays in, arrays out; the floor that imports numba."""
+"""Compiled inner loops: arrays in, arrays out; the floor that imports numba.
+
+Here are the states of a lattice cell, and the four directions of a step, counter-clockwise from
+east, without the compiler, for those who only read maps. Row 0 is the row with the smallest y, so
+north is towards larger rows. Bit ``1 << direction`` of a cell's step mask says that this step is
+legal.
+"""
+
+UNKNOWN, BLOCKED, COVERABLE = 0, 1, 2
+
+EAST, NORTH, WEST, SOUTH = 0, 1, 2, 3
+ROW_STEP = (0, 1, 0, -1)
+COL_STEP = (1, 0, -1, 0)

@@ -17,7 +17,7 @@ import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from fasaco_edge.kernels.cache import (
     KERNEL_SUFFIX,
@@ -42,6 +42,11 @@ finally:
     if _yaml is not None:
         sys.modules["yaml"] = _yaml
 numba.core.config._config_fname = os.devnull
+
+if TYPE_CHECKING:
+    from numba.core.codegen import CPUCodegen
+    from numba.core.cpu import CPUContext
+    from numba.core.dispatcher import Dispatcher
 
 LOG = logging.getLogger(__name__)
 
@@ -78,31 +83,6 @@ class CacheFaults:
 FAULTS = CacheFaults()
 
 
-class _Codegen(Protocol):
-    def magic_tuple(self) -> tuple[str, ...]: ...
-
-
-class _Library(Protocol):
-    has_dynamic_globals: bool
-
-
-class _Target(Protocol):
-    def refresh(self) -> None: ...
-    def codegen(self) -> _Codegen: ...
-
-
-class _Compiled(Protocol):
-    lifted: tuple[object, ...]
-    library: _Library
-    codegen: _Codegen
-
-    def _reduce(self) -> tuple[object, ...]: ...
-
-
-class _Dispatcher(Protocol):
-    _cache: object
-
-
 class _KernelCache:
     """The code of one function, for numba: takes the place of ``numba.core.caching.Cache``."""
 
@@ -113,7 +93,7 @@ class _KernelCache:
         self._name = f"{kernel_module(Path(code.co_filename))}.{function.__qualname__}"
         self._line = code.co_firstlineno
 
-    def load_overload(self, signature: object, target: _Target) -> object:
+    def load_overload(self, signature: object, target: CPUContext) -> object:
         """Return the result of compiling for ``signature``; None where it is missing or damaged.
 
         Whatever goes wrong here is only a reason to compile.
@@ -136,7 +116,7 @@ class _KernelCache:
             return None
         return result
 
-    def save_overload(self, signature: object, result: _Compiled) -> None:
+    def save_overload(self, signature: object, result: CompileResult) -> None:
         """Keep what was compiled for ``signature``, where that can be."""
         if result.lifted or result.library.has_dynamic_globals:
             return
@@ -149,20 +129,20 @@ class _KernelCache:
     def flush(self) -> None:
         """Do nothing: code that is compiled again replaces its file."""
 
-    def _file(self, signature: object, codegen: _Codegen) -> Path:
+    def _file(self, signature: object, codegen: CPUCodegen) -> Path:
         words = [str(self._line), str(signature), *codegen.magic_tuple()]
         digest = hashlib.sha256("\n".join(words).encode()).hexdigest()[:16]
         return self._folder / f"{self._name}-{digest}{KERNEL_SUFFIX}"
 
 
-def _compiled(function: Kernel, compiler: Callable[[Kernel], object]) -> Kernel:
+def _compiled(function: Kernel, compiler: Callable[[Kernel], Dispatcher]) -> Kernel:
     """Return ``function`` as a dispatcher that loads or compiles it on its first call."""
     compiled = compiler(function)
     # The folder's name is a hash of these files alone, and says nothing of closures.
     is_ours = KERNELS in Path(function.__code__.co_filename).parents
     is_named = is_ours and not function.__closure__
     if is_named and CACHE_FOLDER is not None and not numba.config.DISABLE_JIT:
-        cast(_Dispatcher, compiled)._cache = _KernelCache(function, CACHE_FOLDER)
+        compiled._cache = _KernelCache(function, CACHE_FOLDER)  # type: ignore[attr-defined]
     return cast(Kernel, compiled)
 
 

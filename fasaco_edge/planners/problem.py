@@ -23,8 +23,7 @@ from fasaco_edge.errors import (
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.ants.graph import Graph, Scratch
 from fasaco_edge.kernels.bound.covering import covering_bound
-from fasaco_edge.kernels.costs import walk_cost
-from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk
+from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, walk_cost
 from fasaco_edge.kernels.local_search.walk_array import FRAME, Ground, Prices
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 

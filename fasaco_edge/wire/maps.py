@@ -11,9 +11,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge import kernels as cell
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OCCUPIED, UNKNOWN, MapPatch, OccupancyGrid
-from fasaco_edge.kernels import cells as cell
 from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
 from fasaco_edge.wire.fields import (
     read_cells,

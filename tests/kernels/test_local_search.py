@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.costs import walk_cost
+from fasaco_edge.kernels.lattice.reach import walk_cost
 from fasaco_edge.kernels.local_search.proposals import accepts, improve
 from fasaco_edge.kernels.local_search.walk_array import COST, LENGTH
 from fasaco_edge.kernels.random import draw, index_of

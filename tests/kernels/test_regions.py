@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.costs import walk_cost
+from fasaco_edge.kernels.lattice.reach import walk_cost
 from fasaco_edge.kernels.local_search.holes import rays
 from fasaco_edge.kernels.local_search.parity import JUMPS
 from fasaco_edge.kernels.local_search.perturbation import Search, perturb, remember

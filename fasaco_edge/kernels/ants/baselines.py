@@ -25,8 +25,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.ants.graph import Graph, Scratch, append_way, begin, close, open_steps_of
-from fasaco_edge.kernels.cells import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.jit import kernel, lean_kernel
 
 

@@ -36,8 +36,8 @@ from fasaco_edge.kernels.ants.graph import (
     close,
     open_steps_of,
 )
-from fasaco_edge.kernels.costs import walk_cost
 from fasaco_edge.kernels.jit import lean_kernel
+from fasaco_edge.kernels.lattice.reach import walk_cost
 from fasaco_edge.kernels.random import draw_unit
 
 # What eta of equation (5) is 1 over: the distance to a neighbour, which is 1; the

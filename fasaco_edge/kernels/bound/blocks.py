@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import kernel
+from fasaco_edge.kernels.lattice.areas import root
 
 
 class Blocks(NamedTuple):
@@ -236,16 +237,8 @@ def _join(sea: Sea, parent: NDArray[np.int64], cell: int, away: int) -> int:
         if sea.steps[cell] >> direction & 1:
             after = cell + sea.offsets[direction]
             if sea.away[after] == away and sea.island[after] != sea.island[cell]:
-                one, other = _root(parent, sea.island[cell]), _root(parent, sea.island[after])
+                one, other = root(parent, sea.island[cell]), root(parent, sea.island[after])
                 if one != other:
                     parent[one] = other
                     joined += 1
     return joined
-
-
-@kernel
-def _root(parent: NDArray[np.int64], island: int) -> int:
-    while parent[island] != island:
-        parent[island] = parent[parent[island]]
-        island = parent[island]
-    return island

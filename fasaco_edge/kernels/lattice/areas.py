@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.cells import COL_STEP, ROW_STEP
+from fasaco_edge.kernels import COL_STEP, ROW_STEP
 from fasaco_edge.kernels.jit import kernel, lean_kernel
 
 
@@ -30,7 +30,11 @@ class Areas(NamedTuple):
 
 
 @lean_kernel
-def _root(parents: NDArray[np.int32], piece: int) -> int:
+def root(parents: NDArray[np.integer], piece: int) -> int:
+    """Return the piece that stands for all that ``piece`` was joined with; ways to it get shorter.
+
+    Joined pieces are a tree, by each one's parent, int (n,); the root is its own.
+    """
     while parents[piece] != piece:
         parents[piece] = parents[parents[piece]]
         piece = parents[piece]
@@ -56,7 +60,7 @@ def _join_pieces(
             left = labels[row, col - 1] if col > 0 and kinds[row, col - 1] == kind else 0
             below = labels[row - 1, col] if row > 0 and kinds[row - 1, col] == kind else 0
             if left and below:
-                one, other = _root(parents, left), _root(parents, below)
+                one, other = root(parents, left), root(parents, below)
                 parents[max(one, other)] = min(one, other)
                 labels[row, col] = min(one, other)
             elif left or below:
@@ -83,12 +87,15 @@ def _number(parents: NDArray[np.int32], pieces: int) -> int:
 
 
 @lean_kernel
-def _measure(kinds: NDArray[np.uint8], areas: Areas, longest: NDArray[np.int32]) -> None:
+def _measure(
+    kinds: NDArray[np.uint8], parents: NDArray[np.int32], areas: Areas, longest: NDArray[np.int32]
+) -> None:
+    """Replace each cell's piece by its area's number, and fill in what is known of the areas."""
     rows, cols = kinds.shape
     for row in range(rows):
         run = 0
         for col in range(cols):
-            label = areas.labels[row, col]
+            label = areas.labels[row, col] = parents[areas.labels[row, col]]
             run = run + 1 if label and col > 0 and areas.labels[row, col - 1] == label else 1
             if label == 0:
                 continue
@@ -107,19 +114,16 @@ def find_areas(kinds: NDArray[np.uint8]) -> Areas:
     labels = np.empty((rows, cols), np.int32)
     # A piece begins where neither neighbour before it is of its kind.
     parents = np.empty(rows * cols + 1, np.int32)
+    parents[0] = 0
     pieces = _join_pieces(kinds, labels, parents)
     count = _number(parents, pieces)
-    for row in range(rows):
-        for col in range(cols):
-            if labels[row, col]:
-                labels[row, col] = parents[labels[row, col]]
     areas = Areas(
         labels,
         np.zeros(count, np.uint8),
         np.zeros(count, np.int32),
         np.zeros((count, 2), np.int32),
     )
-    _measure(kinds, areas, np.zeros(count, np.int32))
+    _measure(kinds, parents, areas, np.zeros(count, np.int32))
     return areas
 
 

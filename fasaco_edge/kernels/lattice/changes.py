@@ -5,13 +5,12 @@ they lie in memory, then segments of those that differ, and pixels last. Beyond 
 window a map is unknown: one that has grown differs where it is known now.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 from fasaco_edge.kernels.lattice.footprint import (
+    Box,
     Pixels,
     Placement,
     Thresholds,
@@ -24,15 +23,6 @@ from fasaco_edge.kernels.lattice.footprint import (
 STRIP, SEGMENT, BLOCK = 8, 64, 8
 
 BLANK = -1
-
-
-class Box(NamedTuple):
-    """A half-open rectangle of pixels of the raster."""
-
-    row0: int
-    col0: int
-    row1: int
-    col1: int
 
 
 @inlined

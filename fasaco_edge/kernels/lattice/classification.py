@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.cells import COVERABLE, EAST, NORTH, SOUTH, UNKNOWN, WEST
+from fasaco_edge.kernels import COVERABLE, EAST, NORTH, SOUTH, UNKNOWN, WEST
 from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
 from fasaco_edge.kernels.lattice.footprint import (
+    Box,
     Pixels,
     Placement,
     Thresholds,
@@ -65,17 +66,8 @@ class _Map(NamedTuple):
     cells: Cells
 
 
-class _Block(NamedTuple):
-    """Half-open rectangle of cells, as indices of the arrays."""
-
-    row0: int
-    col0: int
-    row1: int
-    col1: int
-
-
 @lean_kernel
-def _stale_block(stale: NDArray[np.bool_], row0: int, col0: int, side: int) -> _Block:
+def _stale_block(stale: NDArray[np.bool_], row0: int, col0: int, side: int) -> Box:
     """Return the block of a tile's stale cells; without rows where there are none."""
     row1, col1 = min(row0 + side, stale.shape[0]), min(col0 + side, stale.shape[1])
     top, left, bottom, right = row1, col1, row0, col0
@@ -84,11 +76,11 @@ def _stale_block(stale: NDArray[np.bool_], row0: int, col0: int, side: int) -> _
             if stale[row, col]:
                 top, bottom = min(top, row), row + 1
                 left, right = min(left, col), max(right, col + 1)
-    return _Block(top, left, bottom, right)
+    return Box(top, left, bottom, right)
 
 
 @lean_kernel
-def _classify_states(given: _Map, block: _Block, table: PixelSums) -> None:
+def _classify_states(given: _Map, block: Box, table: PixelSums) -> None:
     pixels, placement, cells = given.pixels, given.placement, given.cells
     radius = placement.radius
     height, width = pixels.values.shape
@@ -142,12 +134,12 @@ def _classify_step(given: _Map, row: int, col: int, towards: int, table: PixelSu
 
 @lean_kernel
 def _classify_tile(
-    given: _Map, tile: _Block, weights: NDArray[np.int64], sums: NDArray[np.int64]
+    given: _Map, tile: Box, weights: NDArray[np.int64], sums: NDArray[np.int64]
 ) -> None:
     pixels, placement, cells = given.pixels, given.placement, given.cells
     rows, cols = cells.stale.shape
     # With the neighbours in the north and east, whose states the steps depend on.
-    block = _Block(tile.row0, tile.col0, min(tile.row1 + 1, rows), min(tile.col1 + 1, cols))
+    block = Box(tile.row0, tile.col0, min(tile.row1 + 1, rows), min(tile.col1 + 1, cols))
     high, wide = block.row1 - block.row0 - 1, block.col1 - block.col0 - 1
     x, y = centre(
         placement, cells.row + block.row0 + 0.5 * high, cells.col + block.col0 + 0.5 * wide

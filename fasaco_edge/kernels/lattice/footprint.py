@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.cells import BLOCKED, COVERABLE, UNKNOWN
+from fasaco_edge.kernels import BLOCKED, COVERABLE, UNKNOWN
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 
@@ -47,6 +47,15 @@ class Pixels(NamedTuple):
     values: NDArray[np.int8]
     row: int
     col: int
+
+
+class Box(NamedTuple):
+    """A half-open rectangle of pixels of the raster, or of cells as indices of the arrays."""
+
+    row0: int
+    col0: int
+    row1: int
+    col1: int
 
 
 @inlined

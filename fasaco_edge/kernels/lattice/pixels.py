@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.cells import BLOCKED, COVERABLE, UNKNOWN
+from fasaco_edge.kernels import BLOCKED, COVERABLE, UNKNOWN
 from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
 from fasaco_edge.kernels.lattice.footprint import Pixels, Placement, Thresholds, state_of
 

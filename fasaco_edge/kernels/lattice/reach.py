@@ -1,4 +1,4 @@
-"""Reachability over a lattice, shortest walks, and its update after a change.
+"""Reachability over a lattice and its update after a change; shortest walks, and what a walk costs.
 
 After some cells have changed, reachability is updated at the cost of these. Steps have
 changed in a part of the lattice alone. If inside this part the cells at its rim - those
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.cells import COL_STEP, ROW_STEP
+from fasaco_edge.kernels import COL_STEP, ROW_STEP
 from fasaco_edge.kernels.jit import kernel, lean_kernel
 
 UNSEEN = 255
@@ -100,6 +100,26 @@ def shortest_walk(
         if index:
             cell -= offsets[came_from[cell]]
     return walk
+
+
+@lean_kernel
+def walk_cost(walk: NDArray[np.int32], step_us: int, quarter_turn_us: int) -> int:
+    """Return the cost [us] of a walk of flat cells, int32 (n,) with n >= 1.
+
+    A half turn is two quarter-turns; before the first step there is no turn.
+    """
+    quarters = 0
+    if quarter_turn_us:
+        for index in range(2, walk.size):
+            # A step is one difference of index and its opposite the negated one. (With one
+            # column, east is the same as north; but then there are no steps east.)
+            before = walk[index - 1] - walk[index - 2]
+            after = walk[index] - walk[index - 1]
+            if after == -before:
+                quarters += 2
+            elif after != before:
+                quarters += 1
+    return int((walk.size - 1) * step_us + quarters * quarter_turn_us)
 
 
 # The part reaches so many cells beyond those that changed, so that a new obstacle in the

@@ -14,7 +14,7 @@ outside is no hole.
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.cells import EAST, NORTH
+from fasaco_edge.kernels import EAST, NORTH
 from fasaco_edge.kernels.jit import kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.random import draw

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.cells import NORTH
+from fasaco_edge.kernels import NORTH
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 from fasaco_edge.kernels.local_search.walk_array import FIXED, FRAME, Ground, axis_of, copy
 

@@ -175,17 +175,6 @@ def _spread(
 
 
 @kernel
-def _written(walk: _Walk, out: NDArray[np.int32]) -> int:
-    """Write visits in their order, from visit 0 on; return their number."""
-    index, written = 0, 0
-    while index != NOWHERE:
-        out[written] = walk.cells[index]
-        written += 1
-        index = walk.following[index]
-    return written
-
-
-@kernel
 def put_in_new(
     ground: Ground, before: NDArray[np.int32], free_end: bool, held: int, out: NDArray[np.int32]
 ) -> int:
@@ -224,4 +213,9 @@ def put_in_new(
     tail = _spread(ground, walk, wave, tail, False, free_end)
     tail = _begin(wave, before, 0, min(held, before.size), tail)
     _spread(ground, walk, wave, tail, True, free_end)
-    return _written(walk, out)
+    visit, written = 0, 0
+    while visit != NOWHERE:
+        out[written] = walk.cells[visit]
+        written += 1
+        visit = walk.following[visit]
+    return written

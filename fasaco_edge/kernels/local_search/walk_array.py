@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.costs import walk_cost
 from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.lattice.reach import walk_cost
 
 LENGTH, SPARE_CELLS, COST = 0, 1, 2
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.changes import LatticeChange, carried
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
-from fasaco_edge.kernels.cells import COL_STEP, ROW_STEP
+from fasaco_edge.kernels import COL_STEP, ROW_STEP
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, update_reach
 
 # A robot a little off, or whose cell was just closed by a noisy scan, goes on from the nearest

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Polygon, Window
 from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
-from fasaco_edge.kernels.cells import EAST, NORTH, SOUTH, WEST
+from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.mission.orders.order import Zone
 
