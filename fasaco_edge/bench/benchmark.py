@@ -12,7 +12,7 @@ import os
 import platform
 import resource
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -91,11 +91,6 @@ class Report:
         return (ResultTable(self.title, self.header, self.rows), *self.further)
 
 
-def write_nothing(args: argparse.Namespace, samples: Sequence[Any]) -> tuple[Path, ...]:
-    """Leave no files behind."""
-    return ()
-
-
 @dataclass(frozen=True, slots=True)
 class Benchmark(Generic[Sample]):
     """One benchmark of ``fasaco-edge bench``.
@@ -119,8 +114,8 @@ class Benchmark(Generic[Sample]):
     count: Callable[[argparse.Namespace], int]
     measure: Callable[[argparse.Namespace, Say], Generator[Sample, None, None]]
     report: Callable[[argparse.Namespace, Sequence[Sample]], Report]
-    epilog: str = field(default="")
-    write: Callable[[argparse.Namespace, Sequence[Sample]], tuple[Path, ...]] = write_nothing
+    epilog: str = ""
+    write: Callable[[argparse.Namespace, Sequence[Sample]], tuple[Path, ...]] = lambda *_: ()
 
 
 def positive(text: str) -> int:

@@ -23,7 +23,6 @@ from fasaco_edge.drawing.spread import Spread, document, median, text
 from fasaco_edge.host.processes import has_loaded, resident_mb
 from fasaco_edge.host.processes import peak_mb as peak_mb_of
 
-GOAL_READY_S, GOAL_IDLE_MB, GOAL_IDLE_PERCENT, GOAL_WARM_MB = 1.5, 60.0, 0.5, 200.0
 MEASURES = (
     ("ready_s", "exec to liveliness token [s]", 3),
     ("status_s", "exec to first status [s]", 3),
@@ -32,14 +31,15 @@ MEASURES = (
     ("warm_mb", "memory after map and plan [MB]", 1),
     ("peak_mb", "peak memory [MB]", 1),
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Loaded:
-    """Whether a daemon has mapped the compiler and the recorder's library."""
-
-    numba: bool
-    rerun: bool
+# Measure, what it is, the most that its median may be, unit.
+GOALS = (
+    ("ready_s", "ready", 1.5, "s"),
+    ("idle_mb", "memory before the first map", 60.0, "MB"),
+    ("idle_percent", "share of a core, idle", 0.5, "%"),
+    ("warm_mb", "memory after map and plan", 200.0, "MB"),
+)
+# The compiler and the recorder's library, by what a process has mapped of them.
+PACKAGES = {"numba": ("numba", "llvmlite"), "rerun": ("rerun_sdk", "rerun_bindings")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class DaemonStart:
         idle_percent: of a core, that it took until then [%].
         warm_mb: resident after a map and a plan [MB].
         peak_mb: the most it was ever resident with [MB].
-        idle, warm: what was loaded at these two points.
+        idle, warm: which of ``PACKAGES`` were loaded at these two points.
     """
 
     ready_s: float
@@ -62,8 +62,8 @@ class DaemonStart:
     idle_percent: float
     warm_mb: float
     peak_mb: float
-    idle: Loaded
-    warm: Loaded
+    idle: frozenset[str]
+    warm: frozenset[str]
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -125,10 +125,10 @@ def _start(args: argparse.Namespace) -> DaemonStart:
         )
 
 
-def _loaded(pid: int) -> Loaded:
-    compiler = has_loaded(pid, "numba") or has_loaded(pid, "llvmlite")
-    recorder = has_loaded(pid, "rerun_sdk") or has_loaded(pid, "rerun_bindings")
-    return Loaded(numba=compiler, rerun=recorder)
+def _loaded(pid: int) -> frozenset[str]:
+    return frozenset(
+        package for package, names in PACKAGES.items() if any(has_loaded(pid, n) for n in names)
+    )
 
 
 def _report(args: argparse.Namespace, starts: Sequence[DaemonStart]) -> Report:
@@ -137,16 +137,17 @@ def _report(args: argparse.Namespace, starts: Sequence[DaemonStart]) -> Report:
     }
     loaded = {
         point: {
-            package: any(getattr(getattr(start, point), package) for start in starts)
-            for package in ("numba", "rerun")
+            package: any(package in getattr(start, point) for start in starts)
+            for package in PACKAGES
         }
         for point in ("idle", "warm")
     }
     rows = [(label, *text(spreads[name], digits)) for name, label, digits in MEASURES]
     if starts:
-        for package in ("numba", "rerun"):
-            points = [f"{point}: {_yes(loaded[point][package])}" for point in ("idle", "warm")]
-            rows.append((f"{package} loaded", points[0], points[1]))
+        for package in PACKAGES:
+            idle, warm = ("yes" if at[package] else "no" for at in loaded.values())
+            rows.append((f"{package} loaded", f"idle: {idle}", f"warm: {warm}"))
+    recorders = float(any(at["rerun"] for at in loaded.values())) if starts else None
     return Report(
         title=f"a daemon's start and memory, {len(starts)} starts",
         header=("", "median", "range"),
@@ -156,29 +157,15 @@ def _report(args: argparse.Namespace, starts: Sequence[DaemonStart]) -> Report:
             **{name: document(spread) for name, spread in spreads.items()},
             "loaded": loaded if starts else None,
         },
-        goals=_goals(spreads, loaded if starts else None),
+        goals=(
+            *(Goal(what, median(spreads[name]), most, unit) for name, what, most, unit in GOALS),
+            Goal("rerun loaded (0 = never)", recorders, 0.0),
+        ),
         remarks=(
             "the map is 1000 x 1000 pixels of 0.05 m; kernels come from a warm cache",
             f"peak memory of this process {peak_mb()} MB",
         ),
     )
-
-
-def _goals(
-    spreads: dict[str, Spread | None], loaded: dict[str, dict[str, bool]] | None
-) -> tuple[Goal, ...]:
-    recorders = None if loaded is None else float(any(at["rerun"] for at in loaded.values()))
-    return (
-        Goal("ready", median(spreads["ready_s"]), GOAL_READY_S, "s"),
-        Goal("memory before the first map", median(spreads["idle_mb"]), GOAL_IDLE_MB, "MB"),
-        Goal("share of a core, idle", median(spreads["idle_percent"]), GOAL_IDLE_PERCENT, "%"),
-        Goal("memory after map and plan", median(spreads["warm_mb"]), GOAL_WARM_MB, "MB"),
-        Goal("rerun loaded (0 = never)", recorders, 0.0),
-    )
-
-
-def _yes(loaded: bool) -> str:
-    return "yes" if loaded else "no"
 
 
 FOOTPRINT = Benchmark(

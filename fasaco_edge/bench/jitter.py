@@ -103,8 +103,8 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Block, None, None]
                 for name in PLACES:
                     cores = all_cores if name == ANY_CORE else one_core
                     place(daemon.pid, cores, NICENESS)
-                    # The robot's own program is no part of the question.
-                    os.sched_setaffinity(0, _robots(all_cores, cores))
+                    # The robot's own program is no part of the question: elsewhere, if it can.
+                    os.sched_setaffinity(0, all_cores - cores or all_cores)
                     for number in range(2 * args.rounds):
                         covering = number % 2 == 1
                         say(f"{name}, {'covering' if covering else 'without'}")
@@ -112,11 +112,6 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Block, None, None]
             finally:
                 os.kill(daemon.pid, signal.SIGCONT)
                 os.sched_setaffinity(0, all_cores)
-
-
-def _robots(all_cores: Set[int], cores: Set[int]) -> Set[int]:
-    """Return the cores for the robot's program: others, if there are any."""
-    return all_cores - cores or all_cores
 
 
 def _run(

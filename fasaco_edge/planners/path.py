@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ class CoveragePath:
     work: SearchWork = NO_WORK
     cost_s: float = 0.0
     lower_bound_steps: int = 0
-    first_walk_s: float = field(default=0.0, compare=False)
+    first_walk_s: float = 0.0
 
     def __post_init__(self) -> None:
         self.cells.flags.writeable = False

@@ -105,7 +105,6 @@ class TimeBudget:
     started: float = field(default_factory=time.monotonic)
 
     def __call__(self, progress: SearchProgress) -> bool:
-        """Return whether the budget is used up."""
         return time.monotonic() - self.started >= self.seconds
 
 
@@ -116,7 +115,6 @@ class WorkLimit:
     work: SearchWork
 
     def __call__(self, progress: SearchProgress) -> bool:
-        """Return whether every count of the work is reached."""
         return progress.work.reaches(self.work)
 
 
@@ -130,7 +128,6 @@ class GapReached:
     target: float
 
     def __call__(self, progress: SearchProgress) -> bool:
-        """Return whether the walk is near enough to the bound."""
         gap = progress.gap
         return gap is not None and gap <= self.target
 
@@ -142,7 +139,6 @@ class Interrupt:
     asked: threading.Event = field(default_factory=threading.Event)
 
     def __call__(self, progress: SearchProgress) -> bool:
-        """Return whether another thread asked for it."""
         return self.asked.is_set()
 
 
@@ -163,7 +159,6 @@ class StopRecorder:
     _calls: int = 0
 
     def __call__(self, progress: SearchProgress) -> bool:
-        """Return what the other criterion returns."""
         self._calls += 1
         stop = self.criterion(progress)
         if stop:
@@ -179,7 +174,6 @@ class StopAt:
     _calls: int = 0
 
     def __call__(self, progress: SearchProgress) -> bool:
-        """Return whether this is one of these calls."""
         self._calls += 1
         return self._calls in self.stops
 
@@ -193,7 +187,6 @@ class AnyOf:
         self.criteria = criteria
 
     def __call__(self, progress: SearchProgress) -> bool:
-        """Return whether any is met."""
         return any(criterion(progress) for criterion in self.criteria)
 
 
