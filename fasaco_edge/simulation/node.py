@@ -110,28 +110,19 @@ def run_simulation(
     if not speed > 0.0:
         raise BadConfiguration(f"speed must be above 0, got {speed}")
     with open_bus(settings) as bus, stop_event() as stop:
-        robot = _RobotOnBus(world, keys, bus)
-        pace = Pace(speed, world.config.tick_s, time.monotonic())
-        while not (stop.is_set() or should_stop()):
-            behind_s = pace.behind_s(time.monotonic())
-            robot.take_path(0.0 if behind_s >= 0.0 else min(max(-behind_s, WAIT_S), CYCLE_S))
-            cycle_ends_s = time.monotonic() + CYCLE_S
-            while pace.behind_s(now_s := time.monotonic()) >= 0.0 and now_s < cycle_ends_s:
-                robot.publish(world.tick())
-                pace.ticked(now_s)
-            if now_s - robot.reported_s >= REPORT_EVERY_S:
-                report(robot.progress(now_s))
+        robot = RobotOnBus(world, keys, bus)
+        robot.drive(speed, lambda: stop.is_set() or should_stop(), report)
         robot.publish(world.emission())
         report(last := robot.progress(time.monotonic()))
     return last
 
 
-class _RobotOnBus:
-    """The world's publishers and its one subscription; ``reported_s``: when progress was asked."""
+class RobotOnBus:
+    """The robot of a world on a bus: publishes what it emits, and follows the newest path."""
 
     def __init__(self, world: World, keys: Keys, bus: Bus) -> None:
         self._world = world
-        self.reported_s = time.monotonic()
+        self._reported_s = time.monotonic()
         self._reported_sim_s = world.stamp_ns * 1e-9
         self._refused_paths = 0
         self._map = bus.advertise(keys, topics.MAP)
@@ -139,14 +130,34 @@ class _RobotOnBus:
         self._newest_path: LatestSlot[Sample] = LatestSlot()
         bus.listen(keys, topics.PATH, self._newest_path.put)
 
+    def drive(
+        self,
+        speed: float,
+        should_stop: Callable[[], bool],
+        report: Callable[[Progress], None] = lambda _progress: None,
+    ) -> None:
+        """Let time pass until the robot has to stop; arguments as of ``run_simulation``."""
+        world = self._world
+        pace = Pace(speed, world.config.tick_s, time.monotonic())
+        while not should_stop():
+            behind_s = pace.behind_s(time.monotonic())
+            self._take_path(0.0 if behind_s >= 0.0 else min(max(-behind_s, WAIT_S), CYCLE_S))
+            cycle_ends_s = time.monotonic() + CYCLE_S
+            while pace.behind_s(now_s := time.monotonic()) >= 0.0 and now_s < cycle_ends_s:
+                self.publish(world.tick())
+                pace.ticked(now_s)
+            if now_s - self._reported_s >= REPORT_EVERY_S:
+                report(self.progress(now_s))
+
     def publish(self, emission: Emission) -> None:
+        """Publish map and pose, where there are any."""
         # The map first: where the robot stands is on it.
         if emission.map is not None:
             self._map.put(encode_occupancy_grid(emission.map))
         if emission.pose is not None:
             self._pose.put(encode_pose_stamped(emission.pose))
 
-    def take_path(self, timeout_s: float) -> None:
+    def _take_path(self, timeout_s: float) -> None:
         """Wait for a path and follow it; one that cannot be followed costs only itself."""
         sample = self._newest_path.take(timeout_s)
         if sample is None:
@@ -163,9 +174,9 @@ class _RobotOnBus:
     def progress(self, now_s: float) -> Progress:
         """Return the progress, with the speed achieved since it was asked for before."""
         world = self._world
-        sim_s, elapsed_s = world.stamp_ns * 1e-9, max(now_s - self.reported_s, 1e-9)
+        sim_s, elapsed_s = world.stamp_ns * 1e-9, max(now_s - self._reported_s, 1e-9)
         speed = (sim_s - self._reported_sim_s) / elapsed_s
-        self.reported_s, self._reported_sim_s = now_s, sim_s
+        self._reported_s, self._reported_sim_s = now_s, sim_s
         return Progress(
             sim_s,
             world.pose,

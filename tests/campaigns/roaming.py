@@ -8,20 +8,15 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 
-from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, BusSettings, open_bus
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
-from fasaco_edge.simulation.node import Pace
+from fasaco_edge.simulation.node import RobotOnBus
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Emission, World
-from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import encode_occupancy_grid
-from fasaco_edge.wire.paths import decode_path
-from fasaco_edge.wire.poses import encode_pose_stamped
 from tests.support.ledgers import CELL_M, Cell
 from tests.support.processes import free_endpoint
 
@@ -51,19 +46,15 @@ class Trail:
             return [point for point in self.points if start_s <= point[0] <= end_s]
 
 
-class Robot:
+class Robot(RobotOnBus):
     """A robot on a thread of its own, on a bus that outlives every daemon: it drives on."""
 
     def __init__(self, bus: Bus, world: World) -> None:
+        super().__init__(world, Keys(), bus)
         self.trail = Trail()
-        self._world = world
-        self._newest_path = LatestSlot[Sample]()
-        keys = Keys()
-        self._maps = bus.advertise(keys, topics.MAP)
-        self._poses = bus.advertise(keys, topics.POSE)
-        bus.listen(keys, topics.PATH, self._newest_path.put)
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._drive, name="robot")
+        drive = partial(self.drive, SPEED, self._ended.is_set)
+        self._thread = threading.Thread(target=drive, name="robot")
 
     def __enter__(self) -> Robot:
         self._thread.start()
@@ -73,23 +64,10 @@ class Robot:
         self._ended.set()
         self._thread.join()
 
-    def _drive(self) -> None:
-        pace = Pace(SPEED, self._world.config.tick_s, time.monotonic())
-        while not self._ended.is_set():
-            behind_s = pace.behind_s(now := time.monotonic())
-            sample = self._newest_path.take(min(max(-behind_s, 0.0), 0.02))
-            if sample is not None:
-                self._world.follow(decode_path(sample.payload).xy)
-            if behind_s >= 0.0:
-                self._publish(self._world.tick())
-                pace.ticked(now)
-
-    def _publish(self, emission: Emission) -> None:
-        if emission.map is not None:
-            self._maps.put(encode_occupancy_grid(emission.map))
+    def publish(self, emission: Emission) -> None:
+        super().publish(Emission(map=emission.map))
         self.trail.add(self._world.pose, emission.pose is not None)
-        if emission.pose is not None:
-            self._poses.put(encode_pose_stamped(emission.pose))
+        super().publish(Emission(pose=emission.pose))
 
 
 def entries(points: Iterable[Point], doubt_m: float) -> dict[Cell, float]:
