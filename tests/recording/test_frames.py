@@ -17,13 +17,14 @@ import pytest
 pytest.importorskip("rerun")
 
 import pyarrow as pa
+from rerun.chunk import RrdReader
 
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.frames import MOST_CHUNK_BYTES, chunks
 from fasaco_edge.recording.read.repair import FRAME, HEADER_BYTES, scan_recording
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.recording.sdk import RrdReader, rr
+from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.part import Part
 from fasaco_edge.review.review import read_review
 from fasaco_edge.samples import _HEAD, WHOLE, SampleEncoder, _Lane

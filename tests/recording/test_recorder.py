@@ -222,6 +222,13 @@ def test_recording_brings_no_compiler_along():
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0
 
 
+def test_reading_brings_neither_rerun_nor_zenoh_along():
+    check = (
+        "import sys, fasaco_edge.review.review; sys.exit(bool({'rerun', 'zenoh'} & {*sys.modules}))"
+    )
+    assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0
+
+
 def test_without_rerun_the_missing_extra_is_named(monkeypatch):
     from fasaco_edge.recording import sdk
 

@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rerun.chunk import RrdReader
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.session import Bus, BusSettings, open_bus
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import scan_recording
-from fasaco_edge.recording.sdk import RrdReader
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from fasaco_edge.errors import MalformedMessage, UnreadableRecording
+from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.repair import (
     FOOTER_KIND,
     FRAME,
@@ -23,7 +24,6 @@ from fasaco_edge.recording.read.repair import (
     Scan,
     scan_recording,
 )
-from fasaco_edge.recording.sdk import pa
 
 HINT = "name the .rrd files that a recorder has written"
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
+from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.frames import HINT, Chunk, chunks, column, open_part
-from fasaco_edge.recording.sdk import pa
 from fasaco_edge.samples import Place, SampleDecoder, place_of
 
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
