@@ -152,8 +152,11 @@ class SecurityConfig(Section, frozen=True):
         except (OSError, BadConfiguration):
             return  # to open the session raises that
 
-    def of_client(self) -> dict[str, Any]:
+    def of_client(self, dictionary_file: str = "") -> dict[str, Any]:
         """Return the credentials of a session, as a part of Zenoh's configuration.
+
+        Args:
+            dictionary_file: of the users who may connect to it; "" where nobody may.
 
         Raises:
             BadConfiguration: a file cannot be read.
@@ -171,7 +174,9 @@ class SecurityConfig(Section, frozen=True):
                     raise BadConfiguration(
                         f"bus.security.user.password_file: {user.password_file} is empty"
                     )
-                transport = access.user_password(user.name, password)
+                if dictionary_file:
+                    _read("user.dictionary_file", dictionary_file)
+                transport = access.user_password(user.name, password, dictionary_file)
             case _:
                 return {}
         # Gossip would tell everybody where everybody is, and let them make us connect there.
@@ -187,12 +192,9 @@ class SecurityConfig(Section, frozen=True):
         Raises:
             BadConfiguration: a file cannot be read.
         """
-        part = self.of_client()
+        part = self.of_client(self.user.dictionary_file)
         if self.kind == "none":
             return part
-        if self.kind == "user" and self.user.dictionary_file:
-            _read("user.dictionary_file", self.user.dictionary_file)
-            part["transport"]["auth"]["usrpwd"]["dictionary_file"] = self.user.dictionary_file
         grants = [
             access.Grant(role, who, prefix) for role, who in self.names().items() if role != "ros"
         ]

@@ -18,6 +18,7 @@ from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.errors import CommandError, FasacoError, PatchWithoutBase
 from fasaco_edge.grid.occupancy import MapPatch, without_base
 from fasaco_edge.host.processes import release_unused
+from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.events import (
     Answer,
     CommandReceived,
@@ -28,7 +29,7 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     in_runs,
 )
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker
@@ -274,9 +275,7 @@ class Loader:
     def _load(self) -> tuple[Mission, PlanningWorker]:
         from fasaco_edge.daemon.loop.worker import PlanningWorker  # noqa: PLC0415
         from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
-        from fasaco_edge.mission.config import MissionConfig  # noqa: PLC0415
         from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415
-        from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState  # noqa: PLC0415
         from fasaco_edge.planners.near_optimal import NearOptimal  # noqa: PLC0415
         from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
