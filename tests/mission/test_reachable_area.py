@@ -294,7 +294,7 @@ def test_a_robot_is_far_from_its_path_beyond_some_cells():
     line = DrivenPath(path((0, 0), (0, 1)))
     assert not line.is_far((FAR_CELLS, 0))
     assert line.is_far((FAR_CELLS, 1))
-    nothing = DrivenPath.none()
+    nothing = DrivenPath(np.empty((0, 2), np.int32))
     assert not nothing.is_far((9, 9))
     assert nothing.finished
     assert nothing.driven_to((0, 0), everywhere) is nothing

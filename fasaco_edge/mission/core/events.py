@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -103,17 +104,12 @@ class PatchRun:
 
 def in_runs(events: Iterable[Event]) -> Iterator[Event | PatchRun]:
     """Yield events in order, consecutive updates of the map as one."""
-    run: list[MapPatch] = []
-    for event in events:
-        if isinstance(event, PatchReceived):
-            run.append(event.patch)
-            continue
-        if run:
-            yield PatchRun(tuple(run))
-            run = []
-        yield event
-    if run:
-        yield PatchRun(tuple(run))
+    for kind, run in groupby(events, type):
+        if kind is PatchReceived:
+            patches = (event.patch for event in run if isinstance(event, PatchReceived))
+            yield PatchRun(tuple(patches))
+        else:
+            yield from run
 
 
 @dataclass(frozen=True, slots=True)

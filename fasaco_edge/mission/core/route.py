@@ -31,6 +31,8 @@ SKIPPED_S = 1.0
 # After a plan that failed [s].
 BROKEN_S = 30.0
 
+NO_CELLS: NDArray[np.int32] = np.empty((0, 2), np.int32)
+
 
 class SpareTime:
     """Limits attempts at better paths to a share of a processor core; a share of 0 is none.
@@ -123,7 +125,7 @@ class Route:
     """
 
     def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
-        self.path = DrivenPath.none()
+        self.path = DrivenPath(NO_CELLS)
         self.revision = 0
         self.plans = self.attempts = 0
         self.unchanged = self.outdated = 0
@@ -312,7 +314,7 @@ class Route:
         """Publish an empty path; None where the robot has none to drive."""
         if not len(self.path.cells):
             return None
-        return self.publish(np.empty((0, 2), np.int32), reason, now)
+        return self.publish(NO_CELLS, reason, now)
 
     def truncate(self, now: float) -> PathUpdate | None:
         """Cut a path that a new map blocks before the block, at once; a new plan follows.

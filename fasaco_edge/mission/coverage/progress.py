@@ -138,11 +138,6 @@ class DrivenPath:
     cells: NDArray[np.int32]
     index: int = 0
 
-    @classmethod
-    def none(cls) -> Self:
-        """Return an empty path."""
-        return cls(np.empty((0, 2), np.int32))
-
     @property
     def ahead(self) -> NDArray[np.int32]:
         """The cells from the robot's on, int32 (m, 2)."""
