@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 from floor import RESOLUTION, Floor, Point
-
-from fasaco_edge.grid.map_files import write_map
+from map_writer import write_map
 
 
 def office() -> Floor:

@@ -12,10 +12,10 @@ from PIL import Image
 
 from fasaco_edge.cli import main
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.grid.map_files import write_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.simulation.robot import SimulationConfig
+from maps.map_writer import write_map
 from tests.support.processes import fasaco_edge
 from tests.support.rooms import coverable_cells, pillared_room
 

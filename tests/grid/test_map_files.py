@@ -16,8 +16,9 @@ from PIL import Image
 
 from fasaco_edge.errors import MapFileError
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map, write_map
+from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from maps.map_writer import write_map
 
 DESCRIPTION = {
     "image": "map.png",
