@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.plot import Plot
+from fasaco_edge.drawing.plot import MAX_HEIGHT, MAX_WIDTH, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
-from fasaco_edge.drawing.view import MAX_HEIGHT, MAX_WIDTH, View, bounds_of
 from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.reach import reachable_from

@@ -5,7 +5,7 @@ import pytest
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.pictures import draw_mission, draw_walk
-from fasaco_edge.drawing.view import MAX_HEIGHT, MAX_WIDTH
+from fasaco_edge.drawing.plot import MAX_HEIGHT, MAX_WIDTH
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid

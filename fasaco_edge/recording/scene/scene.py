@@ -12,12 +12,11 @@ from fasaco_edge.grid.geometry import Bounds, Pose2D, StampedPose, union_bounds
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, known_bounds
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
-from fasaco_edge.recording.scene.anchor import Anchor
 from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.curves import NOISE, Curves, StatusFigures
 from fasaco_edge.recording.scene.drawings import DrivenPathDrawing, PathDrawing, PheromoneDrawing
-from fasaco_edge.recording.scene.layers import Layers, changed_bounds, size_in_file
+from fasaco_edge.recording.scene.layers import Anchor, Layers, changed_bounds, size_in_file
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter

@@ -11,9 +11,8 @@ from PIL import Image
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.pictures import plot_walk
-from fasaco_edge.drawing.plot import Plot
+from fasaco_edge.drawing.plot import Plot, View
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet, headed
-from fasaco_edge.drawing.view import View
 from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.planner import ColonySnapshot
