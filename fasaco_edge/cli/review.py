@@ -8,8 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from fasaco_edge.cli.console.arguments import Command
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.review.document import explanations
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
@@ -53,17 +56,18 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.cli.console.arguments import check_output, writing
     from fasaco_edge.cli.review_report import print_comparison, print_review
     from fasaco_edge.review.comparison import side_by_side
-    from fasaco_edge.review.document import document
+    from fasaco_edge.review.document import document_of
 
     for file in (args.png, args.html):
         check_output(file)
     review = _read(args.recordings, "recording")
     other = _read(args.against, "the other one") if args.against else None
-    told = document(review)
+    told = document_of(review)
     if args.json:
-        print_json(side_by_side(told, document(other)) if other else told)
+        both = side_by_side(told, document_of(other)) if other else msgspec.to_builtins(told)
+        print_json(both)
     elif other:
-        print_comparison(told, document(other))
+        print_comparison(told, document_of(other))
     else:
         print_review(review, told)
     if args.png:
@@ -103,14 +107,9 @@ def _read(paths: Sequence[Path], name: str) -> Review:
 
 def _epilog() -> str:
     """Return what the JSON document holds: one way to say it, for help and for readers."""
-    # Light to import: a dictionary of texts.
-    from fasaco_edge.review.fields import FIELDS
-
     lines = ["the JSON document holds, with times in seconds since the recording began:"]
-    for name, meaning in FIELDS.items():
-        lines += textwrap.wrap(
-            f"{name}: {meaning}", 96, initial_indent="  ", subsequent_indent="      "
-        )
+    for line in explanations():
+        lines += textwrap.wrap(line, 96, initial_indent="  ", subsequent_indent="      ")
     lines += textwrap.wrap(
         "With --against it holds two of them, `recording` and `against`, and of all numbers that "
         "both have the `difference`, the first less the second.",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.review import rows
@@ -20,13 +20,14 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from fasaco_edge.review.document import ReviewDocument
     from fasaco_edge.review.review import Review
 
 PLOT_WIDTH, PLOT_HEIGHT = 64, 6
 MOST_TROUBLES = 12
 
 
-def print_review(review: Review, document: dict[str, Any]) -> None:
+def print_review(review: Review, document: ReviewDocument) -> None:
     """Print all of a review, whose document is given, too."""
     from rich.text import Text
 
@@ -34,7 +35,7 @@ def print_review(review: Review, document: dict[str, Any]) -> None:
     colours = {True: "green", False: "red", None: "yellow"}
     for complete, text in rows.verdicts(document):
         verdict = Text(one_line(text), colours[complete])
-        console.print(f"{document['recording']}:", verdict, style="bold", soft_wrap=True)
+        console.print(f"{document.recording}:", verdict, style="bold", soft_wrap=True)
     console.print(terminal.figures(rows.card_rows(document)))
     _print_curve(console, review)
     console.print(terminal.figures(rows.figure_rows(document)))
@@ -52,10 +53,10 @@ def print_review(review: Review, document: dict[str, Any]) -> None:
     _print_remarks(console, document)
 
 
-def print_comparison(one: dict[str, Any], other: dict[str, Any]) -> None:
+def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
     """Print the figures of two documents side by side."""
     console = terminal.out()
-    names = (one["recording"], other["recording"])
+    names = (one.recording, other.recording)
     console.print(setup_words(one, other), style="bold", soft_wrap=True)
     _print_table(console, "Set-up", ("", *names), setup_differences(one, other))
     compared = compared_rows(one, other)
@@ -85,12 +86,12 @@ def _print_curve(console: Console, review: Review) -> None:
     console.print(f"{'':>6} 0:00{end:>{PLOT_WIDTH - 4}}")
 
 
-def _print_remarks(console: Console, document: dict[str, Any]) -> None:
-    for part in document["files"]:
-        if part["torn_bytes"]:
-            torn = f"torn, its last {part['torn_bytes']} bytes are lost"
-            console.print(f"{part['path']}: {torn}", soft_wrap=True)
-    for remark in document["remarks"]:
+def _print_remarks(console: Console, document: ReviewDocument) -> None:
+    for part in document.files:
+        if part.torn_bytes:
+            torn = f"torn, its last {part.torn_bytes} bytes are lost"
+            console.print(f"{part.path}: {torn}", soft_wrap=True)
+    for remark in document.remarks:
         console.print(f"recorder: {remark}", soft_wrap=True)
     for line in rows.unknown_lines(document):
         console.print(line, soft_wrap=True)

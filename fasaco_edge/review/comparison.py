@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TypeGuard
 
+import msgspec
+
+from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.rows import NUMBERS, Figure, figures
 
 # By the name of a setting.
@@ -25,30 +28,30 @@ ANYWAY = (
 # Maps of one building from two missions differ a little: its sides [m], and its floor [share].
 SIDE_M, FLOOR_SHARE = 1.0, 0.15
 
-Document = Mapping[str, Any]
-"""A review as ``document.document`` returns it."""
 Difference = tuple[str, str, str]
 """What differs, and its value in the first run and in the other."""
 Row = tuple[str, str, str, str]
 """Name, the texts of one recording and of the other, and the difference; "" for none."""
 
 
-def setup_differences(one: Document, other: Document) -> list[Difference]:
+def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Difference]:
     """Return in what the set-ups of two runs differ; what one does not state does not count."""
     found = [
-        (name, str(one[name]), str(other[name]))
-        for name in ("robot", "version")
-        if one[name] and other[name] and one[name] != other[name]
+        (name, mine, theirs)
+        for name, mine, theirs in (
+            ("robot", one.robot, other.robot),
+            ("version", one.version, other.version),
+        )
+        if mine and theirs and mine != theirs
     ]
     for name, key in SETTINGS.items():
-        mine, theirs = one["config"].get(key), other["config"].get(key)
+        mine, theirs = one.config.get(key), other.config.get(key)
         if mine is not None and theirs is not None and mine != theirs:
             found.append((name, str(mine), str(theirs)))
     if not _is_one_building(one, other):
         found.append(("building", _building(one), _building(other)))
-    mine, theirs = len(one["orders"]), len(other["orders"])
-    if mine != theirs:
-        found.append(("orders", str(mine), str(theirs)))
+    if len(one.orders) != len(other.orders):
+        found.append(("orders", str(len(one.orders)), str(len(other.orders))))
     return found
 
 
@@ -57,7 +60,7 @@ def do_compare(setup: list[Difference]) -> bool:
     return not any(name in ANOTHER_PROBLEM for name, _, _ in setup)
 
 
-def setup_words(one: Document, other: Document) -> str:
+def setup_words(one: ReviewDocument, other: ReviewDocument) -> str:
     """Return a sentence on whether two runs compare."""
     setup = setup_differences(one, other)
     if not setup:
@@ -71,25 +74,26 @@ def setup_words(one: Document, other: Document) -> str:
     )
 
 
-def side_by_side(one: Document, other: Document) -> dict[str, Any]:
+def side_by_side(one: ReviewDocument, other: ReviewDocument) -> dict[str, object]:
     """Return two documents, how their set-ups differ, and the differences of their numbers.
 
     A difference is the first less the second, of each number that both have and that compares.
     """
     setup = setup_differences(one, other)
-    mine = one if do_compare(setup) else {name: one[name] for name in ANYWAY}
+    this, that = (msgspec.to_builtins(document) for document in (one, other))
+    mine = this if do_compare(setup) else {name: this[name] for name in ANYWAY}
     return {
-        "recording": dict(one),
-        "against": dict(other),
-        "setup": [{"what": what, "recording": this, "against": that} for what, this, that in setup],
+        "recording": this,
+        "against": that,
+        "setup": [dict(zip(("what", "recording", "against"), each, strict=True)) for each in setup],
         "compare": do_compare(setup),
-        "difference": differences(mine, other),
+        "difference": differences(mine, that),
     }
 
 
-def differences(one: Document, other: Document) -> dict[str, Any]:
+def differences(one: Mapping[str, object], other: Mapping[str, object]) -> dict[str, object]:
     """Return the first less the second of each number that both documents have."""
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     for name, value in one.items():
         mate = other.get(name)
         if isinstance(value, dict) and isinstance(mate, dict):
@@ -100,7 +104,7 @@ def differences(one: Document, other: Document) -> dict[str, Any]:
     return found
 
 
-def compared_rows(one: Document, other: Document) -> list[Row]:
+def compared_rows(one: ReviewDocument, other: ReviewDocument) -> list[Row]:
     """Return the figures of two runs side by side, with the difference where they compare."""
     mine, theirs = ({figure.name: figure for figure in figures(each)} for each in (one, other))
     compares = do_compare(setup_differences(one, other))
@@ -112,9 +116,9 @@ def compared_rows(one: Document, other: Document) -> list[Row]:
     ]
 
 
-def reason_counts(documents: Sequence[Document]) -> list[tuple[str, list[int]]]:
+def reason_counts(documents: Sequence[ReviewDocument]) -> list[tuple[str, list[int]]]:
     """Return each kind of reason for a replan, and how many there were in each run."""
-    counts = [document["replans_by_reason"] for document in documents]
+    counts = [document.replans_by_reason for document in documents]
     kinds = dict.fromkeys(kind for count in counts for kind in count)
     return [(kind, [count.get(kind, 0) for count in counts]) for kind in kinds]
 
@@ -127,14 +131,14 @@ def _compared(mine: Figure, theirs: Figure, *, compares: bool) -> Row:
     return mine.name, mine.text, theirs.text, text if less else "0"
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _is_one_building(one: Document, other: Document) -> bool:
-    if not one["map"] or not other["map"]:
+def _is_one_building(one: ReviewDocument, other: ReviewDocument) -> bool:
+    if one.map is None or other.map is None:
         return True
-    pairs = zip(_sides_m(one["map"]), _sides_m(other["map"]), strict=True)
+    pairs = zip(one.map.sides_m, other.map.sides_m, strict=True)
     if any(abs(mine - theirs) > SIDE_M for mine, theirs in pairs):
         return False
     mine, theirs = _floor_m2(one), _floor_m2(other)
@@ -143,17 +147,13 @@ def _is_one_building(one: Document, other: Document) -> bool:
     return abs(mine - theirs) <= FLOOR_SHARE * max(mine, theirs)
 
 
-def _sides_m(grid: Document) -> tuple[float, float]:
-    return grid["cols"] * grid["resolution_m"], grid["rows"] * grid["resolution_m"]
-
-
-def _floor_m2(document: Document) -> float | None:
+def _floor_m2(document: ReviewDocument) -> float | None:
     """Return the area of all cells that were coverable at the end [m2]."""
-    cells, width_m = document["coverable_cells"], document["config"].get("robot.tool_width_m")
-    return None if cells is None or width_m is None else float(cells * width_m**2)
+    cells, width_m = document.coverable_cells, document.config.get("robot.tool_width_m")
+    return cells * width_m**2 if cells is not None and isinstance(width_m, int | float) else None
 
 
-def _building(document: Document) -> str:
-    width, depth = _sides_m(document["map"])
+def _building(document: ReviewDocument) -> str:
+    width, depth = document.map.sides_m if document.map else (0.0, 0.0)
     floor = _floor_m2(document)
     return f"{width:.1f} x {depth:.1f} m" + ("" if floor is None else f", {floor:.1f} m2 to cover")

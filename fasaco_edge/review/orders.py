@@ -25,22 +25,22 @@ class OrderChapter:
 
     Attributes:
         ordered: "command", or "itself" for one that was given before the recording.
-        begin_s, end_s: while it held [s].
-        ended_by: "cancel" or "reset"; "start" where another took its place; "" for the end of
+        at_s, until_s: while it held [s].
+        ended_by: "cancel" or "reset"; "start" where another took its place; None for the end of
             the recording.
-        state: of the mission, the last one; "" without any.
-        covered, coverable: cells by the last status; None where that is outdated.
+        state: of the mission, the last one; None without any.
+        covered_cells, coverable_cells: by the last status; None where that is outdated.
         complete: whether it came to ``done`` with nothing missing; None where that is not recorded.
     """
 
     ordered: str
-    begin_s: float
-    end_s: float
-    ended_by: str
-    state: str
-    covered: int | None
-    coverable: int | None
+    at_s: float
+    until_s: float
+    ended_by: str | None
+    state: str | None
     complete: bool | None
+    covered_cells: int | None
+    coverable_cells: int | None
 
 
 def chapters(
@@ -75,7 +75,7 @@ def is_complete(state: str, sample: StatusSample | None, covered: int, coverable
 
 def _held(
     data: RunData, states: Sequence[Span], end_s: float
-) -> Iterator[tuple[str, float, float, str]]:
+) -> Iterator[tuple[str, float, float, str | None]]:
     """Yield who gave each order, from when to when it held [s], and what ended it."""
     ordered, began, order = "itself", 0.0, None
     is_open = True
@@ -87,7 +87,7 @@ def _held(
                 yield ordered, began, at_s, name
             ordered, began, order, is_open = "command", at_s, given, name == "start"
     if is_open:
-        yield ordered, began, end_s, ""
+        yield ordered, began, end_s, None
 
 
 def _goes_on(order: MissionOrder | None, given: MissionOrder, state: str) -> bool:
@@ -114,7 +114,7 @@ def _chapter(
     ordered: str,
     begin_s: float,
     end_s: float,
-    ended_by: str,
+    ended_by: str | None,
 ) -> OrderChapter:
     until = end_s if ended_by else float("inf")
     state = _state_at(states, until)
@@ -132,7 +132,9 @@ def _chapter(
         complete = False
     elif state and covered is not None and coverable is not None:
         complete = is_complete(state, last, covered, coverable)
-    return OrderChapter(ordered, begin_s, end_s, ended_by, state, covered, coverable, complete)
+    return OrderChapter(
+        ordered, begin_s, end_s, ended_by, state or None, complete, covered, coverable
+    )
 
 
 def is_still_true(sample: StatusSample, fractions: NDArray[np.float64]) -> bool:

@@ -15,13 +15,12 @@ from pathlib import Path
 from fasaco_edge.drawing.chart import COLOURS, Line, Panel, Placer
 from fasaco_edge.review import rows
 from fasaco_edge.review.comparison import (
-    Document,
     compared_rows,
     reason_counts,
     setup_differences,
     setup_words,
 )
-from fasaco_edge.review.document import document
+from fasaco_edge.review.document import ReviewDocument, document_of
 from fasaco_edge.review.pictures import coverage_panel, draw_map, replan_panel, state_panel
 from fasaco_edge.review.review import Review
 from fasaco_edge.text import Html, element, html
@@ -115,8 +114,8 @@ GLOSSARY = {
 def page_of(review: Review, other: Review | None = None) -> str:
     """Return an HTML document about a review, or about two side by side."""
     reviews = [review] if other is None else [review, other]
-    documents = [document(each) for each in reviews]
-    title = " against ".join(each["recording"] for each in documents)
+    documents = [document_of(each) for each in reviews]
+    title = " against ".join(each.recording for each in documents)
     kind = "Review of a recorded mission" if other is None else "Two recorded missions compared"
     body = html(
         element(
@@ -154,19 +153,19 @@ def page_of(review: Review, other: Review | None = None) -> str:
     )
 
 
-def _verdict(figures: Document, index: int, of: int) -> Html:
+def _verdict(figures: ReviewDocument, index: int, of: int) -> Html:
     """Return a verdict for each order of a run."""
-    who = (_mark(index), f"{figures['recording']}: ") if of > 1 else ()
+    who = (_mark(index), f"{figures.recording}: ") if of > 1 else ()
     found = rows.verdicts(figures)
     return html(
         *(element("p", *who, text, class_=f"verdict {KINDS[complete]}") for complete, text in found)
     )
 
 
-def _setup(one: Document, other: Document) -> Html:
+def _setup(one: ReviewDocument, other: ReviewDocument) -> Html:
     """Return in what the set-ups of two runs differ."""
     found = setup_differences(one, other)
-    table = (_table(("", one["recording"], other["recording"]), found),) if found else ()
+    table = (_table(("", one.recording, other.recording), found),) if found else ()
     return _section("Do they compare?", element("p", setup_words(one, other)), *table)
 
 
@@ -176,23 +175,21 @@ def _mark(index: int) -> Html:
     return element("i", class_="dot", style=f"background:rgb({red},{green},{blue})")
 
 
-def _tiles(figures: Document) -> Html:
-    covered, coverable = figures["covered_cells"], figures["coverable_cells"]
-    share = f"{100 * covered / coverable:.1f} %" if covered is not None and coverable else "-"
+def _tiles(figures: ReviewDocument) -> Html:
     tiles = (
-        (share, "of the reachable cells covered"),
-        (rows.clock(figures["duration_s"]), "recorded"),
-        (rows.amount(figures["driven_m"], "m"), "driven"),
-        (rows.amount(figures["revisits"], ""), "revisits"),
-        (rows.amount(figures["replan_ms_p50"], "ms"), "a replan, median"),
-        (rows.amount(figures["replan_ms_max"], "ms"), "the slowest replan"),
-        (rows.amount(figures["faults"], ""), "messages refused"),
+        (figures.share_covered or "-", "of the reachable cells covered"),
+        (rows.clock(figures.duration_s), "recorded"),
+        (rows.amount(figures.driven_m, "m"), "driven"),
+        (rows.amount(figures.revisits, ""), "revisits"),
+        (rows.amount(figures.replan_ms_p50, "ms"), "a replan, median"),
+        (rows.amount(figures.replan_ms_max, "ms"), "the slowest replan"),
+        (rows.amount(figures.faults, ""), "messages refused"),
     )
     cells = (element("div", element("b", v), element("span", n)) for v, n in tiles)
     return element("div", *cells, class_="tiles")
 
 
-def _maps(reviews: Sequence[Review], documents: Sequence[Document]) -> Html:
+def _maps(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> Html:
     maps = []
     for review, figures in zip(reviews, documents, strict=True):
         picture = draw_map(review, MAP_ROOM)
@@ -208,8 +205,8 @@ def _maps(reviews: Sequence[Review], documents: Sequence[Document]) -> Html:
     return _section("The map in the end", element("div", *maps, class_=kind))
 
 
-def _charts(reviews: Sequence[Review], documents: Sequence[Document]) -> list[Html]:
-    labels = [each["recording"] for each in documents]
+def _charts(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> list[Html]:
+    labels = [each.recording for each in documents]
     key = Html()
     if len(reviews) > 1:
         marks = (html(_mark(index), label) for index, label in enumerate(labels))
@@ -231,14 +228,14 @@ def _chart(panel: Panel, height: int, name: str = "") -> Html:
     return element("figure", title, *caption, svg_of(panel, height), class_="chart")
 
 
-def _figures(documents: Sequence[Document]) -> Html:
+def _figures(documents: Sequence[ReviewDocument]) -> Html:
     if len(documents) == 1:
         return _table(("", ""), rows.figure_rows(documents[0]))
-    names = (each["recording"] for each in documents)
+    names = (each.recording for each in documents)
     return _table(("", *names, "first less second"), compared_rows(*documents))
 
 
-def _reasons(reviews: Sequence[Review], documents: Sequence[Document]) -> list[Html]:
+def _reasons(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> list[Html]:
     counts = reason_counts(documents)
     if not counts:
         return [element("p", "There were none.")]
@@ -248,11 +245,11 @@ def _reasons(reviews: Sequence[Review], documents: Sequence[Document]) -> list[H
             element("p", "The slowest ones:"),
             _table(rows.REPLANS, rows.replan_rows(reviews[0]), "notes"),
         ]
-    names = (each["recording"] for each in documents)
+    names = (each.recording for each in documents)
     return [_table(("why it came", *names), [(kind, *map(str, n)) for kind, n in counts])]
 
 
-def _remarkable(review: Review, figures: Document, of: int) -> Html:
+def _remarkable(review: Review, figures: ReviewDocument, of: int) -> Html:
     """Return moments, troubles, faults and remarks of one run."""
     moments = rows.moment_rows(review)
     parts = [_table(("worst moments", "how much", "at", "what else is known"), moments, "notes")]
@@ -262,15 +259,15 @@ def _remarkable(review: Review, figures: Document, of: int) -> Html:
     parts.append(_table(titles, troubles, "notes") if troubles else element("p", none))
     none = "No message was refused."
     parts.append(_table(("refused messages", "how many"), faults) if faults else element("p", none))
-    torn = [part for part in figures["files"] if part["torn_bytes"]]
+    torn = [part for part in figures.files if part.torn_bytes]
     remarks = [
-        *(f"{part['path']}: torn, {part['torn_bytes']} bytes lost" for part in torn),
-        *figures["remarks"],
+        *(f"{part.path}: torn, {part.torn_bytes} bytes lost" for part in torn),
+        *figures.remarks,
         *rows.unknown_lines(figures),
     ]
     if remarks:
         parts.append(element("ul", *(element("li", remark) for remark in remarks)))
-    name = f" in {figures['recording']}" if of > 1 else ""
+    name = f" in {figures.recording}" if of > 1 else ""
     return _section(f"What stands out{name}", *parts)
 
 

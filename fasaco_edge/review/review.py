@@ -22,7 +22,14 @@ from fasaco_edge.recording.read.run import (
     count_frames,
     read_run_record,
 )
-from fasaco_edge.review.drive import Drive, WalkFigures, drive_over, first_covered, walk_figures
+from fasaco_edge.review.drive import (
+    Drive,
+    WalkFigures,
+    drive_over,
+    first_covered,
+    milestones,
+    walk_figures,
+)
 from fasaco_edge.review.faults import Faults, faults_of
 from fasaco_edge.review.moments import (
     RECORDER_IN_ORDER,
@@ -160,6 +167,21 @@ class Review:
         return sorted(mission + recorder, key=lambda span: span.begin_s)
 
     @property
+    def seconds_by_state(self) -> dict[str, float]:
+        """How long each state lasted in all [s]."""
+        total: dict[str, float] = {}
+        for span in self.states:
+            total[span.name] = total.get(span.name, 0.0) + span.seconds
+        return total
+
+    @property
+    def reached_s(self) -> dict[int, float | None] | None:
+        """When each of ``MILESTONES`` was reached [s]; None where that is not recorded."""
+        if self.drive is None or self.data.restored_cells:
+            return None
+        return milestones(self.first_s, self.drive.coverage.coverable)
+
+    @property
     def orders(self) -> tuple[OrderChapter, ...]:
         """What was ordered, and what came of each."""
         return chapters(self.data, self.states, self.known_fractions, self.duration_s)
@@ -265,11 +287,3 @@ def _counts(
     return CoverageCounts(
         cover.covered, cover.coverable, cover.recovered, cover.unreachable, source="trail"
     )
-
-
-def seconds_by_state(states: tuple[Span, ...]) -> dict[str, float]:
-    """Return how long each state lasted in all [s]."""
-    total: dict[str, float] = {}
-    for span in states:
-        total[span.name] = total.get(span.name, 0.0) + span.seconds
-    return total

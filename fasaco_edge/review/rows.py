@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 from msgspec.structs import astuple
 
+from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.review import Review
@@ -51,82 +51,73 @@ MOST_REPLANS = 8
 CARD_SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
 
 
-Document = Mapping[str, Any]
-"""A review as ``document.document`` returns it."""
-
-
-def verdicts(document: Document) -> list[tuple[bool | None, str]]:
+def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
     """Return for each order whether it was completed, and that in words."""
-    orders = document["orders"]
+    orders = document.orders
     if len(orders) < 2:
-        return [(document["complete"], _ending(document))]
+        return [(document.complete, _ending(document))]
     found = []
     for number, order in enumerate(orders, 1):
-        span = f"{clock(order['at_s'])} to {clock(order['until_s'])}"
-        who = "ordered" if order["ordered"] == "command" else "begun by itself"
-        by = {"start": "another order", "cancel": "cancel", "reset": "reset", None: ""}
-        ended = by[order["ended_by"]]
+        span = f"{clock(order.at_s)} to {clock(order.until_s)}"
+        who = "ordered" if order.ordered == "command" else "begun by itself"
+        ended = "another order" if order.ended_by == "start" else order.ended_by
         how = {
             True: "complete",
-            False: f"not complete: {order['state'] or 'nothing was told'}"
+            False: f"not complete: {order.state or 'nothing was told'}"
             + (f" when {ended} came" if ended else " at the end of the recording"),
             None: "not known whether it was completed",
-        }[order["complete"]]
-        cells = order["covered_cells"], order["coverable_cells"]
-        counted = "" if None in cells else f", {cells[0]} of {cells[1]} cells"
-        found.append((order["complete"], f"order {number}, {who}, {span}: {how}{counted}"))
+        }[order.complete]
+        cells = f", {order.covered_cells} of {order.coverable_cells} cells"
+        counted = "" if None in (order.covered_cells, order.coverable_cells) else cells
+        found.append((order.complete, f"order {number}, {who}, {span}: {how}{counted}"))
     return found
 
 
-def _ending(document: Document) -> str:
-    if document["complete"]:
+def _ending(document: ReviewDocument) -> str:
+    if document.complete:
         return "complete: all it was to cover, and could reach, is covered"
-    if document["complete"] is None:
+    if document.complete is None:
         return "the recording does not tell whether it was completed"
-    how = "ended" if _is_ended(document) else "broke off"
-    return f"not complete: the recording {how} when the mission was {document['state']}"
+    how = "ended" if document.is_ended else "broke off"
+    return f"not complete: the recording {how} when the mission was {document.state}"
 
 
-def _is_ended(document: Document) -> bool:
-    return all(part["ended"] for part in document["files"])
-
-
-def card_rows(document: Document) -> list[tuple[str, str]]:
+def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
     """Return robot, map, time and settings of a run."""
-    config, grid, parts = document["config"], document["map"], document["files"]
+    config, grid, parts = document.config, document.map, document.files
     size = "none"
-    if grid:
-        width, depth = (grid[side] * grid["resolution_m"] for side in ("cols", "rows"))
-        size = f"{width:.1f} x {depth:.1f} m, {grid['resolution_m']:g} m a pixel"
+    if grid is not None:
+        width, depth = grid.sides_m
+        size = f"{width:.1f} x {depth:.1f} m, {grid.resolution_m:g} m a pixel"
     settings = [
         f"{name.rpartition('.')[2] if name != 'planner.name' else 'planner'} {config[name]}"
         for name in CARD_SETTINGS
         if name in config
     ]
-    megabytes = sum(part["bytes"] for part in parts) / 1e6
-    state = "" if _is_ended(document) else ", not ended in order"
+    megabytes = sum(part.bytes for part in parts) / 1e6
+    state = "" if document.is_ended else ", not ended in order"
     return [
-        ("robot", document["robot"] or "not told"),
-        ("began", _began(document["began"])),
-        ("duration", clock(document["duration_s"])),
+        ("robot", document.robot or "not told"),
+        ("began", _began(document.began)),
+        ("duration", clock(document.duration_s)),
         ("map", size),
-        ("version", document["version"] or "not told"),
+        ("version", document.version or "not told"),
         ("settings", ", ".join(settings) or "not told"),
         ("recording", f"{len(parts)} part{'s' * (len(parts) != 1)}, {megabytes:.1f} MB{state}"),
     ]
 
 
-def figure_rows(document: Document) -> list[tuple[str, str]]:
+def figure_rows(document: ReviewDocument) -> list[tuple[str, str]]:
     """Return name and text of all figures."""
     return [(figure.name, figure.text) for figure in figures(document)]
 
 
-def reason_rows(document: Document) -> list[tuple[str, str, str, str]]:
+def reason_rows(document: ReviewDocument) -> list[tuple[str, str, str, str]]:
     """Return each kind of reason for a replan: how many there were, the median, the slowest."""
-    took = document["replan_ms_by_reason"]
+    took = document.replan_ms_by_reason
     return [
-        (kind, str(count), amount(took[kind]["p50"], "ms"), amount(took[kind]["max"], "ms"))
-        for kind, count in document["replans_by_reason"].items()
+        (kind, str(count), amount(took[kind].p50, "ms"), amount(took[kind].max, "ms"))
+        for kind, count in document.replans_by_reason.items()
     ]
 
 
@@ -157,16 +148,16 @@ def trouble_rows(troubles: list[Span]) -> list[tuple[str, ...]]:
     return [(s.name, clock(s.begin_s), f"{s.seconds:.1f} s", s.reason) for s in troubles]
 
 
-def fault_rows(document: Document) -> list[tuple[str, str]]:
+def fault_rows(document: ReviewDocument) -> list[tuple[str, str]]:
     """Return how many messages were refused, by code."""
-    return [(code, str(count)) for code, count in document["faults_by_code"].items()]
+    return [(code, str(count)) for code, count in document.faults_by_code.items()]
 
 
-def unknown_lines(document: Document) -> Iterator[str]:
+def unknown_lines(document: ReviewDocument) -> Iterator[str]:
     """Yield which samples and figures a recording does not give, and why."""
-    for topic, count in document["unreadable"].items():
+    for topic, count in document.unreadable.items():
         yield f"{count} samples of {topic} cannot be read"
-    for names, why in document["not_recorded"].items():
+    for names, why in document.not_recorded.items():
         yield f"not known: {names}: {why}"
 
 
@@ -179,20 +170,21 @@ class Figure:
     value: float | None = None
 
 
-def figures(document: Document) -> Iterator[Figure]:
+def figures(document: ReviewDocument) -> Iterator[Figure]:
     """Yield the figures that two runs are compared by."""
-    covered, coverable = document["covered_cells"], document["coverable_cells"]
-    share = f" ({100 * covered / coverable:.1f} %)" if covered is not None and coverable else ""
-    yield Figure("complete", {True: "yes", False: "no", None: NOT_KNOWN}[document["complete"]])
-    yield Figure("duration", clock(document["duration_s"]), document["duration_s"])
-    text = NOT_KNOWN if covered is None else f"{covered} of {coverable} cells{share}"
+    share = f" ({document.share_covered})" if document.share_covered else ""
+    covered = document.covered_cells
+    yield Figure("complete", {True: "yes", False: "no", None: NOT_KNOWN}[document.complete])
+    yield Figure("duration", clock(document.duration_s), document.duration_s)
+    text = NOT_KNOWN if covered is None else f"{covered} of {document.coverable_cells} cells{share}"
     yield Figure("covered", text, covered)
     for percent in MILESTONES:
-        at_s = (document["reached_s"] or {}).get(str(percent))
-        text = "never" if document["reached_s"] else NOT_KNOWN
+        at_s = (document.reached_s or {}).get(str(percent))
+        text = "never" if document.reached_s else NOT_KNOWN
         yield Figure(f"{percent} % covered after", text if at_s is None else clock(at_s), at_s)
     for name, member, unit in NUMBERS:
-        yield Figure(name, _count(document[member], unit), document[member])
+        value: float | None = getattr(document, member)
+        yield Figure(name, _count(value, unit), value)
 
 
 def clock(seconds: float) -> str:

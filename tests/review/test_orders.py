@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec import to_builtins
 
 pytest.importorskip("rerun")
 
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.review.comparison import compared_rows, differences, setup_words, side_by_side
+from fasaco_edge.review.document import MapSize, ReviewDocument
 from fasaco_edge.review.moments import spans_of
-from fasaco_edge.review.orders import chapters
+from fasaco_edge.review.orders import OrderChapter, chapters
 from fasaco_edge.review.rows import verdicts
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.replies import CoverageReport
@@ -37,8 +39,8 @@ def told(*rows, commands=()):
 
 def test_a_mission_without_commands_is_one_order():
     (order,) = told((0, "covering", 0, 60), (50, "done", 60, 60))
-    assert (order.ordered, order.begin_s, order.end_s) == ("itself", 0.0, 100.0)
-    assert (order.covered, order.coverable, order.complete) == (60, 60, True)
+    assert (order.ordered, order.at_s, order.until_s) == ("itself", 0.0, 100.0)
+    assert (order.covered_cells, order.coverable_cells, order.complete) == (60, 60, True)
 
 
 def test_three_orders_have_three_verdicts():
@@ -52,24 +54,10 @@ def test_three_orders_have_three_verdicts():
         commands=[(30, "start", KITCHEN), (45, "pause", ALL), (50, "start", ALL)],
     )
     assert [order.complete for order in orders] == [True, False, False]
-    assert [(order.covered, order.coverable) for order in orders] == [(60, 60), (9, 20), (52, 56)]
-    assert [order.ended_by for order in orders] == ["start", "start", ""]
-    document = {
-        "complete": False,
-        "orders": [
-            {
-                "ordered": order.ordered,
-                "at_s": order.begin_s,
-                "until_s": order.end_s,
-                "ended_by": order.ended_by or None,
-                "state": order.state,
-                "complete": order.complete,
-                "covered_cells": order.covered,
-                "coverable_cells": order.coverable,
-            }
-            for order in orders
-        ],
-    }
+    cells = [(order.covered_cells, order.coverable_cells) for order in orders]
+    assert cells == [(60, 60), (9, 20), (52, 56)]
+    assert [order.ended_by for order in orders] == ["start", "start", None]
+    document = ReviewDocument(complete=False, orders=list(orders))
     assert [text for _, text in verdicts(document)] == [
         "order 1, begun by itself, 0:00.0 to 0:30.0: complete, 60 of 60 cells",
         "order 2, ordered, 0:30.0 to 0:50.0: not complete: covering when another order came, "
@@ -82,9 +70,9 @@ def test_three_orders_have_three_verdicts():
 def test_the_same_order_sent_twice_goes_on_unless_it_is_over():
     rows = ((0, "idle", 0, 60), (11, "covering", 5, 60), (50, "done", 60, 60))
     twice = [(10, "start", ALL), (20, "start", ALL)]
-    assert [order.begin_s for order in told(*rows, commands=twice)] == [10]
+    assert [order.at_s for order in told(*rows, commands=twice)] == [10]
     anew = [(10, "start", ALL), (60, "start", ALL)]
-    assert [order.begin_s for order in told(*rows, commands=anew)] == [10, 60]
+    assert [order.at_s for order in told(*rows, commands=anew)] == [10, 60]
 
 
 @pytest.mark.parametrize("command", ["cancel", "reset"])
@@ -92,11 +80,14 @@ def test_what_is_called_off_is_over(command):
     rows = ((0, "covering", 5, 60), (20.1, "idle", 0, 60), (30.1, "covering", 0, 60))
     commands = [(20, command, ALL), (30, "start", ALL), (90, command, ALL)]
     orders = told(*rows, commands=commands)
-    assert [(o.begin_s, o.end_s, o.ended_by) for o in orders] == [
+    assert [(o.at_s, o.until_s, o.ended_by) for o in orders] == [
         (0.0, 20, command),
         (30, 90, command),
     ]
     assert [order.complete for order in orders] == [False, False]
+
+
+ORDER = OrderChapter("itself", 0.0, 100.0, None, "done", True, 400, 400)
 
 
 def run(**changes):
@@ -107,8 +98,8 @@ def run(**changes):
         "robot": "maja",
         "version": "1.0",
         "config": config | changes.pop("config", {}),
-        "map": {"rows": 100, "cols": 200, "resolution_m": 0.05},
-        "orders": [{}],
+        "map": MapSize(rows=100, cols=200, resolution_m=0.05),
+        "orders": [ORDER],
         "coverable_cells": 400,
         "covered_cells": 400,
         "complete": True,
@@ -123,10 +114,10 @@ def run(**changes):
         *("memory_mb_max", "recorder_memory_mb_max", "processor_percent_max", "threads_max"),
         *("faults", "recorder_lost", "samples_missing"),
     )
-    return base | dict.fromkeys(names, 3) | changes
+    return ReviewDocument(**(base | dict.fromkeys(names, 3) | changes))
 
 
-OFFICE = {"rows": 400, "cols": 600, "resolution_m": 0.05}
+OFFICE = MapSize(rows=400, cols=600, resolution_m=0.05)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +130,7 @@ OFFICE = {"rows": 400, "cols": 600, "resolution_m": 0.05}
         (run(map=OFFICE), ["building"], False),
         (run(coverable_cells=900), ["building"], False),
         (run(coverable_cells=410), [], True),
-        (run(orders=[{}, {}]), ["orders"], False),
+        (run(orders=[ORDER, ORDER]), ["orders"], False),
     ],
 )
 def test_what_differs_in_set_up_is_said_and_only_what_compares_is_compared(other, what, compares):
@@ -153,4 +144,4 @@ def test_what_differs_in_set_up_is_said_and_only_what_compares_is_compared(other
     assert rows["messages refused"][3] == "0"
     words = setup_words(run(), other)
     assert ("not two runs of one problem" in words) is not compares
-    assert differences(run(), run())["steps"] == 0
+    assert differences(to_builtins(run()), to_builtins(run()))["steps"] == 0

@@ -18,7 +18,7 @@ pytest.importorskip("rerun")
 from fasaco_edge.cli import main
 from fasaco_edge.cli.review_report import print_review
 from fasaco_edge.drawing import palette
-from fasaco_edge.review.document import document
+from fasaco_edge.review.document import document_of
 from fasaco_edge.review.export import export
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.page import page_of
@@ -29,6 +29,7 @@ from fasaco_edge.wire.replies import MissionReport, ZoneReport
 from fasaco_edge.wire.status import LedgerReport, Status
 from tests.review.test_parts import run_told
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge
+from tests.support.reviews import document
 
 VOID = ("meta", "img")
 
@@ -158,7 +159,8 @@ def test_a_recorder_in_trouble_is_told(review):
 
 
 def test_texts_of_a_recording_do_nothing_to_a_terminal(review, capsys):
-    told = document(review) | {"robot": "[/red] \x1b]0;title\x07", "remarks": ["[/]\x1b[2J"]}
+    told = document_of(review)
+    told.robot, told.remarks = "[/red] \x1b]0;title\x07", ["[/]\x1b[2J"]
     print_review(review, told)
     out = capsys.readouterr().out
     assert "\x1b" not in out

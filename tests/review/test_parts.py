@@ -13,13 +13,14 @@ pytest.importorskip("rerun")
 from fasaco_edge.cli import main
 from fasaco_edge.errors import DifferentRuns, UnreadableRecording
 from fasaco_edge.review.comparison import side_by_side
-from fasaco_edge.review.document import document
+from fasaco_edge.review.document import document_of
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.paths import encode_path
 from tests.support.recordings import bus_on_free_port, recorder_process
+from tests.support.reviews import document
 from tests.support.rooms import map_bytes, pose_bytes, room
 
 CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "mission": {"lost_pose_s": 3.0}}
@@ -177,7 +178,7 @@ def test_parts_of_different_runs_are_refused(parts, other, capsys):
 
 
 def test_two_runs_side_by_side(parts, other, capsys):
-    one, two = (document(read_review(files)) for files in (parts, other))
+    one, two = (document_of(read_review(files)) for files in (parts, other))
     both = side_by_side(one, two)
     assert both["difference"]["faults"] == 3
     assert both["difference"]["steps"] == 0

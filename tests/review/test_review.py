@@ -11,7 +11,6 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.review.document import document
 from fasaco_edge.review.drive import walk_figures
 from fasaco_edge.review.pictures import covered_share
 from fasaco_edge.review.review import read_review
@@ -19,6 +18,7 @@ from tests.benchmarks.judge import check_walk
 from tests.review.naive import nearest_rank, passed_cells, quarter_turns
 from tests.support.processes import fasaco_edge
 from tests.support.recorded_mission import record_mission
+from tests.support.reviews import document
 from tests.support.rooms import TOOL_M
 
 BROKEN_POSES = 3

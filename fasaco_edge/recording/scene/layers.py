@@ -1,4 +1,4 @@
-"""Layers of a recording: where they are drawn, what a new map changed, and how often they are drawn.
+"""Layers of a recording: where they are drawn, what a new map changed, how often each is drawn.
 
 A viewer draws in float32, half a metre coarse at a UTM northing: far from 0 everything is drawn
 relative to whole kilometres near the first place that came.
