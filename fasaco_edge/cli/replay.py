@@ -5,20 +5,30 @@ from __future__ import annotations
 import argparse
 import time
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+import msgspec
+from rich.table import Table
 
 from fasaco_edge import __version__
-from fasaco_edge.cli.console.arguments import Command
+from fasaco_edge.bus.arrival import digest
+from fasaco_edge.cli.console import terminal
+from fasaco_edge.cli.console.arguments import Command, Exit
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.config.config import load_config
+from fasaco_edge.daemon.loop.status import plan_figures
+from fasaco_edge.replay.cycle_replay import CycleReplay, Difference, read_turns
+from fasaco_edge.replay.replay import Replay, read_run
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.recording.read.run import RecordedSamples
-    from fasaco_edge.replay.cycle_replay import CycleRecord, CycleReplay, Difference
+    from fasaco_edge.replay.cycle_replay import CycleRecord
     from fasaco_edge.replay.mission_drive import ReplayStep
-    from fasaco_edge.replay.replay import RecordedRun, Replay
+    from fasaco_edge.replay.replay import RecordedRun
 
 DESCRIPTION = """\
 Play the samples of a recording to the mission again, through the same code that the
@@ -60,11 +70,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay."""
-    from fasaco_edge.cli.console import terminal
-    from fasaco_edge.config.config import load_config
     from fasaco_edge.recording.read.run import RecordedSamples
-    from fasaco_edge.replay.cycle_replay import CycleReplay, read_turns
-    from fasaco_edge.replay.replay import Replay, read_run
 
     samples = RecordedSamples(args.recordings)
     recorded = read_run(samples)
@@ -84,17 +90,19 @@ def run(args: argparse.Namespace) -> int:
         if step.is_news:
             steps.append(step)
     summary = _summary(replay, recorded, samples, steps, last_s)
-    summary |= _cycle_summary(replay, record)
-    code = 0 if summary["equal"] in (True, None) else 1
+    compared = None
+    if record is not None and isinstance(replay, CycleReplay):
+        compared = _comparison(replay, record)
     if args.json:
-        print_json({"decisions": [_document(step) for step in steps], "summary": summary})
-        return code
-    rows = [*_rows(summary), *_cycle_rows(summary)]
-    console = terminal.out()
-    console.print(_table(steps))
-    console.print(terminal.figures((name, str(value)) for name, value in rows))
-    terminal.err().print(f"{last_s:.1f} s in {time.monotonic() - began:.1f} s")
-    return code
+        verdict = msgspec.to_builtins(compared) if compared else {"equal": None}
+        document = msgspec.to_builtins(summary) | verdict
+        print_json({"decisions": [_document(step) for step in steps], "summary": document})
+    else:
+        console = terminal.out()
+        console.print(_table(steps))
+        console.print(terminal.figures([*_rows(summary), *_compared_rows(compared)]))
+        terminal.err().print(f"{last_s:.1f} s in {time.monotonic() - began:.1f} s")
+    return Exit.OK if compared is None or compared.equal else Exit.ERROR
 
 
 def _count(text: str) -> int:
@@ -103,69 +111,78 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def _document(step: ReplayStep) -> dict[str, Any]:
-    faults = (*step.refused, *step.decision.faults)
-    document: dict[str, Any] = {"at_s": round(step.at_s, 6), "state": step.state}
+def _document(step: ReplayStep) -> dict[str, object]:
+    document: dict[str, object] = {"at_s": round(step.at_s, 6), "state": step.state}
     document["reason"] = step.reason
     if step.decision.plan is not None:
         document["asked"] = step.decision.plan.reason
     if step.decision.path is not None:
         document["path"] = _path(step.decision.path) | {"as_recorded": step.as_recorded}
-    if faults:
+    if faults := (*step.refused, *step.decision.faults):
         document["faults"] = [{"code": fault.code, "message": str(fault)} for fault in faults]
     return document
 
 
-def _path(update: PathUpdate) -> dict[str, Any]:
-    from msgspec.structs import asdict
-
-    from fasaco_edge.bus.arrival import digest
-    from fasaco_edge.daemon.loop.status import plan_figures
-
+def _path(update: PathUpdate) -> dict[str, object]:
     return {
         "revision": update.revision,
         "reason": update.reason,
         "steps": max(len(update.cells) - 1, 0),
         "cells_digest": digest(update.cells.astype("<i4").tobytes()).hex(),
-        **asdict(plan_figures(update.plan)),
+        **msgspec.structs.asdict(plan_figures(update.plan)),
     }
+
+
+class Summary(msgspec.Struct):
+    """What a replay came to."""
+
+    duration_s: float
+    state: str
+    reason: str
+    covered_cells: int
+    coverable_cells: int
+    plans: int
+    paths: int
+    paths_recorded: int
+    paths_as_recorded: int
+    faults: dict[str, int]
+    samples_missing: int
+    restored_cells_missing: int
+    restarts_ignored: int
 
 
 def _summary(
     replay: Replay | CycleReplay,
     recorded: RecordedRun,
     samples: RecordedSamples,
-    steps: Iterable[ReplayStep],
+    steps: Sequence[ReplayStep],
     last_s: float,
-) -> dict[str, Any]:
-    steps = list(steps)
-    mission = replay.mission
-    verdicts = Counter(step.as_recorded for step in steps if step.decision.path is not None)
+) -> Summary:
+    mission, coverage = replay.mission, replay.mission.coverage()
+    is_approximate = isinstance(replay, Replay)
     faults = Counter(
         fault.code for step in steps for fault in (*step.refused, *step.decision.faults)
     )
-    coverage = mission.coverage()
-    is_approximate = not hasattr(replay, "difference")
-    return {
-        "duration_s": round(last_s, 3),
-        "state": str(mission.state),
-        "reason": mission.reason,
-        "covered_cells": coverage.covered if coverage else 0,
-        "coverable_cells": coverage.coverable if coverage else 0,
-        "plans": mission.route.plans,
-        "paths": mission.route.revision,
-        "paths_recorded": len(recorded.paths),
-        "paths_as_recorded": verdicts[True],
-        "faults": dict(sorted(faults.items())),
-        "samples_missing": samples.missing,
-        "restored_cells_missing": recorded.restored_cells if is_approximate else 0,
-        "restarts_ignored": recorded.starts if is_approximate else 0,
-    }
+    return Summary(
+        duration_s=round(last_s, 3),
+        state=str(mission.state),
+        reason=mission.reason,
+        covered_cells=coverage.covered if coverage else 0,
+        coverable_cells=coverage.coverable if coverage else 0,
+        plans=mission.route.plans,
+        paths=mission.route.revision,
+        paths_recorded=len(recorded.paths),
+        paths_as_recorded=sum(
+            step.as_recorded is True for step in steps if step.decision.path is not None
+        ),
+        faults=dict(sorted(faults.items())),
+        samples_missing=samples.missing,
+        restored_cells_missing=recorded.restored_cells if is_approximate else 0,
+        restarts_ignored=recorded.starts if is_approximate else 0,
+    )
 
 
-def _table(steps: Iterable[ReplayStep]) -> Any:  # noqa: ANN401 - rich is imported where it is used
-    from rich.table import Table
-
+def _table(steps: Sequence[ReplayStep]) -> Table:
     table = Table(box=None, pad_edge=False)
     for name in ("s", "state", "path", "steps", "proposals", "then"):
         table.add_column(name, justify="left" if name in ("state", "then") else "right")
@@ -190,21 +207,21 @@ def _table(steps: Iterable[ReplayStep]) -> Any:  # noqa: ANN401 - rich is import
     return table
 
 
-def _rows(summary: dict[str, Any]) -> list[tuple[str, object]]:
-    faults = ", ".join(f"{count} {code}" for code, count in summary["faults"].items())
-    rows: list[tuple[str, object]] = [
-        ("ended", f"{summary['state']}: {summary['reason']}"),
-        ("covered", f"{summary['covered_cells']} of {summary['coverable_cells']} cells"),
-        ("plans, paths", f"{summary['plans']}, {summary['paths']}"),
-        ("as recorded", f"{summary['paths_as_recorded']} of {summary['paths_recorded']} paths"),
+def _rows(summary: Summary) -> list[tuple[str, str]]:
+    faults = ", ".join(f"{count} {code}" for code, count in summary.faults.items())
+    rows = [
+        ("ended", f"{summary.state}: {summary.reason}"),
+        ("covered", f"{summary.covered_cells} of {summary.coverable_cells} cells"),
+        ("plans, paths", f"{summary.plans}, {summary.paths}"),
+        ("as recorded", f"{summary.paths_as_recorded} of {summary.paths_recorded} paths"),
         ("refused", faults or "nothing"),
     ]
-    if summary["samples_missing"]:
-        rows.append(("not recorded", f"{summary['samples_missing']} samples"))
-    if summary["restored_cells_missing"]:
-        rows.append(("covered before", f"{summary['restored_cells_missing']} cells, not recorded"))
-    if summary["restarts_ignored"]:
-        rows.append(("daemon restarts", f"{summary['restarts_ignored']}, played as one mission"))
+    if summary.samples_missing:
+        rows.append(("not recorded", f"{summary.samples_missing} samples"))
+    if summary.restored_cells_missing:
+        rows.append(("covered before", f"{summary.restored_cells_missing} cells, not recorded"))
+    if summary.restarts_ignored:
+        rows.append(("daemon restarts", f"{summary.restarts_ignored}, played as one mission"))
     return rows
 
 
@@ -212,64 +229,73 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, object]]:
 NAMED = 5
 
 
-def _cycle_summary(replay: Replay | CycleReplay, record: CycleRecord | None) -> dict[str, Any]:
-    """Return what a replay by turns came to; ``equal`` is None of an approximate one."""
-    from fasaco_edge.replay.cycle_replay import CycleReplay
+class Versions(msgspec.Struct):
+    """What decided then, and what decides now."""
 
-    if record is None or not isinstance(replay, CycleReplay):
-        return {"equal": None}
-    then, difference = record.beginning, replay.difference
-    return {
-        "equal": difference is None and not replay.lacking and not record.gap,
-        "turns": record.turns,
-        "turns_equal": replay.turns,
-        "plans_repeated": replay.plans,
-        "difference": None if difference is None else _difference_document(difference),
-        "samples_lacking": [_difference_document(lacking) for lacking in replay.lacking],
-        "log_ends": record.gap,
-        "version": {"recorded": then.version, "replayed": __version__},
-        "kernels": {"recorded": record.kernels, "replayed": replay.kernels},
-    }
+    recorded: str
+    replayed: str
 
 
-def _cycle_rows(summary: dict[str, Any]) -> list[tuple[str, object]]:
-    """Return the summary of a replay by turns for people."""
-    if summary["equal"] is None:
+class Comparison(msgspec.Struct):
+    """What a replay by turns came to."""
+
+    equal: bool
+    turns: int
+    turns_equal: int
+    plans_repeated: int
+    difference: Difference | None
+    samples_lacking: list[Difference]
+    log_ends: str
+    version: Versions
+    kernels: Versions
+
+
+def _comparison(replay: CycleReplay, record: CycleRecord) -> Comparison:
+    difference, *lacking = (
+        found and replace(found, at_s=round(found.at_s, 6))
+        for found in (replay.difference, *replay.lacking)
+    )
+    return Comparison(
+        equal=difference is None and not lacking and not record.gap,
+        turns=record.turns,
+        turns_equal=replay.turns,
+        plans_repeated=replay.plans,
+        difference=difference,
+        samples_lacking=[found for found in lacking if found is not None],
+        log_ends=record.gap,
+        version=Versions(record.beginning.version, __version__),
+        kernels=Versions(record.kernels, replay.kernels),
+    )
+
+
+def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
+    """Return what a replay by turns came to, for people."""
+    if compared is None:
         return [("replay", "approximate: there is no turn log from the beginning, or it is unused")]
-    turns = f"{summary['turns_equal']} of {summary['turns']} turns"
-    said = "equal bit for bit" if summary["equal"] else "equal as far as can be compared"
-    if summary["difference"] is not None:
+    turns = f"{compared.turns_equal} of {compared.turns} turns"
+    said = "equal bit for bit" if compared.equal else "equal as far as can be compared"
+    if compared.difference is not None:
         said = "not equal"
-    rows: list[tuple[str, object]] = [("replay", f"{said}: {turns}")]
-    if summary["difference"] is not None:
-        rows.append(("first difference", _words(summary["difference"])))
-    lacking = summary["samples_lacking"]
-    rows.extend(("sample", _words(document)) for document in lacking[:NAMED])
+    rows = [("replay", f"{said}: {turns}")]
+    if compared.difference is not None:
+        rows.append(("first difference", _words(compared.difference)))
+    lacking = compared.samples_lacking
+    rows.extend(("sample", _words(found)) for found in lacking[:NAMED])
     if len(lacking) > NAMED:
         rows.append(("samples", f"{len(lacking) - NAMED} more are not as they were taken"))
-    if summary["log_ends"]:
-        rows.append(("compared up to", f"turn {summary['turns']}: {summary['log_ends']}"))
-    for name in ("version", "kernels"):
-        was, now = summary[name]["recorded"], summary[name]["replayed"]
+    if compared.log_ends:
+        rows.append(("compared up to", f"turn {compared.turns}: {compared.log_ends}"))
+    for name, versions in (("version", compared.version), ("kernels", compared.kernels)):
+        was, now = versions.recorded, versions.replayed
         if was and was != now:
             rows.append((name, f"recorded with {was}, replayed with {now}"))
     return rows
 
 
-def _difference_document(difference: Difference) -> dict[str, Any]:
-    return {
-        "turn": difference.turn,
-        "at_s": round(difference.at_s, 6),
-        "what": difference.what,
-        "recorded": difference.recorded,
-        "replayed": difference.replayed,
-    }
-
-
-def _words(document: dict[str, Any]) -> str:
+def _words(found: Difference) -> str:
     return (
-        f"turn {document['turn']} at {document['at_s']:.2f} s: {document['what']} "
-        f"was {document['recorded']}, is {document['replayed']}"
+        f"turn {found.turn} at {found.at_s:.2f} s: {found.what} "
+        f"was {found.recorded}, is {found.replayed}"
     )
 
 
