@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import yaml
@@ -204,7 +204,7 @@ def show(name: str, reply: Reply) -> None:
         print(yaml.safe_dump(document, sort_keys=False), end="")
 
 
-def _figures(reply: Reply) -> dict[str, Any]:
+def _figures(reply: Reply) -> dict[str, object]:
     match reply.schema:
         case schemas.PATH:
             return _path_figures(reply)
@@ -214,7 +214,7 @@ def _figures(reply: Reply) -> dict[str, Any]:
             return _trail_figures(reply)
 
 
-def _path_figures(reply: Reply) -> dict[str, Any]:
+def _path_figures(reply: Reply) -> dict[str, object]:
     path = decode_path(reply.payload)
     length_m = float(np.hypot(*np.diff(path.xy, axis=0).T).sum())
     return {
@@ -225,7 +225,7 @@ def _path_figures(reply: Reply) -> dict[str, Any]:
     }
 
 
-def _coverage_figures(reply: Reply) -> dict[str, Any]:
+def _coverage_figures(reply: Reply) -> dict[str, object]:
     grid = decode_occupancy_grid(reply.payload)
     return {
         "frame": grid.frame,
@@ -236,7 +236,7 @@ def _coverage_figures(reply: Reply) -> dict[str, Any]:
     }
 
 
-def _trail_figures(reply: Reply) -> dict[str, Any]:
+def _trail_figures(reply: Reply) -> dict[str, object]:
     trail = decode_pheromone(reply.payload)
     return {
         "frame": trail.frame,

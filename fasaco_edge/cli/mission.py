@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from fasaco_edge.cli.ask import add_question, ask, show_mission
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
@@ -93,7 +92,7 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Ask, and show the answer."""
-    asked: dict[str, Any] = {"command": args.mission_command}
+    asked: dict[str, object] = {"command": args.mission_command}
     if args.mission_command == "start":
         asked["order"] = _order(args)
     reply = ask(args, "mission", payload=encode_json(asked))
@@ -104,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
     return Exit.OK
 
 
-def _order(args: argparse.Namespace) -> dict[str, Any]:
+def _order(args: argparse.Namespace) -> dict[str, object]:
     """Return the order as a document, checked: what is wrong is told without a daemon."""
     from fasaco_edge.errors import OrderError
     from fasaco_edge.mission.orders.order import order_document, read_order
@@ -149,7 +148,7 @@ def _read(path: Path) -> object:
         raise OrderError(f"neither plain YAML nor JSON: {error}") from error
 
 
-def _zone(text: str) -> dict[str, Any]:
+def _zone(text: str) -> dict[str, object]:
     name, colon, corners = text.partition(":")
     if not colon or not name:
         raise argparse.ArgumentTypeError(f"must be NAME:x,y;x,y;..., got {text!r}")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -102,7 +102,7 @@ def _start(args: argparse.Namespace, lattice: CoverageLattice, file: Path) -> Ce
 
 def _plan(
     args: argparse.Namespace, colony: ColonyConfig, problem: CoverageProblem, asked: Interrupt
-) -> tuple[CoveragePath, dict[str, Any]]:
+) -> tuple[CoveragePath, dict[str, object]]:
     """Plan with a progress bar; return the path and the figures of the search itself.
 
     A planner that knows no lower bound is given one, for its path and for ``--target-gap``.
@@ -153,8 +153,8 @@ def figures_of(
     args: argparse.Namespace,
     problem: CoverageProblem,
     path: CoveragePath,
-    search: dict[str, Any],
-) -> dict[str, Any]:
+    search: dict[str, object],
+) -> dict[str, object]:
     """Return the figures of a walk and of the search for it, as JSON values."""
     from fasaco_edge.planners.path import walk_figures
 
@@ -194,7 +194,7 @@ def draw(
     lattice: CoverageLattice,
     grid: OccupancyGrid | None,
     path: CoveragePath,
-    figures: dict[str, Any],
+    figures: dict[str, object],
 ) -> None:
     """Draw the walk."""
     from fasaco_edge.drawing.pictures import draw_walk
@@ -205,7 +205,7 @@ def draw(
     search = f", {path.work.perturbations} perturbations" if args.local_search else ""
     title = path.planner + colony + search
     lines = [
-        f"{Path(figures['map']).name}: {figures['cells']} cells of {figures['cell_m']} m, "
+        f"{Path(args.map).name}: {figures['cells']} cells of {figures['cell_m']} m, "
         f"{figures['steps']} steps, {figures['revisits']} revisits, "
         f"{figures['turns_90']} quarter-turns; "
         f"at most {path.gap or 0.0:.1%} above the fewest steps there can be",
@@ -213,7 +213,7 @@ def draw(
     draw_walk(lattice, path.cells, grid=grid, title=title, lines=lines).save(file, "PNG")
 
 
-def print_figures(args: argparse.Namespace, figures: dict[str, Any]) -> None:
+def print_figures(args: argparse.Namespace, figures: dict[str, object]) -> None:
     """Print the figures as JSON or as a table."""
     if args.json:
         print_json(figures)

@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
         ending = mission.watch()
     summary = summarise(args, out, ending)
     print_summary(summary, as_json=args.json)
-    return 0 if summary["complete"] else 1
+    return 0 if summary.complete else 1
 
 
 COMMAND = Command(

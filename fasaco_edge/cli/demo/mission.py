@@ -12,7 +12,7 @@ from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import yaml
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
@@ -162,7 +162,7 @@ class DemoMission:
             "robot", ["simulate", str(self._map), "--connect", self._endpoint, *robot, *trail]
         )
 
-    def _config(self) -> dict[str, Any]:
+    def _config(self) -> dict[str, object]:
         return {
             "robot": {"radius_m": self._args.robot_radius, "tool_width_m": self._args.cell},
             "bus": {"listen": [self._endpoint]},

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,66 +33,90 @@ class _Truth:
     visits: NDArray[np.uint16]
 
 
-def summarise(args: argparse.Namespace, out: Path, ending: Ending) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The figures of a demo."""
+
+    map: str
+    complete: bool
+    reachable_cells: int
+    covered_cells: int
+    recovered_cells: int
+    unreachable_cells: int
+    covered_m2: float
+    driven_m: float
+    plans: int
+    paths: int
+    plan_ms_p50: float | None
+    plan_ms_p99: float | None
+    errors: int
+    wall_s: float
+    recording: list[str]
+    picture: str
+
+
+def summarise(args: argparse.Namespace, out: Path, ending: Ending) -> Summary:
     """Return the figures of a demo, and draw and write them into ``out``."""
     truth = _truth(args, out)
     covered = truth.reachable & (truth.visits > 0)
     driven = np.hypot(*np.diff(truth.trail, axis=0).T).sum()
     reachable, done = int(truth.reachable.sum()), int(covered.sum())
     status = ending.status
-    summary: dict[str, Any] = {
-        "map": str(args.map),
-        "complete": done == reachable and not ending.timed_out,
-        "reachable_cells": reachable,
-        "covered_cells": done,
-        "recovered_cells": int((truth.reachable & (truth.visits > 1)).sum()),
-        "unreachable_cells": int((truth.lattice.coverable & ~truth.reachable).sum()),
-        "covered_m2": round(done * args.cell**2, 2),
-        "driven_m": round(float(driven), 1),
-        "plans": status.plan.plans,
-        "paths": status.path.revision if status.path else 0,
-        "plan_ms_p50": _percentile(ending.replan_ms, 50),
-        "plan_ms_p99": _percentile(ending.replan_ms, 99),
-        "errors": status.errors.total,
-        "wall_s": round(ending.wall_s, 1),
-        "recording": [str(file) for file in sorted(out.glob("*.rrd"))],
-        "picture": str(out / "mission.png"),
-    }
+    summary = Summary(
+        map=str(args.map),
+        complete=done == reachable and not ending.timed_out,
+        reachable_cells=reachable,
+        covered_cells=done,
+        recovered_cells=int((truth.reachable & (truth.visits > 1)).sum()),
+        unreachable_cells=int((truth.lattice.coverable & ~truth.reachable).sum()),
+        covered_m2=round(done * args.cell**2, 2),
+        driven_m=round(float(driven), 1),
+        plans=status.plan.plans,
+        paths=status.path.revision if status.path else 0,
+        plan_ms_p50=_percentile(ending.replan_ms, 50),
+        plan_ms_p99=_percentile(ending.replan_ms, 99),
+        errors=status.errors.total,
+        wall_s=round(ending.wall_s, 1),
+        recording=[str(file) for file in sorted(out.glob("*.rrd"))],
+        picture=str(out / "mission.png"),
+    )
     _draw(args, out, truth, summary)
-    (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    (out / "summary.json").write_text(
+        json.dumps(asdict(summary), indent=1) + "\n", encoding="utf-8"
+    )
     return summary
 
 
-def print_summary(summary: dict[str, Any], *, as_json: bool) -> None:
+def print_summary(summary: Summary, *, as_json: bool) -> None:
     """Print a table, or JSON."""
     from fasaco_edge.cli.console import terminal
 
     if as_json:
-        print_json(summary)
+        print_json(asdict(summary))
         return
     console = terminal.out()
-    ending = "every reachable cell is covered" if summary["complete"] else "NOT ALL WAS COVERED"
-    console.print(f"{summary['map']}: {ending}", style="bold")
+    ending = "every reachable cell is covered" if summary.complete else "NOT ALL WAS COVERED"
+    console.print(f"{summary.map}: {ending}", style="bold")
     console.print(terminal.figures(_rows(summary)))
-    for file in (*summary["recording"], summary["picture"]):
+    for file in (*summary.recording, summary.picture):
         console.print(file, soft_wrap=True)
-    if summary["recording"]:
-        files = " ".join(summary["recording"])
+    if summary.recording:
+        files = " ".join(summary.recording)
         console.print(f"review it:   fasaco-edge review {files}", soft_wrap=True)
         console.print(f"look at it:  rerun {files}", soft_wrap=True)
 
 
-def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
-    cells, covered = summary["reachable_cells"], summary["covered_cells"]
+def _rows(summary: Summary) -> list[tuple[str, str]]:
+    cells, covered = summary.reachable_cells, summary.covered_cells
     return [
-        ("covered", f"{covered} of {cells} cells, {summary['covered_m2']} m2"),
-        ("covered again", f"{summary['recovered_cells']} cells"),
-        ("out of reach", f"{summary['unreachable_cells']} cells"),
-        ("driven", f"{summary['driven_m']} m"),
-        ("plans, paths", f"{summary['plans']}, {summary['paths']}"),
-        ("time of a plan", f"{summary['plan_ms_p50']} ms, p99 {summary['plan_ms_p99']} ms"),
-        ("messages refused", str(summary["errors"])),
-        ("time in all", f"{summary['wall_s']} s"),
+        ("covered", f"{covered} of {cells} cells, {summary.covered_m2} m2"),
+        ("covered again", f"{summary.recovered_cells} cells"),
+        ("out of reach", f"{summary.unreachable_cells} cells"),
+        ("driven", f"{summary.driven_m} m"),
+        ("plans, paths", f"{summary.plans}, {summary.paths}"),
+        ("time of a plan", f"{summary.plan_ms_p50} ms, p99 {summary.plan_ms_p99} ms"),
+        ("messages refused", str(summary.errors)),
+        ("time in all", f"{summary.wall_s} s"),
     ]
 
 
@@ -113,10 +136,10 @@ def _truth(args: argparse.Namespace, out: Path) -> _Truth:
     return _Truth(grid, lattice, reachable, trail, ledger.visits(lattice.window))
 
 
-def _draw(args: argparse.Namespace, out: Path, truth: _Truth, summary: dict[str, Any]) -> None:
+def _draw(args: argparse.Namespace, out: Path, truth: _Truth, summary: Summary) -> None:
     lines = [
-        f"{summary['covered_cells']} of {summary['reachable_cells']} reachable cells covered, "
-        f"{summary['driven_m']} m driven, {summary['paths']} paths",
+        f"{summary.covered_cells} of {summary.reachable_cells} reachable cells covered, "
+        f"{summary.driven_m} m driven, {summary.paths} paths",
     ]
     title = f"{Path(args.map).stem}: mapped and covered"
     picture = draw_mission(
