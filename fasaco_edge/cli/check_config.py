@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import yaml
 
 from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
-
-if TYPE_CHECKING:
-    from fasaco_edge.config.config import DaemonConfig
-    from fasaco_edge.config.reading import Fault
+from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.config.config import DaemonConfig, inspect_config
+from fasaco_edge.config.reading import Fault
+from fasaco_edge.daemon.loop.answers import config_document
+from fasaco_edge.errors import BadConfiguration
 
 EPILOG = """\
 It reads the file as the daemon does and starts nothing. It looks at no file that the
@@ -38,8 +40,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check, and tell."""
-    from fasaco_edge.config.config import inspect_config
-
     config, found = inspect_config(args.file)
     faults = sorted(found, key=lambda fault: fault.line or 0)
     if args.json:
@@ -47,10 +47,6 @@ def run(args: argparse.Namespace) -> int:
     elif config is None:
         _print(args.file, faults)
     elif args.show:
-        import yaml
-
-        from fasaco_edge.daemon.loop.answers import config_document
-
         print(yaml.safe_dump(config_document(config), sort_keys=False), end="")
     else:
         print(f"{args.file}: in order")
@@ -75,17 +71,12 @@ def _document(
         ],
     }
     if args.show:
-        from fasaco_edge.daemon.loop.answers import config_document
-
         document["config"] = config_document(config) if config is not None else None
     return document
 
 
 def _print(file: Path, faults: list[Fault]) -> None:
     """Print a line for each fault, as compilers do, and each hint that is not everybody's."""
-    from fasaco_edge.cli.console.terminal import out
-    from fasaco_edge.errors import BadConfiguration
-
     console = out()
     for fault in faults:
         where = f"{file}:{fault.line}" if fault.line else str(file)

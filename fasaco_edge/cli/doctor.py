@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 import threading
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -76,16 +77,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _document(found: list[tuple[str, Finding]]) -> dict[str, object]:
-    checks = [
-        {
-            "name": name,
-            "level": finding.level,
-            "found": finding.found,
-            "to_do": finding.to_do,
-            "details": finding.details,
-        }
-        for name, finding in found
-    ]
+    checks = [{"name": name} | asdict(finding) for name, finding in found]
     return {"ok": all(finding.level != "fail" for _, finding in found), "checks": checks}
 
 

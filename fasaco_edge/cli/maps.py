@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 
 from fasaco_edge.cli.console.arguments import Command
+from fasaco_edge.cli.console.terminal import figures, out
+from fasaco_edge.grid.map_files import builtin_maps
 
 
 def run(args: argparse.Namespace) -> int:
     """Print name and purpose of each map."""
-    from fasaco_edge.cli.console.terminal import figures, out
-    from fasaco_edge.grid.map_files import builtin_maps
-
     out().print(figures(builtin_maps()))
     return 0
 

@@ -230,7 +230,7 @@ def watching(
     args: argparse.Namespace, colony: ColonyConfig
 ) -> Iterator[Callable[[SearchProgress], None]]:
     """Yield what shows how far a search is: the budget used up, else the ants that walked."""
-    with terminal.progress_of_time() if args.local_search else terminal.progress() as bar:
+    with terminal.progress(counted=not args.local_search) as bar:
         total = args.budget if args.local_search else colony.ants
         task = bar.add_task("ants", total=total)
         began = shown = time.perf_counter()

@@ -5,16 +5,24 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import msgspec
+
+from fasaco_edge.bus.session import BusSettings
 from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, client_settings
+from fasaco_edge.config.config import (
+    BusConfig,
+    DaemonConfig,
+    PoseConfig,
+    RecordingConfig,
+    RobotConfig,
+    decode_config,
+    load_config,
+)
+from fasaco_edge.config.ros import RosConfig
+from fasaco_edge.config.security import from_here
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from fasaco_edge.wire.topics import POSE_SCHEMAS
-
-if TYPE_CHECKING:
-    from fasaco_edge.bus.session import BusSettings
-    from fasaco_edge.config.config import DaemonConfig
-    from fasaco_edge.config.ros import RosConfig
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
 
@@ -57,10 +65,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def ros_config(text: str) -> RosConfig:
     """Read the block ``ros2`` of a configuration."""
-    import msgspec
-
-    from fasaco_edge.config.ros import RosConfig
-
     try:
         config = msgspec.json.decode(text, type=RosConfig)
     except msgspec.DecodeError as error:
@@ -125,16 +129,6 @@ def run(args: argparse.Namespace) -> int:
 
 def config_of_options(args: argparse.Namespace) -> DaemonConfig:
     """Return the configuration that the options state; the bus is in ``client_settings``."""
-    import msgspec
-
-    from fasaco_edge.config.config import (
-        BusConfig,
-        DaemonConfig,
-        PoseConfig,
-        RecordingConfig,
-        RobotConfig,
-    )
-
     return DaemonConfig(
         robot=RobotConfig(name=args.robot),
         bus=BusConfig(base=args.base),
@@ -155,10 +149,6 @@ def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
     Raises:
         BadConfiguration: the file, or the document on standard input, is wrong.
     """
-    from fasaco_edge.bus.session import BusSettings
-    from fasaco_edge.config.config import decode_config, load_config
-    from fasaco_edge.config.security import from_here
-
     on_input = str(file) == "-"
     config = decode_config(sys.stdin.buffer.read()) if on_input else load_config(file)
     bus = config.bus

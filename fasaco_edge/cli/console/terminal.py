@@ -42,24 +42,13 @@ def err() -> Console:
     return CleanConsole(stderr=True)
 
 
-def progress() -> Progress:
-    """Return a progress bar that leaves nothing behind."""
+def progress(*, counted: bool = True) -> Progress:
+    """Return a progress bar that leaves nothing behind; ``counted`` shows how much is done."""
+    count = (MofNCompleteColumn(),) if counted else ()
     return Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=32),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=err(),
-        transient=True,
-        disable=not err().is_terminal,
-    )
-
-
-def progress_of_time() -> Progress:
-    """Return a progress bar of time, without a count."""
-    return Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(bar_width=32),
+        *count,
         TimeElapsedColumn(),
         console=err(),
         transient=True,

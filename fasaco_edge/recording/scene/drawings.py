@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from msgspec.structs import astuple
 from numpy.typing import NDArray
 
+from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.curves import Curves
@@ -118,7 +120,7 @@ class PathDrawing:
     def _draw_window(self, changed: Rectangle | None, reason: str) -> None:
         """Draw the part of the map that led to the path; nothing where none did."""
         if changed is not None:
-            bounds = changed.x_min, changed.y_min, changed.x_max, changed.y_max
+            bounds: Bounds = astuple(changed)
             box = draw.box_archetype(bounds, draw.WINDOW)
             label = draw.label_archetype(bounds, reason)
         elif self._has_window:

@@ -14,8 +14,10 @@ import math
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
+from msgspec.structs import astuple
 from msgspec.structs import replace as replace_members
 from numpy.typing import NDArray
 
@@ -29,6 +31,9 @@ from fasaco_edge.wire.status import PathAttachment, Rectangle
 # Nearer to 0 than this float32 resolves a millimetre, and nothing is moved [m].
 NEAR_M = 10_000.0
 STEP_M = 1_000.0
+
+
+Grid = TypeVar("Grid", OccupancyGrid, PheromoneMessage)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,13 +55,12 @@ class Anchor:
         """Return where a pose is drawn."""
         return replace(pose, x=pose.x - self.x, y=pose.y - self.y)
 
-    def grid(self, grid: OccupancyGrid) -> OccupancyGrid:
+    def grid(self, grid: Grid) -> Grid:
         """Return a grid as it is drawn."""
-        return replace(grid, geometry=self._geometry(grid.geometry)) if self else grid
-
-    def pheromone(self, message: PheromoneMessage) -> PheromoneMessage:
-        """Return a pheromone field as it is drawn."""
-        return replace(message, geometry=self._geometry(message.geometry)) if self else message
+        if not self:
+            return grid
+        geometry = grid.geometry
+        return replace(grid, geometry=replace(geometry, origin=self.pose(geometry.origin)))
 
     def path(self, message: PathMessage) -> PathMessage:
         """Return a path as it is drawn."""
@@ -69,16 +73,9 @@ class Anchor:
         changed = about.changed
         if not self or changed is None:
             return about
-        moved = Rectangle(
-            changed.x_min - self.x,
-            changed.y_min - self.y,
-            changed.x_max - self.x,
-            changed.y_max - self.y,
-        )
+        x0, y0, x1, y1 = astuple(changed)
+        moved = Rectangle(x0 - self.x, y0 - self.y, x1 - self.x, y1 - self.y)
         return replace_members(about, changed=moved)
-
-    def _geometry(self, geometry: GridGeometry) -> GridGeometry:
-        return replace(geometry, origin=self.pose(geometry.origin))
 
 
 # Crossing it, a pixel has become an obstacle or ceased to be one [percent].

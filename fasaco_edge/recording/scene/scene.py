@@ -123,7 +123,7 @@ class Scene:
 
     def add_pheromone(self, message: PheromoneMessage) -> None:
         """Draw the pheromone after a cohort, and plot the best walk so far."""
-        self._pheromone.add(self._anchored(message.geometry.origin).pheromone(message))
+        self._pheromone.add(self._anchored(message.geometry.origin).grid(message))
         if self._pheromone.pheromone_range != self._run.pheromone_range:
             self._run = replace(self._run, pheromone_range=self._pheromone.pheromone_range)
             self._describe()
