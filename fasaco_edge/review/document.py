@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from fasaco_edge.wire.status import Rectangle
 
 
+MILESTONES = (50, 90, 99, 100)
+"""Shares of the cells that can be covered at the end [percent]."""
+
+
 class RecordedFile(msgspec.Struct):
     """A file of a recording."""
 

@@ -18,9 +18,7 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS, CoverageLedger
 from fasaco_edge.mission.coverage.progress import Coverage
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
-
-MILESTONES = (50, 90, 99, 100)
-"""Shares of the cells that can be covered at the end [percent]."""
+from fasaco_edge.review.document import MILESTONES
 
 
 @dataclass(frozen=True, slots=True, eq=False)

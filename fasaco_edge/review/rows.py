@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from msgspec.structs import astuple
 
-from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.drive import MILESTONES
-from fasaco_edge.review.moments import Span
-from fasaco_edge.review.review import Review
-from fasaco_edge.wire.status import Rectangle
+from fasaco_edge.review.document import MILESTONES, ReviewDocument
+
+if TYPE_CHECKING:
+    from fasaco_edge.review.moments import Span
+    from fasaco_edge.review.review import Review
+    from fasaco_edge.wire.status import Rectangle
 
 NOT_KNOWN = "not known"
 NUMBERS = (

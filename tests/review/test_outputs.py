@@ -16,7 +16,7 @@ from PIL import Image
 pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
-from fasaco_edge.cli.review_report import print_review
+from fasaco_edge.cli.review import print_review
 from fasaco_edge.drawing import palette
 from fasaco_edge.review.document import document_of
 from fasaco_edge.review.export import export
