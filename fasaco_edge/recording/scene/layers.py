@@ -10,7 +10,6 @@ newest waits until the allowance has grown again, and what came in between is no
 
 from __future__ import annotations
 
-import math
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,7 +20,7 @@ from msgspec.structs import astuple
 from msgspec.structs import replace as replace_members
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D, Window
+from fasaco_edge.grid.geometry import Bounds, Pose2D
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid, marked_window
 from fasaco_edge.recording import entities
 from fasaco_edge.wire.paths import PathMessage
@@ -80,8 +79,6 @@ class Anchor:
 
 # Crossing it, a pixel has become an obstacle or ceased to be one [percent].
 OCCUPIED_FROM = 50
-# Rasters further apart than this are not compared [pixels].
-RASTER_TOLERANCE_PX = 0.01
 
 
 def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None:
@@ -90,13 +87,8 @@ def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None
     Pixels that were unknown do not count, else the whole exploration would. None where
     no pixel changed, or where the two rasters do not match.
     """
-    shift = _raster_shift(before.geometry, after.geometry)
-    if shift is None:
-        return None
-    row0, col0 = shift
-    outer = Window(0, 0, after.geometry.rows, after.geometry.cols)
-    placed = Window(row0, col0, row0 + before.geometry.rows, col0 + before.geometry.cols)
-    common = outer.intersection(placed)
+    (old_raster, placed), (raster, outer) = before.geometry.on_raster(), after.geometry.on_raster()
+    common = outer.intersection(placed) if raster == old_raster else None
     if common is None:
         return None
     old, new = before.cells[common.slices_in(placed)], after.cells[common.slices_in(outer)]
@@ -109,18 +101,8 @@ def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None
     window = marked_window(new.shape, changed)
     if window is None:
         return None
-    return after.geometry.bounds(window.moved(common.row0, common.col0))
-
-
-def _raster_shift(before: GridGeometry, after: GridGeometry) -> tuple[int, int] | None:
-    """Return (row, col) in ``after`` of pixel (0, 0) of ``before``; None off the raster."""
-    turned = not math.isclose(before.origin.yaw, after.origin.yaw, abs_tol=1e-6)
-    if turned or not math.isclose(before.resolution, after.resolution, rel_tol=1e-6):
-        return None
-    col, row = after.to_pixels(before.origin.x, before.origin.y)
-    if max(abs(col - round(col)), abs(row - round(row))) > RASTER_TOLERANCE_PX:
-        return None
-    return round(row), round(col)
+    found = window.moved(common.row0 - outer.row0, common.col0 - outer.col0)
+    return after.geometry.bounds(found)
 
 
 BURST_S = 60.0
