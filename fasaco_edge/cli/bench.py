@@ -6,19 +6,20 @@ import argparse
 import textwrap
 from collections.abc import Sequence
 from contextlib import closing
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from fasaco_edge.bench.benchmark import Benchmark, Report, Sample, machine, peak_mb
 from fasaco_edge.bench.footprint import FOOTPRINT
 from fasaco_edge.bench.jitter import JITTER
 from fasaco_edge.bench.latency import LATENCY
 from fasaco_edge.bench.speed import SPEED
+from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, add_json
 from fasaco_edge.cli.console.streams import print_json
-
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from fasaco_edge.bench.benchmark import Benchmark, Report
 
 WIDTH = 80
 BENCHMARKS: tuple[Benchmark[Any], ...] = (SPEED, FOOTPRINT, LATENCY, JITTER)
@@ -60,9 +61,6 @@ def run(args: argparse.Namespace) -> int:
     if args.benchmark is None:
         args.usage.print_help()
         return 0
-    from fasaco_edge.bench.benchmark import machine, peak_mb
-    from fasaco_edge.cli.console import terminal
-
     samples, interrupted = _measure(args.benchmark, args)
     report: Report = args.benchmark.report(args, samples)
     if args.json:
@@ -86,12 +84,10 @@ def run(args: argparse.Namespace) -> int:
     return Exit.ERROR if args.check and missed else Exit.OK
 
 
-def _measure(benchmark: Benchmark[Any], args: argparse.Namespace) -> tuple[list[Any], bool]:
+def _measure(benchmark: Benchmark[Sample], args: argparse.Namespace) -> tuple[list[Sample], bool]:
     """Return the samples, and whether somebody did not want to wait for all of them."""
-    from fasaco_edge.cli.console.terminal import progress
-
-    samples: list[Any] = []
-    with progress() as bar:
+    samples: list[Sample] = []
+    with terminal.progress() as bar:
         task = bar.add_task(benchmark.name, total=benchmark.count(args))
         try:
             with closing(
@@ -106,16 +102,13 @@ def _measure(benchmark: Benchmark[Any], args: argparse.Namespace) -> tuple[list[
 
 
 def _print(report: Report, interrupted: bool) -> None:
-    from fasaco_edge.cli.console import terminal
-
     console = terminal.out()
     for shown in report.tables:
         table = _table(shown.title)
-        for index, column in enumerate(shown.header):
-            if index:
-                table.add_column(column, justify="right", overflow="fold")
-            else:
-                table.add_column(column, style="cyan", overflow="fold")
+        first, *others = shown.header
+        table.add_column(first, style="cyan", overflow="fold")
+        for column in others:
+            table.add_column(column, justify="right", overflow="fold")
         for row in shown.rows:
             table.add_row(*row)
         console.print(table)
@@ -128,8 +121,6 @@ def _print(report: Report, interrupted: bool) -> None:
 
 
 def _goals(report: Report) -> Table:
-    from rich.text import Text
-
     verdicts: dict[bool | None, Text | str] = {
         True: Text("met", "green"),
         False: Text("missed", "red"),
@@ -149,9 +140,6 @@ def _goals(report: Report) -> Table:
 
 def _table(title: str) -> Table:
     """Return an empty table with narrow columns: ranges take room."""
-    from rich import box
-    from rich.table import Table
-
     return Table(
         title=title,
         title_justify="left",

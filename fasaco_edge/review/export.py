@@ -6,7 +6,6 @@ import csv
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from msgspec.structs import astuple
@@ -110,7 +109,7 @@ def _cell(value: object) -> object:
 
 def _write_arrays(review: Review, file: Path) -> None:
     grid, lattice, drive = review.data.grid, review.lattice, review.drive
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, NDArray[np.generic]] = {}
     if grid is not None:
         origin = grid.geometry.origin
         arrays |= {

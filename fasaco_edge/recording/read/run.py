@@ -10,7 +10,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,6 +127,7 @@ MOST_RATIO, LEAST_BYTES = 16, 16_000_000
 
 TimedText = tuple[int, str]
 """When [ns], and what."""
+Row = tuple[int, float | str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +202,7 @@ class _RunReader:
     ids: dict[str, Path] = field(default_factory=dict)
     parts: list[PartFile] = field(default_factory=list)
     span: list[int] = field(default_factory=list)
-    rows: dict[str, list[tuple[int, Any]]] = field(default_factory=lambda: defaultdict(list))
+    rows: dict[str, list[Row]] = field(default_factory=lambda: defaultdict(list))
     batches: list[Batch] = field(default_factory=list)
 
     def read(self, path: Path) -> None:
@@ -225,9 +226,10 @@ class _RunReader:
         elif entity.startswith(READ) and not chunk.is_static and batch.num_rows:
             times = _wall_ns(batch)
             self.span += [min(times), max(times)]
-            values = [value[0] if value else None for value in _values(batch)]
             self.rows[entity] += [
-                row for row in zip(times, values, strict=False) if row[1] is not None
+                (at, value[0])
+                for at, value in zip(times, _values(batch), strict=False)
+                if value and value[0] is not None
             ]
         else:
             return 0
@@ -279,10 +281,10 @@ def _wall_ns(batch: pa.RecordBatch) -> list[int]:
     return times
 
 
-def _values(batch: pa.RecordBatch) -> list[list[Any] | None]:
+def _values(batch: pa.RecordBatch) -> list[list[float | str] | None]:
     for component, kind in ((SCALAR, pa.float64()), (STATE, pa.string()), (TEXT, pa.string())):
         found = column(batch, component, pa.list_(kind))
         if found is not None:
-            values: list[list[Any] | None] = found.to_pylist()
+            values: list[list[float | str] | None] = found.to_pylist()
             return values
     return []
