@@ -8,13 +8,14 @@ import sys
 import threading
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from rich.text import Text
 
 from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
-
-if TYPE_CHECKING:
-    from fasaco_edge.doctor.finding import Finding
+from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.doctor.finding import Finding, Level
+from fasaco_edge.doctor.report import findings
 
 EPILOG = """\
 Nothing is started or changed: it joins the bus for a second, listens, and asks. Run it as the user
@@ -59,9 +60,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Look, and report."""
-    from fasaco_edge.doctor.finding import Level
-    from fasaco_edge.doctor.report import findings
-
     found = list(findings(args.config, recordings=args.recordings))
     if args.json:
         print_json(_document(found))
@@ -82,10 +80,6 @@ def _document(found: list[tuple[str, Finding]]) -> dict[str, object]:
 
 
 def _print(found: list[tuple[str, Finding]]) -> None:
-    from rich.text import Text
-
-    from fasaco_edge.cli.console.terminal import out
-
     console = out()
     wide = max(len(name) for name, _ in found)
     indent = " " * (wide + 8)

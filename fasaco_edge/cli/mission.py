@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
 
 from fasaco_edge.cli.ask import add_question, ask, show_mission
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.errors import OrderError
+from fasaco_edge.host.plain_yaml import load, read_bounded
+from fasaco_edge.mission.orders.order import order_document, read_order
 from fasaco_edge.wire.json_text import decode_json, encode_json
 
 EPILOG = """\
@@ -105,9 +109,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _order(args: argparse.Namespace) -> dict[str, object]:
     """Return the order as a document, checked: what is wrong is told without a daemon."""
-    from fasaco_edge.errors import OrderError
-    from fasaco_edge.mission.orders.order import order_document, read_order
-
     options = {
         "zones": args.zone,
         "keep_out": args.keep_out,
@@ -131,11 +132,6 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
 
 
 def _read(path: Path) -> object:
-    import json
-
-    from fasaco_edge.errors import OrderError
-    from fasaco_edge.host.plain_yaml import load, read_bounded
-
     try:
         text = read_bounded(path)
         # YAML 1.1 would take 1e3 for a text.

@@ -12,9 +12,15 @@ from fasaco_edge.cli.console.arguments import (
     DEFAULT_RADIUS_M,
     Command,
     add_robot_on_bus,
+    check_output,
     client_settings,
     pair_of_floats,
+    writing,
 )
+from fasaco_edge.cli.console.terminal import err
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.map_files import find_map, read_map
+from fasaco_edge.wire.keys import Keys
 
 if TYPE_CHECKING:
     from fasaco_edge.simulation.node import Progress
@@ -45,14 +51,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Drive until told to stop."""
-    from fasaco_edge.cli.console.arguments import check_output, writing
-    from fasaco_edge.grid.geometry import Pose2D
-    from fasaco_edge.grid.map_files import find_map, read_map
     from fasaco_edge.planners.grids import start_point
     from fasaco_edge.simulation.node import run_simulation
     from fasaco_edge.simulation.robot import SimulationConfig
     from fasaco_edge.simulation.world import World
-    from fasaco_edge.wire.keys import Keys
 
     path = find_map(args.map)
     check_output(args.trail_out)
@@ -77,8 +79,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _report(progress: Progress) -> None:
     """Overwrite one line of a terminal; say nothing into a file."""
-    from fasaco_edge.cli.console.terminal import err
-
     console = err()
     if console.is_terminal:
         pose = progress.pose

@@ -7,6 +7,8 @@ import time
 
 from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.console.terminal import err, progress
+from fasaco_edge.kernels import cache
 
 EPILOG = """\
 The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Code in it is for
@@ -36,9 +38,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compile or check, and say where."""
-    from fasaco_edge.cli.console.terminal import err
-    from fasaco_edge.kernels import cache
-
     seconds = 0.0 if args.check else compile_kernels()
     folder, passed_over = cache.usable_folder()
     missing = cache.missing_from(folder)
@@ -69,8 +68,6 @@ def run(args: argparse.Namespace) -> int:
 
 def compile_kernels() -> float:
     """Compile or load every kernel with a progress bar; return the seconds it took."""
-    from fasaco_edge.cli.console.terminal import progress
-
     started = time.monotonic()
     with progress() as bar:
         task = bar.add_task("loading numba", total=None)

@@ -5,8 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
+from rich.console import Console
+
+from fasaco_edge.cli.ask import nobody_answers
 from fasaco_edge.cli.console.arguments import (
     Command,
     Exit,
@@ -14,12 +17,15 @@ from fasaco_edge.cli.console.arguments import (
     client_settings,
     seconds,
 )
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from fasaco_edge.watch.feed import Feed
-    from fasaco_edge.watch.robot_view import RobotView
+from fasaco_edge.cli.console.logs import say_why
+from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.errors import BusUnavailable, FasacoError
+from fasaco_edge.watch import live
+from fasaco_edge.watch.feed import Feed
+from fasaco_edge.watch.page import Page
+from fasaco_edge.watch.phrases import steady_now
+from fasaco_edge.watch.robot_view import RobotView
+from fasaco_edge.wire.keys import Keys
 
 EPILOG = """\
 examples:
@@ -52,14 +58,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Watch until told to stop."""
-    from fasaco_edge.cli.console.logs import say_why
-    from fasaco_edge.cli.console.terminal import out
-    from fasaco_edge.errors import FasacoError
-    from fasaco_edge.watch import live
-    from fasaco_edge.watch.feed import Feed
-    from fasaco_edge.watch.robot_view import RobotView
-    from fasaco_edge.wire.keys import Keys
-
     keys, console, view = Keys(args.robot, args.base), out(), RobotView(args.robot)
     with Feed(client_settings(args), keys) as feed:
         try:
@@ -93,18 +91,12 @@ def _leave(code: int) -> NoReturn:
 
 
 def _once(args: argparse.Namespace, feed: Feed, view: RobotView, console: Console) -> None:
-    from fasaco_edge.cli.ask import nobody_answers
-    from fasaco_edge.errors import BusUnavailable
-    from fasaco_edge.watch.live import look_once, print_json
-    from fasaco_edge.watch.page import Page
-    from fasaco_edge.watch.phrases import steady_now
-
-    if not look_once(feed, view, args.timeout):
+    if not live.look_once(feed, view, args.timeout):
         if view.trouble:
             raise BusUnavailable(view.trouble)
         raise nobody_answers(f"{args.base}/@v1/{args.robot}", view.robots)
     if args.json:
-        print_json(view.document)
+        live.print_json(view.document)
         return
     # The prompt takes a line.
     width, height = console.width, console.height - 1

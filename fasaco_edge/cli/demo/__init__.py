@@ -11,7 +11,13 @@ from fasaco_edge.cli.console.arguments import (
     DEFAULT_RADIUS_M,
     Command,
     add_json,
+    writing,
 )
+from fasaco_edge.cli.console.terminal import err
+from fasaco_edge.cli.warmup import compile_kernels
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.grid.map_files import find_map
+from fasaco_edge.host.files import make_own_folder
 
 RUNS = Path("runs")
 
@@ -43,14 +49,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the mission; 0 if every reachable cell was covered."""
-    from fasaco_edge.cli.console.arguments import writing
-    from fasaco_edge.cli.console.terminal import err
     from fasaco_edge.cli.demo.mission import DemoMission
     from fasaco_edge.cli.demo.summary import print_summary, summarise
-    from fasaco_edge.cli.warmup import compile_kernels
-    from fasaco_edge.errors import BadConfiguration
-    from fasaco_edge.grid.map_files import find_map
-    from fasaco_edge.host.files import make_own_folder
 
     find_map(args.map)
     if not args.speed > 0:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.demo.mission import Ending
 from fasaco_edge.drawing.pictures import draw_mission
@@ -89,8 +90,6 @@ def summarise(args: argparse.Namespace, out: Path, ending: Ending) -> Summary:
 
 def print_summary(summary: Summary, *, as_json: bool) -> None:
     """Print a table, or JSON."""
-    from fasaco_edge.cli.console import terminal
-
     if as_json:
         print_json(asdict(summary))
         return
