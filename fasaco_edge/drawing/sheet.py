@@ -71,10 +71,8 @@ class Sheet:
     def around(self, plot: Image.Image) -> Image.Image:
         """Return the finished picture, RGB, with ``plot`` in its middle."""
         inner = max(plot.width, MIN_WIDTH)
-        title, caption = (
-            _wrapped([self.title], TITLE_PX, inner),
-            _wrapped(self.lines, TEXT_PX, inner),
-        )
+        title = _wrapped([self.title], TITLE_PX, inner)
+        caption = _wrapped(self.lines, TEXT_PX, inner)
         key_rows = _flowed(self.key, inner)
         head = len(title) * (LINE_PX + 10) + len(caption) * LINE_PX + 8
         foot = FOOT_PX + 8 + len(key_rows) * (LINE_PX + 4)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 
 import pytest
 
@@ -32,6 +34,17 @@ def test_help_names_every_command(capsys):
     told = capsys.readouterr().out
     for name in COMMANDS:
         assert re.search(rf"^    {name}\s+\w", told, re.MULTILINE), name
+
+
+def test_the_list_of_commands_imports_none_of_them():
+    check = (
+        "import sys; from fasaco_edge.cli import main\n"
+        "try: main(['--help'])\n"
+        "finally: assert not {'zenoh', 'numpy', 'rich', 'msgspec'} & set(sys.modules)"
+    )
+    command = [sys.executable, "-c", check]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
 
 
 def test_the_version_is_told(capsys):
