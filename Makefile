@@ -6,6 +6,8 @@ TARGET_PYTHON ?= 3.11
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# As images for containers set it, each of some hundred processes would compile all sources anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test check format bench wheelhouse clean
 
