@@ -31,15 +31,18 @@ SHARES_OF_WEIGHT = 1024 / 100
 
 
 def warm_kernels() -> None:
-    """Compile the kernels into the cache, so that no daemon has to.
+    """Compile the kernels into the cache, where they are missing, so that no daemon has to.
 
-    In a process of its own: this one stays as small as a client on the bus is.
+    In processes of their own: this one stays as small as a client on the bus is.
 
     Raises:
         ProcessEnded: that failed.
     """
+    warmup = [*PROGRAM, "warmup"]
+    if subprocess.run([*warmup, "--check"], check=False, capture_output=True).returncode == 0:
+        return
     try:
-        subprocess.run([*PROGRAM, "warmup"], check=True, capture_output=True, text=True)
+        subprocess.run(warmup, check=True, capture_output=True, text=True)
     except subprocess.CalledProcessError as error:
         raise ProcessEnded(f"warmup ended with {error.returncode}:\n{error.stderr}") from error
 
