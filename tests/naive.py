@@ -7,6 +7,7 @@ so that a twin and its kernel agree bit for bit.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections import Counter, deque
@@ -62,15 +63,21 @@ def _rotated(word: int, by: int) -> int:
 
 def neighbours(steps: NDArray[np.uint8]) -> dict[Cell, dict[Cell, Cell]]:
     """Return for each cell the legal steps: direction -> the cell it leads to."""
-    table: dict[Cell, dict[Cell, Cell]] = {}
-    for row in range(steps.shape[0]):
-        for col in range(steps.shape[1]):
-            table[row, col] = {
-                (up, right): (row + up, col + right)
-                for bit, (up, right) in enumerate(DIRECTIONS)
-                if int(steps[row, col]) & 2**bit
-            }
-    return table
+    return _neighbours(tuple(map(tuple, steps.tolist())))
+
+
+# Asked for with each move of a search, on the same ground.
+@functools.lru_cache(maxsize=8)
+def _neighbours(steps: tuple[tuple[int, ...], ...]) -> dict[Cell, dict[Cell, Cell]]:
+    return {
+        (row, col): {
+            (up, right): (row + up, col + right)
+            for bit, (up, right) in enumerate(DIRECTIONS)
+            if mask & 2**bit
+        }
+        for row, masks in enumerate(steps)
+        for col, mask in enumerate(masks)
+    }
 
 
 def distances(steps: NDArray[np.uint8], start: Cell) -> dict[Cell, int]:
@@ -334,12 +341,13 @@ class _Ground:
         reach = [range(-1, size + 1) for size in (geometry.rows, geometry.cols)]
         turned = complex(math.cos(geometry.origin.yaw), math.sin(geometry.origin.yaw))
         corner = complex(geometry.origin.x, geometry.origin.y)
-        self.pixels = [
+        squares = [
             (row, col, [corner + turned * self.edge * complex(x, y) for x, y in square])
             for row in reach[0]
             for col in reach[1]
             for square in [[(col, row), (col + 1, row), (col + 1, row + 1), (col, row + 1)]]
         ]
+        self.pixels = [(row, col, square, sum(square) / 4) for row, col, square in squares]
 
     def centre(self, row: int, col: int) -> complex:
         """Return the centre of a lattice cell as x + yi."""
@@ -350,8 +358,8 @@ class _Ground:
         middle = (start + end) / 2
         reach = abs(end - start) / 2 + self.radius + self.edge
         certain, touched = True, set()
-        for row, col, square in self.pixels:
-            if abs(sum(square) / 4 - middle) > reach:
+        for row, col, square, centre in self.pixels:
+            if abs(centre - middle) > reach:
                 continue
             distance = segment_to_square(start, end, square)
             certain = certain and abs(distance - self.radius) > 1e-9

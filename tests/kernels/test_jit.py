@@ -158,7 +158,9 @@ def test_twins_agree_without_the_compiler():
     """What is fine as machine code may overflow or fail in plain Python, and the reverse."""
     if os.environ.get("NUMBA_DISABLE_JIT") == "1":
         pytest.skip("this is the run without the compiler")
-    program = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "tests/kernels"]
+    # To rewrite assertions would take as long as some of these; what fails is shown all the same.
+    plain = ["-p", "no:cacheprovider", "--assert=plain"]
+    program = [sys.executable, "-m", "pytest", *plain, "tests/kernels"]
     done = subprocess.run(
         [*program, "tests/planners", "-k", "twin or equation"],
         cwd=ROOT,
