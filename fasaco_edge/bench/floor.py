@@ -1,0 +1,299 @@
+"""A judge of swept floor: how much of it a driven line has swept, and what that took.
+
+It knows a map and a line of points, and nothing of cells, walks and planners.
+
+Reachable floor
+    All that the tool's disc touches at the places that the robot's disc can come to from the
+    beginning of the line. The robot fits where all that its disc touches is known free.
+Swept floor
+    What of it the tool's disc passed over along the line.
+Illegal share
+    The part of the line on which the robot's disc would touch what is not known free.
+Patch
+    Pixels of reachable floor that were not swept, and hang together by their edges.
+
+A map is judged on its own pixels, divided until they are ``FINE_M`` or finer; so a wall lies where
+its pixels do, and a robot fits a corridor that is a finer pixel or two wider than itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bench.pixels import Mask, Patches, within
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.occupancy import FREE, OccupancyGrid, marked_window
+
+# Pixels are at most so large [m], if that makes no more than so many of them.
+FINE_M = 0.025
+MOST_PIXELS = 24_000_000
+# Distances of whole pixels are reached; rounding must not decide otherwise [pixels].
+TOUCH_TOLERANCE_PX = 1e-3
+# A patch larger than this counts [m2]: 4 dm2.
+PATCH_M2 = 0.04
+# Pixels of the robot's disc that a line may lose to the raster before it counts as touching.
+TOUCH_SLACK_PX = 1.5
+# Pieces of a line in which it is looked for walls [pixels], and how many together.
+STEP_PX = 0.7
+PIECES = 4096
+# So many pixels around pieces of it are looked at together while it sweeps.
+SWEPT_PIXELS = 500_000
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class SweepingRobot:
+    """What drives along a line.
+
+    Attributes:
+        tool_m: width of its tool, a disc [m].
+        radius_m: radius of its own disc [m].
+        speed_m_s: how fast it drives [m/s].
+        turn_s: what a quarter-turn takes [s].
+        free_at_most: occupancy values up to this are known free [percent].
+    """
+
+    tool_m: float
+    radius_m: float
+    speed_m_s: float = 0.25
+    turn_s: float = 1.5
+    free_at_most: int = 25
+
+
+@dataclass(frozen=True, slots=True)
+class FloorFigures:
+    """How well a line sweeps a floor.
+
+    Attributes:
+        reachable_m2: reachable floor [m2].
+        swept_m2: what of it was swept [m2].
+        swept_share: that as a share; None where no floor is reachable.
+        illegal_share: part of the line on which the robot touches what is not known free.
+        length_m: length of the line [m].
+        quarter_turns: angle turned on the line, in quarter-turns.
+        seconds: driving and turning [s].
+        seconds_per_m2: that for each square metre swept [s/m2]; None where nothing was.
+        patches_over_4_dm2: patches left that are larger than ``PATCH_M2``.
+        largest_patch_m2: the largest patch left [m2].
+        pixel_m: edge of the pixels it was judged on [m].
+    """
+
+    reachable_m2: float
+    swept_m2: float
+    swept_share: float | None
+    illegal_share: float
+    length_m: float
+    quarter_turns: float
+    seconds: float
+    seconds_per_m2: float | None
+    patches_over_4_dm2: int
+    largest_patch_m2: float
+    pixel_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedFloor:
+    """A floor and what a line did to it.
+
+    Attributes:
+        figures: how well it did.
+        geometry: the raster it was judged on.
+        reachable, swept: bool (rows, cols) on it; swept floor is reachable.
+    """
+
+    figures: FloorFigures
+    geometry: GridGeometry
+    reachable: Mask
+    swept: Mask
+
+
+def judge_floor(
+    grid: OccupancyGrid, line_xy: Points, robot: SweepingRobot, jump_m: float = math.inf
+) -> JudgedFloor:
+    """Judge a line driven on a map.
+
+    Args:
+        grid: the map, also one that lies askew in its frame.
+        line_xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, driven straight from
+            one to the next.
+        robot: what drives.
+        jump_m: two points further apart than this [m] are no drive: nothing is swept in between.
+
+    Raises:
+        ValueError: the line has no point, or one that is not finite.
+    """
+    if line_xy.ndim != 2 or line_xy.shape[1] != 2 or not len(line_xy):
+        raise ValueError(f"a line must be points (n, 2), n >= 1, got {line_xy.shape}")
+    if not np.isfinite(line_xy).all():
+        raise ValueError("a line must be of finite points")
+    floor = _Floor.of(grid, robot)
+    line = _Line.of(line_xy, floor.geometry, jump_m)
+    reachable = floor.reachable_from(line.places[0])
+    swept = line.swept(robot.tool_m / floor.geometry.resolution / 2, reachable.shape)
+    swept &= reachable
+    return JudgedFloor(_figures(floor, line, reachable, swept), floor.geometry, reachable, swept)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Floor:
+    """What is known free of a map, on fine pixels, with a margin that is not around it."""
+
+    geometry: GridGeometry
+    free: Mask
+    robot: SweepingRobot
+
+    @classmethod
+    def of(cls, grid: OccupancyGrid, robot: SweepingRobot) -> _Floor:
+        def is_free(rows: slice) -> Mask:
+            cells = grid.cells[rows]
+            free: Mask = (cells >= FREE) & (cells <= robot.free_at_most)
+            return free
+
+        coarse, cells = grid.geometry, grid.cells
+        window = marked_window(cells.shape, is_free) or Window(0, 0, 1, 1)
+        parts = max(math.ceil(coarse.resolution / FINE_M - TOUCH_TOLERANCE_PX), 1)
+        most = math.isqrt(MOST_PIXELS // (window.rows * window.cols))
+        parts = max(min(parts, most), 1)
+        pixel_m = coarse.resolution / parts
+        margin = math.ceil(max(robot.radius_m, robot.tool_m / 2) / pixel_m) + 2
+        known = is_free(slice(window.row0, window.row1))[:, window.col0 : window.col1]
+        free = np.pad(known.repeat(parts, axis=0).repeat(parts, axis=1), margin)
+        x, y = coarse.to_map(window.col0 - margin / parts, window.row0 - margin / parts)
+        origin = Pose2D(x, y, coarse.origin.yaw)
+        rows, cols = free.shape
+        return cls(GridGeometry(rows, cols, pixel_m, origin), free, robot)
+
+    @property
+    def radius_px(self) -> float:
+        return self.robot.radius_m / self.geometry.resolution
+
+    def reachable_from(self, place: Points) -> Mask:
+        """Return what the tool touches where the robot can come to from a place [pixels]."""
+        # Half a pixel beyond the centre of a blocked one lies its edge.
+        fits = ~within(~self.free, self.radius_px + 0.5 - TOUCH_TOLERANCE_PX)
+        stands = Patches.of(fits).nearest_to(*place.tolist())
+        tool_px = self.robot.tool_m / self.geometry.resolution
+        return within(stands, tool_px / 2 + TOUCH_TOLERANCE_PX)
+
+    def illegal_share(self, line: _Line) -> float:
+        touched = within(~self.free, self.radius_px - TOUCH_SLACK_PX - TOUCH_TOLERANCE_PX)
+        # A robot smaller than that may still not stand outside what is free.
+        touched |= ~self.free
+        rows, cols = self.free.shape
+        illegal = length = 0.0
+        for start, end in line.pieces(STEP_PX, PIECES):
+            col, row = np.floor((start + end) / 2).T
+            inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
+            touches = np.ones(len(row), np.bool_)
+            touches[inside] = touched[row[inside].astype(int), col[inside].astype(int)]
+            # A line of one point is judged by it.
+            weight = np.hypot(*(end - start).T) if line.length_px else np.ones(len(row))
+            illegal += float(weight[touches].sum())
+            length += float(weight.sum())
+        return illegal / length
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Line:
+    """A line on the raster of a floor: places (column, row), float64 (n, 2) [pixels].
+
+    Attributes:
+        places: its points.
+        starts, ends: of what was driven, (m, 2), m >= 1.
+    """
+
+    places: Points
+    starts: Points
+    ends: Points
+
+    @classmethod
+    def of(cls, line_xy: Points, geometry: GridGeometry, jump_m: float) -> _Line:
+        origin, yaw = geometry.origin, geometry.origin.yaw
+        turned = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+        places = (line_xy - np.array([origin.x, origin.y])) @ turned / geometry.resolution
+        driven = np.hypot(*np.diff(line_xy, axis=0).T) <= jump_m
+        starts, ends = places[:-1][driven], places[1:][driven]
+        if not len(starts):
+            starts = ends = places[:1]
+        return cls(places, starts, ends)
+
+    @property
+    def length_px(self) -> float:
+        return float(np.hypot(*(self.ends - self.starts).T).sum())
+
+    @property
+    def quarter_turns(self) -> float:
+        way = self.ends - self.starts
+        way = way[np.hypot(*way.T) > 0]
+        turned = np.diff(np.arctan2(way[:, 1], way[:, 0]))
+        return float(np.abs((turned + np.pi) % (2 * np.pi) - np.pi).sum() / (np.pi / 2))
+
+    def pieces(self, most_px: float, together: int) -> Iterator[tuple[Points, Points]]:
+        """Yield start and end, (k, 2), of pieces of at most ``most_px``, some at a time."""
+        way = self.ends - self.starts
+        counts = np.maximum(np.ceil(np.hypot(*way.T) / most_px), 1).astype(np.int64)
+        stops = np.cumsum(counts)
+        for first in range(0, int(stops[-1]), together):
+            number = np.arange(first, min(first + together, int(stops[-1])))
+            segment = np.searchsorted(stops, number, side="right")
+            part = number - (stops - counts)[segment]
+            start, along = self.starts[segment], way[segment]
+            share = (np.stack([part, part + 1]) / counts[segment])[..., None]
+            yield start + share[0] * along, start + share[1] * along
+
+    def swept(self, half_px: float, shape: tuple[int, ...]) -> Mask:
+        """Return the pixels whose centre lies within ``half_px`` of the line."""
+        swept, (rows, cols) = np.zeros(shape, np.bool_), shape
+        reach = half_px + TOUCH_TOLERANCE_PX
+        longest = max(half_px, 1.0)
+        together = max(SWEPT_PIXELS // math.ceil(2 * reach + longest + 2) ** 2, 1)
+        for starts, ends in self.pieces(longest, together):
+            low, high = np.minimum(starts, ends) - reach, np.maximum(starts, ends) + reach
+            near = ((high > 0) & (low < (cols, rows))).all(axis=1)
+            if not near.any():
+                continue
+            start, way, low = starts[near], (ends - starts)[near], np.floor(low[near])
+            wide, tall = np.ceil((high[near] - low).max(axis=0)).astype(int).tolist()
+            x = low[:, :1] + np.arange(wide) + 0.5 - start[:, :1]
+            y = low[:, 1:] + np.arange(tall) + 0.5 - start[:, 1:]
+            dx, dy = way[:, 0, None], way[:, 1, None]
+            square = np.maximum(dx * dx + dy * dy, 1e-12)
+            # How far along the piece the nearest point of it lies, 0 to 1.
+            along = (x * (dx / square))[:, None, :] + (y * (dy / square))[:, :, None]
+            np.clip(along, 0.0, 1.0, out=along)
+            distance = (x[:, None, :] - along * dx[:, :, None]) ** 2
+            distance += (y[:, :, None] - along * dy[:, :, None]) ** 2
+            piece, row, col = np.nonzero(distance <= reach * reach)
+            row, col = row + low[piece, 1].astype(int), col + low[piece, 0].astype(int)
+            inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
+            swept[row[inside], col[inside]] = True
+        return swept
+
+
+def _figures(floor: _Floor, line: _Line, reachable: Mask, swept: Mask) -> FloorFigures:
+    pixel_m, robot = floor.geometry.resolution, floor.robot
+    reachable_m2, swept_m2 = (
+        int(np.count_nonzero(mask)) * pixel_m * pixel_m for mask in (reachable, swept)
+    )
+    left_m2 = Patches.of(reachable & ~swept).pixels * pixel_m * pixel_m
+    length_m, quarters = line.length_px * pixel_m, line.quarter_turns
+    seconds = length_m / robot.speed_m_s + quarters * robot.turn_s
+    return FloorFigures(
+        reachable_m2=reachable_m2,
+        swept_m2=swept_m2,
+        swept_share=swept_m2 / reachable_m2 if reachable_m2 else None,
+        illegal_share=floor.illegal_share(line),
+        length_m=length_m,
+        quarter_turns=quarters,
+        seconds=seconds,
+        seconds_per_m2=seconds / swept_m2 if swept_m2 else None,
+        patches_over_4_dm2=int(np.count_nonzero(left_m2 > PATCH_M2)),
+        largest_patch_m2=float(left_m2.max(initial=0.0)),
+        pixel_m=pixel_m,
+    )

@@ -1,0 +1,134 @@
+"""Masks of pixels: what lies within a distance of a mask, and what of a mask hangs together.
+
+Exact, and of numpy alone; distances are between the centres of pixels.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Mask = NDArray[np.bool_]
+
+# So many pixels are looked at together: distances along rows take eight bytes for each.
+BLOCK_PIXELS = 1_000_000
+FAR = 2**30
+
+
+def within(mask: Mask, distance: float) -> Mask:
+    """Return which pixels lie at most ``distance`` [pixels] from a marked one.
+
+    A disc is a stack of rows: a pixel is near a marked one ``d`` rows away if that one is, along
+    its own row, within half of the disc's width there.
+
+    Args:
+        mask: bool (rows, cols).
+        distance: from centre to centre; below 0 none is near.
+    """
+    near = np.zeros_like(mask)
+    if distance < 0 or not mask.any():
+        return near
+    (rows, cols), reach = mask.shape, int(distance)
+    some = max(BLOCK_PIXELS // cols, 2 * reach, 1)
+    for start in range(0, rows, some):
+        first, stop = max(start - reach, 0), min(start + some + reach, rows)
+        along = _along_rows(mask[first:stop])
+        for step in range(-reach, reach + 1):
+            here, end = max(start, first - step), min(start + some, rows, stop - step)
+            if here >= end:
+                continue
+            half = int(math.sqrt(distance * distance - step * step))
+            near[here:end] |= along[here + step - first : end + step - first] <= half
+    return near
+
+
+def _along_rows(mask: Mask) -> NDArray[np.int32]:
+    """Return how far the next marked pixel of the same row is; ``FAR`` or more without any."""
+    index = np.arange(mask.shape[1], dtype=np.int32)
+    left = np.maximum.accumulate(np.where(mask, index, np.int32(-FAR)), axis=1)
+    right = np.minimum.accumulate(np.where(mask, index, np.int32(FAR))[:, ::-1], axis=1)[:, ::-1]
+    nearest: NDArray[np.int32] = np.minimum(index - left, right - index)
+    return nearest
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patches:
+    """The patches of a mask: pixels that hang together by their edges.
+
+    Attributes:
+        shape: of the mask.
+        starts, ends: int64 (n,): where each run of marked pixels in a row begins and ends
+            (exclusive), counted along the rows, each one pixel longer than the mask's.
+        of_run: int64 (n,): which patch each run belongs to, 0 .. count - 1.
+        count: number of patches.
+    """
+
+    shape: tuple[int, int]
+    starts: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    of_run: NDArray[np.int64]
+    count: int
+
+    @classmethod
+    def of(cls, mask: Mask) -> Patches:
+        """Return the patches of ``mask``, bool (rows, cols)."""
+        rows, cols = mask.shape
+        # A pixel more, never marked: no run goes on in the next row.
+        flat = np.zeros(rows * (cols + 1) + 1, np.int8)
+        flat[1:].reshape(rows, cols + 1)[:, :cols] = mask
+        change = np.diff(flat)
+        starts, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
+        one, other = _touching(starts, ends, cols + 1)
+        roots, of_run = np.unique(_joined(len(starts), one, other), return_inverse=True)
+        return cls((rows, cols), starts, ends, of_run, len(roots))
+
+    @property
+    def pixels(self) -> NDArray[np.int64]:
+        """How many pixels each patch has, int64 (count,)."""
+        counts: NDArray[np.int64] = np.zeros(self.count, np.int64)
+        np.add.at(counts, self.of_run, self.ends - self.starts)
+        return counts
+
+    def nearest_to(self, col: float, row: float) -> Mask:
+        """Return the patch nearest to a place [pixels], bool (rows, cols); empty without any."""
+        rows, cols = self.shape
+        change = np.zeros(rows * (cols + 1), np.int8)
+        if self.count:
+            of_row, first = np.divmod(self.starts, cols + 1)
+            last = first + (self.ends - self.starts) - 1
+            across = np.clip(col - 0.5, first, last) - (col - 0.5)
+            run = int(np.argmin(across**2 + (of_row + 0.5 - row) ** 2))
+            chosen = self.of_run == self.of_run[run]
+            change[self.starts[chosen]] = 1
+            change[self.ends[chosen]] = -1
+        inside = np.cumsum(change, dtype=np.int8, out=change).view(np.bool_)
+        return inside.reshape(rows, cols + 1)[:, :cols]
+
+
+def _touching(
+    starts: NDArray[np.int64], ends: NDArray[np.int64], row: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return pairs of runs that touch: of a row of ``row`` pixels, and of the next one."""
+    first = np.searchsorted(ends, starts + row, side="right")
+    stop = np.searchsorted(starts, ends + row, side="left")
+    counts = np.maximum(stop - first, 0)
+    one = np.repeat(np.arange(len(starts)), counts)
+    begin = np.repeat(np.cumsum(counts) - counts, counts)
+    other = np.repeat(first, counts) + np.arange(len(one)) - begin
+    return one, other
+
+
+def _joined(count: int, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return for each of ``count`` nodes the smallest one that pairs of them lead to."""
+    root = np.arange(count)
+    while True:
+        a, b = root[one], root[other]
+        apart = a != b
+        if not apart.any():
+            return root
+        np.minimum.at(root, np.maximum(a[apart], b[apart]), np.minimum(a[apart], b[apart]))
+        while (root[root] != root).any():
+            root = root[root]

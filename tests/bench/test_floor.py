@@ -1,0 +1,224 @@
+"""The judge of swept floor, against cases computed by hand and a slow, obvious twin."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fasaco_edge.bench import floor
+from fasaco_edge.bench.floor import JudgedFloor, SweepingRobot, judge_floor
+from fasaco_edge.bench.pixels import Patches, within
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+
+PIXEL_M = 0.05
+ROBOT = SweepingRobot(tool_m=0.4, radius_m=0.2, speed_m_s=0.5, turn_s=2.0)
+# What the corners of a room keep from a disc of 0.2 m [m2].
+CORNERS_M2 = (4 - math.pi) * 0.2**2
+
+
+def room(width_m: float, depth_m: float, origin: Pose2D | None = None) -> OccupancyGrid:
+    """Return an empty room within walls of one pixel; the walls' outer corner is at ``origin``."""
+    rows, cols = round(depth_m / PIXEL_M) + 2, round(width_m / PIXEL_M) + 2
+    cells = np.full((rows, cols), FREE, np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = OCCUPIED
+    geometry = GridGeometry(rows, cols, PIXEL_M, origin or Pose2D(-PIXEL_M, -PIXEL_M))
+    return OccupancyGrid(geometry, cells)
+
+
+def with_rectangle(
+    grid: OccupancyGrid, x0: float, y0: float, x1: float, y1: float, value: int = OCCUPIED
+) -> OccupancyGrid:
+    """Return ``room`` with a rectangle [m] of another value."""
+    cells = grid.cells.copy()
+    col0, row0, col1, row1 = (round(at / PIXEL_M) + 1 for at in (x0, y0, x1, y1))
+    cells[row0:row1, col0:col1] = value
+    return OccupancyGrid(grid.geometry, cells)
+
+
+def judged(grid: OccupancyGrid, *points: tuple[float, float], **options: float) -> JudgedFloor:
+    return judge_floor(grid, np.array(points, np.float64), ROBOT, **options)
+
+
+def test_empty_room_is_reachable_but_for_its_corners() -> None:
+    figures = judged(room(4.0, 3.0), (2.0, 1.5)).figures
+    # The raster keeps the robot's disc a finer pixel from the walls.
+    assert figures.reachable_m2 == pytest.approx(4.0 * 3.0 - CORNERS_M2, rel=0.02)
+    assert figures.pixel_m == 0.025
+    # A tool that stood still swept its own disc.
+    assert figures.swept_m2 == pytest.approx(math.pi * 0.2**2, rel=0.05)
+    assert [figures.length_m, figures.quarter_turns, figures.seconds] == [0.0, 0.0, 0.0]
+    assert figures.illegal_share == 0.0
+
+
+def test_one_lane_sweeps_its_length_and_a_disc() -> None:
+    figures = judged(room(4.0, 3.0), (1.0, 1.5), (2.0, 1.5), (3.0, 1.5)).figures
+    swept_m2 = 2.0 * 0.4 + math.pi * 0.2**2
+    assert figures.swept_m2 == pytest.approx(swept_m2, rel=0.01)
+    assert figures.swept_share == pytest.approx(swept_m2 / (12.0 - CORNERS_M2), rel=0.02)
+    assert [figures.length_m, figures.seconds] == pytest.approx([2.0, 4.0])
+    assert figures.seconds_per_m2 == pytest.approx(4.0 / swept_m2, rel=0.01)
+    # All that is left hangs together around the lane.
+    assert figures.patches_over_4_dm2 == 1
+    assert figures.largest_patch_m2 == pytest.approx(figures.reachable_m2 - figures.swept_m2)
+
+
+def test_turns_count_by_their_angle() -> None:
+    points = [(1.0, 1.0), (2.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 1.0)]
+    figures = judged(room(4.0, 3.0), *points).figures
+    # A quarter to the left, then three eighths of a full turn; standing still is none.
+    assert figures.quarter_turns == pytest.approx(1.0 + 1.5)
+    assert figures.seconds == pytest.approx((2.0 + math.sqrt(2.0)) / 0.5 + 2.5 * 2.0)
+
+
+def test_a_lane_from_wall_to_wall_leaves_two_patches() -> None:
+    # Along both walls a little, or the lane's round ends leave ways from side to side.
+    line = (0.2, 1.4), (0.2, 1.5), (3.8, 1.5), (3.8, 1.6)
+    figures = judged(room(4.0, 3.0), *line).figures
+    assert figures.patches_over_4_dm2 == 2
+    assert figures.largest_patch_m2 == pytest.approx(1.3 * 4.0, rel=0.02)
+
+
+@pytest.mark.parametrize("value", [OCCUPIED, UNKNOWN, 26])
+def test_a_pillar_is_no_floor(value: int) -> None:
+    empty = judged(room(4.0, 3.0), (0.5, 0.5)).figures
+    grid = with_rectangle(room(4.0, 3.0), 2.0, 1.0, 2.5, 2.0, value)
+    figures = judged(grid, (0.5, 0.5)).figures
+    # A finer pixel around it is not reached either.
+    assert empty.reachable_m2 - figures.reachable_m2 == pytest.approx(0.5, abs=0.1)
+    through = judged(grid, (1.0, 1.5), (3.0, 1.5)).figures
+    # The robot touches it from its radius before to its radius behind.
+    assert through.illegal_share == pytest.approx((0.5 + 2 * 0.2) / 2.0, abs=0.05)
+
+
+def test_floor_up_to_the_threshold_is_known_free() -> None:
+    grid = with_rectangle(room(4.0, 3.0), 2.0, 1.0, 2.5, 2.0, 25)
+    assert judged(grid, (1.0, 1.5), (3.0, 1.5)).figures.illegal_share == 0.0
+
+
+def test_a_line_through_a_wall_sweeps_nothing_behind_it() -> None:
+    grid = with_rectangle(room(4.0, 3.0), 1.9, 0.0, 2.1, 3.0)
+    figures = judged(grid, (1.0, 1.5), (3.0, 1.5)).figures
+    assert figures.illegal_share == pytest.approx((0.2 + 2 * 0.2) / 2.0, abs=0.05)
+    assert figures.reachable_m2 == pytest.approx(1.9 * 3.0 - CORNERS_M2, rel=0.03)
+    lane_m2 = 0.7 * 0.4 + math.pi * 0.2**2
+    assert figures.swept_m2 == pytest.approx(lane_m2, rel=0.06)
+
+
+@pytest.mark.parametrize(("door_m", "rooms"), [(0.3, 1), (0.4, 1), (0.45, 2), (0.6, 2)])
+def test_a_door_must_be_wider_than_the_robot(door_m: float, rooms: int) -> None:
+    grid = with_rectangle(room(4.1, 3.0), 2.0, 0.0, 2.1, 3.0)
+    grid = with_rectangle(grid, 2.0, 1.0, 2.1, 1.0 + door_m, FREE)
+    figures = judged(grid, (1.0, 1.5)).figures
+    assert figures.reachable_m2 == pytest.approx(rooms * 2.0 * 3.0, rel=0.04)
+
+
+def test_a_map_that_lies_askew_is_judged_the_same() -> None:
+    straight = with_rectangle(room(4.0, 3.0, Pose2D(0.0, 0.0)), 2.0, 1.0, 2.5, 2.0)
+    rows, cols = straight.cells.shape
+    askew = GridGeometry(rows, cols, PIXEL_M, Pose2D(7e4, -3e4, 0.7))
+    turned = OccupancyGrid(askew, straight.cells)
+    # Beside the pixels' centres and edges: rounding decides nothing here.
+    points = np.array([(0.51, 0.52), (3.51, 0.73), (3.33, 2.57), (0.72, 2.41)])
+    moved = np.array([turned.geometry.to_map(*point) for point in points / PIXEL_M])
+    one = judge_floor(straight, points, ROBOT)
+    other = judge_floor(turned, moved, ROBOT)
+    assert np.array_equal(one.swept, other.swept)
+    assert np.array_equal(one.reachable, other.reachable)
+    assert asdict(other.figures) == pytest.approx(asdict(one.figures), rel=1e-6)
+    swept = np.argwhere(other.swept)[0]
+    x, y = other.geometry.to_map(swept[1] + 0.5, swept[0] + 0.5)
+    assert np.hypot(*(moved - (x, y)).T).min() < 3.5
+
+
+def test_a_jump_sweeps_nothing_in_between() -> None:
+    points = (1.0, 0.5), (2.0, 0.5), (2.0, 2.5), (1.0, 2.5)
+    figures = judged(room(4.0, 3.0), *points, jump_m=1.5).figures
+    assert figures.length_m == pytest.approx(2.0)
+    assert figures.swept_m2 == pytest.approx(2 * (1.0 * 0.4 + math.pi * 0.2**2), rel=0.01)
+    assert judged(room(4.0, 3.0), *points, jump_m=0.5).figures.length_m == 0.0
+
+
+def test_nothing_reachable_is_no_share() -> None:
+    nowhere = OccupancyGrid(
+        GridGeometry(4, 4, PIXEL_M, Pose2D(0.0, 0.0)), np.full((4, 4), UNKNOWN, np.int8)
+    )
+    for grid in (nowhere, room(0.3, 3.0)):
+        figures = judged(grid, (0.1, 0.1), (0.2, 0.1)).figures
+        assert (figures.reachable_m2, figures.swept_share) == (0.0, None)
+        assert (figures.seconds_per_m2, figures.largest_patch_m2) == (None, 0.0)
+        assert figures.illegal_share == 1.0
+
+
+def test_a_line_that_leaves_the_map_touches_what_is_not_known() -> None:
+    figures = judged(room(4.0, 3.0), (2.0, 1.5), (2.0, 1.5 + 30.0)).figures
+    assert figures.illegal_share == pytest.approx((30.0 - 1.3) / 30.0, abs=0.01)
+
+
+def test_pixels_are_no_finer_than_affordable(monkeypatch: pytest.MonkeyPatch) -> None:
+    fine = judged(room(4.0, 3.0), (1.0, 1.5), (3.0, 1.5)).figures
+    monkeypatch.setattr(floor, "MOST_PIXELS", 80 * 60)
+    coarse = judged(room(4.0, 3.0), (1.0, 1.5), (3.0, 1.5)).figures
+    assert (fine.pixel_m, coarse.pixel_m) == (0.025, 0.05)
+    assert coarse.swept_m2 == pytest.approx(fine.swept_m2, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "line", [np.zeros((0, 2)), np.zeros((2, 3)), np.array([[0.0, math.nan]]), np.zeros(2)]
+)
+def test_refuses_what_is_no_line(line: NDArray[np.float64]) -> None:
+    with pytest.raises(ValueError, match="a line must be"):
+        judge_floor(room(1.0, 1.0), line, ROBOT)
+
+
+SHAPES = [(1, 1), (1, 9), (9, 1), (13, 17), (30, 20)]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("distance", [-0.5, 0.0, 1.0, 1.5, math.sqrt(5), 4.0, 40.0])
+def test_within_a_distance_as_compared_pixel_by_pixel(
+    shape: tuple[int, int], distance: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fasaco_edge.bench.pixels.BLOCK_PIXELS", 64)
+    rng = np.random.default_rng(5)
+    for share in (0.0, 0.03, 0.5, 1.0):
+        mask = rng.random(shape) < share
+        near = np.zeros(shape, np.bool_)
+        marked = np.argwhere(mask)
+        for row, col in np.ndindex(shape):
+            squares = ((marked - (row, col)) ** 2).sum(axis=1)
+            near[row, col] = distance >= 0 and bool((squares <= distance**2 + 1e-12).any())
+        assert np.array_equal(within(mask, distance + 1e-9 if distance > 0 else distance), near)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_patches_as_found_by_spreading(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(6)
+    for share in (0.0, 0.3, 0.55, 0.7, 1.0):
+        mask = rng.random(shape) < share
+        patches, left, sizes = Patches.of(mask), {tuple(at) for at in np.argwhere(mask)}, []
+        while left:
+            seed = min(left)
+            patch, edge = set(), [seed]
+            while edge:
+                row, col = at = edge.pop()
+                if at in left:
+                    left.discard(at)
+                    patch.add(at)
+                    edge += [(row + 1, col), (row - 1, col), (row, col + 1), (row, col - 1)]
+            sizes.append(len(patch))
+            found = patches.nearest_to(seed[1] + 0.5, seed[0] + 0.5)
+            assert {tuple(at) for at in np.argwhere(found)} == patch
+        assert sorted(patches.pixels.tolist()) == sorted(sizes)
+    assert not Patches.of(np.zeros(shape, np.bool_)).nearest_to(0.0, 0.0).any()
+
+
+def test_the_nearest_patch_is_found_from_outside() -> None:
+    mask = np.zeros((8, 9), np.bool_)
+    mask[2, 1:4] = mask[6:8, 6:] = True
+    assert np.argwhere(Patches.of(mask).nearest_to(-50.0, 2.5)).tolist() == [[2, 1], [2, 2], [2, 3]]
+    assert Patches.of(mask).nearest_to(5.1, 5.9).sum() == 6
