@@ -15,8 +15,10 @@ import numpy as np
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, check_output, writing
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.plan_line import line_through, write_line
 from fasaco_edge.cli.plan_options import ANYWHERE, EPILOG, HOME, add_options, check, settle
 from fasaco_edge.cli.warmup import compile_kernels
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
 from fasaco_edge.host.processes import ctrl_c_asks
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
@@ -50,19 +52,28 @@ def run(args: argparse.Namespace) -> int:
         visibility=args.visibility,
         beta=args.beta,
     )
-    find_map(args.map)
-    check_output(args.path_out)
-    check_output(args.png)
+    file = find_map(args.map)
+    if args.xy_out is not None and file.suffix == ".npy":
+        raise BadConfiguration(
+            f"--xy-out: {file} is a coverage grid (.npy), which lies in no map frame",
+            hint="plan on a map_server YAML file, or ask for --path-out",
+        )
+    for output in (args.path_out, args.xy_out, args.png):
+        check_output(output)
     compile_kernels()
-    lattice, grid, file = _read(args)
+    lattice, grid = _read(args, file)
     problem = _pose(args, lattice, file)
     asked = Interrupt()
     with ctrl_c_asks(asked.asked.set):
         path, search = _plan(args, colony, problem, asked)
+    line_xy = line_through(lattice, path.cells)
     figures = figures_of(args, problem, path, search)
     if args.path_out is not None:
         with writing(args.path_out):
             np.savetxt(args.path_out, path.cells, "%d", ",", header="row,col", comments="")
+    if args.xy_out is not None:
+        with writing(args.xy_out):
+            write_line(args.xy_out, line_xy)
     if args.png is not None:
         with writing(args.png):
             draw(args, args.png, lattice, grid, path, figures)
@@ -70,14 +81,13 @@ def run(args: argparse.Namespace) -> int:
     return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
 
 
-def _read(args: argparse.Namespace) -> tuple[CoverageLattice, OccupancyGrid | None, Path]:
+def _read(args: argparse.Namespace, file: Path) -> tuple[CoverageLattice, OccupancyGrid | None]:
     from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 
-    file = find_map(args.map)
     if file.suffix == ".npy":
-        return CoverageLattice.from_free(read_coverage_grid(file), args.cell), None, file
+        return CoverageLattice.from_free(read_coverage_grid(file), args.cell), None
     grid = read_map(file)
-    return CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius)), grid, file
+    return CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius)), grid
 
 
 def _pose(args: argparse.Namespace, lattice: CoverageLattice, file: Path) -> CoverageProblem:
@@ -220,7 +230,7 @@ def print_figures(args: argparse.Namespace, figures: dict[str, object]) -> None:
         return
     rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
     terminal.out().print(terminal.figures(rows))
-    for file in (args.path_out, args.png):
+    for file in (args.path_out, args.xy_out, args.png):
         if file is not None:
             terminal.out().print(f"wrote {file}")
 

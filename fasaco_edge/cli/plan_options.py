@@ -24,6 +24,7 @@ EPILOG = """\
 examples:
   fasaco-edge plan basement --png basement.png
   fasaco-edge plan site.yaml --cell 0.35 --robot-radius 0.2 --start-xy 1.5,-2 --json
+  fasaco-edge plan site.yaml --xy-out line.csv --turn-s 1.5
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
   fasaco-edge plan basement --no-local-search --seed 7
@@ -208,6 +209,13 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
 def _add_output(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--path-out", type=Path, metavar="FILE.csv", help="write the walk: header row,col"
+    )
+    group.add_argument(
+        "--xy-out",
+        type=Path,
+        metavar="FILE.csv",
+        help="write the line to be driven, in the map frame, straight from point to point [m]: "
+        "header x_m,y_m; of a YAML map, as a .npy grid has no frame",
     )
     group.add_argument("--png", type=Path, metavar="FILE", help="draw the walk")
     add_json(group, "the figures")

@@ -79,6 +79,12 @@ def folder(tmp_path, monkeypatch):
         ("plan good.npy --png .", 78, "cannot write .: that is a folder"),
         ("plan good.npy --path-out no/w.csv", 78, "cannot write no/w.csv: there is no folder no"),
         ("plan good.npy --path-out /proc/w.csv", 78, "cannot write /proc/w.csv"),
+        (
+            "plan good.npy --xy-out l.csv",
+            78,
+            "good.npy is a coverage grid (.npy), which lies in no",
+        ),
+        ("plan office --xy-out no/l.csv", 78, "cannot write no/l.csv: there is no folder no"),
         (f"simulate office --connect {NOBODY}", 1, "Unable to connect to any of"),
         (f"simulate nowhere --connect {NOBODY}", 1, "no map 'nowhere'"),
         (f"simulate office --speed 0 --connect {NOBODY}", 78, "speed must be above 0, got 0.0"),

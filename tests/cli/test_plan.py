@@ -147,6 +147,29 @@ def test_the_figures_of_a_map_are_right(plan, tmp_path):
     check(figures, walk, coverable_cells(pixels), (1, 2))
 
 
+@pytest.mark.parametrize("origin", [Pose2D(0.0, 0.0), Pose2D(-40.0, 7.5, 0.4)])
+def test_the_line_to_be_driven_is_written_in_the_map_frame(plan, tmp_path, origin):
+    pixels = pillared_room()
+    file, csv = tmp_path / "room.yaml", tmp_path / "line.csv"
+    write_map(OccupancyGrid(GridGeometry(*pixels.shape, 0.05, origin), pixels), file)
+    _, walk = plan(file, "--cell", 0.3, "--xy-out", csv)
+    header, *rows = csv.read_text().splitlines()
+    line = [tuple(float(part) for part in row.split(",")) for row in rows]
+    assert header == "x_m,y_m"
+    # Driven cell by cell, it is the walk; and no point of it lies in the middle of a lane.
+    centres = [((col + 0.5) * 0.3, (row + 0.5) * 0.3) for row, col in walk]
+    driven = [line[0]]
+    for (ax, ay), (bx, by) in pairwise(line):
+        steps = round(max(abs(bx - ax), abs(by - ay)) / 0.3)
+        driven += [
+            (ax + (bx - ax) * step / steps, ay + (by - ay) * step / steps)
+            for step in range(1, steps + 1)
+        ]
+    assert np.allclose(driven, centres, atol=1e-5)
+    ways = np.sign(np.round(np.diff(line, axis=0), 3)).tolist()
+    assert all(before != after for before, after in pairwise(ways))
+
+
 def test_a_start_may_be_negative(plan, tmp_path):
     pixels = pillared_room()
     geometry = GridGeometry(*pixels.shape, 0.05, Pose2D(-3.0, -3.0))
