@@ -329,8 +329,7 @@ def _not_recorded(review: Review) -> dict[str, str]:
     if not data.statuses:
         why["robot, version, config, state"] = "there is no status of a daemon"
     if review.drive is None:
-        lacks = "no map" if data.grid is None else "no configuration"
-        why["steps, revisits, turns_90, turns_180, driven_m, reached_s"] = f"there is {lacks}"
+        why["steps, revisits, turns_90, turns_180, driven_m, reached_s"] = review.no_lattice
     elif review.data.restored_cells:
         restored = review.data.restored_cells
         why["reached_s"] = (

@@ -193,7 +193,7 @@ def _maps(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> Htm
     maps = []
     for review, figures in zip(reviews, documents, strict=True):
         picture = draw_map(review, MAP_ROOM)
-        shown = element("p", "no map was recorded")
+        shown = element("p", review.no_lattice or "no pose was recorded")
         if picture is not None:
             buffer = io.BytesIO()
             picture.save(buffer, "PNG", optimize=True)

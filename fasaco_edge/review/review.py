@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import MapTooLarge
+from fasaco_edge.errors import MapTooFar, MapTooLarge
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.mission.orders.zones import kept_out, without
 from fasaco_edge.recording import entities
@@ -102,7 +102,9 @@ class Review:
     Attributes:
         record: its files, plots, states and log.
         data: of its samples.
-        lattice: over the map at the end; None without a map or a configuration.
+        lattice: over the map at the end; None without a map or a configuration, or where the map
+            is too large or too far away.
+        no_lattice: why there is none; "" where there is one.
         drive, walk: what the robot drove over it.
         first_s: float64 (n,), when each cell was first covered, ascending.
         counts: of cells; None where that is not recorded.
@@ -117,6 +119,7 @@ class Review:
     record: RunRecord
     data: RunData
     lattice: CoverageLattice | None
+    no_lattice: str
     drive: Drive | None
     walk: WalkFigures | None
     first_s: NDArray[np.float64]
@@ -196,7 +199,7 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
         missing: how many samples were lost in between.
     """
     end_s = _end_s(record, data)
-    lattice = _lattice(data)
+    lattice, no_lattice = _lattice(data)
     lost_pose_s = known_settings(data.config).mission.lost_pose_s
     drive = drive_over(lattice, data.times, data.track, lost_pose_s) if lattice else None
     states = spans_of(_mission_states(data, record), end_s)
@@ -206,6 +209,7 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
         record=record,
         data=data,
         lattice=lattice,
+        no_lattice=no_lattice,
         drive=drive,
         walk=walk_figures(drive.cells) if drive else None,
         first_s=first_covered(drive, lattice) if drive and lattice else np.zeros(0),
@@ -221,11 +225,14 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
     )
 
 
-def _lattice(data: RunData) -> CoverageLattice | None:
+def _lattice(data: RunData) -> tuple[CoverageLattice | None, str]:
+    """Return the lattice over the map at the end, or why there is none."""
     known = known_settings(data.config)
     cell_m, radius_m = known.robot.tool_width_m, known.robot.radius_m
-    if data.grid is None or not cell_m or not radius_m:
-        return None
+    if data.grid is None:
+        return None, "there is no map"
+    if not cell_m or not radius_m:
+        return None, "there is no configuration"
     free, occupied = known.map.free_at_most, known.map.occupied_at_least
     usual = Footprint(cell_m, radius_m)
     footprint = Footprint(
@@ -236,11 +243,11 @@ def _lattice(data: RunData) -> CoverageLattice | None:
     )
     try:
         lattice = CoverageLattice.from_map(data.grid, footprint)
-    except MapTooLarge:
-        return None
+    except (MapTooLarge, MapTooFar) as error:
+        return None, str(error)
     if not data.keep_out:
-        return lattice
-    return without(lattice, kept_out(data.keep_out, lattice.window, cell_m, radius_m))
+        return lattice, ""
+    return without(lattice, kept_out(data.keep_out, lattice.window, cell_m, radius_m)), ""
 
 
 def _end_s(record: RunRecord, data: RunData) -> float:

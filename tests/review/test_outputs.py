@@ -18,6 +18,8 @@ pytest.importorskip("rerun")
 from fasaco_edge.cli import main
 from fasaco_edge.cli.review import print_review
 from fasaco_edge.drawing import palette
+from fasaco_edge.grid.geometry import FARTHEST_M, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.review.document import document_of
 from fasaco_edge.review.export import export
 from fasaco_edge.review.moments import Span
@@ -103,12 +105,38 @@ def test_the_picture_shows_map_and_trail(review):
 
 
 def test_without_map_and_poses_there_are_still_charts(review):
-    bare = replace(review, lattice=None, drive=None, walk=None, counts=None)
+    bare = replace(
+        review, lattice=None, no_lattice="there is no map", drive=None, walk=None, counts=None
+    )
     assert draw_review(bare).size == SIZE
-    assert "no map was recorded" in page_of(bare)
+    assert "there is no map" in page_of(bare)
     told = document(bare)
     assert told["steps"] is told["covered_cells"] is None
     assert len(told["not_recorded"]) >= 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"grid": None}, "there is no map"),
+        ({"config": {}}, "there is no configuration"),
+        ({"origin": Pose2D(FARTHEST_M, 0.0)}, "reaches beyond"),
+        ({"resolution": 1e3}, "exceeds"),
+    ],
+)
+def test_a_map_without_a_lattice_is_named(review, changes, why):
+    data = review.data
+    if changes.keys() <= {"grid", "config"}:
+        data = replace(data, **changes)
+    else:
+        geometry = replace(data.grid.geometry, **changes)
+        data = replace(data, grid=OccupancyGrid(geometry, data.grid.cells))
+    without = review_of(review.record, data, 0)
+    assert without.lattice is None
+    told = document(without)
+    assert told["steps"] is None
+    assert why in told["not_recorded"]["steps, revisits, turns_90, turns_180, driven_m, reached_s"]
+    assert why in page_of(without)
 
 
 def zone(cells, covered):
