@@ -37,14 +37,14 @@ def fault_text(fault: FasacoError) -> str:
 
 
 class Faults:
-    """Counts what was refused, by code, and logs it."""
+    """Counts faults by code, and logs them."""
 
     def __init__(self) -> None:
         self._by_code: Counter[str] = Counter()
         self._last = ""
 
     def count(self, faults: Sequence[FasacoError], *, is_logged: bool = False) -> None:
-        """Note refused events, and log them if that is not done already."""
+        """Count faults, and log them if that is not done already."""
         for fault in faults:
             if not is_logged:
                 log_fault(LOG, fault)

@@ -28,8 +28,8 @@ class ClaimReport(Document, frozen=True):
 
     Attributes:
         id: its Zenoh id.
-        stand: looks: it does not know yet whether another plans; yields: it waits, and planned
-            before.
+        stand: its role. looks: whether another plans is not known yet; waits: another plans;
+            yields: another plans, and this one did before; plans: this one does.
     """
 
     id: Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")] = ""
@@ -41,7 +41,8 @@ class MapReport(Document, frozen=True):
 
     Attributes:
         resolution_m: edge of a pixel.
-        revision: counts maps and updates taken in.
+        revision: goes up by one with each new state of the map; updates that come together count
+            once.
         frame: name of its frame.
     """
 
@@ -125,7 +126,7 @@ class PathAttachment(PlanFigures, frozen=True):
     Attributes:
         revision: counts the published paths.
         map_stamp_ns: stamp of the map it was planned on [ns].
-        map_revision: counts the maps and updates taken in.
+        map_revision: revision of that map, as in the status.
         reason: why it replaces the one before.
         steps: steps from pose to pose.
         plan_ms: how long planning took; 0 where no plan was needed.
@@ -166,7 +167,7 @@ class Latencies(Document, frozen=True):
     Attributes:
         ingest: taking in the newest map.
         plan: making the newest plan.
-        map_to_path: from a map's coming to its path's going.
+        map_to_path: from the arrival of a map to the publication of the path it led to.
     """
 
     ingest: Amount | None = None
@@ -195,7 +196,7 @@ class LoopTimes(Document, frozen=True):
 
 
 class ErrorCounts(Document, frozen=True):
-    """What was refused since the start.
+    """Faults since the start: what was refused, could not be published, or failed.
 
     Attributes:
         last: message of the newest.

@@ -104,7 +104,7 @@ class Mission:
 
     @property
     def map_revision(self) -> int:
-        """How many maps and updates were accepted."""
+        """Goes up by one with each new state of the map; 0 before there is one."""
         return self._map.map_revision
 
     @property

@@ -31,7 +31,8 @@ class MapState:
 
     Attributes:
         grid: the newest map, with all updates; None before there is one.
-        map_revision: counts the maps, from 1.
+        map_revision: goes up by one with each new state of the map: a whole map, updates taken in
+            together, the map of another frame; 0 before there is one.
         free: the lattice over it.
         lattice: the same without the cells the robot must keep out of.
         pose: the newest pose in the map's frame; before there is a map in any frame.
