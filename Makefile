@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 # As images for containers set it, each of some hundred processes would compile all sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format bench wheelhouse clean
+.PHONY: demo test check format contract bench wheelhouse clean
 
 demo: $(STAMP)  ## watch a robot cover a building nobody mapped before
 	$(BIN)/fasaco-edge demo $(ARGS)
@@ -30,6 +30,9 @@ check: $(STAMP)  ## format, lint, types, import contracts
 format: $(STAMP)  ## put the sources into their format
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+contract: $(STAMP)  ## files of protocol/ that are made from the package: keys, QoS, schemas, tables
+	$(BIN)/python -m tests.wire.contract_files
 
 bench: $(STAMP)  ## speed, footprint, latency
 	$(BIN)/fasaco-edge bench speed

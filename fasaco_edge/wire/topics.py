@@ -2,7 +2,7 @@
 
 Publishers, subscribers, queues, the recorder's inputs and access rules are made from these rows;
 ``protocol/keys.yaml``, ``protocol/qos.yaml``, the tables of ``protocol/README.md`` and the session
-templates are written from them (``python -m tests.wire.contract_files``).
+templates are written from them (``make contract``).
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""Files of ``protocol/`` that say what ``fasaco_edge.wire.topics`` says, and the README's tables.
+"""Files of ``protocol/`` that are made from the package; ``make contract`` writes them all.
 
-``python -m tests.wire.contract_files`` writes them: keys and queries of ``keys.yaml``,
-``qos.yaml``, the key expressions of the session templates, the tables of ``README.md``.
+From ``fasaco_edge.wire.topics``: keys and queries of ``keys.yaml``, ``qos.yaml``, the key
+expressions of the session templates, the tables of ``README.md``. From the typed documents: the
+schemas, see ``tests.wire.make_schemas``.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import yaml
 from fasaco_edge.bus import access
 from fasaco_edge.host.resources import folder
 from fasaco_edge.wire.topics import QOS, QUERIES, TOPICS, Query, Topic
+from tests.wire import make_schemas
 
 PROTOCOL = folder("protocol")
 PREFIX = "{base}/@v1/{robot}/"
@@ -219,7 +221,8 @@ def with_keys(template: str, grants: Sequence[access.Grant]) -> str:
 
 
 def write() -> None:
-    """Write all that is made from the table of topics."""
+    """Write all files that are made from the table of topics, and the schemas."""
+    make_schemas.write(PROTOCOL / "schema")
     keys = PROTOCOL / "keys.yaml"
     head, _, rest = keys.read_text().partition("\nkeys:\n")
     about_queries = "# What can be asked" + rest.partition("# What can be asked")[2]

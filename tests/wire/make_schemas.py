@@ -1,4 +1,4 @@
-"""Writes protocol/schema: ``python -m tests.wire.make_schemas``, from the top folder.
+"""JSON Schemas of ``protocol/schema``, made from the structs; ``make contract`` writes them.
 
 A test holds the files to what this module makes of the structs. A member's description stands
 in the docstring of its struct, below ``Attributes:``.
@@ -16,7 +16,6 @@ from typing import Any, get_args
 import msgspec
 
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.host.resources import folder
 from fasaco_edge.mission.orders.order import CommandDocument
 from fasaco_edge.wire.replies import Error, Replan, Reply, Version
 from fasaco_edge.wire.status import PathAttachment, Recorder, Status
@@ -124,7 +123,3 @@ def write(into: Path) -> None:
     """Write all files to ``into``."""
     for name, content in files().items():
         (into / name).write_text(content)
-
-
-if __name__ == "__main__":
-    write(folder("protocol") / "schema")

@@ -24,7 +24,7 @@ def test_it_is_a_schema(name):
 
 
 def test_they_are_what_the_structs_make():
-    """To write them anew: python -m tests.wire.make_schemas."""
+    """To write them anew: make contract."""
     written = {path.name: path.read_text() for path in (PROTOCOL / "schema").iterdir()}
     assert written == files()
 

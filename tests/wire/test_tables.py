@@ -28,7 +28,7 @@ PRIORITIES = (
 
 @pytest.mark.parametrize("table", ["key", "qos", "query", "wildcard", "error"])
 def test_a_table_of_the_readme_is_that_of_the_data(table):
-    """To write it: python -m tests.wire.contract_files."""
+    """To write it: make contract."""
     rows = getattr(contract_files, f"{table}_rows")()
     assert "\n|---" in README
     assert "\n".join(rows) in README
