@@ -42,6 +42,12 @@ class Sample:
         self._payload = payload
         self._attachment = attachment
 
+    @classmethod
+    def of(cls, sample: zenoh.Sample) -> Sample:
+        """Return what Zenoh has delivered."""
+        attachment = b"" if sample.attachment is None else sample.attachment
+        return cls(str(sample.key_expr), sample.payload, schema_of(sample.encoding), attachment)
+
     @property
     def payload(self) -> bytes:
         """The message itself."""
@@ -71,6 +77,11 @@ class Sample:
 
     def _told(self) -> tuple[str, bytes, str, bytes]:
         return self.key, self.payload, self.schema, self.attachment
+
+
+def schema_of(encoding: zenoh.Encoding) -> str:
+    """Return the type that an encoding names, "" for none."""
+    return str(encoding).partition(";")[2]
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,11 +19,6 @@ def encoding_of(schema: str) -> zenoh.Encoding:
     return CDR.with_schema(schema) if schema else JSON
 
 
-def schema_of(encoding: zenoh.Encoding) -> str:
-    """Return the type that an encoding names, "" for none."""
-    return str(encoding).partition(";")[2]
-
-
 class Publisher:
     """Publishes samples on one key.
 

@@ -16,7 +16,8 @@ from typing import Any
 
 import zenoh
 
-from fasaco_edge.bus.publisher import encoding_of, schema_of
+from fasaco_edge.bus.arrival import schema_of
+from fasaco_edge.bus.publisher import encoding_of
 
 # Of a flood of tokens no more are remembered.
 MOST_TOKENS = 16_384

@@ -24,7 +24,7 @@ import zenoh
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Asker, LatchedSubscription, Subscription
-from fasaco_edge.bus.publisher import JSON, Publisher, schema_of
+from fasaco_edge.bus.publisher import JSON, Publisher
 from fasaco_edge.bus.queries import (
     Question,
     Reply,
@@ -139,7 +139,7 @@ class Bus:
         """
 
         def receive(sample: zenoh.Sample) -> None:
-            callback(_sample(sample))
+            callback(Sample.of(sample))
 
         subscription = (
             LatchedSubscription(self._session, key, receive, history, self._asker)
@@ -331,11 +331,6 @@ def _merged(own: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
         else:
             merged[key] = value
     return merged
-
-
-def _sample(sample: zenoh.Sample) -> Sample:
-    attachment = b"" if sample.attachment is None else sample.attachment
-    return Sample(str(sample.key_expr), sample.payload, schema_of(sample.encoding), attachment)
 
 
 def _first_line(error: Exception) -> str:
