@@ -19,9 +19,9 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.config.config import load_config
-from fasaco_edge.daemon.loop.status import plan_figures
 from fasaco_edge.replay.cycle_replay import CycleReplay, Difference, read_turns
 from fasaco_edge.replay.replay import Replay, read_run
+from fasaco_edge.wire.status import PlanFigures
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.events import PathUpdate
@@ -129,7 +129,7 @@ def _path(update: PathUpdate) -> dict[str, object]:
         "reason": update.reason,
         "steps": max(len(update.cells) - 1, 0),
         "cells_digest": digest(update.cells.astype("<i4").tobytes()).hex(),
-        **msgspec.structs.asdict(plan_figures(update.plan)),
+        **msgspec.structs.asdict(PlanFigures.of(update.plan)),
     }
 
 

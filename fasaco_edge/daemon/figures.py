@@ -1,4 +1,4 @@
-"""Figures of the loop: faults by code, failures to publish, durations of cycles and plans."""
+"""Figures of the loop: faults by code, durations of cycles and plans."""
 
 from __future__ import annotations
 
@@ -6,17 +6,13 @@ import logging
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from fasaco_edge.errors import FasacoError, NotPublished
+from fasaco_edge.errors import FasacoError
 from fasaco_edge.wire.status import ErrorCounts, LoopTimes
 
 LOG = logging.getLogger(__name__)
 
-# Of what fails again and again one is logged in so long [s].
-PERIOD_S = 10.0
-# So many wait to be counted at most.
-MOST_FAULTS = 100
 # A cycle longer than this [s] makes what arrives meanwhile late.
 LATE_S = 0.1
 # Durations are counted to within 10 %, in logarithmic buckets, the last for all beyond 18 minutes:
@@ -54,43 +50,6 @@ class Faults:
     def counts(self) -> ErrorCounts:
         """Return the counts as part of a status."""
         return ErrorCounts(self._by_code.total(), self._last, dict(self._by_code))
-
-
-class PublishGuard:
-    """Publishes what the loop sends: a failure costs that message alone.
-
-    All failures are counted; of each topic one in ``PERIOD_S`` is logged.
-    """
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
-        self._faults: list[FasacoError] = []
-        self._logged_at: dict[str, float] = {}
-
-    def attempt(self, topic: str, publish: Callable[[], None]) -> bool:
-        """Make and send a message; tell whether that went well."""
-        try:
-            publish()
-        except Exception as error:
-            why = (
-                str(error) if isinstance(error, FasacoError) else f"{type(error).__name__}: {error}"
-            )
-            fault = NotPublished(f"{topic} was not published: {why}")
-            now = self._clock()
-            if now - self._logged_at.get(topic, float("-inf")) >= PERIOD_S:
-                self._logged_at[topic] = now
-                log_fault(LOG, fault)
-                if not isinstance(error, FasacoError):
-                    LOG.exception("%s", topic)
-            if len(self._faults) < MOST_FAULTS:
-                self._faults.append(fault)
-            return False
-        return True
-
-    def take_faults(self) -> list[FasacoError]:
-        """Return what was not published since the last call; it is logged already."""
-        faults, self._faults = self._faults, []
-        return faults
 
 
 class CycleTimes:

@@ -168,6 +168,12 @@ class GridGeometry:
     resolution: float
     origin: Pose2D
 
+    @classmethod
+    def of_cells(cls, window: Window, cell_m: float) -> GridGeometry:
+        """Return the placement of a window of the coverage lattice, cells ``cell_m`` [m] wide."""
+        corner = Pose2D(window.col0 * cell_m, window.row0 * cell_m)
+        return cls(window.rows, window.cols, cell_m, corner)
+
     def to_pixels(self, x: float, y: float) -> tuple[float, float]:
         """Return the pixel coordinates (column, row), not rounded, of a point [m]."""
         dx, dy = x - self.origin.x, y - self.origin.y

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge import kernels as cell
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.grid.occupancy import OCCUPIED, UNKNOWN, MapPatch, OccupancyGrid
 from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
 from fasaco_edge.wire.fields import (
@@ -127,12 +127,6 @@ def _least_and_most(cells: NDArray[np.int8]) -> tuple[int, int]:
     return cells.item(cells.argmin()), cells.item(cells.argmax())
 
 
-def lattice_geometry(window: Window, cell_m: float) -> GridGeometry:
-    """Return the placement of a window of the coverage lattice, cells ``cell_m`` [m] wide."""
-    corner = Pose2D(window.col0 * cell_m, window.row0 * cell_m)
-    return GridGeometry(window.rows, window.cols, cell_m, corner)
-
-
 def coverage_grid(
     window: Window,
     cell_m: float,
@@ -157,4 +151,4 @@ def coverage_grid(
     values[coverable] = CoverageValue.TO_COVER
     values[coverable & (visits == 1)] = CoverageValue.COVERED
     values[coverable & (visits > 1)] = CoverageValue.RECOVERED
-    return OccupancyGrid(lattice_geometry(window, cell_m), values, frame, stamp_ns)
+    return OccupancyGrid(GridGeometry.of_cells(window, cell_m), values, frame, stamp_ns)

@@ -26,7 +26,6 @@ from fasaco_edge.wire.fields import (
     write_header,
 )
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
-from fasaco_edge.wire.maps import lattice_geometry
 from fasaco_edge.wire.schemas import PHEROMONE_GRID
 
 TOP_STEP = 254
@@ -81,7 +80,7 @@ def encode_pheromone(snapshot: ColonySnapshot, frame: str, stamp_ns: int) -> byt
     writer = CdrWriter(PHEROMONE_GRID)
     levels, trail_min, trail_max = _quantised(snapshot.trail, writer.message)
     write_header(writer, frame, stamp_ns)
-    geometry = lattice_geometry(snapshot.window, snapshot.cell_m)
+    geometry = GridGeometry.of_cells(snapshot.window, snapshot.cell_m)
     if levels.shape != (geometry.rows, geometry.cols):
         refuse(writer.message, "levels", f"{geometry.rows, geometry.cols}", levels.shape)
     write_grid_geometry(writer, geometry, stamp_ns)

@@ -6,13 +6,16 @@ default, so that a reader takes a document of another version (``json_text.decod
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Self
 
 import msgspec
 from msgspec import UNSET, UnsetType
 
 from fasaco_edge.wire.json_text import Amount, Count, Document, Name, Ordinal, allowed, tolerant
 from fasaco_edge.wire.replies import CoverageReport, MissionReport, Point, State
+
+if TYPE_CHECKING:
+    from fasaco_edge.planners.path import CoveragePath
 
 RECORDER_STATES: Final = ("recording", "disk full", "stalled", "stopping")
 SUPERVISED_STATES: Final = ("starting", *RECORDER_STATES, "silent", "restarting")
@@ -89,6 +92,23 @@ class PlanFigures(Document, frozen=True):
     planned_cost_s: Amount | None = None
     lower_bound_steps: Ordinal | None = None
     gap: float | None = None
+
+    @classmethod
+    def of(cls, plan: CoveragePath | None) -> Self:
+        """Return what is known of the plan a path follows."""
+        if plan is None:
+            return cls()
+        return cls(
+            planner=plan.planner,
+            seed=plan.seed,
+            ants=plan.work.ants,
+            kicks=plan.work.perturbations,
+            proposals=plan.work.proposals,
+            planned_steps=plan.steps,
+            planned_cost_s=round(plan.cost_s, 3),
+            lower_bound_steps=plan.lower_bound_steps or None,
+            gap=None if plan.gap is None else round(plan.gap, 6),
+        )
 
 
 class PathReport(PlanFigures, frozen=True):

@@ -12,7 +12,6 @@ from msgspec.structs import asdict
 
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, Sample, digest
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.loop.status import plan_figures
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import COVERABLE
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
@@ -23,6 +22,7 @@ from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.poses import decode_pose
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, POSE_STAMPED
+from fasaco_edge.wire.status import PlanFigures
 from tests import naive
 
 Cell = tuple[int, int]
@@ -192,7 +192,7 @@ def with_paths(samples: Samples, story: Story) -> Samples:
         about = {
             "revision": update.revision,
             "reason": update.reason,
-            **asdict(plan_figures(update.plan)),
+            **asdict(PlanFigures.of(update.plan)),
         }
         points = lattice.centres(update.cells).tobytes()
         sample = Sample("robot/path", digest(points), attachment=encode_json(about))

@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid import lattice
-from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import maps
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
@@ -50,7 +50,7 @@ def test_coverage_values() -> None:
 def test_coverage_lies_where_the_lattice_says() -> None:
     free = np.ones((4, 5), bool)
     plan = lattice.CoverageLattice.from_free(free, 0.25)
-    geometry = maps.lattice_geometry(plan.window, plan.cell_m)
+    geometry = GridGeometry.of_cells(plan.window, plan.cell_m)
     for cell in ((0, 0), (3, 4), (2, 1)):
         (centre,) = plan.centres(np.array([cell], np.int32))
         col, row = geometry.to_pixels(*centre)

@@ -1,13 +1,12 @@
-"""Answers to queries.
+"""Answers to queries for configuration, versions and commands, and what all answers share.
 
-Those for the last samples, the configuration and the versions are given on Zenoh's thread, without
-waiting for the loop; commands are answered once the mission has decided.
+Configuration and versions are told on Zenoh's thread, without waiting for the loop; commands are
+answered once the mission has decided.
 """
 
 from __future__ import annotations
 
 import re
-import threading
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import cast
@@ -19,7 +18,7 @@ from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.bus.queries import Question, Reply, Request, Shared, matches
 from fasaco_edge.bus.session import ZENOH_VERSION, Bus
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.errors import BadQuery, CommandError, FasacoError, NotYet, UnknownQuery
+from fasaco_edge.errors import BadQuery, CommandError, FasacoError, UnknownQuery
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import (
     EVERYTHING_ONCE,
@@ -38,7 +37,6 @@ from fasaco_edge.wire.status import Settings
 REPLAN_PERIOD_S = 1.0
 # A document of JSON, and its question.
 QUERY_BYTES = MAX_JSON_BYTES + 4096
-NEWEST = "newest"
 Said = Reply | Shared
 
 
@@ -72,65 +70,6 @@ def check(request: Request, *parameters: str, payload: bool = False) -> None:
             raise BadQuery(f"{name}: unknown parameter {parameter!r}, it takes {takes}")
     if request.payload and not payload:
         raise BadQuery(f"{name} takes no payload, got one of {len(request.payload)} bytes")
-
-
-class LastSamples:
-    """Keeps what was said last on some topics, and answers with it.
-
-    The answer is the same on the topic itself, as a storage would give it.
-    """
-
-    def __init__(self, bus: Bus, keys: Keys) -> None:
-        self._lock = threading.Lock()
-        self._last: dict[str, Said] = {}
-        # Of the newest full plan: by cohort, and the newest; and the number of its request.
-        self._trails: dict[str, Said] = {}
-        self._plan = 0
-        for topic in (topics.PATH, topics.STATUS, topics.COVERAGE):
-            answer = answering(partial(self._answer, topic.name))
-            for key in (keys.rpc(topic.name), keys.of(topic)):
-                bus.serve(key, answer)
-        for key in (keys.rpc("pheromone"), keys.of(topics.PHEROMONE)):
-            bus.serve(key, answering(self._trail))
-
-    def keep(self, topic: str, reply: Said) -> None:
-        """Keep what was said on ``topic``."""
-        with self._lock:
-            self._last[topic] = reply
-
-    def keep_trail(self, plan: int, cohort: int, reply: Said) -> None:
-        """Keep the trail that ``cohort`` of plan ``plan`` has left."""
-        with self._lock:
-            if plan != self._plan:
-                self._plan, self._trails = plan, {}
-            self._trails[str(cohort)] = self._trails[NEWEST] = reply
-
-    def _answer(self, topic: str, request: Request) -> Said:
-        check(request)
-        with self._lock:
-            reply = self._last.get(topic)
-        if reply is None:
-            raise NotYet(f"there is no {topic} yet")
-        return reply
-
-    def _trail(self, request: Request) -> Said:
-        check(request, "cohort")
-        cohort = request.parameters.get("cohort", NEWEST)
-        if cohort != NEWEST:
-            if not re.fullmatch("[0-9]{1,9}", cohort):
-                raise BadQuery(f"cohort must be a whole number from 0, got {cohort!r}")
-            cohort = str(int(cohort))
-        with self._lock:
-            reply = self._trails.get(cohort)
-            kept = [name for name in self._trails if name != NEWEST]
-        if reply is not None:
-            return reply
-        if not kept:
-            raise NotYet("there is no pheromone yet: no full plan was made")
-        raise NotYet(
-            f"the newest full plan has no trail of cohort {cohort}",
-            hint=f"leave cohort out, or ask for {', '.join(kept)}",
-        )
 
 
 SECRET = re.compile(r"password|passphrase|secret|private_key|credential|token", re.IGNORECASE)

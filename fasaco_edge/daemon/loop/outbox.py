@@ -1,23 +1,29 @@
-"""The outbox: publishers of path, coverage, pheromone, status and commands."""
+"""The outbox: publishers of path, coverage, pheromone, status and commands.
+
+What was published last is kept, to answer who asks for it.
+"""
 
 from __future__ import annotations
 
+import logging
+import re
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from msgspec.structs import asdict, replace
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from fasaco_edge.bus.queries import Reply, Shared
+from fasaco_edge.bus.queries import Reply, Request, Shared
 from fasaco_edge.bus.session import Bus
-from fasaco_edge.daemon.figures import PublishGuard
-from fasaco_edge.daemon.loop.answers import LastSamples
+from fasaco_edge.daemon.figures import log_fault
+from fasaco_edge.daemon.loop.answers import Said, answering, check
 from fasaco_edge.daemon.loop.inbox import PlanSnapshot
-from fasaco_edge.daemon.loop.status import plan_figures
 from fasaco_edge.daemon.ros_bridge import RosBridge
+from fasaco_edge.errors import BadQuery, FasacoError, NotPublished, NotYet
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import command_document
@@ -34,7 +40,16 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.mission.core.mission import Mission
 
-PERIOD_S = 0.5
+LOG = logging.getLogger(__name__)
+
+# The coverage is published no more often than this [s].
+COVERAGE_PERIOD_S = 0.5
+# Of what fails again and again one is logged in so long [s].
+LOG_PERIOD_S = 10.0
+# So many failures wait to be counted at most.
+MOST_FAULTS = 100
+# The cohort that stands for the last one.
+NEWEST = "newest"
 
 
 class Outbox:
@@ -138,7 +153,8 @@ def path_attachment(mission: Mission, update: PathUpdate) -> PathAttachment:
     """Return what is sent with a path."""
     assert mission.grid is not None
     assert mission.lattice is not None
-    return PathAttachment(
+    return replace(
+        PathAttachment.of(update.plan),
         revision=update.revision,
         map_stamp_ns=mission.grid.stamp_ns,
         map_revision=mission.map_revision,
@@ -146,7 +162,6 @@ def path_attachment(mission: Mission, update: PathUpdate) -> PathAttachment:
         steps=max(len(update.cells) - 1, 0),
         plan_ms=round(1e3 * update.plan_s, 3),
         changed=rectangle(update.changed, mission.lattice.cell_m),
-        **asdict(plan_figures(update.plan)),
     )
 
 
@@ -174,7 +189,7 @@ class CoveragePublisher:
         """Publish the coverage if that is due."""
         # An order may forget what was covered, and keep the robot out of cells.
         key = (mission.ledger.total, mission.map_revision, mission.order_state)
-        if key == self._key or now - self._published_at < PERIOD_S:
+        if key == self._key or now - self._published_at < COVERAGE_PERIOD_S:
             return
         lattice, grid = mission.lattice, mission.grid
         if lattice is None or grid is None:
@@ -185,4 +200,100 @@ class CoveragePublisher:
             coverage_grid(
                 lattice.window, lattice.cell_m, lattice.states, visits, grid.frame, grid.stamp_ns
             )
+        )
+
+
+class PublishGuard:
+    """Publishes what the loop sends: a failure costs that message alone.
+
+    All failures are counted; of each topic one in ``LOG_PERIOD_S`` is logged.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._faults: list[FasacoError] = []
+        self._logged_at: dict[str, float] = {}
+
+    def attempt(self, topic: str, publish: Callable[[], None]) -> bool:
+        """Make and send a message; tell whether that went well."""
+        try:
+            publish()
+        except Exception as error:
+            why = (
+                str(error) if isinstance(error, FasacoError) else f"{type(error).__name__}: {error}"
+            )
+            fault = NotPublished(f"{topic} was not published: {why}")
+            now = self._clock()
+            if now - self._logged_at.get(topic, float("-inf")) >= LOG_PERIOD_S:
+                self._logged_at[topic] = now
+                log_fault(LOG, fault)
+                if not isinstance(error, FasacoError):
+                    LOG.exception("%s", topic)
+            if len(self._faults) < MOST_FAULTS:
+                self._faults.append(fault)
+            return False
+        return True
+
+    def take_faults(self) -> list[FasacoError]:
+        """Return what was not published since the last call; it is logged already."""
+        faults, self._faults = self._faults, []
+        return faults
+
+
+class LastSamples:
+    """Keeps what was said last on some topics, and answers with it.
+
+    The answer is the same on the topic itself, as a storage would give it.
+    """
+
+    def __init__(self, bus: Bus, keys: Keys) -> None:
+        self._lock = threading.Lock()
+        self._last: dict[str, Said] = {}
+        # Of the newest full plan: by cohort, and the newest; and the number of its request.
+        self._trails: dict[str, Said] = {}
+        self._plan = 0
+        for topic in (topics.PATH, topics.STATUS, topics.COVERAGE):
+            answer = answering(partial(self._answer, topic.name))
+            for key in (keys.rpc(topic.name), keys.of(topic)):
+                bus.serve(key, answer)
+        for key in (keys.rpc("pheromone"), keys.of(topics.PHEROMONE)):
+            bus.serve(key, answering(self._trail))
+
+    def keep(self, topic: str, reply: Said) -> None:
+        """Keep what was said on ``topic``."""
+        with self._lock:
+            self._last[topic] = reply
+
+    def keep_trail(self, plan: int, cohort: int, reply: Said) -> None:
+        """Keep the trail that ``cohort`` of plan ``plan`` has left."""
+        with self._lock:
+            if plan != self._plan:
+                self._plan, self._trails = plan, {}
+            self._trails[str(cohort)] = self._trails[NEWEST] = reply
+
+    def _answer(self, topic: str, request: Request) -> Said:
+        check(request)
+        with self._lock:
+            reply = self._last.get(topic)
+        if reply is None:
+            raise NotYet(f"there is no {topic} yet")
+        return reply
+
+    def _trail(self, request: Request) -> Said:
+        check(request, "cohort")
+        cohort = request.parameters.get("cohort", NEWEST)
+        if cohort != NEWEST:
+            if not re.fullmatch("[0-9]{1,9}", cohort):
+                raise BadQuery(f"cohort must be a whole number from 0, got {cohort!r}")
+            cohort = str(int(cohort))
+        with self._lock:
+            reply = self._trails.get(cohort)
+            kept = [name for name in self._trails if name != NEWEST]
+        if reply is not None:
+            return reply
+        if not kept:
+            raise NotYet("there is no pheromone yet: no full plan was made")
+        raise NotYet(
+            f"the newest full plan has no trail of cohort {cohort}",
+            hint=f"leave cohort out, or ask for {', '.join(kept)}",
         )

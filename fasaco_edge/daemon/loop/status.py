@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from msgspec.structs import asdict
+from msgspec.structs import replace
 
 from fasaco_edge import __version__
 from fasaco_edge.config.config import DaemonConfig
@@ -24,7 +24,6 @@ from fasaco_edge.wire.status import (
     MapReport,
     PathReport,
     PlanCounts,
-    PlanFigures,
     PoseReport,
     Status,
     SupervisedRecorder,
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.mission_runner import MissionRunner
     from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.mission.core.mission import Mission
-    from fasaco_edge.planners.path import CoveragePath
 
 
 from typing import TYPE_CHECKING
@@ -155,30 +153,13 @@ class StatusBoard:
         update = self.path
         if update is None or mission is None:
             return None
-        return PathReport(
+        return replace(
+            PathReport.of(update.plan),
             revision=update.revision,
             steps=max(len(update.cells) - 1, 0),
             remaining_steps=max(len(mission.route.path.ahead) - 1, 0),
             reason=update.reason,
-            **asdict(plan_figures(update.plan)),
         )
-
-
-def plan_figures(plan: CoveragePath | None) -> PlanFigures:
-    """Return what is known of the plan a path follows."""
-    if plan is None:
-        return PlanFigures()
-    return PlanFigures(
-        planner=plan.planner,
-        seed=plan.seed,
-        ants=plan.work.ants,
-        kicks=plan.work.perturbations,
-        proposals=plan.work.proposals,
-        planned_steps=plan.steps,
-        planned_cost_s=round(plan.cost_s, 3),
-        lower_bound_steps=plan.lower_bound_steps or None,
-        gap=None if plan.gap is None else round(plan.gap, 6),
-    )
 
 
 def _map(mission: Mission | None) -> MapReport | None:
