@@ -161,7 +161,7 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         "--velocities",
         default="8:1",
         metavar="V",
-        help="cohorts' velocities [cells/step]: 8:1 falling, 1:8 rising, 4 constant, 8,4,1 "
+        help="cohorts' velocities [cells/move]: 8:1 falling, 1:8 rising, 4 constant, 8,4,1 "
         "(default: %(default)s)",
     )
     group.add_argument(

@@ -121,7 +121,7 @@ class PlannerConfig(Section, frozen=True):
 
     ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
     The paper's ants see no further than their neighbours; a robot's see what will soon
-    be cut off, which saves it revisits (``fasaco_edge/bench/RESULTS.md``).
+    be cut off, which saves it revisits (``tests/benchmarks/RESULTS.md``).
     """
 
     name: PlannerName = "fasaco"

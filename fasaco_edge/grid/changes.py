@@ -71,7 +71,8 @@ class LatticeChange:
         """Return the lattice over a first map.
 
         Raises:
-            MapTooLarge: it would have more than ``max_cells`` cells.
+            MapTooLarge: it would have more than ``max_cells`` cells, or the pixels are too small.
+            MapTooFar: it would reach too far from 0, see ``lattice_window``.
         """
         lattice = CoverageLattice.from_map(grid, footprint, max_cells)
         return cls(None, lattice, _cells_where(lattice.states != UNKNOWN, lattice.window))
@@ -98,6 +99,7 @@ class LatticeChange:
         Raises:
             MapTooLarge: the new lattice would have more than ``max_cells`` cells, or the pixels
                 are too small.
+            MapTooFar: it would reach too far from 0, see ``lattice_window``.
         """
         window = lattice_window(grids[1].geometry, footprint.cell_m, max_cells)
         placement = placement_of(grids[1].geometry, footprint)

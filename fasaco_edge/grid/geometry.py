@@ -187,7 +187,7 @@ class GridGeometry:
         return self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v
 
     def on_raster(self) -> tuple[Raster, Window]:
-        """Return the raster this grid lies on, and which of its pixels they are.
+        """Return the raster this grid lies on, and the window of it that the grid occupies.
 
         Two grids lie on one raster if they differ by whole pixels. The raster is off the
         grid by up to half a step, 1 / 4096 of a pixel, on either axis.

@@ -11,7 +11,7 @@ VISIBILITIES = ("neighbour", "distance", "fewest-open")
 
 @dataclass(frozen=True, slots=True)
 class Cohort:
-    """Ants of one velocity [cells/step]."""
+    """Ants of one velocity [cells/move]."""
 
     ants: int
     velocity: int
@@ -23,7 +23,7 @@ class ColonyConfig:
 
     Attributes:
         ants: ants in all.
-        velocities: velocity of each cohort [cells/step], in the order they walk.
+        velocities: velocity of each cohort [cells/move], in the order they walk.
         q0: probability of taking the strongest trail, equation (4).
         alpha: weight of new pheromone, equations (7) and (8).
         tau0: pheromone every move starts with, equation (7).

@@ -140,7 +140,7 @@ class Group(NamedTuple):
 
     Attributes:
         cohort: number of their cohort.
-        velocity: of theirs [cells/step].
+        velocity: of theirs [cells/move].
         streams: a random stream for each, int64 (ants, 4), independent of all others.
         is_last: whether it is the last group of the cohort.
     """

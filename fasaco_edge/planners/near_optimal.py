@@ -1,6 +1,7 @@
 """FaSACO with local search: a complete walk at once, then better ones until it is stopped.
 
-1. An ant without a trail walks: the first complete walk, within milliseconds.
+1. One or more simple walks, the cheapest kept: the first complete walk, within milliseconds
+   (``baselines.first_walks``).
 2. Local search improves it, region by region where the ground is large.
 3. Perturbations, each followed by local search, go on from there.
 4. Where perturbations gain nothing any more, the next ants of the colony walk; the

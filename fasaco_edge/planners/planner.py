@@ -200,7 +200,7 @@ class ColonySnapshot:
         trail: float32 (rows, cols): mean pheromone on the moves into a cell; 0 where
             the cell is not coverable.
         cohort: index of the cohort that walked last, from 0.
-        velocity: its velocity [cells/step].
+        velocity: its velocity [cells/move].
         ants: how many ants have walked so far.
         best_steps: steps of the best walk so far.
     """

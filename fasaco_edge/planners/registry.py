@@ -1,8 +1,8 @@
 """The registry of planners, the only list of their names.
 
-A new planner is a module here, a row of ``PLANNERS`` and a test; configuration and command
-line take the names from here. Factories are imported when a planner is made: to read the
-names does not load the compiler.
+A new planner is a factory in a module here, a row of ``PLANNERS`` and a test; configuration and
+command line take the names from here. Factories are imported when a planner is made: to read
+the names does not load the compiler.
 """
 
 from __future__ import annotations

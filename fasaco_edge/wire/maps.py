@@ -141,7 +141,7 @@ def coverage_grid(
         window: which cells of the lattice.
         cell_m: edge of a cell [m].
         states: uint8 (rows, cols), the lattice's: UNKNOWN, BLOCKED or COVERABLE.
-        visits: uint16 (rows, cols), how often the robot has been in each cell.
+        visits: uint16 (rows, cols), how often the tool has passed over each cell.
         frame: name of the map frame.
         stamp_ns: time of the coverage [ns].
     """

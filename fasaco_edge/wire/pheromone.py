@@ -45,7 +45,7 @@ class PheromoneMessage:
             to ``trail_max``.
         trail_min, trail_max: bounds of the trail; both 0 where no cell is coverable.
         cohort: which cohort has just walked, from 0.
-        velocity: its velocity [cells/step].
+        velocity: its velocity [cells/move].
         ants: how many ants have walked so far.
         best_steps: steps of the best walk so far.
         frame: name of the map frame.

@@ -148,7 +148,7 @@ def test_a_cell_left_over_after_several_tries_is_tried_again_later():
     assert drive.mission.state is State.BLOCKED
     assert stands_short(drive, 100) == 1
     assert drive.mission.state is State.DONE
-    assert drive.mission.reason == "every reachable cell is covered but 1 left over"
+    assert drive.mission.reason == "1 reachable cell was left over"
     assert reasons(drive) == [(1, "left over after 6 tries")]
 
 

@@ -171,7 +171,7 @@ def test_stc_ends_an_open_walk_with_the_last_cell_that_wants_a_visit():
 @pytest.mark.parametrize(
     ("name", "planner", "most"),
     [
-        # What the authors' code drives, start to start; see bench/RESULTS.md.
+        # What the authors' code drives, start to start; see tests/benchmarks/RESULTS.md.
         ("paper_simulated", "spiral-stc", 80),
         ("paper_basement", "spiral-stc", 249),
         ("paper_simulated", "zigzag", 84),

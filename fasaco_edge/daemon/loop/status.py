@@ -1,6 +1,6 @@
 """The daemon's status: one JSON document, published on change and once a second.
 
-The order in a status, and in the answer to a command: what it is, and how far.
+Also reports the order and its progress, in a status and in the answer to a command.
 """
 
 from __future__ import annotations
@@ -16,7 +16,15 @@ from fasaco_edge.daemon.figures import CycleTimes, Faults
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.host.processes import resident_mb, thread_count
 from fasaco_edge.mission.orders.order_state import OrderState
-from fasaco_edge.wire.replies import CoverageReport, Reply
+from fasaco_edge.wire.replies import (
+    CoverageReport,
+    MissionReport,
+    Point,
+    Reply,
+    UnreachedArea,
+    UnreachedReport,
+    ZoneReport,
+)
 from fasaco_edge.wire.status import (
     ClaimReport,
     Latencies,
@@ -33,22 +41,6 @@ if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.mission_runner import MissionRunner
     from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.mission.core.mission import Mission
-
-
-from typing import TYPE_CHECKING
-
-from fasaco_edge.wire.replies import (
-    MissionReport,
-    Point,
-    UnreachedArea,
-    UnreachedReport,
-    ZoneReport,
-)
-
-if TYPE_CHECKING:
-    from fasaco_edge.daemon.loop.mission_runner import MissionRunner
-    from fasaco_edge.mission.core.mission import Mission
-
 
 HEARTBEAT_S = 1.0
 # Changes closer together than this go out as one.

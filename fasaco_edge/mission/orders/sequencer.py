@@ -70,7 +70,8 @@ class Exploration:
     def seek(self, zone: Zone | None, area: ReachableArea | None, cell: Cell) -> str:
         """Look for a way to a zone out of reach; return why a plan is wanted, or "".
 
-        Along the frontier, cell by cell, until the zone is in reach or all was looked at.
+        From frontier cell to frontier cell, nearest to the zone's corners first, until the zone
+        is in reach or all were looked at.
         """
         if zone is None or zone.polygon is None or area is None or is_in_reach(zone, area):
             return ""
@@ -309,9 +310,11 @@ class Sequencer:
         run.retry_at = None
         self.state = replace(self.state, stage=Stage.OVER)
         every = order is None or order.zones[0].polygon is None
-        run.ending = f"every reachable cell{'' if every else ' of the zones'} is covered"
+        zones = "" if every else " of the zones"
+        run.ending = f"every reachable cell{zones} is covered"
         if left:
-            run.ending += f" but {left} left over"
+            cells, were = ("cell", "was") if left == 1 else ("cells", "were")
+            run.ending = f"{left} reachable {cells}{zones} {were} left over"
 
     def _is_worth_trying(self) -> bool:
         """Tell whether there is anything to try again; searched anew if anything changed."""

@@ -241,6 +241,6 @@ def _cohort_line(message: PheromoneMessage) -> str:
     cells = "cell" if message.velocity == 1 else "cells"
     ants = "ant" if message.ants == 1 else "ants"
     return (
-        f"cohort {message.cohort + 1}, {message.velocity} {cells} a step\n"
+        f"cohort {message.cohort + 1}, {message.velocity} {cells} a move\n"
         f"{message.ants} {ants} in all, best walk {message.best_steps} steps"
     )

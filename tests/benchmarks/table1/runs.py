@@ -25,7 +25,7 @@ class Variant:
     Attributes:
         name: its name in figures.
         planner: its name in the registry.
-        velocities: of its cohorts [cells/step]; () where there are no ants.
+        velocities: of its cohorts [cells/move]; () where there are no ants.
         q0, visibility: of the colony; the faithful rows have the defaults.
         closed: whether its walk ends where it began, as all the faithful ones do.
     """
