@@ -112,6 +112,11 @@ class JudgedFloor:
     reachable: Mask
     swept: Mask
 
+    @property
+    def unswept(self) -> Mask:
+        """What is reachable and was not swept, bool (rows, cols)."""
+        return self.reachable & ~self.swept
+
 
 def judge_floor(
     grid: OccupancyGrid, line_xy: Points, robot: SweepingRobot, jump_m: float = math.inf

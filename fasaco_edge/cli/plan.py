@@ -15,7 +15,13 @@ import numpy as np
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, check_output, writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.plan_line import line_through, write_line
+from fasaco_edge.cli.plan_line import (
+    Line,
+    PlannedFloor,
+    line_through,
+    planned_floor,
+    write_line,
+)
 from fasaco_edge.cli.plan_options import ANYWHERE, EPILOG, HOME, add_options, check, settle
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
@@ -67,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
     with ctrl_c_asks(asked.asked.set):
         path, search = _plan(args, colony, problem, asked)
     line_xy = line_through(lattice, path.cells)
+    floor = planned_floor(args, grid, line_xy)
     figures = figures_of(args, problem, path, search)
     if args.path_out is not None:
         with writing(args.path_out):
@@ -76,8 +83,8 @@ def run(args: argparse.Namespace) -> int:
             write_line(args.xy_out, line_xy)
     if args.png is not None:
         with writing(args.png):
-            draw(args, args.png, lattice, grid, path, figures)
-    print_figures(args, figures)
+            draw(args, args.png, lattice, grid, path, figures, floor, line_xy)
+    print_figures(args, figures, floor)
     return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
 
 
@@ -205,8 +212,10 @@ def draw(
     grid: OccupancyGrid | None,
     path: CoveragePath,
     figures: dict[str, object],
+    floor: PlannedFloor | None,
+    line_xy: Line,
 ) -> None:
-    """Draw the walk."""
+    """Draw the walk, as the line ``line_xy``."""
     from fasaco_edge.drawing.pictures import draw_walk
 
     ants = path.work.ants
@@ -220,15 +229,21 @@ def draw(
         f"{figures['turns_90']} quarter-turns; "
         f"at most {path.gap or 0.0:.1%} above the fewest steps there can be",
     ]
-    draw_walk(lattice, path.cells, grid=grid, title=title, lines=lines).save(file, "PNG")
+    if floor is not None:
+        lines.append(f"reachable floor: {floor}")
+    picture = draw_walk(lattice, path.cells, grid=grid, title=title, lines=lines, line_xy=line_xy)
+    picture.save(file, "PNG")
 
 
-def print_figures(args: argparse.Namespace, figures: dict[str, object]) -> None:
+def print_figures(
+    args: argparse.Namespace, figures: dict[str, object], floor: PlannedFloor | None
+) -> None:
     """Print the figures as JSON or as a table."""
     if args.json:
-        print_json(figures)
+        print_json(figures | {"floor": asdict(floor) if floor else None})
         return
     rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
+    rows.append(("floor", str(floor or "not known of a coverage grid")))
     terminal.out().print(terminal.figures(rows))
     for file in (args.path_out, args.xy_out, args.png):
         if file is not None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.floor import FloorFigures, JudgedFloor, SweepingRobot, judge_floor
+from fasaco_edge.bench.floor import FloorFigures, SweepingRobot, judge_floor
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.lattice import CoverageLattice
@@ -39,10 +39,17 @@ def write_line(file: Path, line_xy: Line) -> None:
     np.savetxt(file, line_xy, "%.6f", ",", header="x_m,y_m", comments="")
 
 
-def judge(args: argparse.Namespace, grid: OccupancyGrid, line_xy: Line) -> JudgedFloor:
-    """Return what a line does to the floor of a map; the tool is as wide as a cell."""
+def planned_floor(
+    args: argparse.Namespace, grid: OccupancyGrid | None, line_xy: Line
+) -> PlannedFloor | None:
+    """Return what a line does to the floor of a map; None for a coverage grid, which has none.
+
+    The tool is as wide as a cell.
+    """
+    if grid is None:
+        return None
     robot = SweepingRobot(args.cell, args.robot_radius, args.speed_m_s, args.turn_s)
-    return judge_floor(grid, line_xy, robot)
+    return PlannedFloor.of(judge_floor(grid, line_xy, robot).figures)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +62,23 @@ class PlannedFloor:
     patches_over_4_dm2: int
     largest_patch_m2: float
     illegal_share: float
+
+    def __str__(self) -> str:
+        """What a table and a picture say of it."""
+        if self.swept_share is None:
+            return "none is reachable"
+        swept_m2 = self.swept_share * self.reachable_m2
+        words = f"{swept_m2:,.1f} of {self.reachable_m2:,.1f} m2 swept ({self.swept_share:.1%})"
+        if self.patches_over_4_dm2:
+            words += (
+                f", {self.patches_over_4_dm2} patches over 4 dm2 left, "
+                f"the largest {self.largest_patch_m2:,.2f} m2"
+            )
+        if self.seconds_per_m2 is not None:
+            words += f", {self.seconds_per_m2:.1f} s/m2"
+        if self.illegal_share:
+            words += f"; {self.illegal_share:.1%} of the line is too near to what is not free"
+        return words
 
     @classmethod
     def of(cls, figures: FloorFigures) -> PlannedFloor:

@@ -35,6 +35,11 @@ figures:
   n_r_paper        revisits with the way home, to compare with the paper's Table I
   cost_s           seconds the robot drives and turns
   gap              steps / lower_bound_steps - 1, of steps whatever turns cost
+  floor            of a YAML map, on its own pixels, by a tool as wide as --cell:
+                   reachable_m2, all that the tool touches where the robot's disc can
+                   come to; the share of it that the line sweeps; seconds_per_m2 swept;
+                   patches left of more than 4 dm2, the largest; illegal_share, the part
+                   of the line where the robot would touch what is not known free
 
 fasaco searches until its budget ends, the walk is proven to be the best, or all ants
 have walked: a complete walk within milliseconds, then better ones by local search,

@@ -20,6 +20,8 @@ COVERED: Colour = (226, 238, 247)
 # By number of visits: two, three, four and more.
 RECOVERED: tuple[Colour, ...] = ((255, 232, 176), (255, 206, 140), (250, 172, 120))
 LEFT_OUT: Colour = (244, 214, 232)
+# Floor that the tool could reach: stronger than the cells left out, of which it may be part.
+UNSWEPT: Colour = (233, 120, 170)
 UNREACHABLE: Colour = (200, 60, 60)
 
 START: Colour = (13, 128, 92)

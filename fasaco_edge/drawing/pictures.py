@@ -10,11 +10,18 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.plot import MAX_HEIGHT, MAX_WIDTH, Plot, View, bounds_of
+from fasaco_edge.drawing.plot import MAX_HEIGHT, MAX_WIDTH, MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.reach import reachable_from
+
+
+def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
+    """Paint reachable floor that was not swept; return what the colour means."""
+    plot.paint(unswept, palette.UNSWEPT)
+    label = f"reachable floor not swept ({unswept.area_m2:,.1f} m2)"
+    return [KeyEntry("tile", palette.UNSWEPT, label)] if unswept.mask.any() else []
 
 
 def draw_visits(
@@ -74,6 +81,9 @@ def _entry(symbol: str, colour: palette.Colour, label: str, cells: NDArray[np.bo
 
 Points = NDArray[np.float64]
 
+# Cosine of a turn; what turns less goes straight on.
+STRAIGHT = 0.999
+
 
 def directions(points: Points) -> Points:
     """Return unit vectors (n - 1, 2) along points (n, 2), no two in succession equal."""
@@ -86,17 +96,18 @@ def lanes(points: Points, offset: float) -> tuple[Points, Points]:
     """Return start and end of every segment, both (m, 2), of the line beside ``points``.
 
     Args:
-        points: a walk (n, 2) of right angles, no two points in succession equal.
+        points: a walk or any other line (n, 2), no two points in succession equal.
         offset: how far to the right of the walk [same unit].
     """
     along = directions(points)
     right = np.stack([along[:, 1], -along[:, 0]], axis=1)
     cosine = (along[:-1] * along[1:]).sum(axis=1)
-    corner, back = np.abs(cosine) < 0.5, cosine <= -0.5
+    corner, back = np.abs(cosine) < STRAIGHT, cosine <= -0.5
     at_start, at_end = right.copy(), right.copy()
     # Where it turns, the two lanes meet beside the corner.
-    at_end[:-1][corner] += right[1:][corner]
-    at_start[1:][corner] += right[:-1][corner]
+    corner &= ~back
+    beside = (right[:-1] + right[1:])[corner] / (1 + cosine[corner])[:, None]
+    at_end[:-1][corner] = at_start[1:][corner] = beside
     # Where it turns back, they are joined a little beyond the centre.
     at_end[:-1][back] += along[:-1][back]
     at_start[1:][back] += along[:-1][back]
@@ -139,6 +150,7 @@ def draw_walk(
     grid: OccupancyGrid | None,
     title: str,
     lines: Sequence[str],
+    line_xy: Points | None = None,
 ) -> Image.Image:
     """Return a picture, RGB, of a walk over the lattice, with the map below it.
 
@@ -149,24 +161,42 @@ def draw_walk(
         grid: the map the lattice was made from; None draws the lattice's own states.
         title: heading.
         lines: caption below it.
+        line_xy: float64 (n, 2), n >= 1: what is driven in its place, points (x, y) [m] joined by
+            straight lines; None for the centres of the cells.
     """
     centres = lattice.centres(cells)
-    plot = Plot(View.over(bounds_of(grid, lattice, centres), lattice.cell_m))
+    driven = centres if line_xy is None else line_xy
+    plot = Plot(View.over(bounds_of(grid, lattice, driven), lattice.cell_m))
     plot.ground(lattice if grid is None else grid)
-    key = plot_walk(plot, lattice, cells)
+    key = plot_walk(plot, lattice, cells, driven)
     bar = ("0", f"{len(cells) - 1:,} steps")
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
 
 
-def plot_walk(plot: Plot, lattice: CoverageLattice, cells: NDArray[np.int32]) -> list[KeyEntry]:
-    """Draw a walk, int32 (n, 2) as in ``draw_walk``; return what its tints and marks mean."""
-    centres = lattice.centres(cells)
+def plot_walk(
+    plot: Plot, lattice: CoverageLattice, cells: NDArray[np.int32], line_xy: Points | None = None
+) -> list[KeyEntry]:
+    """Draw a walk, both as in ``draw_walk``; return what its tints and marks mean."""
+    line = lattice.centres(cells) if line_xy is None else line_xy
     key = draw_visits(plot, lattice, _visits(lattice, cells), tuple(cells[0].tolist()))
-    _draw_line(plot, centres, lattice.cell_m)
-    if (cells[0] != cells[-1]).any():
-        plot.end_mark(centres[-1])
-    plot.start_mark(centres[0])
+    _draw_line(plot, in_pieces(line, lattice.cell_m), lattice.cell_m)
+    if (line[0] != line[-1]).any():
+        plot.end_mark(line[-1])
+    plot.start_mark(line[0])
     return key
+
+
+def in_pieces(line: Points, longest: float) -> Points:
+    """Return a line (n, 2), n >= 1, with points added so that none are further apart than that.
+
+    A little more is left as it is: what is as long as a cell, rounded, is one piece.
+    """
+    ways = np.diff(line, axis=0)
+    counts = np.maximum(np.ceil(np.hypot(*ways.T) / longest - 1e-3), 1).astype(np.int64)
+    segment = np.repeat(np.arange(len(ways)), counts)
+    number = np.arange(1, len(segment) + 1) - (np.cumsum(counts) - counts)[segment]
+    share = (number / counts[segment])[:, None]
+    return np.vstack([line[:1], line[:-1][segment] + share * ways[segment]])
 
 
 def _visits(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.int64]:
@@ -176,10 +206,10 @@ def _visits(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.in
     return visits
 
 
-def _draw_line(plot: Plot, centres: NDArray[np.float64], cell_m: float) -> None:
-    moves = np.ones(len(centres), np.bool_)
-    moves[1:] = (np.diff(centres, axis=0) != 0).any(axis=1)
-    points = centres[moves]
+def _draw_line(plot: Plot, line: Points, cell_m: float) -> None:
+    moves = np.ones(len(line), np.bool_)
+    moves[1:] = (np.diff(line, axis=0) != 0).any(axis=1)
+    points = line[moves]
     offset = LANE_OFFSET * cell_m
     plot.track(*lanes(points, offset), LINE_WIDTH * cell_m)
 
@@ -206,6 +236,7 @@ def draw_mission(
     lines: Sequence[str],
     space: tuple[int, int] = (MAX_WIDTH, MAX_HEIGHT),
     jump_m: float = math.inf,
+    unswept: MapLayer | None = None,
 ) -> Image.Image:
     """Return a picture, RGB, of a mission's result.
 
@@ -218,11 +249,14 @@ def draw_mission(
         lines: caption below it.
         space: the most the map may take (width, height) [px].
         jump_m: two places further apart than this [m] are no drive, and not joined.
+        unswept: reachable floor that was not swept; None where that is not known.
     """
     plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m, *space))
     plot.ground(grid)
     start = lattice.cell_at(*driven_xy[0].tolist())
     key = draw_visits(plot, lattice, visits, start)
+    if unswept is not None:
+        key += draw_unswept(plot, unswept)
     lengths_m = np.hypot(*np.diff(driven_xy, axis=0).T)
     driven = lengths_m <= jump_m
     plot.track(driven_xy[:-1][driven], driven_xy[1:][driven], DRIVEN_WIDTH * lattice.cell_m)

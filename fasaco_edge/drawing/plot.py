@@ -11,7 +11,7 @@ from PIL import Image, ImageChops, ImageDraw
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.palette import Colour
-from fasaco_edge.grid.geometry import Bounds, Window
+from fasaco_edge.grid.geometry import Bounds, GridGeometry, Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
 
@@ -97,6 +97,19 @@ def bounds_of(
     return x0, y0, x1, y1
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class MapLayer:
+    """Marked pixels, bool (rows, cols), and where they lie; they need not be those of a map."""
+
+    geometry: GridGeometry
+    mask: NDArray[np.bool_]
+
+    @property
+    def area_m2(self) -> float:
+        """Area of the marked pixels [m2]."""
+        return int(np.count_nonzero(self.mask)) * self.geometry.resolution**2
+
+
 # Below this many pixels a cell, lines between cells would be all there is to see.
 RULED_CELL_PX = 14
 HATCH_PX = 7
@@ -125,24 +138,32 @@ class Plot:
             table[COVERABLE] = palette.FREE
             image = self._spread(source, table[source.states], palette.UNKNOWN)
         else:
-            image = self._placed(source)
+            shades = np.rint(np.linspace(palette.FREE, palette.OCCUPIED, 101))
+            # The last entry is for -1, unknown.
+            table = np.vstack([shades, palette.UNKNOWN]).astype(np.uint8)
+            image = self._placed(source.geometry, table[source.cells], palette.UNKNOWN)
         self._image, self._draw = image, ImageDraw.Draw(image)
 
-    def _placed(self, grid: OccupancyGrid) -> Image.Image:
-        shades = np.rint(np.linspace(palette.FREE, palette.OCCUPIED, 101))
-        # The last entry is for -1, unknown.
-        table = np.vstack([shades, palette.UNKNOWN]).astype(np.uint8)
-        geometry, step = grid.geometry, 1 / self.view.samples_per_metre
+    def _placed(
+        self, geometry: GridGeometry, values: NDArray[np.uint8], outside: Colour | int
+    ) -> Image.Image:
+        """Return pixels of a map, uint8 (rows, cols) or (rows, cols, 3), where they lie."""
+        step = 1 / self.view.samples_per_metre
         left, top = self.view.left, self.view.top
         col, row = geometry.to_pixels(left, top)
         right, down = geometry.to_pixels(left + step, top), geometry.to_pixels(left, top - step)
-        return Image.fromarray(table[grid.cells]).transform(
+        return Image.fromarray(values).transform(
             self._size,
             Image.Transform.AFFINE,
             (right[0] - col, down[0] - col, col, right[1] - row, down[1] - row, row),
             Image.Resampling.NEAREST,
-            fillcolor=palette.UNKNOWN,
+            fillcolor=outside,
         )
+
+    def paint(self, layer: MapLayer, colour: Colour) -> None:
+        """Paint the marked pixels of a layer."""
+        placed = self._placed(layer.geometry, layer.mask.astype(np.uint8) * 255, 0)
+        self._image.paste(colour, mask=placed)
 
     def tint(self, lattice: CoverageLattice, colours: NDArray[np.uint8]) -> None:
         """Tint cells, uint8 (rows, cols, 3); white leaves a cell as it is."""

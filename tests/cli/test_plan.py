@@ -36,7 +36,7 @@ KEYS = {
     *("revisits", "recovered_cells", "n_r_paper", "turns_90", "turns_180", "length_m"),
     *("kicks", "proposals", "cost_s", "lower_bound_steps", "gap", "first_walk_ms"),
     *("unreachable_cells", "wall_s", "cpu_s", "ended_by"),
-    *("speed_m_s", "turn_s", "budget_s", "target_gap", "threads"),
+    *("speed_m_s", "turn_s", "budget_s", "target_gap", "threads", "floor"),
 }
 
 
@@ -135,6 +135,8 @@ def test_the_figures_of_a_coverage_grid_are_right(plan, grid_file):
     assert set(figures) == KEYS
     assert (figures["planner"], figures["seed"], figures["ants"]) == ("fasaco", 3, 40)
     assert (figures["local_search"], figures["kicks"], figures["proposals"]) == (False, 0, 0)
+    # Its cells are all there is of it.
+    assert figures["floor"] is None
     check(figures, walk, cells_in(grid_file), (2, 5))
 
 
@@ -145,6 +147,21 @@ def test_the_figures_of_a_map_are_right(plan, tmp_path):
     options = ("--cell", 0.3, "--robot-radius", 0.18, "--ants", 40)
     figures, walk = plan(tmp_path / "room.yaml", *options, "--start-xy", "0.75,0.45")
     check(figures, walk, coverable_cells(pixels), (1, 2))
+    # A room of 3.9 x 2.9 m with a pillar, but for corners. Cells lie off its walls.
+    floor = figures["floor"]
+    assert floor["reachable_m2"] == pytest.approx(3.9 * 2.9 - 0.16, rel=0.04)
+    swept_m2 = floor["swept_share"] * floor["reachable_m2"]
+    assert 0.7 * figures["cells"] * 0.09 < swept_m2 < 1.05 * figures["cells"] * 0.09
+    assert floor["seconds_per_m2"] == pytest.approx(figures["cost_s"] / swept_m2, rel=0.01)
+    assert floor["patches_over_4_dm2"] >= 1
+    assert 0.04 < floor["largest_patch_m2"] < floor["reachable_m2"] - swept_m2
+    assert floor["illegal_share"] == 0.0
+
+
+def test_a_table_says_how_much_floor_is_swept(capsys):
+    assert main(["plan", "office", "--budget", "0.05"]) == 0
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert " of 40.9 m2 swept (" in said
 
 
 @pytest.mark.parametrize("origin", [Pose2D(0.0, 0.0), Pose2D(-40.0, 7.5, 0.4)])

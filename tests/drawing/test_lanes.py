@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fasaco_edge.drawing.pictures import arrow_places, directions, lanes
+from fasaco_edge.drawing.pictures import arrow_places, directions, in_pieces, lanes
 
 
 def walk(*points):
@@ -54,3 +54,21 @@ def test_arrows_stand_on_straight_stretches():
 
 def test_no_arrows_where_nothing_is_straight():
     assert len(arrow_places(walk((0, 0), (1, 0), (1, 1), (2, 1)), 0.5)) == 0
+
+
+def test_lanes_of_any_angle_stay_as_far_beside_the_line():
+    points = walk((0, 0), (4, 0), (6, 3), (7, 2), (8, -3), (9, -3.01))
+    starts, ends = lanes(points, 0.25)
+    joined(starts, ends)
+    for (ax, ay), way, start, end in zip(
+        points[:-1], directions(points), starts, ends, strict=True
+    ):
+        for x, y in (start, end):
+            assert way[0] * (y - ay) - way[1] * (x - ax) == pytest.approx(-0.25)
+
+
+def test_a_line_is_divided_evenly_where_it_is_long():
+    line = in_pieces(walk((0, 0), (3, 4), (3, 4.9), (3, 4.9)), 1.0)
+    assert line[:6].tolist() == pytest.approx(np.linspace((0, 0), (3, 4), 6))
+    assert line[6:].tolist() == [[3, 4.9], [3, 4.9]]
+    assert in_pieces(walk((3, 4)), 1.0).tolist() == [[3, 4]]

@@ -5,7 +5,7 @@ import pytest
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.pictures import draw_mission, draw_walk
-from fasaco_edge.drawing.plot import MAX_HEIGHT, MAX_WIDTH
+from fasaco_edge.drawing.plot import MAX_HEIGHT, MAX_WIDTH, MapLayer
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -177,6 +177,41 @@ def test_a_mission_shows_visits_trail_start_and_end():
     x, y = relative(places(picture, palette.COVERED, 1), area)
     assert (x, y) == pytest.approx((2.75 / 7, 1.25 / 5), abs=0.03)
     assert len(inside(places(picture, palette.LEFT_OUT), area)) > 1000
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.6])
+def test_a_mission_shows_floor_that_was_not_swept_where_it_is(yaw):
+    grid = room()
+    lattice = CoverageLattice.from_map(grid, FOOTPRINT)
+    visits = np.zeros(lattice.states.shape, np.uint16)
+    # A raster of its own: a square of 0.5 m around (2, 0.5).
+    mask = np.zeros((30, 40), bool)
+    mask[10:20, 20:30] = True
+    corner = GridGeometry(30, 40, 0.05, Pose2D(0.0, 0.0, yaw)).to_map(25, 15)
+    geometry = GridGeometry(30, 40, 0.05, Pose2D(2.0 - corner[0], 0.5 - corner[1], yaw))
+    layer = MapLayer(geometry, mask)
+    driven = np.array([(-1.25, -0.25), (-1.0, -0.25)])
+    picture = draw_mission(grid, lattice, driven, visits, title="", lines=[], unswept=layer)
+    area = drawing_area(picture)
+    found = inside(places(picture, palette.UNSWEPT), area)
+    assert relative(found, area) == pytest.approx((4.5 / 7, 2.0 / 5), abs=0.01)
+    # As large as it is, and in the key.
+    metre_px = (area[2] - area[0]) / 7
+    assert len(found) == pytest.approx(layer.area_m2 * metre_px**2, rel=0.1)
+    assert layer.area_m2 == pytest.approx(0.25)
+    assert len(places(picture, palette.UNSWEPT)) > len(found) + 100
+
+
+def test_a_line_beside_the_cells_is_drawn_where_it_is():
+    grid = room()
+    lattice = CoverageLattice.from_map(grid, FOOTPRINT)
+    line_xy = np.array([(-1.5, -0.5), (3.2, 1.9)])
+    walk = line((-1, -3), (-1, 6))
+    picture = draw_walk(lattice, walk, grid=grid, title="", lines=[], line_xy=line_xy)
+    area = drawing_area(picture)
+    assert relative(places(picture, palette.START), area) == pytest.approx((1 / 7, 1 / 5), abs=0.02)
+    end = relative(places(picture, palette.END), area)
+    assert end == pytest.approx((5.7 / 7, 3.4 / 5), abs=0.02)
 
 
 @pytest.mark.parametrize("driven", [[(0.0, 0.0)], [(50.0, 0.0), (-50.0, 3.0)]])
