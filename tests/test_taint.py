@@ -235,7 +235,7 @@ def recorded(folder: Path) -> Path:
         at_ns = BEGAN_NS + number * 10**9
         encoder.add(Arrival(topic, Sample(TAINT, payload, TAINT, attachment), at_ns, at_ns))
     part = Part(file, TAINT)
-    rr.set_time(entities.WALL, timestamp=np.datetime64(BEGAN_NS, "ns"), recording=part.stream)
+    rr.set_time(entities.WALL_CLOCK, timestamp=np.datetime64(BEGAN_NS, "ns"), recording=part.stream)
     for entity in (entities.MISSION_LOG, entities.BUS_LOG, entities.RECORDER_LOG):
         rr.log(entity, rr.TextLog(TAINT), recording=part.stream)
     rr.log(f"{entities.ERRORS}/{SCRIPT.replace('/', '')}", rr.Scalars(3.0), recording=part.stream)

@@ -42,7 +42,7 @@ from fasaco_edge.planners.problem import (
     graph_of,
     lower_bound_steps,
 )
-from fasaco_edge.planners.regions import EDGE, Patch, is_one_region, regions_of, stream_of
+from fasaco_edge.planners.regions import EDGE, WalkRegion, is_one_region, regions_of, stream_of
 from fasaco_edge.planners.repair import can_repair, repaired
 
 # Proposals between two pauses: about a millisecond.
@@ -157,7 +157,7 @@ class Search:
         self._groups = groups_of(planner.config, problem.cells)
         self._colony: Colony | None = None
         self._cohort, self._velocity = 0, planner.config.velocities[0]
-        self._patch = Patch(0, 0, 0, 0)
+        self._region = WalkRegion(0, 0, 0, 0)
 
     def run(self) -> Iterator[None]:
         """Search until nothing is left to do; pause after each piece of work."""
@@ -168,7 +168,7 @@ class Search:
         while not self._is_proven():
             before = self._work
             yield from self._perturb()
-            # The walk is too long for the patch, or in no region: nothing could be perturbed.
+            # The walk is too long for its memory, or in no region: nothing could be perturbed.
             stuck = self._work == before
             if not self._is_whole and self._since_gain >= GAINLESS_PASSES * self._perturbed_in_pass:
                 return
@@ -186,10 +186,10 @@ class Search:
         """
         best_us, steps = self._best_us, self._best.size - 1
         exact = self._is_whole or not self._prices.quarter_turn_us
-        if self._patch.is_loaded and exact:
-            here_us = self._walk_us + self._patch.gain_us
+        if self._region.is_loaded and exact:
+            here_us = self._walk_us + self._region.gain_us
             if here_us < best_us:
-                best_us, steps = here_us, self._walk.size - 1 + self._patch.longer_by
+                best_us, steps = here_us, self._walk.size - 1 + self._region.longer_by
         return SearchProgress(self._work, best_us / MICROSECONDS, steps, self._bound)
 
     def path(self) -> CoveragePath:
@@ -209,7 +209,7 @@ class Search:
 
     @property
     def _work(self) -> SearchWork:
-        return self._patch.work + SearchWork(ants=self._ants)
+        return self._region.work + SearchWork(ants=self._ants)
 
     def _is_proven(self) -> bool:
         """Return whether no walk can be better: it has no step and no turn too many."""
@@ -217,13 +217,13 @@ class Search:
             return True
         return not self._prices.quarter_turn_us and self.progress().steps == self._bound
 
-    def _new_patch(self) -> Patch:
+    def _new_region(self) -> WalkRegion:
         framed, cells = self._framed, self._problem.cells
         if self._is_whole:
             # Few cells may lie far apart: then most of the walk is between them.
             visits = max(VISITS_PER_CELL * cells, 2 * self._walk.size)
-            return Patch(framed.rows, framed.cols, visits, 1)
-        return Patch(EDGE, EDGE, VISITS_PER_CELL * EDGE * EDGE, JUMPS)
+            return WalkRegion(framed.rows, framed.cols, visits, 1)
+        return WalkRegion(EDGE, EDGE, VISITS_PER_CELL * EDGE * EDGE, JUMPS)
 
     def _begin(self) -> Iterator[None]:
         for walk in first_walks(self._problem, self._graph):
@@ -235,22 +235,22 @@ class Search:
                 self._walk, self._walk_us = self._framed.framed(walk), cost_us
                 self._best, self._best_us = self._walk, self._walk_us
             yield
-        self._patch = self._new_patch()
+        self._region = self._new_region()
         self._bound = lower_bound_steps(self._problem)
 
     def _regions(self) -> Iterator[None]:
         """Load each region of the next pass in turn."""
         for box in regions_of(self._framed, self._problem.cells, self._passes):
-            if self._patch.load(self._framed, self._walk, box):
+            if self._region.load(self._framed, self._walk, box):
                 yield
                 self._unload()
         self._passes += 1
 
     def _unload(self) -> None:
         """Put the region's best walk back, if that is a gain or costs nothing."""
-        if not self._patch.is_loaded:
+        if not self._region.is_loaded:
             return
-        walk = self._patch.put_back()
+        walk = self._region.put_back()
         cost_us = self._problem.cost_us(walk)
         if cost_us < self._walk_us:
             self._since_gain = 0
@@ -264,14 +264,14 @@ class Search:
         effort = self._effort
         for _ in range(1 if self._is_whole else 2):
             for _ in self._regions():
-                at_each = effort.proposals * self._patch.best_length // len(effort.temperatures_us)
+                at_each = effort.proposals * self._region.best_length // len(effort.temperatures_us)
                 for temperature_us in effort.temperatures_us:
                     for proposals in _pieces(at_each, PROPOSALS_AT_ONCE):
-                        self._patch.improve(temperature_us, proposals, self._random)
+                        self._region.improve(temperature_us, proposals, self._random)
                         yield
                         if self._is_proven():
                             return
-                self._patch.go_back()
+                self._region.go_back()
 
     def _perturb(self) -> Iterator[None]:
         """Perturb the walk in every region."""
@@ -279,11 +279,11 @@ class Search:
         times = PERTURBATIONS_IN_VISIT if self._is_whole else PERTURBATIONS_IN_PASS
         self._perturbed_in_pass = 0
         for _ in self._regions():
-            proposals = rules.proposals * self._patch.best_length
+            proposals = rules.proposals * self._region.best_length
             if rules.radius >= 0:
                 proposals = min(proposals, PROPOSALS_AT_ONCE // 4)
             for piece in _pieces(times, max(PROPOSALS_AT_ONCE // proposals, 1)):
-                self._patch.perturb(rules, piece, self._random)
+                self._region.perturb(rules, piece, self._random)
                 self._since_gain += piece
                 self._perturbed_in_pass += piece
                 yield

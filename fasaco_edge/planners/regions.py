@@ -56,8 +56,8 @@ EVERYWHERE = np.empty(0, np.int32)
 LOOPS = 4096
 
 
-class Patch:
-    """Memory for a region of up to ``rows`` x ``cols`` cells and a walk in it.
+class WalkRegion:
+    """A region of a walk in memory of its own: up to ``rows`` x ``cols`` cells and the walk there.
 
     Args:
         rows, cols: size of the largest region.
@@ -101,7 +101,7 @@ class Patch:
         Args:
             framed: the whole ground.
             cells: int32 (n,), the whole walk.
-            box: the region, no larger than the patch.
+            box: the region, no larger than this memory.
         """
         ground, prices = framed.ground, framed.prices
         _, walk, _, tally, _ = self._search
@@ -294,12 +294,12 @@ class Neighbourhood:
     changed: NDArray[np.int32]
     is_first: bool
 
-    def patch(self, walk: NDArray[np.int32]) -> Patch:
+    def walk_region(self, walk: NDArray[np.int32]) -> WalkRegion:
         """Return memory for it, and for the parts of a walk, framed cells, that lie in it."""
         inside = self.box.labels[walk] == self.box.label
         jumps = int(np.count_nonzero(np.diff(inside))) // 2 + 1
         visits = int(np.count_nonzero(inside)) + 4 * jumps + SPARE_VISITS
-        return Patch(self.box.rows, self.box.cols, visits, jumps)
+        return WalkRegion(self.box.rows, self.box.cols, visits, jumps)
 
 
 def neighbourhoods(

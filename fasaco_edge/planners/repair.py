@@ -24,7 +24,7 @@ from fasaco_edge.planners.effort import repair_for
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import NO_WORK, SearchProgress, StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround, lower_bound_steps
-from fasaco_edge.planners.regions import Neighbourhood, Patch, neighbourhoods, spot, stream_of
+from fasaco_edge.planners.regions import Neighbourhood, WalkRegion, neighbourhoods, spot, stream_of
 
 
 def completed(
@@ -122,17 +122,17 @@ class _Repair:
         self._cost_us = problem.cost_us(self._walk)
         self._bound = lower_bound_steps(problem)
         self._random = stream_of(seed, len(self._walk))
-        # Work on the patches before, and the patch that is being improved.
+        # Work on the regions before, and the region that is being improved.
         self._work = NO_WORK
-        self._patch: Patch | None = None
+        self._region: WalkRegion | None = None
 
     def run(self) -> Iterator[None]:
         """Improve the walk, one neighbourhood after the other; pause after each piece of work."""
         for place in self._places():
-            patch = place.patch(self._walk)
-            if patch.load(self._framed, self._walk, place.box):
-                self._patch = patch
-                yield from self._improve(patch, place)
+            region = place.walk_region(self._walk)
+            if region.load(self._framed, self._walk, place.box):
+                self._region = region
+                yield from self._improve(region, place)
                 self._unload()
 
     def _places(self) -> Iterator[Neighbourhood]:
@@ -150,20 +150,20 @@ class _Repair:
             if gainless * SPOT_CELLS > PASSES * len(self._walk):
                 return
 
-    def _improve(self, patch: Patch, place: Neighbourhood) -> Iterator[None]:
+    def _improve(self, region: WalkRegion, place: Neighbourhood) -> Iterator[None]:
         """Improve around the changes, then perturb; pause after each piece.
 
         Moves at no cost shift a walk about: at first not just ahead of the robot.
         """
         for held in (HELD_CELLS, 0) if place.is_first else (0,):
-            patch.hold(held)
-            patch.touch_up(place.changed, self._effort.rules, self._random)
+            region.hold(held)
+            region.touch_up(place.changed, self._effort.rules, self._random)
             yield
         for done in range(0, self._effort.perturbations, PERTURBATIONS_AT_ONCE):
             if self._is_proven():
                 return
-            patch.hold(HELD_CELLS if place.is_first and done < self._effort.held else 0)
-            patch.perturb(self._effort.rules, PERTURBATIONS_AT_ONCE, self._random)
+            region.hold(HELD_CELLS if place.is_first and done < self._effort.held else 0)
+            region.perturb(self._effort.rules, PERTURBATIONS_AT_ONCE, self._random)
             yield
 
     def _is_proven(self) -> bool:
@@ -171,20 +171,20 @@ class _Repair:
         return not self._framed.prices.quarter_turn_us and self.progress().steps == self._bound
 
     def _unload(self) -> None:
-        """Put the patch that is being improved back into the walk."""
-        if self._patch is None:
+        """Put the region that is being improved back into the walk."""
+        if self._region is None:
             return
-        self._walk, self._work = self._patch.put_back(), self._work + self._patch.work
+        self._walk, self._work = self._region.put_back(), self._work + self._region.work
         self._cost_us = self._problem.cost_us(self._walk)
-        self._patch = None
+        self._region = None
 
     def progress(self) -> SearchProgress:
         """Return how far it is."""
         cost_us, steps, work = self._cost_us, self._walk.size - 1, self._work
-        if self._patch is not None:
-            cost_us += self._patch.gain_us
-            steps += self._patch.longer_by
-            work += self._patch.work
+        if self._region is not None:
+            cost_us += self._region.gain_us
+            steps += self._region.longer_by
+            work += self._region.work
         return SearchProgress(work, cost_us / MICROSECONDS, steps, self._bound)
 
     def path(self, name: str, seed: int) -> CoveragePath:

@@ -6,7 +6,7 @@ from typing import Final
 
 APPLICATION: Final = "fasaco_edge"
 
-WALL: Final = "wall"
+WALL_CLOCK: Final = "wall"
 """Timeline: when the recorder received it."""
 REPLAN: Final = "replan"
 """Timeline: revision of the path in force."""

@@ -109,7 +109,7 @@ class MissionDrive:
         self.began = now if self.began is None else self.began
         events, malformed = self._inbox.decode(batch)
         claim = ClaimState.PLANS if may_begin else ClaimState.WAITS
-        mission, events, useless = self._runner.start(events, claim)
+        mission, events, useless = self._runner.mission_for(events, claim)
         refused = (*malformed, *useless)
         at_s = now - self.began
         if mission is None:

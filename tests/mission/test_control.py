@@ -29,7 +29,7 @@ def cells(row0, col0, row1, col1):
 def idle(*rows, cell=(0, 0)):
     """A robot that waits for an order."""
     events = MapReceived(building(*rows)), pose_at(*cell)
-    return Drive(cell, *events, assignment=OrderState.idle("no order yet"))
+    return Drive(cell, *events, order_state=OrderState.idle("no order yet"))
 
 
 def follow(drive, ticks=600):
@@ -47,7 +47,7 @@ def follow(drive, ticks=600):
 
 
 def test_without_an_order_it_stands_and_says_so():
-    drive = Drive((0, 0), assignment=OrderState.idle("no order yet"))
+    drive = Drive((0, 0), order_state=OrderState.idle("no order yet"))
     assert (drive.mission.state, drive.mission.reason) == (State.IDLE, "no order yet")
     drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0))
     assert drive.mission.state is State.IDLE
@@ -339,7 +339,7 @@ def test_unknown_parts_of_a_zone_are_named():
 def resumed(drive, cell, *rows):
     """What comes after a kill -9: all that was kept, and nothing else."""
     kept = drive.mission.snapshot()
-    again = Drive(cell, assignment=OrderState.from_json(kept.note))
+    again = Drive(cell, order_state=OrderState.from_json(kept.note))
     again.mission.restore_ledger(kept)
     again.tell(MapReceived(building(*rows)), pose_at(*cell))
     return again
@@ -472,7 +472,7 @@ HOUSE = ("....#.......", "....#.####..", "....#.#..#..", "......#.....", "....#.
 
 def test_a_zone_nobody_has_seen_yet_is_looked_for():
     mapper = Mapper(*HOUSE)
-    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), assignment=OrderState.idle("none"))
+    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), order_state=OrderState.idle("none"))
     # Through the door in the middle, around the corner, and in from behind.
     decision = drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(0, 7, 3, 9)}]})
     assert decision.plan.reason == "looking for a way to zone 'a'"
@@ -485,7 +485,7 @@ def test_a_zone_nobody_has_seen_yet_is_looked_for():
 
 def test_a_zone_without_a_way_to_it_is_given_up_once_all_is_seen():
     mapper = Mapper(*(line.replace("#..#", "####", 1) for line in HOUSE))
-    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), assignment=OrderState.idle("none"))
+    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), order_state=OrderState.idle("none"))
     drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(1, 7, 2, 9)}]})
     mapper.rows = tuple(line[:6] + "######" for line in HOUSE)
     explore(drive, mapper)

@@ -158,7 +158,7 @@ def test_the_legs_of_an_order():
 
 
 @pytest.mark.parametrize(
-    "assignment",
+    "order_state",
     [
         OrderState.autostart(),
         OrderState.idle("cancelled"),
@@ -167,8 +167,8 @@ def test_the_legs_of_an_order():
         OrderState(MissionOrder(return_home=True), stage=Stage.OVER),
     ],
 )
-def test_what_is_kept_is_what_was(assignment):
-    assert OrderState.from_json(assignment.to_json()) == assignment
+def test_what_is_kept_is_what_was(order_state):
+    assert OrderState.from_json(order_state.to_json()) == order_state
 
 
 @pytest.mark.parametrize(
@@ -218,8 +218,8 @@ def test_another_order_replaces_the_one_before_and_the_same_one_begins_again_whe
 
 @pytest.mark.parametrize("command", ["pause", "resume"])
 @pytest.mark.parametrize(
-    "assignment", [OrderState.idle("cancelled"), OrderState(TWO, stage=Stage.OVER)]
+    "order_state", [OrderState.idle("cancelled"), OrderState(TWO, stage=Stage.OVER)]
 )
-def test_there_has_to_be_a_mission_to_pause(command, assignment):
+def test_there_has_to_be_a_mission_to_pause(command, order_state):
     with pytest.raises(CommandError, match=f"there is no mission to {command}"):
-        assignment.commanded(command, TWO)
+        order_state.commanded(command, TWO)

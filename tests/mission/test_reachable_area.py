@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.coverage.progress import FAR_CELLS, LOOK_AHEAD, DrivenPath
+from fasaco_edge.mission.coverage.progress import FAR_CELLS, LOOK_AHEAD, PathProgress
 from fasaco_edge.mission.map import reachable_area as area_module
 from fasaco_edge.mission.map.reachable_area import AreaChange, ReachableArea, anchor_cell
 from tests import naive
@@ -257,7 +257,7 @@ def everywhere(cell):
 
 
 def test_a_pose_in_the_lane_beside_leaves_out_nothing():
-    lanes = DrivenPath(
+    lanes = PathProgress(
         path(*[(0, col) for col in range(6)], *[(1, col) for col in range(5, -1, -1)])
     )
     beside = lanes.driven_to((1, 3), lambda cell: cell == (0, 0))
@@ -267,7 +267,7 @@ def test_a_pose_in_the_lane_beside_leaves_out_nothing():
 
 
 def test_a_driven_path_follows_the_robot_a_little_way_ahead():
-    line = DrivenPath(path(*[(0, col) for col in range(40)]))
+    line = PathProgress(path(*[(0, col) for col in range(40)]))
     assert line.driven_to((0, 3), everywhere).index == 3
     assert line.driven_to((0, LOOK_AHEAD - 1), everywhere).index == LOOK_AHEAD - 1
     assert line.driven_to((0, LOOK_AHEAD), everywhere).index == 0
@@ -279,7 +279,7 @@ def test_a_driven_path_follows_the_robot_a_little_way_ahead():
 
 
 def test_a_path_that_comes_back_is_followed_once_each_way():
-    spike = DrivenPath(path((0, 0), (0, 1), (0, 0), (1, 0)))
+    spike = PathProgress(path((0, 0), (0, 1), (0, 0), (1, 0)))
     out = spike.driven_to((0, 1), everywhere)
     assert (
         spike.driven_to((0, 0), everywhere).index,
@@ -291,10 +291,10 @@ def test_a_path_that_comes_back_is_followed_once_each_way():
 
 
 def test_a_robot_is_far_from_its_path_beyond_some_cells():
-    line = DrivenPath(path((0, 0), (0, 1)))
+    line = PathProgress(path((0, 0), (0, 1)))
     assert not line.is_far((FAR_CELLS, 0))
     assert line.is_far((FAR_CELLS, 1))
-    nothing = DrivenPath(np.empty((0, 2), np.int32))
+    nothing = PathProgress(np.empty((0, 2), np.int32))
     assert not nothing.is_far((9, 9))
     assert nothing.finished
     assert nothing.driven_to((0, 0), everywhere) is nothing

@@ -61,7 +61,7 @@ def test_what_the_map_shows_meanwhile_does_not_hide_that_it_was_asked_for():
     [
         (lambda: Drive((0, 0)), "there is no map yet"),
         (lambda: Drive((0, 0), MapReceived(building(*ROOM))), "there is no pose yet"),
-        (lambda: Drive((0, 0), assignment=OrderState.idle("")), "there is no mission"),
+        (lambda: Drive((0, 0), order_state=OrderState.idle("")), "there is no mission"),
         (lambda: Drive((9, 9), MapReceived(building(*ROOM)), pose_at(9, 9)), "outside of the map"),
     ],
 )

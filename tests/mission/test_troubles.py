@@ -208,7 +208,7 @@ def test_whatever_happens_it_is_a_state_with_a_reason_and_the_same_every_time(se
     random = np.random.default_rng(seed)
     truth = np.zeros((8, 20), np.int8)
     config = with_policy(WATCHFUL, retries=1, retry_s=5.0)
-    drive = Drive((0, 0), config=config, assignment=OrderState.idle("no order"))
+    drive = Drive((0, 0), config=config, order_state=OrderState.idle("no order"))
     heard = [((), drive.now)]
     again = Mission(config, OrderState.idle("no order"))
 

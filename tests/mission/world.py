@@ -90,8 +90,8 @@ class Drive:
 
     refused = None
 
-    def __init__(self, cell, *first_events, config=CONFIG, assignment=None):
-        self.mission = Mission(config, assignment)
+    def __init__(self, cell, *first_events, config=CONFIG, order_state=None):
+        self.mission = Mission(config, order_state)
         self.cell = cell
         self.now = 0.0
         self.walk = []

@@ -109,7 +109,7 @@ def test_a_search_ends_by_itself_and_that_repeats_too(room, cost):
 
 @settings(max_examples=60, deadline=None)
 @given(rows=st.integers(1, 200), cols=st.integers(1, 200), number=st.integers(0, 5))
-def test_each_cell_is_of_one_region_and_that_fits_into_the_patch(rows, cols, number):
+def test_each_cell_is_of_one_region_and_that_fits_into_memory(rows, cols, number):
     problem = CoverageProblem.of(CoverageLattice.from_free(np.ones((rows, cols), bool)), (0, 0))
     framed = FramedGround.of(problem)
     for cells in (regions.ONE_REGION, regions.ONE_REGION + 1):

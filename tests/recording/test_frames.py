@@ -39,7 +39,9 @@ def recorded(folder, *batches):
     file = folder / f"{RUN_ID}-part1.rrd"
     part = Part(file, RUN_ID)
     for number in range(5):
-        rr.set_time(entities.WALL, timestamp=np.datetime64(BEGAN_NS, "ns"), recording=part.stream)
+        rr.set_time(
+            entities.WALL_CLOCK, timestamp=np.datetime64(BEGAN_NS, "ns"), recording=part.stream
+        )
         rr.log(entities.COVERED_FRACTION, rr.Scalars(0.2 * number), recording=part.stream)
         rr.log(entities.MISSION_LOG, rr.TextLog(f"covering: {number}"), recording=part.stream)
     rr.log("world/card", rr.TextDocument("static"), static=True, recording=part.stream)

@@ -219,7 +219,7 @@ def _texts(path: Path, entity: str, component: str) -> tuple[str, ...]:
 
 
 def _wall_ns(batch: Any) -> NDArray[np.int64]:
-    wall: NDArray[np.int64] = batch.column(entities.WALL).to_numpy(False).astype(np.int64)
+    wall: NDArray[np.int64] = batch.column(entities.WALL_CLOCK).to_numpy(False).astype(np.int64)
     return wall
 
 

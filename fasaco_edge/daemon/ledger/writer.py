@@ -38,41 +38,41 @@ class LedgerKeeper:
     """Keeps coverage and order in the ledger; also before there is a mission.
 
     Attributes:
-        assignment: the order to begin with: the one that was under way, if any.
+        order_state: the order to begin with: the one that was under way, if any.
     """
 
     def __init__(self, writer: LedgerWriter, cell_m: float, *, autostart: bool) -> None:
         self._faults: list[FasacoError] = []
         self._writer = writer
         self._before = writer.restored or LedgerSnapshot(cell_m, "", 0, {})
-        self.assignment = self._first_assignment(autostart)
-        self._kept = self._before.total, self.assignment
+        self.order_state = self._first_order_state(autostart)
+        self._kept = self._before.total, self.order_state
         self._kept_at = float("-inf")
 
     def restore(self, mission: Mission) -> None:
         """Let a mission go on where the former one ended."""
         if self._before.cells:
             mission.restore_ledger(self._before)
-        mission.restore_order(self.assignment)
+        mission.restore_order(self.order_state)
 
     def take_back(self, mission: Mission) -> None:
         """Take what a mission has done, for the one that replaces it."""
-        self._before, self.assignment = mission.snapshot(), mission.order_state
+        self._before, self.order_state = mission.snapshot(), mission.order_state
 
     def keep(self, mission: Mission | None, now: float) -> None:
         """Have changes written: an order at once, coverage once a period."""
         total = mission.ledger.total if mission else self._before.total
-        assignment = mission.order_state if mission else self.assignment
-        kept_total, kept_assignment = self._kept
-        if total == kept_total and assignment == kept_assignment:
+        order_state = mission.order_state if mission else self.order_state
+        kept_total, kept_order_state = self._kept
+        if total == kept_total and order_state == kept_order_state:
             return
-        if assignment == kept_assignment and now - self._kept_at < PERIOD_S:
+        if order_state == kept_order_state and now - self._kept_at < PERIOD_S:
             return
-        self._kept, self._kept_at = (total, assignment), now
+        self._kept, self._kept_at = (total, order_state), now
         if mission is not None:
             self._writer.put(mission.snapshot())
         else:
-            self._before = replace(self._before, note=assignment.to_json())
+            self._before = replace(self._before, note=order_state.to_json())
             self._writer.put(self._before)
 
     def is_kept(self, now: float) -> bool:
@@ -103,7 +103,7 @@ class LedgerKeeper:
         self._writer.begin_anew(fault, why)
         self._kept, self._kept_at = (-1, OrderState()), float("-inf")
 
-    def _first_assignment(self, autostart: bool) -> OrderState:
+    def _first_order_state(self, autostart: bool) -> OrderState:
         """Return the order that was under way, or the one to begin with."""
         kept = OrderState.idle(NO_ORDER)
         try:

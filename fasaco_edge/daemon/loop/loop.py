@@ -100,7 +100,7 @@ class Loop:
             self._reload_config(batch)
         now = time.monotonic()
         events, faults = self._bus.inbox.decode(batch)
-        self._refuse(faults)
+        self._count_faults(faults)
         self._note(batch)
         commands = self._bus.commands.take(batch.questions, now)
         decision = self._step(events, commands, batch, now)
@@ -179,8 +179,8 @@ class Loop:
         self._latency = MapLatency()
         self._coverage.forget()
 
-    def _refuse(self, faults: Sequence[FasacoError]) -> None:
-        """Count what was refused; ask for the map that updates lack."""
+    def _count_faults(self, faults: Sequence[FasacoError]) -> None:
+        """Count faults; ask for the map that updates lack."""
         self._status.faults.count(faults)
         if any(isinstance(fault, PatchWithoutBase) for fault in faults):
             self._bus.inbox.ask_for_map(time.monotonic())
@@ -203,8 +203,8 @@ class Loop:
         self, events: list[Event], commands: list[CommandReceived], batch: Batch, now: float
     ) -> Decision:
         """Step the mission and perform what it decides; during startup, only hold events."""
-        mission, events, faults = self._runner.start(events, self._bus.claim.state)
-        self._refuse(faults)
+        mission, events, faults = self._runner.mission_for(events, self._bus.claim.state)
+        self._count_faults(faults)
         if mission is None:
             return Decision(answers=self._runner.answer(commands, self._status.stands_back))
         self._status.waits = "no map yet"
@@ -224,7 +224,7 @@ class Loop:
         return decision
 
     def _perform(self, mission: Mission, decision: Decision) -> None:
-        self._refuse(decision.faults)
+        self._count_faults(decision.faults)
         self._keeper.note_faults(decision.faults)
         if decision.forgotten:
             self._keeper.forget()

@@ -146,16 +146,16 @@ class MissionRunner:
         self._held = HeldEvents()
 
     @property
-    def assignment(self) -> OrderState:
+    def order_state(self) -> OrderState:
         """What the mission does, or will do."""
-        return self.mission.order_state if self.mission else self._keeper.assignment
+        return self.mission.order_state if self.mission else self._keeper.order_state
 
     @property
     def loading(self) -> str:
         """What startup is loading; "" for nothing."""
         return self._loader.stage if self._loader else ""
 
-    def start(
+    def mission_for(
         self, events: list[Event], claim: ClaimState
     ) -> tuple[Mission | None, list[Event], list[FasacoError]]:
         """Return the mission, once it is loaded and this daemon plans, and the events for it.
@@ -181,14 +181,14 @@ class MissionRunner:
 
         ``rival`` says why another daemon is to be commanded; "" for none.
         """
-        return tuple(Answer(asked.number, self._refusal(asked, rival)) for asked in commands)
+        return tuple(Answer(asked.number, self._carry_out(asked, rival)) for asked in commands)
 
-    def _refusal(self, asked: CommandReceived, rival: str) -> FasacoError | None:
-        """Take a command; return why it is refused."""
+    def _carry_out(self, asked: CommandReceived, rival: str) -> FasacoError | None:
+        """Carry a command out on the order that is kept; return why it is refused, if it is."""
         try:
             if rival:
                 raise CommandError(rival, hint="command the one that plans")
-            self._keeper.assignment = self.assignment.commanded(asked.command, asked.order)
+            self._keeper.order_state = self.order_state.commanded(asked.command, asked.order)
             if asked.command == "replan":
                 raise CommandError("nothing to plan: the first plan is still to come")
         except FasacoError as error:
@@ -198,7 +198,7 @@ class MissionRunner:
         return None
 
     def held(self) -> list[Event]:
-        """Return the events that tell another mission map and pose."""
+        """Return newest map and pose as events, for a new mission."""
         if self.mission is None:
             return self._held.events
         grid, pose = self.mission.grid, self.mission.pose
@@ -288,7 +288,7 @@ class Loader:
         )
         chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
-        mission = MissionConfig(
+        config = MissionConfig(
             footprint,
             maps.max_lattice_cells,
             robot.cost(),
@@ -298,7 +298,7 @@ class Loader:
         first = (
             OrderState.autostart() if self._config.mission.autostart else OrderState.idle(NO_ORDER)
         )
-        return Mission(mission, first), worker
+        return Mission(config, first), worker
 
     def _report(self, stage: str) -> None:
         self.stage = f"kernels: {stage}"

@@ -82,12 +82,12 @@ class StatusBoard:
 
         A daemon that waits for another one leaves the heartbeat to that one.
         """
-        mission, assignment = runner.mission, runner.assignment
+        mission, order_state = runner.mission, runner.order_state
         state, reason = self._state(runner)
         recorder = self.recorder and self.recorder.state
         revision = self.path and self.path.revision
         claim = self.claim.stand
-        key = (state, reason, revision, recorder, self.ledger.fault, assignment, claim)
+        key = (state, reason, revision, recorder, self.ledger.fault, order_state, claim)
         # Many small faults are not worth a message each: the heartbeat counts them.
         heartbeat_s = float("inf") if self.stands_back else HEARTBEAT_S
         wait = LEAST_INTERVAL_S if key != self._sent_key else heartbeat_s
@@ -115,7 +115,7 @@ class StatusBoard:
             cpu_s=round(time.process_time(), 3),
             threads=thread_count(),
             config=self._shown_config,
-            mission=mission_report(mission, assignment),
+            mission=mission_report(mission, order_state),
         )
 
     def reply(self, runner: MissionRunner) -> Reply:
@@ -126,7 +126,7 @@ class StatusBoard:
             state=state,
             reason=reason,
             coverage=_coverage(runner.mission),
-            mission=mission_report(runner.mission, runner.assignment),
+            mission=mission_report(runner.mission, runner.order_state),
         )
 
     def _state(self, runner: MissionRunner) -> tuple[str, str]:
@@ -134,10 +134,10 @@ class StatusBoard:
             return "blocked", self.stands_back
         if (mission := runner.mission) is not None:
             return str(mission.state), mission.reason
-        assignment, loading = runner.assignment, runner.loading
-        if assignment.order is None:
-            return "idle", assignment.why
-        if assignment.paused:
+        order_state, loading = runner.order_state, runner.loading
+        if order_state.order is None:
+            return "idle", order_state.why
+        if order_state.paused:
             return "paused", "paused by command"
         return ("loading", loading) if loading else ("waiting for map", self.waits)
 
@@ -204,30 +204,30 @@ def _ms(seconds: float | None) -> float | None:
     return None if seconds is None else round(1e3 * seconds, 3)
 
 
-def mission_report(mission: Mission | None, assignment: OrderState) -> MissionReport:
+def mission_report(mission: Mission | None, order_state: OrderState) -> MissionReport:
     """Return this part of the status."""
-    order, zone = assignment.order, assignment.current_zone
-    home = assignment.home
+    order, zone = order_state.order, order_state.current_zone
+    home = order_state.home
     lattice = mission.lattice if mission else None
     return MissionReport(
-        ordered=None if order is None else ("itself" if assignment.automatic else "command"),
-        stage=None if order is None else str(assignment.stage),
-        paused=assignment.paused,
+        ordered=None if order is None else ("itself" if order_state.automatic else "command"),
+        stage=None if order is None else str(order_state.stage),
+        paused=order_state.paused,
         zone=None if zone is None or zone.polygon is None else zone.name,
-        pass_number=None if zone is None else assignment.pass_number,
+        pass_number=None if zone is None else order_state.pass_number,
         passes=None if zone is None else zone.passes,
-        zones=_zones(mission, assignment),
+        zones=_zones(mission, order_state),
         keep_out=0 if order is None else len(order.keep_out),
         return_home=bool(order and order.return_home),
         home=None if home is None or lattice is None else Point(*_centre(home, lattice.cell_m)),
-        tries=assignment.tries,
+        tries=order_state.tries,
         unreached=_unreached(mission),
     )
 
 
-def _zones(mission: Mission | None, assignment: OrderState) -> tuple[ZoneReport, ...]:
+def _zones(mission: Mission | None, order_state: OrderState) -> tuple[ZoneReport, ...]:
     if mission is None:
-        zones = assignment.order.zones if assignment.order else ()
+        zones = order_state.order.zones if order_state.order else ()
         return tuple(
             ZoneReport(zone.name, zone.passes) for zone in zones if zone.polygon is not None
         )

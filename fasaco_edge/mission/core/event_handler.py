@@ -123,7 +123,7 @@ class EventHandler:
     def _go_on(self, misfit: LedgerMismatchError | None) -> None:
         """Update what can be reached; begin anew where the ledger is of another place."""
         if misfit is not None:
-            self.begin_order(self.orders.state.in_other_building(str(misfit)))
+            self.begin_order(self.orders.order_state.in_other_building(str(misfit)))
         self.update_area()
         if misfit is not None:
             self.route.want(self.ledger.first_plan_reason)
@@ -136,7 +136,7 @@ class EventHandler:
         misfit = self.ledger.move_to(frame)
         if misfit is None and before not in ("", frame):
             why = f"map and poses are in frame {frame!r} now, no more in {before!r}"
-            self.begin_order(self.orders.state.in_other_frame(why))
+            self.begin_order(self.orders.order_state.in_other_frame(why))
         if not is_other_map and misfit is None:
             return
         self._leave_map(f"map and poses are in frame {frame!r} now")
@@ -189,7 +189,7 @@ class EventHandler:
 
     def _obey(self, event: CommandReceived) -> None:
         """Carry out a command; what is wrong with it is its answer."""
-        before = self.orders.state
+        before = self.orders.order_state
         try:
             if event.command == "start":
                 self.map.check_zones(event.order)

@@ -72,9 +72,9 @@ class Executive:
             # A robot that had to stop waits a moment.
             is_too_soon = self._state is State.BLOCKED and not self._has_waited()
             return Decision(path=update) if is_too_soon else self._request(cell, update)
-        if orders.state.stage is Stage.RETURNING and cell == orders.state.home:
+        if orders.order_state.stage is Stage.RETURNING and cell == orders.order_state.home:
             orders.advance(now)
-        if orders.state.stage is Stage.OVER or (
+        if orders.order_state.stage is Stage.OVER or (
             orders.is_waiting and route.path.finished and route.pending is None
         ):
             return self._settle(update)
@@ -84,7 +84,7 @@ class Executive:
 
     def _why_resting(self) -> tuple[State, str] | None:
         """Return the state and reason of a robot with nothing to decide on; None where there is."""
-        order = self.orders.state
+        order = self.orders.order_state
         if order.order is None:
             return State.IDLE, order.why
         if order.paused:
@@ -116,7 +116,7 @@ class Executive:
         route = self.route
         if route.pending is not None and not len(route.path.cells):
             self._state, self._reason = State.PLANNING, route.pending.reason
-        elif self.orders.state.stage is not Stage.RETURNING:
+        elif self.orders.order_state.stage is not Stage.RETURNING:
             self._state, self._reason = State.COVERING, f"path {route.revision}"
 
     def _has_waited(self) -> bool:
@@ -159,7 +159,7 @@ class Executive:
         """Request the plan that is wanted; where nothing is to be covered, go on."""
         route, orders = self.route, self.orders
         orders.reopen()
-        while orders.state.stage is not Stage.RETURNING:
+        while orders.order_state.stage is not Stage.RETURNING:
             try:
                 problem = orders.problem(cell, route.path_to_keep)
             except NothingToCover:
@@ -167,7 +167,7 @@ class Executive:
                     route.want(reason)
                     continue
                 orders.advance(self._now)
-                if orders.is_waiting or orders.state.stage is Stage.OVER:
+                if orders.is_waiting or orders.order_state.stage is Stage.OVER:
                     route.drop()
                     return self._settle(update)
                 if reason := orders.begin(cell, self._now):
@@ -181,7 +181,7 @@ class Executive:
         return self._return_home(cell, update)
 
     def _return_home(self, cell: Cell, update: PathUpdate | None) -> Decision:
-        route, area, home = self.route, self.map.area, self.orders.state.home
+        route, area, home = self.route, self.map.area, self.orders.order_state.home
         assert area is not None
         route.drop()
         self.monitor.clear_doubt()

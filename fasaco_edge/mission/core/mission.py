@@ -95,7 +95,7 @@ class Mission:
     @property
     def order_state(self) -> OrderState:
         """The order, and how far it is carried out."""
-        return self._orders.state
+        return self._orders.order_state
 
     @property
     def grid(self) -> OccupancyGrid | None:

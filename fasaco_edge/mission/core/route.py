@@ -12,7 +12,7 @@ from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.events import PathUpdate, PlanBroken, PlanReady, PlanRequest
-from fasaco_edge.mission.coverage.progress import DrivenPath
+from fasaco_edge.mission.coverage.progress import PathProgress
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.sequencer import Sequencer
@@ -83,7 +83,9 @@ class Attempt:
     problem: CoverageProblem
 
     @classmethod
-    def at(cls, path: DrivenPath, revision: int, orders: Sequencer, number: int) -> Attempt | None:
+    def at(
+        cls, path: PathProgress, revision: int, orders: Sequencer, number: int
+    ) -> Attempt | None:
         """Return attempt ``number`` at a path; None where too little of it is left."""
         # The next cells ahead of the robot stay as they are; a shorter rest is not worth a search.
         joint = path.index + HELD_CELLS
@@ -96,7 +98,7 @@ class Attempt:
             return None  # the map has changed: a repair is due
         return cls(revision, path.index, joint, problem)
 
-    def joined(self, path: DrivenPath, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
+    def joined(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
         """Return the cells ahead on a better path, int32 (n, 2); None if it saves too little."""
         if path.index > self.joint:
             return None
@@ -125,7 +127,7 @@ class Route:
     """
 
     def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
-        self.path = DrivenPath(NO_CELLS)
+        self.path = PathProgress(NO_CELLS)
         self.revision = 0
         self.plans = self.attempts = 0
         self.unchanged = self.outdated = 0
@@ -302,12 +304,12 @@ class Route:
         """Publish a path in place of the one before."""
         self.revision += 1
         self.published_at = now
-        self.path = DrivenPath(cells)
+        self.path = PathProgress(cells)
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
         return PathUpdate(self.revision, cells, reason, plan, seconds, changed)
 
     def follow(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> None:
-        """Note that the robot is in ``cell``, see ``DrivenPath.driven_to``."""
+        """Note that the robot is in ``cell``, see ``PathProgress.driven_to``."""
         self.path = self.path.driven_to(cell, has_visited)
 
     def stop(self, reason: str, now: float) -> PathUpdate | None:

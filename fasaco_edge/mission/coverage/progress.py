@@ -127,7 +127,7 @@ class FreeArea:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DrivenPath:
+class PathProgress:
     """The published path and the robot's progress on it.
 
     Attributes:
@@ -148,7 +148,7 @@ class DrivenPath:
         """Whether the robot is at the end."""
         return self.index >= len(self.cells) - 1
 
-    def driven_to(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> DrivenPath:
+    def driven_to(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> PathProgress:
         """Return the path with the robot in ``cell``, if it drove there along the path.
 
         The path may come back beside itself: a pose that flickers into the next lane must not
@@ -192,10 +192,10 @@ class ZoneProgress:
 
 
 def zone_progress(
-    assignment: OrderState, ground: ReachableArea | None, ledger: CoverageLedger
+    order_state: OrderState, ground: ReachableArea | None, ledger: CoverageLedger
 ) -> list[ZoneProgress]:
     """Return how far each zone is, in order; none of an order for everything."""
-    order = assignment.order
+    order = order_state.order
     if order is None:
         return []
     polygons = tuple(zone.polygon for zone in order.zones if zone.polygon)
@@ -209,12 +209,12 @@ def zone_progress(
     # Either all zones have polygons, or there is but one, without: for everything.
     for index, counted in enumerate(zip(cells, covered, strict=True)):
         zone = order.zones[index]
-        if assignment.stage is not Stage.COVERING or index < assignment.zone:
+        if order_state.stage is not Stage.COVERING or index < order_state.zone:
             begun = zone.passes
-        elif index > assignment.zone:
+        elif index > order_state.zone:
             begun = 0
         else:
-            begun = assignment.pass_number if assignment.begun else assignment.pass_number - 1
+            begun = order_state.pass_number if order_state.begun else order_state.pass_number - 1
         reached, done = counted
         found.append(ZoneProgress(zone.name, zone.passes, begun, reached, done if begun else 0))
     return found

@@ -135,11 +135,11 @@ class Sequencer:
     """Decides what part of an order is next, on the map as it is now. Times are [s].
 
     Attributes:
-        state: the order, and how far it is.
+        order_state: the order, and how far it is.
     """
 
     def __init__(self, config: MissionConfig, map_state: MapState, ledger: MissionLedger) -> None:
-        self.state = OrderState.idle(NO_ORDER)
+        self.order_state = OrderState.idle(NO_ORDER)
         self._config = config
         self._map = map_state
         self._ledger = ledger
@@ -156,7 +156,7 @@ class Sequencer:
     @property
     def can_plan(self) -> bool:
         """Whether a plan would have anything to cover."""
-        return self.state.stage is not Stage.RETURNING and self._left() > 0
+        return self.order_state.stage is not Stage.RETURNING and self._left() > 0
 
     @property
     def ending(self) -> str:
@@ -165,13 +165,13 @@ class Sequencer:
 
     def start(self, state: OrderState) -> None:
         """Begin with another order, or with none."""
-        self.state, self._run = state, _Run()
+        self.order_state, self._run = state, _Run()
         self._retry_check = (None, False)
         self._unreached.restart()
 
     def set_state(self, state: OrderState) -> None:
         """Go on with the same order in another state, as a command has left it."""
-        self.state = state
+        self.order_state = state
 
     def note_area(self) -> None:
         """Remember what can be reached now."""
@@ -188,14 +188,14 @@ class Sequencer:
             self.advance(now)
         if run.retry_at is not None:
             return self._begin_retry(cell) if now >= run.retry_at else ""
-        state = self.state
+        state = self.order_state
         if state.begun or state.order is None or state.stage is Stage.OVER:
             return ""
         zone = state.current_zone
         if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
             cell_m = self._config.footprint.cell_m
             self._ledger.forget(lambda window: in_zones((zone,), window, cell_m))
-        self.state = replace(state, begun=True, home=state.home or cell)
+        self.order_state = replace(state, begun=True, home=state.home or cell)
         run.left_over, run.same_again = -1, 0
         if state.pass_number == 1:
             run.exploration.looked.clear()
@@ -214,7 +214,7 @@ class Sequencer:
         Raises:
             NothingToCover: nothing is.
         """
-        area, state = self._map.area, self.state
+        area, state = self._map.area, self.order_state
         assert area is not None
         lattice, home = area.lattice, state.home
         self._run.exploration.end_if_reached(state.current_zone, area)
@@ -233,11 +233,11 @@ class Sequencer:
 
     def explore(self, cell: Cell) -> str:
         """Look for a way to a zone out of reach; return why a plan is wanted, or ""."""
-        return self._run.exploration.seek(self.state.current_zone, self._map.area, cell)
+        return self._run.exploration.seek(self.order_state.current_zone, self._map.area, cell)
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
-        order, zone = self.state.order, self.state.current_zone
+        order, zone = self.order_state.order, self.order_state.current_zone
         if order is None:
             return np.zeros((window.rows, window.cols), bool)
         zones = order.zones if zone is None else (zone,)
@@ -258,11 +258,11 @@ class Sequencer:
 
     def advance(self, now: float) -> None:
         """Go on to what comes next: all that could be done now is done."""
-        state, run = self.state, self._run
+        state, run = self.order_state, self._run
         run.exploration.viewpoints.clear()
         following = state.next_pass()
         if following is not state:
-            self.state = following
+            self.order_state = following
             return
         if state.stage is Stage.RETRYING and not self.is_waiting:
             state = replace(state, tries=state.tries + 1)
@@ -270,32 +270,32 @@ class Sequencer:
             self._end()
             return
         # What is left is counted over all zones from here on.
-        self.state = replace(state, stage=Stage.RETRYING)
+        self.order_state = replace(state, stage=Stage.RETRYING)
         if state.tries < self._config.policy.retries and self._is_worth_trying():
             if run.retry_at is None:
                 run.retry_at = now + self._config.policy.retry_s
         elif state.returns_home_next:
             run.retry_at = None
-            self.state = replace(state, stage=Stage.RETURNING, begun=False)
+            self.order_state = replace(state, stage=Stage.RETURNING, begun=False)
         else:
             self._end()
 
     def reopen(self) -> None:
         """Let an automatic order go on: the map has changed since it was over."""
-        if self.state.automatic and self.state.stage is Stage.OVER:
-            self.state = replace(self.state, stage=Stage.COVERING)
+        if self.order_state.automatic and self.order_state.stage is Stage.OVER:
+            self.order_state = replace(self.order_state, stage=Stage.COVERING)
 
     def waiting_reason(self) -> str:
         """Return in words what the robot waits for before it tries again."""
         cells, policy = self.unreached().cells, self._config.policy
         return (
             f"{cells} {'cell' if cells == 1 else 'cells'} not reached: tried again after "
-            f"{policy.retry_s:g} s ({self.state.tries + 1} of {policy.retries})"
+            f"{policy.retry_s:g} s ({self.order_state.tries + 1} of {policy.retries})"
         )
 
     def unreached(self) -> Unreached:
         """Return what of the order stays uncovered on the map as it is."""
-        return self._unreached.unreached(self.state)
+        return self._unreached.unreached(self.order_state)
 
     def _begin_retry(self, cell: Cell) -> str:
         run = self._run
@@ -303,12 +303,12 @@ class Sequencer:
         run.exploration.aim_at(self._viewpoints() - {cell})
         # In a retry, one path without progress is enough to give up.
         run.left_over, run.same_again = self._left(), MAX_SAME_LEFTOVERS
-        return f"tried again, {self.state.tries + 1} of {self._config.policy.retries}"
+        return f"tried again, {self.order_state.tries + 1} of {self._config.policy.retries}"
 
     def _end(self) -> None:
-        run, left, order = self._run, self._left(), self.state.order
+        run, left, order = self._run, self._left(), self.order_state.order
         run.retry_at = None
-        self.state = replace(self.state, stage=Stage.OVER)
+        self.order_state = replace(self.order_state, stage=Stage.OVER)
         every = order is None or order.zones[0].polygon is None
         zones = "" if every else " of the zones"
         run.ending = f"every reachable cell{zones} is covered"
@@ -332,5 +332,5 @@ class Sequencer:
 
     def _viewpoints(self) -> set[Cell]:
         """Return the cells to look at closed areas from."""
-        order, area = self.state.order, self._map.area
+        order, area = self.order_state.order, self._map.area
         return set() if order is None or area is None else self._unreached.viewpoints(order, area)

@@ -274,9 +274,9 @@ class _RunReader:
 
 def _wall_ns(batch: pa.RecordBatch) -> list[int]:
     """Return when the rows of a record batch were logged [ns]."""
-    found = column(batch, entities.WALL, pa.timestamp("ns"))
+    found = column(batch, entities.WALL_CLOCK, pa.timestamp("ns"))
     if found is None:
-        raise ValueError(f"rows without the timeline {entities.WALL}")
+        raise ValueError(f"rows without the timeline {entities.WALL_CLOCK}")
     times: list[int] = found.cast(pa.int64()).to_pylist()
     return times
 

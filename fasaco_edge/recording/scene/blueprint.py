@@ -34,7 +34,7 @@ def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
             rrb.Vertical(_figures(), _card(), row_shares=[5, 2]),
             column_shares=COLUMNS,
         ),
-        rrb.TimePanel(state="collapsed", timeline=entities.WALL),
+        rrb.TimePanel(state="collapsed", timeline=entities.WALL_CLOCK),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,
@@ -104,7 +104,7 @@ def _states() -> rrb.StateTimelineView:
 def _log() -> rrb.TextLogView:
     # A column of times would be a digit wide; the cursor shows the time.
     columns = rrb.TextLogColumns(
-        timeline_columns=[rrb.encodings.TimelineColumn(entities.WALL, visible=False)],
+        timeline_columns=[rrb.encodings.TimelineColumn(entities.WALL_CLOCK, visible=False)],
         text_log_columns=[rrb.encodings.TextLogColumn("Body")],
     )
     return rrb.TextLogView(origin="/log", name="Log", columns=columns)
@@ -130,7 +130,7 @@ def _eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3
 
 def _last(seconds: float) -> rrb.VisibleTimeRanges:
     return rrb.VisibleTimeRanges(
-        timeline=entities.WALL,
+        timeline=entities.WALL_CLOCK,
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )

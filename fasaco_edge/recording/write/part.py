@@ -104,7 +104,7 @@ class Part:
 
     def write_blob(self, blob: bytes, wall_ns: int) -> None:
         """Write bytes at ``wall_ns`` [ns], past what gathers."""
-        time = rr.TimeColumn(entities.WALL, timestamp=np.array([wall_ns], "datetime64[ns]"))
+        time = rr.TimeColumn(entities.WALL_CLOCK, timestamp=np.array([wall_ns], "datetime64[ns]"))
         columns = rr.DynamicArchetype.columns(
             archetype=entities.INPUTS_ARCHETYPE,
             components={entities.INPUTS_COMPONENT: rr.components.BlobBatch([blob])},

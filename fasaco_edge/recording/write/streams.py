@@ -73,7 +73,7 @@ class LatchedState:
         self._set_times(stream, self.wall_ns)
 
     def _set_times(self, stream: rr.RecordingStream, wall_ns: int) -> None:
-        stream.set_time(entities.WALL, timestamp=np.datetime64(wall_ns, "ns"))
+        stream.set_time(entities.WALL_CLOCK, timestamp=np.datetime64(wall_ns, "ns"))
         for timeline, number in self.sequences.items():
             stream.set_time(timeline, sequence=number)
 
