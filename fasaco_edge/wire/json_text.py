@@ -145,6 +145,8 @@ def _fitting_plain(value: object, kind: Any) -> object:  # noqa: ANN401 - a clas
         return UNSET
     if isinstance(value, str) and kind is str:
         return value[:MAX_TEXT]
+    if kind is object and not _is_within_bounds(value):
+        return UNSET
     try:
         if isinstance(value, dict) and issubclass(kind, msgspec.Struct):
             return tolerant(value, kind)

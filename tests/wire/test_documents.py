@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import MalformedMessage
@@ -95,6 +97,7 @@ def test_no_attachment_is_an_empty_one():
 
 
 @given(st.dictionaries(st.sampled_from(MEMBERS), JSON))
+@example({"robot": None, "config": {"robot": [math.inf]}})
 def test_a_tolerant_reader_takes_any_object(document):
     status = tolerant(document, Status)
     assert decode_document(encode_json(status), Status) == status
