@@ -5,13 +5,14 @@ A signal asks a process to end in order, with what it has done so far.
 
 from __future__ import annotations
 
+import _thread
 import ctypes
 import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePath
 from types import FrameType
@@ -133,8 +134,22 @@ PARENT_PERIOD_S = 0.5
 def call_on(*numbers: int, call: Callable[[], None]) -> Callable[[], None]:
     """Call ``call`` on each of these signals; return what restores the handlers before.
 
+    It is called on a thread of its own: a handler runs in between any two instructions of the main
+    thread, which may hold the lock that ``call`` needs, as that of an event it waits for.
     Only the main thread may handle signals: in any other this changes nothing.
     """
+    return _handle(numbers, lambda: _call_apart(call))
+
+
+def _call_apart(call: Callable[[], None]) -> None:
+    try:
+        # Beneath ``threading``, whose locks the main thread may hold as well.
+        _thread.start_new_thread(call, ())
+    except RuntimeError:  # there can be no more threads
+        call()
+
+
+def _handle(numbers: Iterable[int], call: Callable[[], None]) -> Callable[[], None]:
     if threading.current_thread() is not threading.main_thread():
         return lambda: None
 
@@ -167,9 +182,9 @@ def ctrl_c_asks(ask: Callable[[], None]) -> Iterator[None]:
 
     def once() -> None:
         restore()
-        ask()
+        _call_apart(ask)
 
-    restore = call_on(signal.SIGINT, call=once)
+    restore = _handle([signal.SIGINT], once)
     try:
         yield
     finally:

@@ -24,6 +24,24 @@ def test_a_child_imports_nothing_of_the_working_folder(tmp_path: Path, how):
     assert not (tmp_path / "LOADED").exists()
 
 
+# A signal that arrives while the main thread is about to wait for the event, holding its lock.
+STOP_IN_WAIT = """
+import os, signal
+from fasaco_edge.host.processes import stop_event
+with stop_event() as stop:
+    with stop._cond:
+        os.kill(os.getpid(), signal.SIGTERM)
+        signal.sigpending()
+    print(stop.wait(10))
+"""
+
+
+def test_a_signal_inside_a_wait_is_not_lost_in_a_lock():
+    program = [sys.executable, "-c", STOP_IN_WAIT]
+    ended = subprocess.run(program, capture_output=True, text=True, timeout=20, check=True)
+    assert ended.stdout == "True\n"
+
+
 def test_nobody_starts_a_module_otherwise():
     package = Path(__file__).parents[2] / "fasaco_edge"
     found = [
