@@ -97,6 +97,14 @@ class FloorFigures:
     pixel_m: float
 
 
+def swept_words(swept_m2: float, reachable_m2: float) -> str:
+    """Return swept and reachable floor [m2] in words; never 100 % before all is swept."""
+    areas = f"{swept_m2:,.1f} of {reachable_m2:,.1f} m2"
+    if not reachable_m2:
+        return areas
+    return f"{areas} ({math.floor(1e3 * swept_m2 / reachable_m2 + 1e-9) / 10:.1f} %)"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedFloor:
     """A floor and what a line did to it.
@@ -119,7 +127,12 @@ class JudgedFloor:
 
 
 def judge_floor(
-    grid: OccupancyGrid, line_xy: Points, robot: SweepingRobot, jump_m: float = math.inf
+    grid: OccupancyGrid,
+    line_xy: Points,
+    robot: SweepingRobot,
+    *,
+    driven: Mask | None = None,
+    stands_at: tuple[float, float] | None = None,
 ) -> JudgedFloor:
     """Judge a line driven on a map.
 
@@ -128,18 +141,23 @@ def judge_floor(
         line_xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, driven straight from
             one to the next.
         robot: what drives.
-        jump_m: two points further apart than this [m] are no drive: nothing is swept in between.
+        driven: bool (n - 1,), which of the ways from point to point it drove; on the others it
+            swept nothing, as when a pose jumped. None for all.
+        stands_at: where (x, y) [m] it could come to all that is reachable from; None for the
+            beginning of the line.
 
     Raises:
-        ValueError: the line has no point, or one that is not finite.
+        ValueError: the line has no point, or one that is not finite, or ``driven`` is not of it.
     """
     if line_xy.ndim != 2 or line_xy.shape[1] != 2 or not len(line_xy):
         raise ValueError(f"a line must be points (n, 2), n >= 1, got {line_xy.shape}")
     if not np.isfinite(line_xy).all():
         raise ValueError("a line must be of finite points")
+    if driven is not None and driven.shape != (len(line_xy) - 1,):
+        raise ValueError(f"a line must have a way less than points, got {driven.shape} driven")
     floor = _Floor.of(grid, robot)
-    line = _Line.of(line_xy, floor.geometry, jump_m)
-    reachable = floor.reachable_from(line.places[0])
+    line = _Line.of(line_xy, floor.geometry, driven)
+    reachable = floor.reachable_from(stands_at or tuple(line_xy[0].tolist()))
     swept = line.swept(robot.tool_m / floor.geometry.resolution / 2, reachable.shape)
     swept &= reachable
     return JudgedFloor(_figures(floor, line, reachable, swept), floor.geometry, reachable, swept)
@@ -178,11 +196,11 @@ class _Floor:
     def radius_px(self) -> float:
         return self.robot.radius_m / self.geometry.resolution
 
-    def reachable_from(self, place: Points) -> Mask:
-        """Return what the tool touches where the robot can come to from a place [pixels]."""
+    def reachable_from(self, point: tuple[float, float]) -> Mask:
+        """Return what the tool touches where the robot can come to from a point (x, y) [m]."""
         # Half a pixel beyond the centre of a blocked one lies its edge.
         fits = ~within(~self.free, self.radius_px + 0.5 - TOUCH_TOLERANCE_PX)
-        stands = Patches.of(fits).nearest_to(*place.tolist())
+        stands = Patches.of(fits).nearest_to(*self.geometry.to_pixels(*point))
         tool_px = self.robot.tool_m / self.geometry.resolution
         return within(stands, tool_px / 2 + TOUCH_TOLERANCE_PX)
 
@@ -206,27 +224,26 @@ class _Floor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Line:
-    """A line on the raster of a floor: places (column, row), float64 (n, 2) [pixels].
+    """A driven line on the raster of a floor.
 
     Attributes:
-        places: its points.
-        starts, ends: of what was driven, (m, 2), m >= 1.
+        starts, ends: where each way begins and ends, (column, row) [pixels], both (n, 2), n >= 1.
     """
 
-    places: Points
     starts: Points
     ends: Points
 
     @classmethod
-    def of(cls, line_xy: Points, geometry: GridGeometry, jump_m: float) -> _Line:
+    def of(cls, line_xy: Points, geometry: GridGeometry, driven: Mask | None) -> _Line:
         origin, yaw = geometry.origin, geometry.origin.yaw
         turned = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
         places = (line_xy - np.array([origin.x, origin.y])) @ turned / geometry.resolution
-        driven = np.hypot(*np.diff(line_xy, axis=0).T) <= jump_m
-        starts, ends = places[:-1][driven], places[1:][driven]
+        starts, ends = places[:-1], places[1:]
+        if driven is not None:
+            starts, ends = starts[driven], ends[driven]
         if not len(starts):
             starts = ends = places[:1]
-        return cls(places, starts, ends)
+        return cls(starts, ends)
 
     @property
     def length_px(self) -> float:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.floor import FloorFigures, SweepingRobot, judge_floor
+from fasaco_edge.bench.floor import FloorFigures, SweepingRobot, judge_floor, swept_words
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.lattice import CoverageLattice
@@ -68,7 +68,7 @@ class PlannedFloor:
         if self.swept_share is None:
             return "none is reachable"
         swept_m2 = self.swept_share * self.reachable_m2
-        words = f"{swept_m2:,.1f} of {self.reachable_m2:,.1f} m2 swept ({self.swept_share:.1%})"
+        words = f"{swept_words(swept_m2, self.reachable_m2)} swept"
         if self.patches_over_4_dm2:
             words += (
                 f", {self.patches_over_4_dm2} patches over 4 dm2 left, "

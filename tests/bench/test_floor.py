@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fasaco_edge.bench import floor
-from fasaco_edge.bench.floor import JudgedFloor, SweepingRobot, judge_floor
+from fasaco_edge.bench.floor import JudgedFloor, SweepingRobot, judge_floor, swept_words
 from fasaco_edge.bench.pixels import Patches, within
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
@@ -40,8 +40,11 @@ def with_rectangle(
     return OccupancyGrid(grid.geometry, cells)
 
 
-def judged(grid: OccupancyGrid, *points: tuple[float, float], **options: float) -> JudgedFloor:
-    return judge_floor(grid, np.array(points, np.float64), ROBOT, **options)
+def judged(
+    grid: OccupancyGrid, *points: tuple[float, float], driven: list[bool] | None = None
+) -> JudgedFloor:
+    ways = None if driven is None else np.array(driven, np.bool_)
+    return judge_floor(grid, np.array(points, np.float64), ROBOT, driven=ways)
 
 
 def test_empty_room_is_reachable_but_for_its_corners() -> None:
@@ -135,12 +138,22 @@ def test_a_map_that_lies_askew_is_judged_the_same() -> None:
     assert np.hypot(*(moved - (x, y)).T).min() < 3.5
 
 
-def test_a_jump_sweeps_nothing_in_between() -> None:
+def test_a_way_that_was_not_driven_sweeps_nothing() -> None:
     points = (1.0, 0.5), (2.0, 0.5), (2.0, 2.5), (1.0, 2.5)
-    figures = judged(room(4.0, 3.0), *points, jump_m=1.5).figures
+    figures = judged(room(4.0, 3.0), *points, driven=[True, False, True]).figures
     assert figures.length_m == pytest.approx(2.0)
-    assert figures.swept_m2 == pytest.approx(2 * (1.0 * 0.4 + math.pi * 0.2**2), rel=0.01)
-    assert judged(room(4.0, 3.0), *points, jump_m=0.5).figures.length_m == 0.0
+    assert figures.swept_m2 == pytest.approx(2 * (1.0 * 0.4 + math.pi * 0.2**2), rel=0.02)
+    assert judged(room(4.0, 3.0), *points, driven=[False] * 3).figures.length_m == 0.0
+    with pytest.raises(ValueError, match="a way less than points"):
+        judged(room(4.0, 3.0), *points, driven=[True])
+
+
+def test_floor_is_reachable_from_where_the_robot_stands() -> None:
+    grid = with_rectangle(room(5.0, 3.0), 1.9, 0.0, 2.0, 3.0)
+    line = np.array([(1.0, 1.5), (3.0, 1.5)])
+    here = judge_floor(grid, line, ROBOT).figures.reachable_m2
+    there = judge_floor(grid, line, ROBOT, stands_at=(3.0, 1.5)).figures.reachable_m2
+    assert [here, there] == pytest.approx([1.9 * 3.0, 3.0 * 3.0], rel=0.03)
 
 
 def test_nothing_reachable_is_no_share() -> None:
@@ -157,6 +170,19 @@ def test_nothing_reachable_is_no_share() -> None:
 def test_a_line_that_leaves_the_map_touches_what_is_not_known() -> None:
     figures = judged(room(4.0, 3.0), (2.0, 1.5), (2.0, 1.5 + 30.0)).figures
     assert figures.illegal_share == pytest.approx((30.0 - 1.3) / 30.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("swept_m2", "reachable_m2", "said"),
+    [
+        (34.54, 49.42, "34.5 of 49.4 m2 (69.8 %)"),
+        (1999.9, 2000.0, "1,999.9 of 2,000.0 m2 (99.9 %)"),
+        (2.0, 2.0, "2.0 of 2.0 m2 (100.0 %)"),
+        (0.0, 0.0, "0.0 of 0.0 m2"),
+    ],
+)
+def test_not_all_is_not_called_all(swept_m2: float, reachable_m2: float, said: str) -> None:
+    assert swept_words(swept_m2, reachable_m2) == said
 
 
 def test_pixels_are_no_finer_than_affordable(monkeypatch: pytest.MonkeyPatch) -> None:

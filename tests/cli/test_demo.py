@@ -35,6 +35,9 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path):
     reachable = reachable_cells(grid, trail[0])
     assert reachable - visited_cells(trail) == set()
     assert summary["reachable_cells"] == summary["covered_cells"] == len(reachable)
+    # 27 % of the office lie beside the cells: cells are not the floor.
+    assert summary["reachable_m2"] == pytest.approx(40.9, abs=0.1)
+    assert 0.6 < summary["swept_m2"] / summary["reachable_m2"] < 0.8
     driven = sum(math.dist(a, b) for a, b in pairwise(trail))
     assert summary["driven_m"] == pytest.approx(driven, abs=0.1)
     check_clearance(grid, trail)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Self
 
 import yaml
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
@@ -44,7 +44,7 @@ class DemoView:
         self._bar = Progress(
             TextColumn("{task.description}", style="bold", markup=False),
             BarColumn(bar_width=28),
-            TaskProgressColumn(),
+            TextColumn("{task.percentage:>3.0f} % of cells", markup=False),
             TextColumn("{task.fields[figures]}", markup=False),
             TimeElapsedColumn(),
             console=self._console,
@@ -69,7 +69,7 @@ class DemoView:
         now = time.monotonic()
         if not self._console.is_terminal and now - self._printed_at >= PLAIN_LINE_EVERY_S:
             self._printed_at = now
-            line = f"{elapsed_s:6.1f} s  {100 * fraction:5.1f} %  {text}"
+            line = f"{elapsed_s:6.1f} s  {100 * fraction:5.1f} % of cells  {text}"
             self._console.print(line, soft_wrap=True)
 
 

@@ -10,10 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.bench.floor import JudgedFloor, SweepingRobot, judge_floor, swept_words
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.demo.mission import Ending
 from fasaco_edge.drawing.pictures import draw_mission
+from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
@@ -25,18 +27,19 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Truth:
-    """The building, what of it can be reached, and how often the robot's trail visited it."""
+    """The building, what of it can be reached, and what the robot's trail did to it."""
 
     grid: OccupancyGrid
     lattice: CoverageLattice
     reachable: NDArray[np.bool_]
     trail: NDArray[np.float64]
     visits: NDArray[np.uint16]
+    floor: JudgedFloor
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """The figures of a demo."""
+    """The figures of a demo; ``reachable_m2`` and ``swept_m2`` are of floor, not of cells."""
 
     map: str
     complete: bool
@@ -44,7 +47,8 @@ class Summary:
     covered_cells: int
     recovered_cells: int
     unreachable_cells: int
-    covered_m2: float
+    reachable_m2: float
+    swept_m2: float
     driven_m: float
     plans: int
     paths: int
@@ -70,7 +74,8 @@ def summarise(args: argparse.Namespace, out: Path, ending: Ending) -> Summary:
         covered_cells=done,
         recovered_cells=int((truth.reachable & (truth.visits > 1)).sum()),
         unreachable_cells=int((truth.lattice.coverable & ~truth.reachable).sum()),
-        covered_m2=round(done * args.cell**2, 2),
+        reachable_m2=round(truth.floor.figures.reachable_m2, 2),
+        swept_m2=round(truth.floor.figures.swept_m2, 2),
         driven_m=round(float(driven), 1),
         plans=status.plan.plans,
         paths=status.path.revision if status.path else 0,
@@ -108,7 +113,8 @@ def print_summary(summary: Summary, *, as_json: bool) -> None:
 def _rows(summary: Summary) -> list[tuple[str, str]]:
     cells, covered = summary.reachable_cells, summary.covered_cells
     return [
-        ("covered", f"{covered} of {cells} cells, {summary.covered_m2} m2"),
+        ("covered", f"{covered} of {cells} cells"),
+        ("reachable floor swept", swept_words(summary.swept_m2, summary.reachable_m2)),
         ("covered again", f"{summary.recovered_cells} cells"),
         ("out of reach", f"{summary.unreachable_cells} cells"),
         ("driven", f"{summary.driven_m} m"),
@@ -132,17 +138,25 @@ def _truth(args: argparse.Namespace, out: Path) -> _Truth:
     start = anchor_cell(lattice, Pose2D(float(trail[0, 0]), float(trail[0, 1])))
     nowhere = np.zeros(lattice.states.shape, bool)
     reachable = nowhere if start is None else ReachableArea.around(lattice, start).reachable
-    return _Truth(grid, lattice, reachable, trail, ledger.visits(lattice.window))
+    floor = judge_floor(grid, trail, SweepingRobot(args.cell, args.robot_radius))
+    return _Truth(grid, lattice, reachable, trail, ledger.visits(lattice.window), floor)
 
 
 def _draw(args: argparse.Namespace, out: Path, truth: _Truth, summary: Summary) -> None:
     lines = [
         f"{summary.covered_cells} of {summary.reachable_cells} reachable cells covered, "
         f"{summary.driven_m} m driven, {summary.paths} paths",
+        f"reachable floor swept: {swept_words(summary.swept_m2, summary.reachable_m2)}",
     ]
     title = f"{Path(args.map).stem}: mapped and covered"
     picture = draw_mission(
-        truth.grid, truth.lattice, truth.trail, truth.visits, title=title, lines=lines
+        truth.grid,
+        truth.lattice,
+        truth.trail,
+        truth.visits,
+        title=title,
+        lines=lines,
+        unswept=MapLayer(truth.floor.geometry, truth.floor.unswept),
     )
     picture.save(out / "mission.png")
 
