@@ -1,4 +1,4 @@
-"""Subscriber of a latched key: the newest samples first, and the last one even if it was lost.
+"""Subscriber of a latched key: gets the kept samples on joining, and a lost last one afterwards.
 
 Zenoh's advanced subscriber (1.10) does that, too, but once a second, for as long as the session
 lives, it queries every publisher that there ever was, even for subscribers that were undeclared.
@@ -87,14 +87,14 @@ class LatchedSubscription(Subscription):
         self._caches = f"{key}/@adv/**"
         # Reentrant: a cache of the same session answers on the thread that asks.
         self._lock = threading.RLock()
-        self._there: dict[str, _Publisher] = {}
-        # By publisher, the number or time of what was heard of it last.
-        self._last = OrderedDict[str, int]()
+        self._publishers: dict[str, _Publisher] = {}
+        # By publisher, the sequence number or timestamp of its last sample: its mark.
+        self._last_mark = OrderedDict[str, int]()
         # When that was published, by the publisher's clock; 0 where it does not tell.
         self._stamps = OrderedDict[str, int]()
-        # As ``_last``, of those that may keep nothing: only what a cache answers is compared with
-        # it, for no token tells when such a clock is set back.
-        self._unlisted = OrderedDict[str, int]()
+        # The same of publishers without a token. Used only to drop cached replies that were
+        # received already: a reset of such a clock would go unnoticed.
+        self._unconfirmed = OrderedDict[str, int]()
         # Where several samples count, they wait for those before them, which were asked for.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._held_bytes = 0
@@ -102,9 +102,9 @@ class LatchedSubscription(Subscription):
         # Whether all are to be asked, and whether for what was heard already, too.
         self._wants_all, self._wants_again = True, False
         self._tokens = f"{key}/@adv/pub/**"
-        self._look_at = 0.0
-        self._is_looking = False
-        super().__init__(session.declare_subscriber(key, self._hear))
+        self._query_tokens_at = 0.0
+        self._awaits_tokens = False
+        super().__init__(session.declare_subscriber(key, self._on_sample))
         asker.add(self)
 
     def ask(self) -> None:
@@ -116,31 +116,31 @@ class LatchedSubscription(Subscription):
     def ask_who_is_due(self, now: float) -> float:
         """Ask, on the asker's thread; return when there is more to ask [s, monotonic]."""
         questions: list[tuple[str, _Publisher | None]] = []
-        self._look(now)
+        self._query_tokens(now)
         with self._lock:
             again = self._wants_again
             if self._wants_all:
                 self._wants_all = self._wants_again = False
                 questions.append((f"{self._caches}?_max={self._depth}", None))
-            for name, publisher in self._there.items():
+            for name, publisher in self._publishers.items():
                 if questions:
                     # It is asked with all the others.
                     publisher.ask_at = now + ASK_PERIOD_S
                 elif now >= publisher.ask_at and not publisher.is_asked:
                     publisher.ask_at, publisher.is_asked = now + ASK_PERIOD_S, True
                     # One key for all where it can be: of each Zenoh remembers something.
-                    key = self._caches if len(self._there) == 1 else publisher.key
+                    key = self._caches if len(self._publishers) == 1 else publisher.key
                     questions.append((f"{key}?{self._missing(name)}", publisher))
             self._open += len(questions)
-            waiting = [p.ask_at for p in self._there.values() if not p.is_asked]
-            next_at = min((self._look_at, *waiting))
+            waiting = [p.ask_at for p in self._publishers.values() if not p.is_asked]
+            next_at = min((self._query_tokens_at, *waiting))
         for selector, asked in questions:
             self._put(selector, asked, again=again)
         return next_at
 
     def _missing(self, name: str) -> str:
         """Return what to ask a publisher for: what came after the last that was heard of it."""
-        last = self._last.get(name)
+        last = self._last_mark.get(name)
         if last is None or name.endswith("/uhlc"):
             return f"_max={self._depth}"
         return f"_sn={(last + 1) % _SEQUENCE_NUMBERS}.."
@@ -167,52 +167,52 @@ class LatchedSubscription(Subscription):
                 accept_replies=zenoh.ReplyKeyExpr.ANY,
             )
 
-    def _look(self, now: float) -> None:
+    def _query_tokens(self, now: float) -> None:
         """Ask for the tokens of the publishers that are there."""
         with self._lock:
-            if now < self._look_at or self._is_looking:
+            if now < self._query_tokens_at or self._awaits_tokens:
                 return
-            self._look_at, self._is_looking = now + ASK_PERIOD_S, True
-        if not ask_for_tokens(self._session, self._tokens, MOST_TOKENS, self._see):
-            self._is_looking = False
+            self._query_tokens_at, self._awaits_tokens = now + ASK_PERIOD_S, True
+        if not ask_for_tokens(self._session, self._tokens, MOST_TOKENS, self._on_tokens):
+            self._awaits_tokens = False
 
-    def _see(self, tokens: list[str], is_whole: bool) -> None:
+    def _on_tokens(self, tokens: list[str], is_whole: bool) -> None:
         """Take account of who is there, and of who is gone if all were told."""
         found = {"/".join(key.rpartition("/@adv/pub/")[2].split("/")[:2]): key for key in tokens}
         with self._lock:
-            self._is_looking = False
-            for name in [name for name in self._there if is_whole and name not in found]:
+            self._awaits_tokens = False
+            for name in [name for name in self._publishers if is_whole and name not in found]:
                 # One that comes back under its name may count from 0 again.
-                del self._there[name]
-                self._last.pop(name, None)
-            came = [name for name in found if name not in self._there]
+                del self._publishers[name]
+                self._last_mark.pop(name, None)
+            came = [name for name in found if name not in self._publishers]
             # Those that were there before answer the first question, and are not asked twice.
             waits_s = ASK_PERIOD_S if self._wants_all or self._open else 0.0
-            for name in came[: MOST_PUBLISHERS - len(self._there)]:
-                self._there[name] = _Publisher(found[name], time.monotonic() + waits_s)
-                if name in self._unlisted:
-                    _remember(self._last, name, self._unlisted.pop(name))
+            for name in came[: MOST_PUBLISHERS - len(self._publishers)]:
+                self._publishers[name] = _Publisher(found[name], time.monotonic() + waits_s)
+                if name in self._unconfirmed:
+                    _remember(self._last_mark, name, self._unconfirmed.pop(name))
         if came:
             self._asker.wake()
 
-    def _hear(self, sample: zenoh.Sample) -> None:
+    def _on_sample(self, sample: zenoh.Sample) -> None:
         """Take what is published, on a Zenoh thread."""
         name, mark = _origin(sample)
         with self._lock:
             waits = self._depth > 1 and bool(self._open or self._wants_all)
-            is_listed = sample.source_info or name in self._last or name in self._there
+            is_listed = sample.source_info or name in self._last_mark or name in self._publishers
             if not name or not (is_listed or waits):
                 # Of a publisher that keeps nothing, or of one that is not yet found.
                 if name:
-                    _remember(self._unlisted, name, mark)
+                    _remember(self._unconfirmed, name, mark)
                 self._receive(sample)
                 return
-            last = self._last.get(name)
+            last = self._last_mark.get(name)
             if last and not mark and _ticks(sample) >= self._stamps.get(name, 0):
                 # It was started anew under the same name: what an answer has overtaken is older.
-                del self._last[name]
+                del self._last_mark[name]
                 last = None
-            is_gap = name in self._there and _leaves_gap(name, mark, last)
+            is_gap = name in self._publishers and _leaves_gap(name, mark, last)
             if waits or (self._depth > 1 and is_gap):
                 self._hold(name, mark, sample)
             elif _is_newer(mark, last):
@@ -222,7 +222,7 @@ class LatchedSubscription(Subscription):
         """Take an answer; ``again``: also one that was heard already, if nothing came after it."""
         name, mark = _origin(sample)
         with self._lock:
-            last = self._last.get(name, self._unlisted.get(name))
+            last = self._last_mark.get(name, self._unconfirmed.get(name))
             if self._depth > 1:
                 self._hold(name, mark, sample)
             elif _is_newer(mark, last) or (again and mark == last):
@@ -234,20 +234,20 @@ class LatchedSubscription(Subscription):
         is_full = len(self._held) > MOST_PUBLISHERS * self._depth
         if is_full or self._held_bytes > HELD_BYTES:
             self._deliver_held()
-        elif not self._open and name in self._there:
-            self._there[name].ask_at = 0.0
+        elif not self._open and name in self._publishers:
+            self._publishers[name].ask_at = 0.0
             self._asker.wake()
 
     def _deliver_held(self) -> None:
         held, self._held = sorted(self._held, key=lambda one: one[:2]), []
         self._held_bytes = 0
         for name, mark, sample in held:
-            if _is_newer(mark, self._last.get(name, self._unlisted.get(name))):
+            if _is_newer(mark, self._last_mark.get(name, self._unconfirmed.get(name))):
                 self._deliver(name, mark, sample)
 
     def _deliver(self, name: str, mark: int, sample: zenoh.Sample) -> None:
-        self._unlisted.pop(name, None)
-        _remember(self._last, name, mark)
+        self._unconfirmed.pop(name, None)
+        _remember(self._last_mark, name, mark)
         _remember(self._stamps, name, _ticks(sample))
         self._receive(sample)
 
@@ -303,7 +303,7 @@ class Asker:
 
 
 def _remember(marks: OrderedDict[str, int], name: str, mark: int) -> None:
-    """Note the last mark of a name; those noted the longest ago are forgotten."""
+    """Note the last mark of a publisher; those noted the longest ago are forgotten."""
     marks[name] = mark
     marks.move_to_end(name)
     if len(marks) > MOST_REMEMBERED:
@@ -311,7 +311,7 @@ def _remember(marks: OrderedDict[str, int], name: str, mark: int) -> None:
 
 
 def _origin(sample: zenoh.Sample) -> tuple[str, int]:
-    """Return who published a sample, as in its token, and the number or time it bears."""
+    """Return who published a sample, as in its token, and its sequence number or timestamp."""
     info, stamp = sample.source_info, sample.timestamp
     if info is not None:
         return f"{info.source_id.zid}/{info.source_id.eid}", int(info.source_sn)
@@ -326,7 +326,7 @@ def _ticks(sample: zenoh.Sample) -> int:
 
 
 def _is_newer(mark: int, last: int | None) -> bool:
-    """Tell whether a sample comes after the last one; numbers begin anew behind the largest."""
+    """Tell whether a sample comes after the last one; sequence numbers wrap at 2^32."""
     if last is None or last >= _SEQUENCE_NUMBERS:
         return last is None or mark > last
     return 0 < (mark - last) % _SEQUENCE_NUMBERS < _SEQUENCE_NUMBERS // 2

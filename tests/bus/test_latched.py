@@ -204,7 +204,7 @@ def test_what_an_answer_has_overtaken_is_not_heard(bus, endpoint, numbered):
         subscription = bus.subscribe(KEY, samples.put, latched=True)
         assert taken(samples, 1) == [b"before"]
         for sample in late:
-            subscription._hear(sample)
+            subscription._on_sample(sample)
         assert samples.empty()
     client.close()
 
@@ -231,7 +231,7 @@ def test_a_publisher_heard_before_it_is_found_is_heard_once(bus, endpoint, numbe
         time.sleep(0.3)  # by then what it publishes reaches the subscriber at once
         publisher.put(b"one")
         assert taken(samples, 1) == [b"one"]
-        until(lambda: subscription._there)
+        until(lambda: subscription._publishers)
         time.sleep(1.5 * latched.ASK_PERIOD_S)
         assert samples.empty()
 
@@ -264,7 +264,7 @@ def test_a_flood_of_publishers_is_not_asked(bus, endpoint):
             client.liveliness().declare_token(f"{KEY}/@adv/pub/{number:x}/1/_")
             for number in range(1, 301)
         ]
-        until(lambda: len(subscription._there) == latched.MOST_PUBLISHERS)
+        until(lambda: len(subscription._publishers) == latched.MOST_PUBLISHERS)
         questions = spy.in_rounds(2, wanted=2 * latched.MOST_PUBLISHERS)
         assert len(questions) <= 3 * latched.MOST_PUBLISHERS
         honest.put(b"two")
