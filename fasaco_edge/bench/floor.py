@@ -100,9 +100,12 @@ class FloorFigures:
 def swept_words(swept_m2: float, reachable_m2: float) -> str:
     """Return swept and reachable floor [m2] in words; never 100 % before all is swept."""
     areas = f"{swept_m2:,.1f} of {reachable_m2:,.1f} m2"
-    if not reachable_m2:
-        return areas
-    return f"{areas} ({math.floor(1e3 * swept_m2 / reachable_m2 + 1e-9) / 10:.1f} %)"
+    return f"{areas} ({share_words(swept_m2 / reachable_m2)})" if reachable_m2 else areas
+
+
+def share_words(share: float) -> str:
+    """Return a share in percent, rounded down."""
+    return f"{math.floor(1e3 * share + 1e-9) / 10:.1f} %"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

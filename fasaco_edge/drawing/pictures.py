@@ -76,7 +76,8 @@ def _visit_key(visits: NDArray[np.integer]) -> list[KeyEntry]:
 
 
 def _entry(symbol: str, colour: palette.Colour, label: str, cells: NDArray[np.bool_]) -> KeyEntry:
-    return KeyEntry(symbol, colour, f"{label} ({np.count_nonzero(cells):,})")
+    count = int(np.count_nonzero(cells))
+    return KeyEntry(symbol, colour, f"{label} ({count:,} cell{'s' * (count != 1)})")
 
 
 Points = NDArray[np.float64]

@@ -100,6 +100,10 @@ class ReviewDocument(msgspec.Struct):
         covered_cells, coverable_cells: at the end: cells that are reachable, those of them covered.
         recovered_cells: cells of these that were covered more than once.
         unreachable_cells: cells where the robot would fit but cannot come to.
+        reachable_m2, swept_m2: floor at the end, on the pixels of the last map, not of cells: what
+            the tool's disc touches where the robot's disc can come to, and what of it the tool
+            passed over along the recorded poses [m2].
+        patches_over_4_dm2, largest_patch_m2: what of it was left, in one piece [m2].
         coverage_from: who counted: `status` (the daemon) or `trail` (from the recorded poses and
             the last map, where the daemon's last recorded count is outdated).
         reached_s: when 50, 90, 99 and 100 % of the cells coverable at the end were covered [s].
@@ -153,6 +157,10 @@ class ReviewDocument(msgspec.Struct):
     coverable_cells: int | None = None
     recovered_cells: int | None = None
     unreachable_cells: int | None = None
+    reachable_m2: float | None = None
+    swept_m2: float | None = None
+    patches_over_4_dm2: int | None = None
+    largest_patch_m2: float | None = None
     coverage_from: str | None = None
     reached_s: dict[str, float | None] | None = None
     steps: int | None = None
@@ -284,6 +292,12 @@ def _add_coverage(told: ReviewDocument, review: Review) -> None:
         told.covered_cells, told.coverable_cells = counts.covered, counts.coverable
         told.recovered_cells, told.unreachable_cells = counts.recovered, counts.unreachable
         told.coverage_from = counts.source
+    if (floor := review.floor) is not None:
+        figures = floor.figures
+        told.reachable_m2 = _rounded(figures.reachable_m2)
+        told.swept_m2 = _rounded(figures.swept_m2)
+        told.patches_over_4_dm2 = figures.patches_over_4_dm2
+        told.largest_patch_m2 = _rounded(figures.largest_patch_m2)
     if (walk := review.walk) is not None:
         told.steps, told.revisits = walk.steps, walk.revisits
         told.turns_90, told.turns_180 = walk.turns_90, walk.turns_180
@@ -324,17 +338,22 @@ def _replan(path: PublishedPath) -> Replan:
     )
 
 
+FLOOR = "reachable_m2, swept_m2, patches_over_4_dm2, largest_patch_m2"
+
+
 def _not_recorded(review: Review) -> dict[str, str]:
     data, why = review.data, {}
     if not data.statuses:
         why["robot, version, config, state"] = "there is no status of a daemon"
     if review.drive is None:
         why["steps, revisits, turns_90, turns_180, driven_m, reached_s"] = review.no_lattice
+        why[FLOOR] = review.no_lattice
     elif review.data.restored_cells:
         restored = review.data.restored_cells
-        why["reached_s"] = (
-            f"{restored} cells were covered before, and a recording does not tell which"
-        )
+        before = f"{restored} cells were covered before, and a recording does not tell which"
+        why["reached_s"] = why[FLOOR] = before
+    elif review.floor is None:
+        why[FLOOR] = "no pose lies on the map"
     if review.counts is None:
         why["covered_cells, coverable_cells, recovered_cells"] = (
             "the daemon's last recorded count is outdated, and the trail does not tell all"

@@ -12,6 +12,7 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+from fasaco_edge.bench.floor import share_words
 from fasaco_edge.drawing.chart import COLOURS, Line, Panel, Placer
 from fasaco_edge.review import rows
 from fasaco_edge.review.comparison import (
@@ -89,10 +90,14 @@ POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 INTRODUCTION = (
     "A robot was to pass over every place it can reach, on a map that grows while it drives. "
     "The ground is divided into square cells as wide as its tool; a cell is covered when the "
-    "tool has passed over its centre. Whenever the map shows something new, the way is planned "
-    "anew: a replan."
+    "tool has passed over its centre. Cells are not all of the floor: strips along walls lie in "
+    "none; what the tool swept is told in square metres. Whenever the map shows something new, "
+    "the way is planned anew: a replan."
 )
 GLOSSARY = {
+    "reachable floor": "all that the tool touches at the places that the robot can come to, on the "
+    "pixels of the last map; swept is what of it the tool passed over",
+    "patch left": "reachable floor in one piece that was not swept; 4 dm2 are 20 x 20 cm",
     "covered again": "cells that were passed over more than once",
     "out of reach": "cells where the robot would fit, but that it cannot come to",
     "steps": "moves from one cell to the next",
@@ -176,8 +181,11 @@ def _mark(index: int) -> Html:
 
 
 def _tiles(figures: ReviewDocument) -> Html:
+    swept_m2, reachable_m2 = figures.swept_m2, figures.reachable_m2
+    swept = share_words(swept_m2 / reachable_m2) if swept_m2 and reachable_m2 else "-"
     tiles = (
         (figures.share_covered or "-", "of the reachable cells covered"),
+        (swept, "of the reachable floor swept"),
         (rows.clock(figures.duration_s), "recorded"),
         (rows.amount(figures.driven_m, "m"), "driven"),
         (rows.amount(figures.revisits, ""), "revisits"),
@@ -198,7 +206,7 @@ def _maps(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> Htm
             buffer = io.BytesIO()
             picture.save(buffer, "PNG", optimize=True)
             content = base64.b64encode(buffer.getvalue()).decode()
-            text = "map, covered cells and the way of the robot"
+            text = "map, covered cells, floor not swept, and the way of the robot"
             shown = Html(f'<img alt="{text}" src="data:image/png;base64,{content}">')
         maps.append(element("figure", shown, _table(("", ""), rows.card_rows(figures), "plain")))
     kind = "maps two" if len(maps) > 1 else "maps"

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from fasaco_edge.bench.floor import swept_words
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.chart import COLOURS, Axis, Line, Panel, draw_panels
 from fasaco_edge.drawing.palette import Colour
 from fasaco_edge.drawing.pictures import draw_mission
+from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.rows import clock
@@ -225,13 +227,13 @@ def draw_review(review: Review) -> Image.Image:
 
 
 def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
-    """Return the map at the end with cells and track; None where a recording lacks them.
+    """Return the map at the end with cells, floor not swept and track; None without any of them.
 
     Args:
         review: of what.
         space: the most the map may take (width, height) [px].
     """
-    grid, lattice, drive = review.data.grid, review.lattice, review.drive
+    grid, lattice, drive, floor = review.data.grid, review.lattice, review.drive, review.floor
     track = _thinned(review.data.track[:, :2])
     if grid is None or lattice is None or drive is None or not len(track):
         return None
@@ -244,6 +246,7 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
         lines=_caption(review),
         space=space,
         jump_m=JUMP_CELLS * lattice.cell_m,
+        unswept=MapLayer(floor.geometry, floor.unswept) if floor else None,
     )
 
 
@@ -255,6 +258,10 @@ def _caption(review: Review) -> list[str]:
             f"{counts.covered:,} of {counts.coverable:,} reachable cells covered; "
             f"recorded for {clock(review.duration_s)}"
         )
+    if review.floor is not None:
+        figures = review.floor.figures
+        swept = swept_words(figures.swept_m2, figures.reachable_m2)
+        lines.append(f"reachable floor swept: {swept}")
     if walk is not None:
         lines.append(
             f"{walk.steps:,} steps, {walk.revisits:,} revisits, {walk.turns_90:,} quarter-turns"

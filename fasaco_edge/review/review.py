@@ -11,8 +11,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.bench.floor import JudgedFloor
 from fasaco_edge.errors import MapTooFar, MapTooLarge
-from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.orders.zones import kept_out, without
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import (
@@ -31,6 +32,7 @@ from fasaco_edge.review.drive import (
     walk_figures,
 )
 from fasaco_edge.review.faults import Faults, faults_of
+from fasaco_edge.review.floor import swept_floor
 from fasaco_edge.review.moments import (
     RECORDER_IN_ORDER,
     TROUBLES,
@@ -106,6 +108,8 @@ class Review:
             is too large or too far away.
         no_lattice: why there is none; "" where there is one.
         drive, walk: what the robot drove over it.
+        floor: what of the reachable floor it swept; None without a drive, or where some was swept
+            before.
         first_s: float64 (n,), when each cell was first covered, ascending.
         counts: of cells; None where that is not recorded.
         replans: plans made anew.
@@ -121,6 +125,7 @@ class Review:
     lattice: CoverageLattice | None
     no_lattice: str
     drive: Drive | None
+    floor: JudgedFloor | None
     walk: WalkFigures | None
     first_s: NDArray[np.float64]
     counts: CoverageCounts | None
@@ -202,6 +207,7 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
     lattice, no_lattice = _lattice(data)
     lost_pose_s = known_settings(data.config).mission.lost_pose_s
     drive = drive_over(lattice, data.times, data.track, lost_pose_s) if lattice else None
+    floor = swept_floor(data, lattice, lost_pose_s) if lattice else None
     states = spans_of(_mission_states(data, record), end_s)
     replans = Replans.of(data.paths)
     fractions = record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
@@ -211,6 +217,7 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
         lattice=lattice,
         no_lattice=no_lattice,
         drive=drive,
+        floor=floor,
         walk=walk_figures(drive.cells) if drive else None,
         first_s=first_covered(drive, lattice) if drive and lattice else np.zeros(0),
         counts=_counts(data, drive, fractions),
@@ -227,26 +234,18 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
 
 def _lattice(data: RunData) -> tuple[CoverageLattice | None, str]:
     """Return the lattice over the map at the end, or why there is none."""
-    known = known_settings(data.config)
-    cell_m, radius_m = known.robot.tool_width_m, known.robot.radius_m
+    footprint = data.footprint
     if data.grid is None:
         return None, "there is no map"
-    if not cell_m or not radius_m:
+    if footprint is None:
         return None, "there is no configuration"
-    free, occupied = known.map.free_at_most, known.map.occupied_at_least
-    usual = Footprint(cell_m, radius_m)
-    footprint = Footprint(
-        cell_m,
-        radius_m,
-        usual.free_at_most if free is None else free,
-        usual.occupied_at_least if occupied is None else occupied,
-    )
     try:
         lattice = CoverageLattice.from_map(data.grid, footprint)
     except (MapTooLarge, MapTooFar) as error:
         return None, str(error)
     if not data.keep_out:
         return lattice, ""
+    cell_m, radius_m = footprint.cell_m, footprint.robot_radius_m
     return without(lattice, kept_out(data.keep_out, lattice.window, cell_m, radius_m)), ""
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import astuple
 
+from fasaco_edge.bench.floor import swept_words
 from fasaco_edge.review.document import MILESTONES, ReviewDocument
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
 
 def _ending(document: ReviewDocument) -> str:
     if document.complete:
-        return "complete: all it was to cover, and could reach, is covered"
+        return "complete: every cell it was to cover, and could reach, is covered"
     if document.complete is None:
         return "the recording does not tell whether it was completed"
     how = "ended" if document.is_ended else "broke off"
@@ -180,10 +181,20 @@ def figures(document: ReviewDocument) -> Iterator[Figure]:
     yield Figure("duration", clock(document.duration_s), document.duration_s)
     text = NOT_KNOWN if covered is None else f"{covered} of {document.coverable_cells} cells{share}"
     yield Figure("covered", text, covered)
+    swept_m2, reachable_m2 = document.swept_m2, document.reachable_m2
+    text = NOT_KNOWN
+    if swept_m2 is not None and reachable_m2 is not None:
+        text = swept_words(swept_m2, reachable_m2)
+    yield Figure("reachable floor swept", text, swept_m2)
+    patches, largest_m2 = document.patches_over_4_dm2, document.largest_patch_m2
+    yield Figure("patches left, over 4 dm2", _count(patches, ""), patches)
+    yield Figure("largest patch left", _count(largest_m2, "m2"), largest_m2)
     for percent in MILESTONES:
         at_s = (document.reached_s or {}).get(str(percent))
         text = "never" if document.reached_s else NOT_KNOWN
-        yield Figure(f"{percent} % covered after", text if at_s is None else clock(at_s), at_s)
+        yield Figure(
+            f"{percent} % of cells covered after", text if at_s is None else clock(at_s), at_s
+        )
     for name, member, unit in NUMBERS:
         value: float | None = getattr(document, member)
         yield Figure(name, _count(value, unit), value)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival
 from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Polygon
+from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.orders.order import MissionOrder, read_command
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
@@ -138,6 +139,22 @@ class RunData:
     def restored_cells(self) -> int:
         """Cells that were covered before a restart."""
         return max((each.status.ledger.restored_cells for each in self.statuses), default=0)
+
+    @property
+    def footprint(self) -> Footprint | None:
+        """Tool, robot and thresholds by the configuration; None where it does not tell."""
+        known = known_settings(self.config)
+        cell_m, radius_m = known.robot.tool_width_m, known.robot.radius_m
+        if not cell_m or not radius_m:
+            return None
+        free, occupied = known.map.free_at_most, known.map.occupied_at_least
+        usual = Footprint(cell_m, radius_m)
+        return Footprint(
+            cell_m,
+            radius_m,
+            usual.free_at_most if free is None else free,
+            usual.occupied_at_least if occupied is None else occupied,
+        )
 
     @property
     def times(self) -> NDArray[np.float64]:

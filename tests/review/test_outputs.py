@@ -88,6 +88,16 @@ def test_the_page_tells_the_figures(review):
     page, told = Page(page_of(review)), document(review)
     for text in (told["recording"], "4 of 24 cells", "not complete", "no pose for 3 s", "<odd>"):
         assert text in page.text
+    # Three cells' widths there and back, and a disc, in a room of 2.3 x 1.7 m without its corners.
+    assert told["swept_m2"] == pytest.approx(0.9 * 0.3 + np.pi * 0.15**2, rel=0.03)
+    assert told["reachable_m2"] == pytest.approx(2.3 * 1.7, rel=0.06)
+    assert (told["patches_over_4_dm2"], told["largest_patch_m2"]) == (
+        1,
+        pytest.approx(told["reachable_m2"] - told["swept_m2"], abs=0.05),
+    )
+    swept = f"{told['swept_m2']:.1f} of {told['reachable_m2']:.1f} m2 ("
+    assert page.text.count(swept) == 1
+    assert "of the reachable floor swept" in page.text
 
 
 def test_the_page_sets_two_side_by_side(review):
@@ -102,11 +112,18 @@ def test_the_picture_shows_map_and_trail(review):
     assert picture.size == SIZE
     colours = {colour for _, colour in picture.getcolors(maxcolors=1 << 20)}
     assert {palette.OCCUPIED, palette.COVERED, palette.RECOVERED[0], palette.START} <= colours
+    assert palette.UNSWEPT in colours
 
 
 def test_without_map_and_poses_there_are_still_charts(review):
     bare = replace(
-        review, lattice=None, no_lattice="there is no map", drive=None, walk=None, counts=None
+        review,
+        lattice=None,
+        no_lattice="there is no map",
+        drive=None,
+        floor=None,
+        walk=None,
+        counts=None,
     )
     assert draw_review(bare).size == SIZE
     assert "there is no map" in page_of(bare)
@@ -170,7 +187,7 @@ def test_what_was_covered_before_is_not_guessed_at(review):
     before = StatusSample(0.0, Status(ledger=LedgerReport(restored_cells=7)))
     data = replace(review.data, statuses=[before, *review.data.statuses])
     told = document(review_of(review.record, data, 0))
-    assert told["covered_cells"] is told["reached_s"] is None
+    assert told["covered_cells"] is told["reached_s"] is told["swept_m2"] is None
     assert told["steps"] == 5
     assert "7 cells were covered before" in told["not_recorded"]["reached_s"]
 

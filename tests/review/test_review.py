@@ -62,6 +62,19 @@ def test_the_trail_comes_to_the_same_cells(review, recording):
     assert (mine.recovered, mine.unreachable) == (coverage["recovered"], coverage["unreachable"])
 
 
+def test_floor_is_that_under_the_tool_of_the_simulated_robot(told, review, recording):
+    """Counted here on a raster of its own, of five centimetres."""
+    places = (np.indices((54, 72)).reshape(2, -1).T[:, ::-1] + 0.5) * 0.05
+    shares = np.linspace(0, 1, 9)[:, None]
+    pieces = [a + (b - a) * shares for a, b in pairwise(recording.trail)]
+    swept = np.zeros(len(places), bool)
+    for x, y in np.vstack(pieces):
+        swept |= np.hypot(places[:, 0] - x, places[:, 1] - y) <= TOOL_M / 2
+    assert told["swept_m2"] == pytest.approx(swept.sum() * 0.05**2, rel=0.05)
+    assert told["swept_m2"] < told["reachable_m2"] < 3.5 * 2.6
+    assert review.floor.figures.illegal_share == 0.0
+
+
 def test_the_walk_is_that_of_the_simulated_robot(told, review, truth, recording):
     cells = [cell for cell, _ in truth]
     assert [tuple(cell) for cell in review.drive.cells.tolist()] == cells

@@ -1,0 +1,78 @@
+"""The floor of a recorded mission: what of it the robot could reach at the end, and has swept.
+
+Judged on the pixels of the last map along the recorded poses, by tool and robot of the
+configuration. What a keep-out zone touches is as good as a wall.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bench.floor import JudgedFloor, SweepingRobot, judge_floor
+from fasaco_edge.grid.geometry import Polygon, Window
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
+from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
+from fasaco_edge.mission.orders.zones import cells_inside
+from fasaco_edge.review.run_data import RunData
+
+
+def swept_floor(data: RunData, lattice: CoverageLattice, lost_pose_s: float) -> JudgedFloor | None:
+    """Return what the robot did to the floor; None without a pose on the map.
+
+    None also where some was swept before the recording began: a recording does not tell what.
+
+    Args:
+        data: of the samples, with a map and a configuration.
+        lattice: over that map; a pose beyond it is astray.
+        lost_pose_s: after so long without a pose [s] the way to the next one is unknown; 0 for
+            never.
+    """
+    footprint = data.footprint
+    if data.grid is None or footprint is None or data.restored_cells:
+        return None
+    cells = np.floor(data.track[:, 1::-1] / lattice.cell_m)
+    window = lattice.window
+    low, high = (window.row0, window.col0), (window.row1, window.col1)
+    on_map = ((cells >= low) & (cells < high)).all(axis=1)
+    track, at_s = data.track[on_map, :2], data.times[on_map]
+    if not len(track):
+        return None
+    driven = _driven(track, at_s, JUMP_CELLS * lattice.cell_m, lost_pose_s)
+    robot = SweepingRobot(
+        footprint.cell_m, footprint.robot_radius_m, free_at_most=footprint.free_at_most
+    )
+    # What can be reached is told from where the robot was in the end, as with the cells.
+    x, y = track[-1].tolist()
+    grid = with_kept_out(data.grid, data.keep_out)
+    return judge_floor(grid, track, robot, driven=driven, stands_at=(x, y))
+
+
+def with_kept_out(grid: OccupancyGrid, keep_out: tuple[Polygon, ...]) -> OccupancyGrid:
+    """Return a map on which the pixels with their centre in a keep-out zone are occupied."""
+    if not keep_out:
+        return grid
+    cells, whole = grid.cells.copy(), Window(0, 0, *grid.cells.shape)
+    for polygon in keep_out:
+        corners = tuple(grid.geometry.to_pixels(x, y) for x, y in polygon)
+        cols, rows = zip(*corners, strict=True)
+        box = Window(
+            math.floor(min(rows)), math.floor(min(cols)), math.ceil(max(rows)), math.ceil(max(cols))
+        )
+        if common := box.intersection(whole):
+            inside = cells_inside(corners, common, 1.0)
+            cells[common.slices_in(whole)][inside] = OCCUPIED
+    return OccupancyGrid(grid.geometry, cells, grid.frame, grid.stamp_ns)
+
+
+def _driven(
+    track: NDArray[np.float64], at_s: NDArray[np.float64], jump_m: float, lost_pose_s: float
+) -> NDArray[np.bool_]:
+    """Return which ways between poses, (n, 2), were driven, bool (n - 1,), as the ledger has it."""
+    driven: NDArray[np.bool_] = np.hypot(*np.diff(track, axis=0).T) <= jump_m
+    if lost_pose_s > 0:
+        driven &= np.diff(at_s) <= lost_pose_s
+    return driven

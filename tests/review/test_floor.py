@@ -1,0 +1,96 @@
+"""The swept floor of a mission: what counts as driven, and what as floor."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.review.floor import swept_floor, with_kept_out
+from fasaco_edge.review.run_data import RunData, StatusSample
+from fasaco_edge.wire.status import LedgerReport, Status
+from tests.support.rooms import RADIUS_M, RESOLUTION_M, TOOL_M, room
+
+DISC_M2 = math.pi * (TOOL_M / 2) ** 2
+# A lane of three metres, a pose each half metre and second.
+LANE = [(0.5 + 0.5 * step, 1.5) for step in range(7)]
+
+
+def told(poses, *, keep_out=(), yaw=0.0, lost_pose_s=0.0, at_s=None, **changes):
+    """Return the figures of poses (x, y) in a room of 3.9 x 2.9 m, which may lie askew."""
+    pixels = room(4.0, 3.0)
+    geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0, yaw))
+    data = RunData(
+        pose_s=[float(at) for at in at_s or range(len(poses))],
+        poses=[(*turned(geometry, *pose), 0.0) for pose in poses],
+        grid=OccupancyGrid(geometry, pixels),
+        keep_out=tuple(tuple(turned(geometry, *at) for at in polygon) for polygon in keep_out),
+        config={"robot": {"tool_width_m": TOOL_M, "radius_m": RADIUS_M}},
+        **changes,
+    )
+    lattice = CoverageLattice.from_map(data.grid, data.footprint)
+    floor = swept_floor(data, lattice, lost_pose_s)
+    return floor and floor.figures
+
+
+def reached(width_m, depth_m):
+    """Return what the tool of a robot wider than it reaches of a rectangle [m2]; not exactly."""
+    rim_m = RADIUS_M - TOOL_M / 2
+    return (width_m - 2 * rim_m) * (depth_m - 2 * rim_m)
+
+
+def turned(geometry, x, y):
+    return geometry.to_map(x / RESOLUTION_M, y / RESOLUTION_M)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.5])
+def test_a_lane_is_swept_as_wide_as_the_tool(yaw):
+    figures = told(LANE, yaw=yaw)
+    assert figures.swept_m2 == pytest.approx(3.0 * TOOL_M + DISC_M2, rel=0.02)
+    assert figures.reachable_m2 == pytest.approx(reached(3.9, 2.9), rel=0.02)
+
+
+def test_a_jump_is_no_drive():
+    jump = told([*LANE[:2], *LANE[4:]])
+    assert jump.swept_m2 == pytest.approx(1.5 * TOOL_M + 2 * DISC_M2, rel=0.02)
+
+
+def test_what_was_driven_without_a_pose_is_not_known():
+    at_s = [0, 1, 2, 9, 10, 11, 12]
+    lost = told(LANE, at_s=at_s, lost_pose_s=3.0)
+    assert lost.swept_m2 == pytest.approx(2.5 * TOOL_M + 2 * DISC_M2, rel=0.02)
+    assert told(LANE, at_s=at_s).swept_m2 == told(LANE).swept_m2
+
+
+def test_a_pose_astray_changes_nothing():
+    astray = [*LANE[:3], (5000.0, -7000.0), *LANE[3:]]
+    assert told(astray) == told(LANE)
+    assert told([(5000.0, -7000.0)]) is None
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.5])
+def test_a_keep_out_zone_is_as_good_as_a_wall(yaw):
+    zone = ((2.0, -1.0), (2.2, -1.0), (2.2, 9.0), (2.0, 9.0))
+    beyond = ((3.0, 8.0), (4.0, 8.0), (4.0, 9.0))
+    figures = told([(0.5, 1.5), (1.0, 1.5)], keep_out=(zone, beyond), yaw=yaw)
+    assert figures.reachable_m2 == pytest.approx(reached(1.95, 2.9), rel=0.02)
+    # From where it was in the end.
+    behind = told([(0.5, 1.5), (3.0, 1.5)], keep_out=(zone,), yaw=yaw)
+    assert behind.reachable_m2 == pytest.approx(reached(1.75, 2.9), rel=0.02)
+
+
+def test_a_map_without_zones_is_left_as_it_is():
+    grid = OccupancyGrid(GridGeometry(3, 4, 0.05, Pose2D(0, 0)), np.zeros((3, 4), np.int8))
+    assert with_kept_out(grid, ()) is grid
+    kept = with_kept_out(grid, (((0.05, -1.0), (0.1, -1.0), (0.1, 0.1), (0.05, 0.1)),))
+    assert np.argwhere(kept.cells).tolist() == [[0, 1], [1, 1]]
+    assert not grid.cells.any()
+
+
+def test_floor_swept_before_is_not_guessed_at():
+    before = StatusSample(0.0, Status(ledger=LedgerReport(restored_cells=7)))
+    assert told(LANE, statuses=[before]) is None
