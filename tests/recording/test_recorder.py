@@ -199,6 +199,9 @@ def test_the_pheromone_is_neither_flat_nor_misplaced(recorded):
     assert image[1:5, 24:26].all()
     cell = read_column(recorded.path, entities.PHEROMONE, "GridMap:cell_size").values[-1][0]
     assert cell == pytest.approx(CELL_M)
+    label = read_column(recorded.path, entities.COHORT, "Points3D:labels").values[-1]
+    best = recorded.mission.best_steps
+    assert label == [f"cohort 3, 1 cell a move\n60 ants in all, best walk {best} steps"]
 
 
 def test_a_malformed_sample_costs_that_sample(recorded):

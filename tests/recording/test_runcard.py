@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -60,3 +61,25 @@ def test_the_range_of_the_pheromone_is_a_property():
     assert (told["trail_min"], told["trail_max"]) == ("0.1", "0.25")
     assert "trail_min * (trail_max / trail_min)" in told["trail"]
     assert "trail" not in RunDescription("r2", "2026-01-01").properties()
+
+
+@pytest.mark.parametrize(
+    ("field", "known"),
+    [
+        ((0.15, 0.3), (0.1, 0.5)),
+        ((0.095, 0.54), (0.1, 0.5)),  # not by a tenth
+        ((0.0, 0.0), (0.1, 0.5)),  # no cell is coverable
+        ((0.05, 0.3), (0.05, 0.5)),
+        ((0.15, 0.6), (0.1, 0.6)),
+    ],
+)
+def test_the_range_of_the_pheromone_widens(field, known):
+    first = RunDescription("r2", "2026-01-01").with_pheromone(0.1, 0.5)
+    assert first.pheromone_range == (0.1, 0.5)
+    after = first.with_pheromone(*field)
+    assert after.pheromone_range == known
+    assert (after is first) == (known == (0.1, 0.5))
+
+
+def test_a_field_without_coverable_cells_has_no_range():
+    assert RunDescription("r2", "2026-01-01").with_pheromone(0.0, 0.0).pheromone_range is None

@@ -34,6 +34,8 @@ LABEL_COLOUR: Colour = (255, 255, 255)
 # Heights [m] only order the layers: the eye looks down from far above.
 ROBOT_Z, LABEL_Z = 0.06, 0.1
 MAP_ORDER, COVERAGE_ORDER = 0.0, 1.0
+# How far above a field its label is, as a share of the field's height.
+LABEL_ABOVE = 0.1
 
 # Sine over cosine of a bend that is none.
 STRAIGHT = 1e-6
@@ -75,6 +77,17 @@ def coverage_archetype(grid: OccupancyGrid) -> rr.GridMap:
 def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
     """Return a pheromone field as it came: one byte per cell, log scale, 0 black."""
     return _grid(message.geometry, message.levels, rr.components.Colormap.Inferno, MAP_ORDER)
+
+
+def cohort_archetype(message: PheromoneMessage) -> rr.Points3D:
+    """Return the label over a pheromone field: the cohort that left it so."""
+    cells = "cell" if message.velocity == 1 else "cells"
+    ants = "ant" if message.ants == 1 else "ants"
+    text = (
+        f"cohort {message.cohort + 1}, {message.velocity} {cells} a move\n"
+        f"{message.ants} {ants} in all, best walk {message.best_steps} steps"
+    )
+    return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
 
 
 def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:

@@ -1,8 +1,4 @@
-"""Drawings of paths, of the driven path, and of the pheromone, as a recording shows them.
-
-All cohorts walk on one pheromone field. What one has done is what the field is then otherwise than
-after the one before it: the timeline ``iter`` goes from cohort to cohort.
-"""
+"""Drawings of paths and of the driven path, as a recording shows them."""
 
 from __future__ import annotations
 
@@ -15,12 +11,10 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
-from fasaco_edge.recording.scene.curves import Curves
-from fasaco_edge.recording.scene.layers import Layers, size_in_file
+from fasaco_edge.recording.scene.layers import Layers
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.paths import PathMessage
-from fasaco_edge.wire.pheromone import PheromoneMessage
 from fasaco_edge.wire.status import PathAttachment, Rectangle
 
 # Edge of a region [steps], and at most about so many of them side by side.
@@ -186,61 +180,3 @@ class DrivenPathDrawing:
         self._writer.log(entities.DRIVEN_PATH, piece)
         # The next piece begins where this one ends.
         self._piece = self._piece[-1:]
-
-
-# How far above the field its label is, as a share of the field's height.
-LABEL_ABOVE = 0.1
-# A range that grows by less than this factor is not updated.
-SLACK = 1.1
-
-
-class PheromoneDrawing:
-    """Draws pheromone as soon as the allowance of its layer lets it.
-
-    Attributes:
-        pheromone_range: least and greatest pheromone of all fields so far; None before the first.
-    """
-
-    def __init__(self, writer: RecordingWriter, layers: Layers, curves: Curves) -> None:
-        self._writer = writer
-        self._layers = layers
-        self._curves = curves
-        self._cohorts = 0
-        self.pheromone_range: tuple[float, float] | None = None
-
-    def add(self, message: PheromoneMessage) -> None:
-        """Draw the pheromone after a cohort, and plot the best walk so far."""
-        self._cohorts += 1
-        self._writer.sequence(entities.ITER, self._cohorts)
-
-        def draw_pheromone() -> None:
-            field = draw.pheromone_archetype(message)
-            label = draw.label_archetype(
-                message.geometry.bounds(), _cohort_line(message), LABEL_ABOVE
-            )
-            self._writer.log(entities.PHEROMONE, field, latched=True, size=message.levels.size)
-            self._writer.log(entities.COHORT, label, latched=True)
-
-        size = size_in_file(message.levels)
-        self._layers.draw(entities.PHEROMONE, size, draw_pheromone, self._writer.wall_ns)
-        self._curves.draw(entities.BEST_STEPS, message.best_steps)
-        # The levels' scale: with it they can be turned back into trails.
-        self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
-        self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
-        self._widen(message.trail_min, message.trail_max)
-
-    def _widen(self, least: float, most: float) -> None:
-        if most <= 0:
-            return  # no cell is coverable
-        low, high = self.pheromone_range or (least, most)
-        if self.pheromone_range is None or least * SLACK < low or most > high * SLACK:
-            self.pheromone_range = min(least, low), max(most, high)
-
-
-def _cohort_line(message: PheromoneMessage) -> str:
-    cells = "cell" if message.velocity == 1 else "cells"
-    ants = "ant" if message.ants == 1 else "ants"
-    return (
-        f"cohort {message.cohort + 1}, {message.velocity} {cells} a move\n"
-        f"{message.ants} {ants} in all, best walk {message.best_steps} steps"
-    )

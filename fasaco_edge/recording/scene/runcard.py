@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.status import Settings
@@ -17,6 +17,9 @@ HEAD = (
     ("tool_width_m", "cells of", " m"),
     ("radius_m", "radius", " m"),
 )
+
+# The range of the pheromone is updated where it grows by this factor.
+SLACK = 1.1
 
 # Of Markdown: what ends a cell, or makes links, pictures and HTML.
 MARK_UP = re.compile(r"[\\`\[\]<>!|]")
@@ -56,6 +59,18 @@ class RunDescription:
     config: Settings = field(default_factory=dict)
     pheromone_range: tuple[float, float] | None = None
     anchor: tuple[float, float] | None = None
+
+    def with_pheromone(self, least: float, most: float) -> RunDescription:
+        """Return it with a field of this least and greatest pheromone; 0 where it has none.
+
+        A range that grows by less than ``SLACK`` stays.
+        """
+        if most <= 0:
+            return self  # no cell is coverable
+        low, high = self.pheromone_range or (least, most)
+        if self.pheromone_range and least * SLACK >= low and most <= high * SLACK:
+            return self
+        return replace(self, pheromone_range=(min(least, low), max(most, high)))
 
     @property
     def name(self) -> str:

@@ -15,7 +15,7 @@ from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.curves import NOISE, Curves, StatusFigures
-from fasaco_edge.recording.scene.drawings import DrivenPathDrawing, PathDrawing, PheromoneDrawing
+from fasaco_edge.recording.scene.drawings import DrivenPathDrawing, PathDrawing
 from fasaco_edge.recording.scene.layers import Anchor, Layers, changed_bounds, size_in_file
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
@@ -41,14 +41,13 @@ class Scene:
         self._map: OccupancyGrid | None = None
         self._known: Bounds | None = None
         self._framed: Bounds | None = None
-        self._errors = self._restored = 0
+        self._errors = self._restored = self._cohorts = 0
         self._states: dict[str, str] = {}
         self._layers = Layers()
         self._curves = Curves(writer)
         self._driven = DrivenPathDrawing(writer)
         self._figures = StatusFigures(self._curves)
         self._paths = PathDrawing(writer, self._layers)
-        self._pheromone = PheromoneDrawing(writer, self._layers, self._curves)
         log_styles(writer)
         self._describe()
         self._draw_robot(DEFAULT_RADIUS_M)
@@ -122,10 +121,28 @@ class Scene:
         self._curves.draw(entities.RECOVERED_FRACTION, recovered)
 
     def add_pheromone(self, message: PheromoneMessage) -> None:
-        """Draw the pheromone after a cohort, and plot the best walk so far."""
-        self._pheromone.add(self._anchored(message.geometry.origin).grid(message))
-        if self._pheromone.pheromone_range != self._run.pheromone_range:
-            self._run = replace(self._run, pheromone_range=self._pheromone.pheromone_range)
+        """Draw the pheromone after a cohort, and plot the best walk so far.
+
+        All cohorts walk on one field. What one has done is what the field is then otherwise than
+        after the one before it: the timeline ``iter`` goes from cohort to cohort.
+        """
+        message = self._anchored(message.geometry.origin).grid(message)
+        self._cohorts += 1
+        self._writer.sequence(entities.ITER, self._cohorts)
+
+        def draw_pheromone() -> None:
+            field = draw.pheromone_archetype(message)
+            self._writer.log(entities.PHEROMONE, field, latched=True, size=message.levels.size)
+            self._writer.log(entities.COHORT, draw.cohort_archetype(message), latched=True)
+
+        self._draw(entities.PHEROMONE, size_in_file(message.levels), draw_pheromone)
+        self._curves.draw(entities.BEST_STEPS, message.best_steps)
+        # The levels' scale: with it they can be turned back into trails.
+        self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
+        self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
+        known = self._run.with_pheromone(message.trail_min, message.trail_max)
+        if known is not self._run:
+            self._run = known
             self._describe()
 
     def add_status(self, status: Status) -> None:
