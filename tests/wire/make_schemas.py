@@ -21,7 +21,10 @@ from fasaco_edge.wire.replies import Error, Replan, Reply, Version
 from fasaco_edge.wire.status import PathAttachment, Recorder, Status
 from fasaco_edge.wire.turns import TurnBatch
 
-DIALECT = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+HEAD = {
+    "$schema": "https://json-schema.org/draft/2020-12/schema",
+    "$comment": "Written by `make contract` from the typed documents of fasaco_edge.",
+}
 DOCUMENTS = {
     "error": Error,
     "mission": CommandDocument,
@@ -39,7 +42,7 @@ def files() -> dict[str, str]:
     """Return every file in protocol/schema, by its name there."""
     made = {f"{name}.json": schema_of(kind) for name, kind in DOCUMENTS.items()}
     made["config.json"] = config_schema()
-    return {name: json.dumps(DIALECT | made[name], indent=2) + "\n" for name in sorted(made)}
+    return {name: json.dumps(HEAD | made[name], indent=2) + "\n" for name in sorted(made)}
 
 
 def schema_of(kind: type[msgspec.Struct]) -> dict[str, Any]:
