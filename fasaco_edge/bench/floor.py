@@ -41,8 +41,8 @@ TOUCH_SLACK_PX = 1.5
 # Pieces of a line in which it is looked for walls [pixels], and how many together.
 STEP_PX = 0.7
 PIECES = 4096
-# So many pixels around pieces of it are looked at together while it sweeps.
-SWEPT_PIXELS = 500_000
+# So many rows of pixels beside pieces of it are looked at together while it sweeps.
+SWEPT_ROWS = 30_000
 
 Points = NDArray[np.float64]
 
@@ -161,7 +161,7 @@ def judge_floor(
     floor = _Floor.of(grid, robot)
     line = _Line.of(line_xy, floor.geometry, driven)
     reachable = floor.reachable_from(stands_at or tuple(line_xy[0].tolist()))
-    swept = line.swept(robot.tool_m / floor.geometry.resolution / 2, reachable.shape)
+    swept = line.swept(robot.tool_m / floor.geometry.resolution / 2, floor.free.shape)
     swept &= reachable
     return JudgedFloor(_figures(floor, line, reachable, swept), floor.geometry, reachable, swept)
 
@@ -213,13 +213,14 @@ class _Floor:
         touched |= ~self.free
         rows, cols = self.free.shape
         illegal = length = 0.0
+        is_line = line.length_px > 0
         for start, end in line.pieces(STEP_PX, PIECES):
             col, row = np.floor((start + end) / 2).T
             inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
             touches = np.ones(len(row), np.bool_)
             touches[inside] = touched[row[inside].astype(int), col[inside].astype(int)]
             # A line of one point is judged by it.
-            weight = np.hypot(*(end - start).T) if line.length_px else np.ones(len(row))
+            weight = np.hypot(*(end - start).T) if is_line else np.ones(len(row))
             illegal += float(weight[touches].sum())
             length += float(weight.sum())
         return illegal / length
@@ -264,41 +265,68 @@ class _Line:
         way = self.ends - self.starts
         counts = np.maximum(np.ceil(np.hypot(*way.T) / most_px), 1).astype(np.int64)
         stops = np.cumsum(counts)
+        begins = stops - counts
         for first in range(0, int(stops[-1]), together):
             number = np.arange(first, min(first + together, int(stops[-1])))
             segment = np.searchsorted(stops, number, side="right")
-            part = number - (stops - counts)[segment]
+            part = number - begins[segment]
             start, along = self.starts[segment], way[segment]
             share = (np.stack([part, part + 1]) / counts[segment])[..., None]
             yield start + share[0] * along, start + share[1] * along
 
-    def swept(self, half_px: float, shape: tuple[int, ...]) -> Mask:
-        """Return the pixels whose centre lies within ``half_px`` of the line."""
-        swept, (rows, cols) = np.zeros(shape, np.bool_), shape
+    def swept(self, half_px: float, shape: tuple[int, int]) -> Mask:
+        """Return the pixels whose centre lies within ``half_px`` of the line, bool ``shape``.
+
+        Those of one row near one piece of it are a run: it is counted where each run begins, and
+        counted off behind its end.
+        """
+        rows, cols = shape
         reach = half_px + TOUCH_TOLERANCE_PX
         longest = max(half_px, 1.0)
-        together = max(SWEPT_PIXELS // math.ceil(2 * reach + longest + 2) ** 2, 1)
+        together = max(SWEPT_ROWS // math.ceil(2 * reach + longest + 1), 1)
+        runs = np.zeros(rows * (cols + 1), np.int32)
         for starts, ends in self.pieces(longest, together):
-            low, high = np.minimum(starts, ends) - reach, np.maximum(starts, ends) + reach
-            near = ((high > 0) & (low < (cols, rows))).all(axis=1)
-            if not near.any():
-                continue
-            start, way, low = starts[near], (ends - starts)[near], np.floor(low[near])
-            wide, tall = np.ceil((high[near] - low).max(axis=0)).astype(int).tolist()
-            x = low[:, :1] + np.arange(wide) + 0.5 - start[:, :1]
-            y = low[:, 1:] + np.arange(tall) + 0.5 - start[:, 1:]
-            dx, dy = way[:, 0, None], way[:, 1, None]
-            square = np.maximum(dx * dx + dy * dy, 1e-12)
-            # How far along the piece the nearest point of it lies, 0 to 1.
-            along = (x * (dx / square))[:, None, :] + (y * (dy / square))[:, :, None]
-            np.clip(along, 0.0, 1.0, out=along)
-            distance = (x[:, None, :] - along * dx[:, :, None]) ** 2
-            distance += (y[:, :, None] - along * dy[:, :, None]) ** 2
-            piece, row, col = np.nonzero(distance <= reach * reach)
-            row, col = row + low[piece, 1].astype(int), col + low[piece, 0].astype(int)
-            inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
-            swept[row[inside], col[inside]] = True
-        return swept
+            bottom = np.floor(np.minimum(starts[:, 1], ends[:, 1]) - reach).astype(np.int64)
+            top = np.maximum(starts[:, 1], ends[:, 1]) + reach
+            row = bottom[:, None] + np.arange(math.ceil((top - bottom).max()))
+            left, right = _run_beside(starts, ends, row.astype(np.float64) + 0.5, reach)
+            first = np.maximum(np.ceil(left - 0.5), 0.0)
+            stop = np.minimum(np.floor(right - 0.5) + 1.0, float(cols))
+            near = (first < stop) & (row >= 0) & (row < rows)
+            before = row[near] * (cols + 1)
+            np.add.at(runs, before + first[near].astype(np.int64), 1)
+            np.add.at(runs, before + stop[near].astype(np.int64), -1)
+        # Runs that end in a row's last pixel are counted off in one of its own.
+        beside = np.cumsum(runs, out=runs).reshape(rows, cols + 1) > 0
+        return beside[:, :-1]
+
+
+def _run_beside(starts: Points, ends: Points, y: Points, reach: float) -> tuple[Points, Points]:
+    """Return where lines across segments enter and leave all that lies within ``reach`` of them.
+
+    A disc at the share ``t`` of a segment spans ``x(t) +- sqrt(reach^2 - (y - y(t))^2)`` on a
+    line: its right end is furthest where the line meets the tangent of all discs, or else at the
+    nearer end of the segment; so is its left end.
+
+    Args:
+        starts, ends: of the segments, float64 (n, 2).
+        y: of the lines, parallel to the x axis, float64 (n, m).
+        reach: radius of the discs.
+
+    Returns:
+        Two of x, float64 (n, m); the first is NaN where a line comes near no point of a segment.
+    """
+    way = ends - starts
+    dx, dy = way[:, :1], np.where(way[:, 1:] == 0.0, 1e-12, way[:, 1:])
+    up = y - starts[:, 1:]
+    tangent = reach * dx * np.sign(dy) / np.hypot(dx, dy)
+    found = []
+    for side in (-1.0, 1.0):
+        share = np.clip((up + side * tangent) / dy, 0.0, 1.0)
+        square = reach * reach - (up - share * dy) ** 2
+        with np.errstate(invalid="ignore"):
+            found.append(starts[:, :1] + share * dx + side * np.sqrt(square))
+    return found[0], found[1]
 
 
 def _figures(floor: _Floor, line: _Line, reachable: Mask, swept: Mask) -> FloorFigures:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -84,6 +85,30 @@ def test_a_lane_from_wall_to_wall_leaves_two_patches() -> None:
     figures = judged(room(4.0, 3.0), *line).figures
     assert figures.patches_over_4_dm2 == 2
     assert figures.largest_patch_m2 == pytest.approx(1.3 * 4.0, rel=0.02)
+
+
+def test_swept_is_what_lies_near_the_line_as_compared_pixel_by_pixel() -> None:
+    grid = room(4.0, 3.0)
+    rng = np.random.default_rng(3)
+    for count in (1, 2, 3, 9):
+        points = rng.uniform((-0.5, -0.5), (4.5, 3.5), (count, 2))
+        # Along the axes, standing still, and a hair's breadth on.
+        points[1::4, 0], points[2::4, 1] = points[0, 0], points[0, 1]
+        points[4::4] = points[3:-1:4][: len(points[4::4])]
+        points[8::4] += 1e-9
+        floor = judge_floor(grid, points, ROBOT, stands_at=(2.0, 1.5))
+        rows, cols = np.indices(floor.swept.shape) + 0.5
+        x = floor.geometry.origin.x + cols * floor.geometry.resolution
+        y = floor.geometry.origin.y + rows * floor.geometry.resolution
+        near = np.hypot(x - points[0, 0], y - points[0, 1]) <= 0.2
+        for (ax, ay), (bx, by) in pairwise(points):
+            length = max((bx - ax) ** 2 + (by - ay) ** 2, 1e-30)
+            share = np.clip(((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length, 0.0, 1.0)
+            near |= np.hypot(x - ax - share * (bx - ax), y - ay - share * (by - ay)) <= 0.2
+        differ = floor.swept != (near & floor.reachable)
+        # The tolerance of a thousandth of a pixel decides about few of them.
+        assert np.count_nonzero(differ) <= 0.001 * np.count_nonzero(near)
+        assert floor.figures.swept_m2 == pytest.approx(np.count_nonzero(floor.swept) * 0.025**2)
 
 
 @pytest.mark.parametrize("value", [OCCUPIED, UNKNOWN, 26])
