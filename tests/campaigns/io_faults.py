@@ -1,6 +1,8 @@
 """Let each file call of the daemon, the recorder and the compiler fail in turn.
 
-    python -m tests.campaigns.io_faults                       # all of them
+    python -m tests.campaigns.io_faults                       # all, hours
+    python -m tests.campaigns.io_faults --most 20             # 20 of each kind of call
+    python -m tests.campaigns.io_faults --only compile        # an empty cache of kernels: days
     python -m tests.campaigns.io_faults --only orders --again orders:sync:2:EIO
 
 The Nth open, read, write, fsync, rename, mmap and so on under the folders of state, recordings,
@@ -19,6 +21,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import operator
 import os
 import random
 import signal
@@ -32,7 +35,7 @@ from pathlib import Path
 
 from fasaco_edge.cli.console.arguments import Exit
 from tests.campaigns.file_calls import Failure, Kind, Watch, why_not
-from tests.campaigns.io_scenarios import SCENARIOS, WrongError
+from tests.campaigns.io_scenarios import LONG, SCENARIOS, WrongError
 from tests.campaigns.services import show
 
 # What each kind may fail with. Who calls again after EINTR, and who writes the rest of what was
@@ -125,12 +128,16 @@ def failures_of(counts: dict[Kind, int], most: int, seed: int, *, every: bool) -
 
     Args:
         counts: how many calls there are of each kind.
-        most: so many at most, 0 for all.
+        most: so many of each kind at most, 0 for all.
         seed: chooses the errors, and which are left out.
         every: each call with each error, once and for good.
+
+    Returns:
+        the failures, those of the rarest kind first: the others are much alike.
     """
     rng, failures = random.Random(seed), list[Failure]()
-    for kind, count in counts.items():
+    for kind, count in sorted(counts.items(), key=operator.itemgetter(1)):
+        of_kind = list[Failure]()
         errors = [(error, False) for error in MAY_FAIL[kind]]
         lasting = [(error, True) for error, _ in errors if error not in ("EINTR", "short")]
         if kind is Kind.ANY:
@@ -138,10 +145,11 @@ def failures_of(counts: dict[Kind, int], most: int, seed: int, *, every: bool) -
         for at in range(1, count + 1, STRIDE if kind is Kind.ANY and not every else 1):
             chosen = lasting if not errors or rng.random() < LASTING_SHARE else errors
             for error, for_good in errors + lasting if every else [rng.choice(chosen)]:
-                failures.append(Failure(kind, at, error, for_good))
-    if not 0 < most < len(failures):
-        return failures
-    return sorted(rng.sample(failures, most), key=failures.index)
+                of_kind.append(Failure(kind, at, error, for_good))
+        if 0 < most < len(of_kind):
+            of_kind = sorted(rng.sample(of_kind, most), key=of_kind.index)
+        failures += of_kind
+    return failures
 
 
 def main() -> int:
@@ -151,11 +159,11 @@ def main() -> int:
     )
     parser.add_argument(
         "--only", choices=SCENARIOS, action="append", metavar="SCENARIO",
-        help=f"run these alone, of {', '.join(SCENARIOS)}",
+        help=f"run these alone, of {', '.join(SCENARIOS)}; only so: {', '.join(LONG)}",
     )  # fmt: skip
     parser.add_argument(
-        "--most", type=int, default=0, metavar="N", help="so many faults of each scenario, chosen "
-        "by --seed; 0 for all (default: %(default)s)",
+        "--most", type=int, default=0, metavar="N", help="so many faults of each kind of call "
+        "in each scenario, chosen by --seed; 0 for all (default: %(default)s)",
     )  # fmt: skip
     parser.add_argument(
         "--every-error", action="store_true", help="each call with each error, once and for good; "
@@ -184,7 +192,7 @@ def main() -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     outcomes = _read(args.json) if args.resume else []
     try:
-        for name in args.only or SCENARIOS:
+        for name in args.only or [name for name in SCENARIOS if name not in LONG]:
             known = {outcome.failure for outcome in outcomes if outcome.scenario == name}
             for outcome in _all_of(name, args.most, args.seed, known, every=args.every_error):
                 outcomes.append(outcome)

@@ -58,6 +58,13 @@ def test_a_failure_is_written_as_it_is_read():
         Failure.of_text("open:1:ENONE")
 
 
+def test_the_rarest_calls_come_first_and_no_kind_is_left_out():
+    counts = {Kind.READ: 600, Kind.SYNC: 3, Kind.OPEN: 300, Kind.MAP: 0}
+    chosen = failures_of(counts, 20, 0, every=False)
+    expected = [Kind.SYNC] * 3 + [Kind.OPEN] * 20 + [Kind.READ] * 20
+    assert [failure.kind for failure in chosen] == expected
+
+
 @pytest.mark.parametrize(
     "fault",
     [
@@ -68,6 +75,7 @@ def test_a_failure_is_written_as_it_is_read():
         "recorder:write:4:EIO",
         "recorder:write:9:ENOSPC",
         "recorder:folder:1:EIO",
+        "warmup:rename:2:ENOSPC",
     ],
 )
 def test_a_fault_is_told_and_nothing_is_lost(fault):
