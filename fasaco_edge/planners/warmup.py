@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.grid.changes import LatticeChange
+from fasaco_edge.grid.floor import Floor, RobotDiscs, StandLattice
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
@@ -18,6 +19,7 @@ from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.kernels.lattice.reach import update_reach
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.line import LineConfig, line_over
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import SearchProgress, ignore, never
@@ -27,8 +29,11 @@ from fasaco_edge.planners.repair import repaired
 
 LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
 WALKS, BOUND = "shortest walks", "lower bound"
-LOCAL_SEARCH, REPAIR = "local search", "repair"
-STAGES = (LATTICE, CHANGES, REACH, AREAS, WALKS, BOUND, LOCAL_SEARCH, REPAIR, *PLANNER_NAMES)
+LOCAL_SEARCH, REPAIR, LINE = "local search", "repair", "driven line"
+STAGES = (
+    *(LATTICE, CHANGES, REACH, AREAS, WALKS, BOUND, LOCAL_SEARCH, REPAIR, LINE),
+    *PLANNER_NAMES,
+)
 
 
 def warm_up(report: Callable[[str], None] | None = None) -> None:
@@ -62,6 +67,8 @@ def _stages() -> Iterator[str]:
     path = NearOptimal(ColonyConfig(ants=1, velocities=(1,))).plan(costly, _perturbed, ignore)
     yield REPAIR
     repaired(replace(costly, before=path.cells[2:]), path.planner, 0, _perturbed)
+    yield LINE
+    _take_line(grid)
     for name in PLANNER_NAMES:
         yield name
         planner_of(name, ColonyConfig(ants=1, velocities=(1,))).plan(problem, never, ignore)
@@ -86,6 +93,13 @@ def _take_areas(lattice: CoverageLattice) -> None:
     turn_inside(corners, 0, 0, 1.0, cells)
     add_near(corners, 0, 0, 1.0, 0.5, np.zeros((4, 5), np.int32))
     count_in(np.packbits(cells)[np.newaxis], np.packbits(cells))
+
+
+def _take_line(grid: OccupancyGrid) -> None:
+    floor = Floor.around(grid, RobotDiscs(radius_m=0.4, tool_m=0.6), (0.5, 0.5))
+    stands = StandLattice.over(floor, 1.0)
+    walk = np.array([(0, 0), (0, 1), (1, 1)], np.int32)
+    line_over(walk, stands, floor, LineConfig(moves_m2=20), is_end_fixed=False)
 
 
 def _perturbed(progress: SearchProgress) -> bool:

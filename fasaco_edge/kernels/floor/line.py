@@ -1,0 +1,353 @@
+"""The driven line as a list of points: what a change of it gains, and how it is made.
+
+A change replaces the points between two others. Its gain is exact: seconds of the chains before
+and after, with the turns at either end, and the pixels that are swept more or less. Each block of
+pixels keeps the time of the line's last change there.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.floor.capsule import (
+    BLOCK,
+    Scratch,
+    Sweeps,
+    is_clear,
+    prepare,
+    sweep,
+    swept_more,
+)
+from fasaco_edge.kernels.jit import inlined, lean_kernel
+
+# A move that gains less is not made [s]: sums of floats must not go in circles.
+LEAST_GAIN_S = 1e-3
+# No edge is shorter than this [pixels].
+LEAST_EDGE = 0.3
+# The most points that a move puts in.
+MOST_NEW = 4
+# The most points of a chain: those replaced, and two on either side.
+MOST_CHAIN = MOST_NEW + 4
+NONE = -1
+
+
+class Line(NamedTuple):
+    """The driven line as a list of points, and what was looked at since it changed.
+
+    Attributes:
+        points: float64 (capacity, 2): y, x [pixels]; the line begins with the first.
+        next, previous: int32 (capacity,): the number of the next point, and of the one before;
+            NONE at the ends.
+        seen: int64 (capacity,): when all moves at a point were last tried.
+        changed: int64, a block each: when the line was last changed there.
+        state: int64 (3,): points used, the time, moves tried.
+        is_end_fixed: whether the line has to end where it does.
+    """
+
+    points: NDArray[np.float64]
+    next: NDArray[np.int32]
+    previous: NDArray[np.int32]
+    seen: NDArray[np.int64]
+    changed: NDArray[np.int64]
+    state: NDArray[np.int64]
+    is_end_fixed: bool
+
+
+USED, TIME, TRIED = range(3)
+
+
+class Floor(NamedTuple):
+    """What the line lies on.
+
+    Attributes:
+        blocked: int32 (rows, cols + 1), see ``capsule.is_clear``.
+        places: bool (rows, cols): where the robot may be, and can come to.
+        sweeps: what the line sweeps.
+        robot, tool: their radii [pixels].
+    """
+
+    blocked: NDArray[np.int32]
+    places: NDArray[np.bool_]
+    sweeps: Sweeps
+    robot: float
+    tool: float
+
+
+class Price(NamedTuple):
+    """What is weighed: seconds for a pixel driven, a radian turned, a pixel left unswept."""
+
+    drive_s: float
+    turn_s: float
+    left_s: float
+
+
+class Memory(NamedTuple):
+    """Memory for a move: points before and after, float64 (MOST_CHAIN, 2), and the points to be
+    put in, those of the best so far, and a place, float64 (MOST_NEW, 2)."""
+
+    before: NDArray[np.float64]
+    after: NDArray[np.float64]
+    new: NDArray[np.float64]
+    best: NDArray[np.float64]
+    place: NDArray[np.float64]
+    capsules: Scratch
+
+
+@inlined
+def _arctangent(ratio: float) -> float:
+    """Return the arctangent of a ratio in [0, 1], to 1e-5 rad, the same on every machine.
+
+    M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions, 4.4.49.
+    """
+    square = ratio * ratio
+    series = 0.0208351 * square - 0.085133
+    series = series * square + 0.180141
+    series = series * square - 0.3302995
+    return ratio * (series * square + 0.999866)
+
+
+@inlined
+def turn_between(uy: float, ux: float, vy: float, vx: float) -> float:
+    """Return the angle from one direction to another [rad], in [0, pi]."""
+    sine, cosine = abs(ux * vy - uy * vx), ux * vx + uy * vy
+    if sine <= 1e-9 * abs(cosine):
+        return 0.0 if cosine >= 0.0 else np.pi
+    if cosine >= 0.0:
+        angle = (
+            _arctangent(sine / cosine)
+            if sine <= cosine
+            else 0.5 * np.pi - _arctangent(cosine / sine)
+        )
+    elif sine <= -cosine:
+        angle = np.pi - _arctangent(sine / -cosine)
+    else:
+        angle = 0.5 * np.pi + _arctangent(-cosine / sine)
+    return angle
+
+
+@inlined
+def copy_point(source: NDArray[np.float64], at: int, target: NDArray[np.float64], to: int) -> None:
+    """Copy a point; numba would allocate for an assignment of rows."""
+    target[to, 0], target[to, 1] = source[at, 0], source[at, 1]
+
+
+@lean_kernel
+def chain_s(points: NDArray[np.float64], first: int, last: int, count: int, price: Price) -> float:
+    """Return the seconds of a chain: its edges from ``first`` to ``last``, all its turns."""
+    seconds = 0.0
+    for number in range(first, last):
+        dy = points[number + 1, 0] - points[number, 0]
+        dx = points[number + 1, 1] - points[number, 1]
+        seconds += price.drive_s * np.sqrt(dy * dy + dx * dx)
+    for number in range(1, count - 1):
+        seconds += price.turn_s * turn_between(
+            points[number, 0] - points[number - 1, 0],
+            points[number, 1] - points[number - 1, 1],
+            points[number + 1, 0] - points[number, 0],
+            points[number + 1, 1] - points[number, 1],
+        )
+    return seconds
+
+
+@lean_kernel
+def _left_around(
+    left: NDArray[np.int32], points: NDArray[np.float64], first: int, last: int, tool: float
+) -> int:
+    """Return at least how many unswept pixels the edges from ``first`` to ``last`` pass over."""
+    rows, cols = left.shape
+    found = 0
+    for number in range(first, last):
+        ay, ax = points[number, 0], points[number, 1]
+        by, bx = points[number + 1, 0], points[number + 1, 1]
+        for i in range(
+            max(int(min(ay, by) - tool) >> BLOCK, 0),
+            min((int(max(ay, by) + tool) >> BLOCK) + 1, rows),
+        ):
+            for j in range(
+                max(int(min(ax, bx) - tool) >> BLOCK, 0),
+                min((int(max(ax, bx) + tool) >> BLOCK) + 1, cols),
+            ):
+                found += left[i, j]
+    return found
+
+
+class Chains(NamedTuple):
+    """The points in ``Memory.before`` and ``after``: those replaced, and up to two on either side.
+
+    Attributes:
+        lead: number of the first point whose edge changes; the one before it tells a turn.
+        olds, news: points before and after; 0 where they are too many.
+        last_old, last_new: the last point whose edge changes.
+    """
+
+    lead: int
+    olds: int
+    news: int
+    last_old: int
+    last_new: int
+
+
+@lean_kernel
+def _chains(line: Line, memory: Memory, begin: int, end: int, count: int) -> Chains:
+    points, following, preceding = line.points, line.next, line.previous
+    old, new = memory.before, memory.after
+    lead = 0
+    if preceding[begin] != NONE:
+        copy_point(points, preceding[begin], old, 0)
+        copy_point(old, 0, new, 0)
+        lead = 1
+    olds, news = lead, lead + 1
+    number = begin
+    while number != end:
+        if olds == MOST_CHAIN - 2:
+            return Chains(0, 0, 0, 0, 0)
+        copy_point(points, number, old, olds)
+        olds += 1
+        number = following[number]
+    copy_point(points, begin, new, lead)
+    for place in range(count):
+        copy_point(memory.new, place, new, news)
+        news += 1
+    tail = 0
+    while number != NONE and tail < 2:
+        copy_point(points, number, old, olds)
+        copy_point(points, number, new, news)
+        olds += 1
+        news += 1
+        tail += 1
+        number = following[number]
+    behind = max(tail - 1, 0)
+    return Chains(lead, olds, news, olds - 1 - behind, news - 1 - behind)
+
+
+@lean_kernel
+def _is_way(floor: Floor, points: NDArray[np.float64], first: int, last: int) -> bool:
+    """Tell whether the edges between two points of a chain are clear, and none is too short."""
+    for number in range(first, last):
+        ay, ax = points[number, 0], points[number, 1]
+        by, bx = points[number + 1, 0], points[number + 1, 1]
+        if abs(by - ay) + abs(bx - ax) < LEAST_EDGE:
+            return False
+        if not is_clear(floor.blocked, ay, ax, by, bx, floor.robot):
+            return False
+    return True
+
+
+@lean_kernel
+def _prepare_edges(
+    scratch: Scratch, at: int, points: NDArray[np.float64], first: int, last: int, tool: float
+) -> int:
+    """Prepare the capsules of a chain's edges, from number ``at`` on; return how many."""
+    for number in range(first, last):
+        ay, ax = points[number, 0], points[number, 1]
+        by, bx = points[number + 1, 0], points[number + 1, 1]
+        prepare(scratch.capsules, at + number - first, ay, ax, by, bx, tool)
+    return max(last - first, 0)
+
+
+@lean_kernel
+def gain_of(
+    line: Line, floor: Floor, price: Price, memory: Memory, begin: int, end: int, count: int
+) -> float:
+    """Return what is gained if ``memory.new[:count]`` replace the points between two others [s].
+
+    0.0 where that is less than LEAST_GAIN_S, or where the way would not be clear.
+
+    Args:
+        line, floor, price, memory: see above.
+        begin: number of the point before.
+        end: of the point behind; NONE where the line shall end with the new ones.
+        count: new points.
+    """
+    line.state[TRIED] += 1
+    if end == NONE and line.is_end_fixed:
+        return 0.0
+    lead, olds, news, last_old, last_new = _chains(line, memory, begin, end, count)
+    if not olds:
+        return 0.0
+    old, new, tool = memory.before, memory.after, floor.tool
+    longer_s = chain_s(new, lead, last_new, news, price)
+    longer_s -= chain_s(old, lead, last_old, olds, price)
+    if longer_s >= -LEAST_GAIN_S:
+        most = _left_around(floor.sweeps.left, new, lead, last_new, tool)
+        if price.left_s * most <= longer_s + LEAST_GAIN_S:
+            return 0.0
+    if not _is_way(floor, new, lead, last_new):
+        return 0.0
+    scratch = memory.capsules
+    taken = _prepare_edges(scratch, 0, old, lead, last_old, tool)
+    given = _prepare_edges(scratch, taken, new, lead, last_new, tool)
+    more = swept_more(floor.sweeps.counts, scratch, taken, given, tool)
+    gain = price.left_s * more - longer_s
+    return gain if gain > LEAST_GAIN_S else 0.0
+
+
+@lean_kernel
+def note_change(line: Line, begin: int, tool: float, hops: int, now: int) -> int:
+    """Return when the line was last changed around some points from the one before ``begin`` on;
+    with ``now`` above 0 note a change there."""
+    points = line.points
+    number = line.previous[begin] if line.previous[begin] != NONE else begin
+    low_y, low_x = points[number, 0], points[number, 1]
+    high_y, high_x = low_y, low_x
+    for _ in range(hops):
+        if number == NONE:
+            break
+        y, x = points[number, 0], points[number, 1]
+        low_y, high_y = min(low_y, y), max(high_y, y)
+        low_x, high_x = min(low_x, x), max(high_x, x)
+        number = line.next[number]
+    newest = 0
+    rows, cols = line.changed.shape
+    for i in range(
+        max(int(low_y - tool) >> BLOCK, 0), min((int(high_y + tool) >> BLOCK) + 1, rows)
+    ):
+        for j in range(
+            max(int(low_x - tool) >> BLOCK, 0), min((int(high_x + tool) >> BLOCK) + 1, cols)
+        ):
+            if now > 0:
+                line.changed[i, j] = now
+            newest = max(newest, line.changed[i, j])
+    return newest
+
+
+# Points around one whose moves depend on each other.
+HOPS = 6
+
+
+@lean_kernel
+def replace_points(
+    line: Line, floor: Floor, memory: Memory, begin: int, end: int, count: int
+) -> None:
+    """Put ``memory.new[:count]`` in the place of the points between two others."""
+    points, following, preceding, tool = line.points, line.next, line.previous, floor.tool
+    line.state[TIME] += 1
+    note_change(line, begin, tool, HOPS, line.state[TIME])
+    number = begin
+    while number != end and following[number] != NONE:
+        a, b = points[number], points[following[number]]
+        sweep(floor.sweeps, a[0], a[1], b[0], b[1], tool, -1, memory.capsules)
+        number = following[number]
+    # The points that go lend their numbers to those that come.
+    free, last = following[begin], begin
+    for number in range(count):
+        if free != end and free != NONE:  # noqa: PLR1714 - numba has no `in` for tuples
+            place, free = free, following[free]
+        else:
+            place = np.int32(line.state[USED])
+            line.state[USED] += 1
+        copy_point(memory.new, number, points, place)
+        line.seen[place] = 0
+        following[last], preceding[place] = place, last
+        last = place
+    following[last] = end
+    if end != NONE:
+        preceding[end] = last
+    number = begin
+    while number != end and following[number] != NONE:
+        a, b = points[number], points[following[number]]
+        sweep(floor.sweeps, a[0], a[1], b[0], b[1], tool, 1, memory.capsules)
+        number = following[number]
+    line.state[TIME] += 1
+    note_change(line, begin, tool, HOPS, line.state[TIME])

@@ -1,0 +1,160 @@
+"""The driven line: a walk over stands, polished against the floor that it sweeps.
+
+What is minimised is seconds to drive plus a price for each reachable square metre that is left
+unswept. Lengths count at the robot's speed, turns of any angle at the time of a quarter-turn.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.floor import Floor, StandLattice, straightened
+from fasaco_edge.kernels.floor import line as kernel
+from fasaco_edge.kernels.floor.capsule import BLOCK, MOST_CAPSULES, NEVER, Scratch, Sweeps, sweep
+from fasaco_edge.kernels.floor.polish import polish, sweep_patches
+
+# What is left further from an edge is no reason for a detour of that edge [m].
+FARTHEST_M = 1.0
+# What is left in one place counts as a patch from here on [m2].
+PATCH_M2 = 0.04
+
+
+@dataclass(frozen=True, slots=True)
+class LineConfig:
+    """How a line is polished.
+
+    Attributes:
+        price_s_m2: what sweeping a square metre is worth [s/m2]; 0 for no polish.
+        speed_m_s: of the robot [m/s].
+        quarter_turn_s: a turn by 90 degrees on the spot [s].
+        moves_m2: at most so many moves are tried for each reachable square metre.
+        patch_s: a patch is swept at the end where that takes no longer than this [s].
+    """
+
+    price_s_m2: float = 180.0
+    speed_m_s: float = 0.25
+    quarter_turn_s: float = 1.5
+    moves_m2: int = 8000
+    patch_s: float = 20.0
+
+
+LINES = {"quick": LineConfig(price_s_m2=60.0, patch_s=0.0), "thorough": LineConfig()}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrivenLine:
+    """A line to be driven, straight between its points.
+
+    Attributes:
+        xy: float64 (n, 2), read-only: x, y in the map frame [m].
+        swept_m2, reachable_m2: of the reachable floor [m2], counted in pixels of its raster.
+        tried: moves that were tried.
+    """
+
+    xy: NDArray[np.float64]
+    swept_m2: float
+    reachable_m2: float
+    tried: int
+
+    def __post_init__(self) -> None:
+        self.xy.flags.writeable = False
+
+
+def line_over(
+    walk: NDArray[np.int32],
+    stands: StandLattice,
+    floor: Floor,
+    config: LineConfig,
+    *,
+    is_end_fixed: bool,
+) -> DrivenLine:
+    """Return the polished line along a walk.
+
+    Args:
+        walk: int32 (n, 2), cells (row, col), each a step from the one before.
+        stands: the lattice that it walks on.
+        floor: what is to be swept.
+        config: prices.
+        is_end_fixed: whether the line has to end where the walk does.
+    """
+    points = stands.points(walk)
+    sweeps = _sweeps(floor)
+    unit = floor.geometry.resolution
+    tool = floor.discs.tool_m / 2 / unit
+    memory = _memory()
+    for a, b in pairwise(points if len(points) > 1 else points[[0, 0]]):
+        sweep(sweeps, a[0], a[1], b[0], b[1], tool, 1, memory.capsules)
+    tried = 0
+    if config.price_s_m2 > 0.0 and len(points) > 1:
+        line = _linked(points, sweeps.left.shape, is_end_fixed=is_end_fixed)
+        price = kernel.Price(
+            drive_s=unit / config.speed_m_s,
+            turn_s=config.quarter_turn_s / (0.5 * math.pi),
+            left_s=config.price_s_m2 * unit * unit,
+        )
+        on = kernel.Floor(floor.blocked, floor.places, sweeps, floor.discs.radius_m / unit, tool)
+        most = int(config.moves_m2 * floor.reachable_m2)
+        polish(line, on, price, memory, FARTHEST_M / unit, most)
+        patch = price._replace(left_s=config.patch_s / PATCH_M2 * unit * unit)
+        if patch.left_s > price.left_s:
+            least = math.ceil(PATCH_M2 / (unit * unit))
+            sweep_patches(line, on, patch, memory, FARTHEST_M / unit, least)
+        points = straightened(_points(line))
+        tried = int(line.state[kernel.TRIED])
+    left = int(np.count_nonzero(sweeps.counts == 0)) * unit * unit
+    return DrivenLine(floor.to_map(points), floor.reachable_m2 - left, floor.reachable_m2, tried)
+
+
+def _sweeps(floor: Floor) -> Sweeps:
+    counts = np.where(floor.reachable, 0, NEVER).astype(np.int16)
+    rows, cols = counts.shape
+    side = 1 << BLOCK
+    padded = np.zeros((-(-rows // side) * side, -(-cols // side) * side), np.bool_)
+    padded[:rows, :cols] = floor.reachable
+    blocks = padded.reshape(padded.shape[0] // side, side, padded.shape[1] // side, side)
+    return Sweeps(counts, blocks.sum(axis=(1, 3)).astype(np.int32))
+
+
+def _linked(
+    points: NDArray[np.float64], blocks: tuple[int, ...], *, is_end_fixed: bool
+) -> kernel.Line:
+    count = len(points)
+    capacity = 3 * count + 4096
+    room = np.zeros((capacity, 2))
+    room[:count] = points
+    following, previous = (np.full(capacity, kernel.NONE, np.int32) for _ in range(2))
+    following[: count - 1] = np.arange(1, count)
+    previous[1:count] = np.arange(count - 1)
+    seen = np.zeros(capacity, np.int64)
+    state = np.array([count, 0, 0], np.int64)
+    changed = np.zeros(blocks, np.int64)
+    return kernel.Line(room, following, previous, seen, changed, state, is_end_fixed)
+
+
+def _points(line: kernel.Line) -> NDArray[np.float64]:
+    numbers = [0]
+    while (number := int(line.next[numbers[-1]])) != kernel.NONE:
+        numbers.append(number)
+    return line.points[numbers]
+
+
+def _memory() -> kernel.Memory:
+    def points(count: int) -> NDArray[np.float64]:
+        return np.zeros((count, 2))
+
+    def stretches() -> NDArray[np.int64]:
+        return np.zeros((MOST_CAPSULES, 2), np.int64)
+
+    return kernel.Memory(
+        before=points(kernel.MOST_CHAIN),
+        after=points(kernel.MOST_CHAIN),
+        new=points(kernel.MOST_NEW),
+        best=points(kernel.MOST_NEW),
+        place=np.zeros(2),
+        capsules=Scratch(np.zeros((MOST_CAPSULES, 8)), stretches(), stretches()),
+    )

@@ -1,0 +1,104 @@
+"""Floor of a map: places, what the tool reaches, and where the robot stands in the cells."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fasaco_edge.errors import MapTooLarge, StartBlocked, StartOutsideMap
+from fasaco_edge.grid.floor import Floor, RobotDiscs, StandLattice, straightened
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+
+DISCS = RobotDiscs(radius_m=0.18, tool_m=0.3)
+
+
+def room(width_m: float, height_m: float, yaw: float = 0.0, unit: float = 0.05) -> OccupancyGrid:
+    """Return a room without anything in it, walls one pixel thick; its corner lies at (2, 1) m."""
+    rows, cols = round(height_m / unit) + 2, round(width_m / unit) + 2
+    cells = np.zeros((rows, cols), np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = 100
+    x, y = 2.0 - unit, 1.0 - unit
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return OccupancyGrid(
+        GridGeometry(rows, cols, unit, Pose2D(cos * x - sin * y, sin * x + cos * y, yaw)), cells
+    )
+
+
+def test_the_reachable_floor_of_a_room():
+    floor = Floor.around(room(3.0, 2.0), DISCS, (3.0, 2.0))
+    # Of fine pixels of 0.025 m the robot may be from 0.1875 m on; at 0.18 m a disc would fit.
+    inner = (3.0 - 0.35) * (2.0 - 0.35)
+    assert np.count_nonzero(floor.places) * 0.025**2 == pytest.approx(inner)
+    # Beside it the tool reaches 6 pixels; in the corners it is round.
+    rim = 2 * 0.15 * (3.0 + 2.0 - 0.7) + math.pi * 0.15**2
+    assert floor.reachable_m2 == pytest.approx(inner + rim, abs=0.03)
+
+
+@pytest.mark.parametrize("yaw", [math.pi / 2, 0.4, -2.0])
+def test_a_turned_map_has_the_same_floor(yaw):
+    level, turned = room(3.0, 2.0), room(3.0, 2.0, yaw)
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    expected = Floor.around(level, DISCS, (3.0, 2.0))
+    found = Floor.around(turned, DISCS, (3 * cos - 2 * sin, 3 * sin + 2 * cos))
+    assert (found.places == expected.places).all()
+    pixels = np.array([(30.0, 40.0), (50.5, 60.25)])
+    back = found.to_map(pixels) @ np.array([[cos, -sin], [sin, cos]])
+    assert back == pytest.approx(expected.to_map(pixels))
+
+
+def test_a_start_has_to_be_where_the_robot_fits():
+    grid = room(3.0, 2.0)
+    with pytest.raises(StartOutsideMap, match=r"\(9, 9\) m is outside the map"):
+        Floor.around(grid, DISCS, (9.0, 9.0))
+    with pytest.raises(StartBlocked, match="does not fit at"):
+        Floor.around(room(0.3, 0.3), DISCS, (2.1, 1.1))
+    with pytest.raises(StartBlocked, match="nor within its radius of it"):
+        Floor.around(grid, DISCS, (2.02, 1.02))
+    beside_the_wall = Floor.around(grid, DISCS, (2.02, 2.0))
+    (at,) = beside_the_wall.to_map(np.array([beside_the_wall.start]))
+    assert at == pytest.approx((2.1875, 2.0), abs=0.02)
+
+
+def test_a_raster_too_large_is_refused(monkeypatch):
+    monkeypatch.setattr("fasaco_edge.grid.floor.MOST_PIXELS", 10_000)
+    with pytest.raises(MapTooLarge, match=r"pixels of 0\.025 m exceeds 10000 pixels"):
+        Floor.around(room(3.0, 2.0), DISCS, (3.0, 2.0))
+
+
+def test_cells_at_walls_have_stands_beside_their_middles():
+    floor = Floor.around(room(3.0, 2.0), DISCS, (3.0, 2.0))
+    stands = StandLattice.over(floor, 0.275)
+    lattice = stands.lattice
+    cells = np.argwhere(lattice.coverable)
+    at = floor.to_map(stands.stands[tuple(cells.T)])
+    own = np.floor(at / 0.275).astype(int)[:, ::-1]
+    assert (own == cells + np.array((lattice.window.row0, lattice.window.col0))).all()
+    # Of all places in the cell it is the nearest to the middle, to half a pixel.
+    places = floor.to_map(np.argwhere(floor.places))
+    middles = lattice.centres(own.astype(np.int32))
+    for cell, middle, stand in zip(own, middles, at, strict=True):
+        inside = places[(np.floor(places / 0.275)[:, ::-1] == cell).all(axis=1)]
+        nearest = np.hypot(*(inside - middle).T).min()
+        assert np.hypot(*(stand - middle)) == pytest.approx(nearest, abs=0.0125)
+    row, col = stands.start_cell(floor)
+    assert np.hypot(*(lattice.centres(np.array([[row, col]]))[0] - (3.0, 2.0))) < 0.2
+
+
+def test_a_step_round_a_corner_has_a_bend():
+    grid = room(1.6, 1.6)
+    cells = grid.cells.copy()
+    cells[16:, 16:] = 100  # all but an L
+    floor = Floor.around(
+        OccupancyGrid(grid.geometry, cells), RobotDiscs(radius_m=0.3, tool_m=0.7), (2.4, 1.4)
+    )
+    stands = StandLattice.over(floor, 0.7)
+    assert not np.isnan(stands.bends).all()
+
+
+def test_points_on_the_straight_way_are_left_out():
+    line = np.array([(0, 0), (0, 0), (0, 1), (0, 2), (0, 1), (3, 1), (3, 1)], float)
+    assert straightened(line).tolist() == [[0, 0], [0, 2], [0, 1], [3, 1]]
+    assert straightened(line[:2]).tolist() == [[0, 0]]

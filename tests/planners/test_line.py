@@ -1,0 +1,119 @@
+"""The driven line: each gain is real, each way clear, and the same work gives the same line."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fasaco_edge.bench.floor import SweepingRobot, judge_floor
+from fasaco_edge.grid.floor import Floor, RobotDiscs, StandLattice
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.line import LINES, DrivenLine, LineConfig, line_over
+from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.planner import ignore
+from fasaco_edge.planners.problem import CoverageProblem
+
+ROBOT = SweepingRobot(tool_m=0.3, radius_m=0.18)
+CELL_M = 0.276
+
+
+@pytest.fixture(scope="module", params=["flat", "clutter"])
+def planned(request):
+    """A map, its floor, its stands and a walk over them."""
+    if request.param == "flat":
+        grid, start = read_map(find_map("flat")), suggested_start(find_map("flat"))
+    else:
+        grid, start = clutter(), (0.5, 0.5)
+    floor = Floor.around(grid, RobotDiscs(ROBOT.radius_m, ROBOT.tool_m), start)
+    stands = StandLattice.over(floor, CELL_M)
+    cost = CoverageCost.for_robot(CELL_M, ROBOT.speed_m_s, ROBOT.turn_s)
+    problem = CoverageProblem.of(stands.lattice, stands.start_cell(floor), cost=cost)
+    walk = NearOptimal().plan(problem, lambda s: s.work.perturbations >= 50, ignore).cells
+    return grid, floor, stands, walk
+
+
+def clutter():
+    """Return a room of 4 x 3 m with pillars of one pixel and a wall askew."""
+    cells = np.zeros((62, 82), np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = 100
+    rng = np.random.default_rng(4)
+    cells[rng.integers(20, 60, 25), rng.integers(20, 80, 25)] = 100
+    for step in range(25):
+        cells[30 + step, 20 + step // 2] = 100
+    return OccupancyGrid(GridGeometry(62, 82, 0.05, Pose2D(-0.05, -0.05)), cells)
+
+
+def seconds_and_left(grid, line: DrivenLine, price: float) -> float:
+    """Return what is minimised, as the judge has it."""
+    figures = judge_floor(grid, line.xy, ROBOT).figures
+    return figures.seconds + price * (figures.reachable_m2 - figures.swept_m2)
+
+
+@pytest.mark.parametrize("price", [60.0, 180.0])
+def test_a_polished_line_is_better_by_the_judge(planned, price):
+    grid, floor, stands, walk = planned
+    plain = line_over(walk, stands, floor, LineConfig(price_s_m2=0.0), is_end_fixed=False)
+    config = LineConfig(price_s_m2=price, patch_s=0.0)
+    line = line_over(walk, stands, floor, config, is_end_fixed=False)
+    before, after = (seconds_and_left(grid, one, price) for one in (plain, line))
+    assert after < 0.93 * before
+    figures = judge_floor(grid, line.xy, ROBOT).figures
+    assert figures.illegal_share == 0.0
+    assert line.reachable_m2 == pytest.approx(figures.reachable_m2, rel=0.01)
+    # The judge adds a line's own pixels up again: each is counted in and out as often.
+    assert line.swept_m2 == pytest.approx(figures.swept_m2, rel=0.01)
+
+
+def test_a_thorough_line_leaves_little(planned):
+    grid, floor, stands, walk = planned
+    quick, thorough = (
+        line_over(walk, stands, floor, LINES[name], is_end_fixed=False)
+        for name in ("quick", "thorough")
+    )
+    figures = judge_floor(grid, thorough.xy, ROBOT).figures
+    assert figures.swept_share > 0.955
+    assert quick.swept_m2 < thorough.swept_m2
+
+
+def test_the_same_work_gives_the_same_line(planned):
+    _, floor, stands, walk = planned
+    config = LineConfig(moves_m2=500)
+    lines = [line_over(walk, stands, floor, config, is_end_fixed=False) for _ in range(2)]
+    assert lines[0].xy.tobytes() == lines[1].xy.tobytes()
+    # Patches come after the budget.
+    assert lines[0].tried == lines[1].tried <= 600 * floor.reachable_m2
+
+
+def test_a_fixed_end_stays(planned):
+    _, floor, stands, walk = planned
+    line = line_over(walk, stands, floor, LineConfig(moves_m2=1000), is_end_fixed=True)
+    plain = floor.to_map(stands.points(walk))
+    assert line.xy[-1].tolist() == plain[-1].tolist()
+    assert line.xy[0].tolist() == plain[0].tolist()
+
+
+def test_nothing_comes_nearer_to_a_wall_than_the_robot_is_wide(planned):
+    grid, floor, stands, walk = planned
+    line = line_over(walk, stands, floor, LineConfig(moves_m2=1000), is_end_fixed=False)
+    geometry = grid.geometry
+    rows, cols = np.nonzero((grid.cells < 0) | (grid.cells > 25))
+    for a, b in zip(line.xy[:-1], line.xy[1:], strict=True):
+        count = math.ceil(math.dist(a, b) / 0.02) + 1
+        for x, y in np.linspace(a, b, count):
+            col, row = geometry.to_pixels(x, y)
+            dx = np.maximum(np.maximum(cols - col, col - cols - 1), 0.0)
+            dy = np.maximum(np.maximum(rows - row, row - rows - 1), 0.0)
+            # As near as touching counts as free, and floats round [pixels].
+            assert np.hypot(dx, dy).min() * geometry.resolution > ROBOT.radius_m - 1e-4
+
+
+def test_a_walk_of_one_cell_sweeps_what_is_below_the_tool(planned):
+    _, floor, stands, walk = planned
+    line = line_over(walk[:1], stands, floor, LineConfig(), is_end_fixed=False)
+    assert len(line.xy) == 1
+    assert 0.0 < line.swept_m2 <= math.pi * 0.15**2 * 1.05
