@@ -15,14 +15,8 @@ import numpy as np
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, check_output, writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.plan_line import (
-    Line,
-    PlannedFloor,
-    line_through,
-    planned_floor,
-    write_line,
-)
-from fasaco_edge.cli.plan_options import ANYWHERE, EPILOG, HOME, add_options, check, settle
+from fasaco_edge.cli.plan_line import Ground, Line, PlannedFloor, judged_floor, write_line
+from fasaco_edge.cli.plan_options import ANYWHERE, CELLS, EPILOG, HOME, add_options, check, settle
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
@@ -40,8 +34,8 @@ from fasaco_edge.planners.planner import (
 from fasaco_edge.planners.registry import planner_of
 
 if TYPE_CHECKING:
+    from fasaco_edge.bench.floor import JudgedFloor
     from fasaco_edge.grid.lattice import Cell, CoverageLattice
-    from fasaco_edge.grid.occupancy import OccupancyGrid
     from fasaco_edge.planners.path import CoveragePath
     from fasaco_edge.planners.problem import CoverageProblem
 
@@ -59,21 +53,19 @@ def run(args: argparse.Namespace) -> int:
         beta=args.beta,
     )
     file = find_map(args.map)
-    if args.xy_out is not None and file.suffix == ".npy":
-        raise BadConfiguration(
-            f"--xy-out: {file} is a coverage grid (.npy), which lies in no map frame",
-            hint="plan on a map_server YAML file, or ask for --path-out",
-        )
+    if file.suffix == ".npy":
+        _check_no_floor(args, file)
     for output in (args.path_out, args.xy_out, args.png):
         check_output(output)
     compile_kernels()
-    lattice, grid = _read(args, file)
-    problem = _pose(args, lattice, file)
+    ground = _read(args, file)
+    problem = _pose(args, ground)
     asked = Interrupt()
     with ctrl_c_asks(asked.asked.set):
         path, search = _plan(args, colony, problem, asked)
-    line_xy = line_through(lattice, path.cells)
-    floor = planned_floor(args, grid, line_xy)
+    line_xy = ground.line(args, path.cells, ends=problem.end is not None)
+    judged = judged_floor(args, ground.grid, line_xy)
+    floor = PlannedFloor.of(judged.figures) if judged else None
     figures = figures_of(args, problem, path, search)
     if args.path_out is not None:
         with writing(args.path_out):
@@ -83,27 +75,41 @@ def run(args: argparse.Namespace) -> int:
             write_line(args.xy_out, line_xy)
     if args.png is not None:
         with writing(args.png):
-            draw(args, args.png, lattice, grid, path, figures, floor, line_xy)
+            draw(args, args.png, ground, path, figures, judged, line_xy)
     print_figures(args, figures, floor)
     return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
 
 
-def _read(args: argparse.Namespace, file: Path) -> tuple[CoverageLattice, OccupancyGrid | None]:
+def _check_no_floor(args: argparse.Namespace, file: Path) -> None:
+    wanted = {"--xy-out": args.xy_out is not None, f"--line {args.line}": args.line != CELLS}
+    for option, is_wanted in wanted.items():
+        if is_wanted:
+            raise BadConfiguration(
+                f"{option}: {file} is a coverage grid (.npy), which lies in no map frame",
+                hint="plan on a map_server YAML file, or ask for --path-out",
+            )
+
+
+def _read(args: argparse.Namespace, file: Path) -> Ground:
     from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 
     if file.suffix == ".npy":
-        return CoverageLattice.from_free(read_coverage_grid(file), args.cell), None
+        cells = CoverageLattice.from_free(read_coverage_grid(file), args.cell)
+        return Ground(cells, None, _start(args, cells, file))
     grid = read_map(file)
-    return CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius)), grid
+    cells = CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius))
+    start = _start(args, cells, file)
+    if args.line == CELLS:
+        return Ground(cells, grid, start)
+    return Ground.of_floor(args, grid, cells, start)
 
 
-def _pose(args: argparse.Namespace, lattice: CoverageLattice, file: Path) -> CoverageProblem:
+def _pose(args: argparse.Namespace, ground: Ground) -> CoverageProblem:
     from fasaco_edge.planners.problem import CoverageProblem
 
-    start = _start(args, lattice, file)
-    end = {ANYWHERE: None, HOME: start}.get(args.end, args.end)
-    cost = CoverageCost.for_robot(args.cell, args.speed_m_s, args.turn_s)
-    return CoverageProblem.of(lattice, start, end=end, cost=cost)
+    end = {ANYWHERE: None, HOME: ground.start}.get(args.end, args.end)
+    cost = CoverageCost.for_robot(ground.lattice.cell_m, args.speed_m_s, args.turn_s)
+    return CoverageProblem.of(ground.lattice, ground.start, end=end, cost=cost)
 
 
 def _start(args: argparse.Namespace, lattice: CoverageLattice, file: Path) -> Cell:
@@ -185,13 +191,15 @@ def figures_of(
         "proposals": path.work.proposals,
         "velocities": {"fasaco": args.velocities, "aco": "1"}.get(path.planner),
         "map": str(args.map),
-        "cell_m": args.cell,
+        "line": args.line,
+        "tool_m": args.cell,
+        "cell_m": problem.lattice.cell_m,
         "start": list(problem.start),
         "end": path.cells[-1].tolist(),
         **walk,
         # What there is to cover; the walk may pass over no other cells.
         "cells": problem.cells,
-        "length_m": round(path.steps * args.cell, 3),
+        "length_m": round(path.steps * problem.lattice.cell_m, 3),
         "cost_s": path.cost_s,
         "lower_bound_steps": path.lower_bound_steps,
         "gap": None if path.gap is None else round(path.gap, 6),
@@ -208,15 +216,15 @@ def figures_of(
 def draw(
     args: argparse.Namespace,
     file: Path,
-    lattice: CoverageLattice,
-    grid: OccupancyGrid | None,
+    ground: Ground,
     path: CoveragePath,
     figures: dict[str, object],
-    floor: PlannedFloor | None,
+    judged: JudgedFloor | None,
     line_xy: Line,
 ) -> None:
-    """Draw the walk, as the line ``line_xy``."""
+    """Draw the walk, as the line ``line_xy``, and what it leaves of the floor."""
     from fasaco_edge.drawing.pictures import draw_walk
+    from fasaco_edge.drawing.plot import MapLayer
 
     ants = path.work.ants
     counted = "1 ant" if ants == 1 else f"{ants} ants"
@@ -229,10 +237,19 @@ def draw(
         f"{figures['turns_90']} quarter-turns; "
         f"at most {path.gap or 0.0:.1%} above the fewest steps there can be",
     ]
-    if floor is not None:
-        lines.append(f"reachable floor: {floor}")
-    picture = draw_walk(lattice, path.cells, grid=grid, title=title, lines=lines, line_xy=line_xy)
-    picture.save(file, "PNG")
+    if judged is not None:
+        lines.append(f"reachable floor: {PlannedFloor.of(judged.figures)}")
+    swept = MapLayer(judged.geometry, judged.swept) if judged and args.line != CELLS else None
+    draw_walk(
+        ground.lattice,
+        path.cells,
+        grid=ground.grid,
+        title=title,
+        lines=lines,
+        line_xy=line_xy,
+        swept=swept,
+        unswept=MapLayer(judged.geometry, judged.unswept) if judged else None,
+    ).save(file, "PNG")
 
 
 def print_figures(

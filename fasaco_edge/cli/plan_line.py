@@ -1,26 +1,84 @@
 """The line of a plan: where its points are, its file, and how much floor it sweeps.
 
 A line is float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, to be driven straight from
-one to the next; today the centres of a walk's cells.
+one to the next: the centres of a walk's cells, or a line over the floor that they stand for.
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.floor import FloorFigures, SweepingRobot, judge_floor, swept_words
+from fasaco_edge.bench.floor import (
+    FloorFigures,
+    JudgedFloor,
+    SweepingRobot,
+    judge_floor,
+    swept_words,
+)
 
 if TYPE_CHECKING:
-    from fasaco_edge.grid.lattice import CoverageLattice
+    from fasaco_edge.grid.floor import Floor, StandLattice
+    from fasaco_edge.grid.lattice import Cell, CoverageLattice
     from fasaco_edge.grid.occupancy import OccupancyGrid
 
 Line = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """What a walk is planned on.
+
+    Attributes:
+        lattice: its cells.
+        grid: the map; None for a coverage grid.
+        start: the cell (row, col) it begins in.
+        floor, stands: where the robot stands in the cells; None for their centres.
+    """
+
+    lattice: CoverageLattice
+    grid: OccupancyGrid | None
+    start: Cell
+    floor: Floor | None = None
+    stands: StandLattice | None = None
+
+    @classmethod
+    def of_floor(
+        cls, args: argparse.Namespace, grid: OccupancyGrid, cells: CoverageLattice, start: Cell
+    ) -> Ground:
+        """Return the ground of a line over the floor that is reached from a cell's centre.
+
+        Args:
+            args: of the command.
+            grid: the map.
+            cells: the lattice of cells as wide as the tool.
+            start: one of these.
+
+        Raises:
+            StartOutsideMap, StartBlocked: the robot cannot stand there.
+        """
+        from fasaco_edge.grid.floor import Floor, RobotDiscs, StandLattice
+
+        (xy,) = cells.centres(np.array([start], np.int32)).tolist()
+        if args.start_xy is not None:
+            xy = args.start_xy
+        floor = Floor.around(grid, RobotDiscs(args.robot_radius, args.cell), tuple(xy))
+        stands = StandLattice.over(floor, args.cell * (1.0 - args.overlap))
+        return cls(stands.lattice, grid, stands.start_cell(floor), floor, stands)
+
+    def line(self, args: argparse.Namespace, walk: NDArray[np.int32], *, ends: bool) -> Line:
+        """Return the line along a walk, int32 (n, 2), n >= 1; ``ends`` where it ends there."""
+        from fasaco_edge.planners.line import LINES, line_over
+
+        if self.floor is None or self.stands is None:
+            return line_through(self.lattice, walk)
+        config = replace(LINES[args.line], speed_m_s=args.speed_m_s, quarter_turn_s=args.turn_s)
+        return line_over(walk, self.stands, self.floor, config, is_end_fixed=ends).xy
 
 
 def line_through(lattice: CoverageLattice, cells: NDArray[np.int32]) -> Line:
@@ -39,9 +97,9 @@ def write_line(file: Path, line_xy: Line) -> None:
     np.savetxt(file, line_xy, "%.6f", ",", header="x_m,y_m", comments="")
 
 
-def planned_floor(
+def judged_floor(
     args: argparse.Namespace, grid: OccupancyGrid | None, line_xy: Line
-) -> PlannedFloor | None:
+) -> JudgedFloor | None:
     """Return what a line does to the floor of a map; None for a coverage grid, which has none.
 
     The tool is as wide as a cell.
@@ -49,7 +107,7 @@ def planned_floor(
     if grid is None:
         return None
     robot = SweepingRobot(args.cell, args.robot_radius, args.speed_m_s, args.turn_s)
-    return PlannedFloor.of(judge_floor(grid, line_xy, robot).figures)
+    return judge_floor(grid, line_xy, robot)
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ EPILOG = """\
 examples:
   fasaco-edge plan basement --png basement.png
   fasaco-edge plan site.yaml --cell 0.35 --robot-radius 0.2 --start-xy 1.5,-2 --json
-  fasaco-edge plan site.yaml --xy-out line.csv --turn-s 1.5
+  fasaco-edge plan site.yaml --line thorough --xy-out line.csv --png line.png
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
   fasaco-edge plan basement --no-local-search --seed 7
@@ -54,6 +54,11 @@ velocities, the others none.
 BUDGET_S = 1.0
 SEARCH_Q0, PAPER_Q0 = 0.98, 0.7
 SEARCH_VISIBILITY, PAPER_VISIBILITY = "fewest-open", "neighbour"
+# The line through the cells' centres; the others are in ``planners.line``.
+CELLS = "cells"
+OVERLAP, MOST_OVERLAP = 0.08, 0.5
+# A quarter-turn on the spot of a line over the floor, where nobody says [s].
+TURN_S = 1.5
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -64,6 +69,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="map_server YAML, a name from `maps`, or a coverage grid .npy (bool, True = free)",
     )
     _add_problem(parser.add_argument_group("problem"))
+    _add_line(parser.add_argument_group("line"))
     _add_planner(parser.add_argument_group("planner"))
     _add_output(parser.add_argument_group("output"))
 
@@ -77,6 +83,8 @@ def check(args: argparse.Namespace) -> None:
     for option, value in (("--cell", args.cell), ("--robot-radius", args.robot_radius)):
         _require(0.0 < value <= 10.0, option, "be in (0, 10] m", value)
     _require(0.0 < args.speed_m_s <= 10.0, "--speed-m-s", "be in (0, 10] m/s", args.speed_m_s)
+    most = "be in [0, 0.5], of the tool's width"
+    _require(0.0 <= args.overlap <= MOST_OVERLAP, "--overlap", most, args.overlap)
     _require(0.0 <= args.turn_s <= 3600.0, "--turn-s", "be in [0, 3600] s", args.turn_s)
     _require(1 <= args.threads <= 64, "--threads", "be in 1..64", args.threads)
     if args.budget is not None:
@@ -94,6 +102,10 @@ def settle(args: argparse.Namespace) -> None:
         args.q0 = SEARCH_Q0 if args.local_search else PAPER_Q0
     if args.visibility is None:
         args.visibility = SEARCH_VISIBILITY if args.local_search else PAPER_VISIBILITY
+    if args.turn_s is None:
+        args.turn_s = 0.0 if args.line == CELLS else TURN_S
+    if args.overlap is None:
+        args.overlap = OVERLAP
     if args.budget is None and args.local_search:
         args.budget = BUDGET_S
 
@@ -111,7 +123,8 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         type=float,
         default=DEFAULT_CELL_M,
         metavar="M",
-        help="edge of a cell, the width of the tool [m] (default: %(default)s)",
+        help="width of the tool [m]; cells are as wide, but for the overlap of a line over the "
+        "floor (default: %(default)s)",
     )
     group.add_argument(
         "--robot-radius",
@@ -146,10 +159,28 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--turn-s",
         type=float,
-        default=0.0,
         metavar="S",
         help="a quarter-turn on the spot [s]; 0 looks for the fewest steps, as the paper does "
+        f"(default: 0; {TURN_S:g} for a line over the floor)",
+    )
+
+
+def _add_line(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--line",
+        choices=(CELLS, "quick", "thorough"),
+        default=CELLS,
+        help="cells: through the centres of the cells, as the paper's planners; quick, thorough: "
+        "the robot stands in a cell where it can, and the line is polished against the floor that "
+        "it sweeps, where a square metre is worth 60 or 180 s; of a YAML map "
         "(default: %(default)s)",
+    )
+    group.add_argument(
+        "--overlap",
+        type=float,
+        metavar="SHARE",
+        help="of the tool's width, by which neighbouring cells of a line over the floor overlap "
+        f"(default: {OVERLAP:g})",
     )
 
 

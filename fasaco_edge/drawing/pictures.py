@@ -17,11 +17,21 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.reach import reachable_from
 
 
+def draw_swept(plot: Plot, swept: MapLayer) -> list[KeyEntry]:
+    """Tint the floor that was swept; return what that and the marks of a line mean."""
+    plot.paint(swept, palette.COVERED)
+    label = f"floor swept ({swept.area_m2:,.1f} m2)"
+    return [*_ENDS, KeyEntry("tile", palette.COVERED, label)]
+
+
 def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
     """Paint reachable floor that was not swept; return what the colour means."""
     plot.paint(unswept, palette.UNSWEPT)
     label = f"reachable floor not swept ({unswept.area_m2:,.1f} m2)"
     return [KeyEntry("tile", palette.UNSWEPT, label)] if unswept.mask.any() else []
+
+
+_ENDS = (KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.END, "end"))
 
 
 def draw_visits(
@@ -62,8 +72,7 @@ def _reachable(lattice: CoverageLattice, start: Cell) -> NDArray[np.bool_]:
 
 def _visit_key(visits: NDArray[np.integer]) -> list[KeyEntry]:
     key = [
-        KeyEntry("disc", palette.START, "start"),
-        KeyEntry("square", palette.END, "end"),
+        *_ENDS,
         _entry("tile", palette.COVERED, "covered once", visits == 1),
     ]
     most = len(palette.RECOVERED) + 1
@@ -152,6 +161,8 @@ def draw_walk(
     title: str,
     lines: Sequence[str],
     line_xy: Points | None = None,
+    swept: MapLayer | None = None,
+    unswept: MapLayer | None = None,
 ) -> Image.Image:
     """Return a picture, RGB, of a walk over the lattice, with the map below it.
 
@@ -164,22 +175,32 @@ def draw_walk(
         lines: caption below it.
         line_xy: float64 (n, 2), n >= 1: what is driven in its place, points (x, y) [m] joined by
             straight lines; None for the centres of the cells.
+        swept: floor that it sweeps, to be drawn in place of the cells; None for these.
+        unswept: reachable floor that it leaves; None where that is not known.
     """
     centres = lattice.centres(cells)
     driven = centres if line_xy is None else line_xy
     plot = Plot(View.over(bounds_of(grid, lattice, driven), lattice.cell_m))
     plot.ground(lattice if grid is None else grid)
-    key = plot_walk(plot, lattice, cells, driven)
+    left = draw_unswept(plot, unswept) if unswept is not None else []
+    key = plot_walk(plot, lattice, cells, driven, swept) + left
     bar = ("0", f"{len(cells) - 1:,} steps")
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
 
 
 def plot_walk(
-    plot: Plot, lattice: CoverageLattice, cells: NDArray[np.int32], line_xy: Points | None = None
+    plot: Plot,
+    lattice: CoverageLattice,
+    cells: NDArray[np.int32],
+    line_xy: Points | None = None,
+    swept: MapLayer | None = None,
 ) -> list[KeyEntry]:
     """Draw a walk, both as in ``draw_walk``; return what its tints and marks mean."""
     line = lattice.centres(cells) if line_xy is None else line_xy
-    key = draw_visits(plot, lattice, _visits(lattice, cells), tuple(cells[0].tolist()))
+    if swept is None:
+        key = draw_visits(plot, lattice, _visits(lattice, cells), tuple(cells[0].tolist()))
+    else:
+        key = draw_swept(plot, swept)
     _draw_line(plot, in_pieces(line, lattice.cell_m), lattice.cell_m)
     if (line[0] != line[-1]).any():
         plot.end_mark(line[-1])

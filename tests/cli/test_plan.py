@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from fasaco_edge.cli import main
+from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.registry import PLANNER_NAMES
@@ -27,6 +28,8 @@ KEYS = {
         "ants",
         "velocities",
         "map",
+        "line",
+        "tool_m",
         "cell_m",
         "start",
         "end",
@@ -185,6 +188,38 @@ def test_the_line_to_be_driven_is_written_in_the_map_frame(plan, tmp_path, origi
     assert np.allclose(driven, centres, atol=1e-5)
     ways = np.sign(np.round(np.diff(line, axis=0), 3)).tolist()
     assert all(before != after for before, after in pairwise(ways))
+
+
+@pytest.mark.parametrize("origin", [Pose2D(0.0, 0.0), Pose2D(-40.0, 7.5, 0.4)])
+def test_a_line_over_the_floor_sweeps_more_of_it(plan, tmp_path, origin):
+    pixels = pillared_room()
+    file, csv, png = tmp_path / "room.yaml", tmp_path / "line.csv", tmp_path / "line.png"
+    write_map(OccupancyGrid(GridGeometry(*pixels.shape, 0.05, origin), pixels), file)
+    (cells, _), (quick, _), (thorough, walk) = (
+        plan(file, "--line", line, "--xy-out", csv, "--png", png, "--end", "home")
+        for line in ("cells", "quick", "thorough")
+    )
+    shares = [figures["floor"]["swept_share"] for figures in (cells, quick, thorough)]
+    assert shares[0] < shares[1] < shares[2] > 0.96
+    assert [figures["floor"]["illegal_share"] for figures in (quick, thorough)] == [0.0, 0.0]
+    assert (thorough["line"], thorough["tool_m"], thorough["turn_s"]) == ("thorough", 0.3, 1.5)
+    assert thorough["cell_m"] == pytest.approx(0.92 * 0.3)
+    line = np.loadtxt(csv, delimiter=",", skiprows=1)
+    # Home is where it stands first; that is not the middle of a cell.
+    assert line[0] == pytest.approx(line[-1])
+    assert walk[0] == walk[-1]
+    assert png.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("overlap", ["0.9", "-0.1", "nan"])
+def test_an_overlap_is_a_share_of_the_tool(capsys, overlap):
+    assert main(["plan", "office", "--line", "quick", f"--overlap={overlap}"]) == Exit.CONFIG
+    assert "--overlap must be in [0, 0.5]" in capsys.readouterr().err
+
+
+def test_a_coverage_grid_has_no_floor(grid_file, capsys):
+    assert main(["plan", str(grid_file), "--line", "thorough"]) == Exit.CONFIG
+    assert "--line thorough" in capsys.readouterr().err
 
 
 def test_a_start_may_be_negative(plan, tmp_path):
