@@ -297,6 +297,7 @@ def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
     assert figures["ended_by"] == "budget"
     assert figures["wall_s"] < 300
     # Turns at a price: no walk is proven to be the best, so only the clock ends the search.
+    options = ("--ants", 1_000_000, "--budget", 1)
     figures, walk = plan(grid_file, *options, "--turn-s", 1)
     check(figures, walk, cells_in(grid_file), (0, 0), turn_s=1.0)
     assert figures["kicks"] > 0

@@ -89,5 +89,6 @@ def test_the_example_gets_a_path_over_every_cell(tmp_path):
         assert said == "path"
         visited = cells_of([[float(x) for x in point.strip("()\n").split(",")] for point in points])
         assert set(visited) == coverable_cells(room(4.0, 3.0))
-        assert "status; waiting for map\n" in heard
+        # On a busy machine the map is there before the first status.
+        assert heard[0] in ("status; waiting for map\n", "status; loading\n")
         assert "Traceback" not in rest

@@ -23,9 +23,7 @@ from fasaco_edge.bus.arrival import PATH_DIGEST
 from fasaco_edge.errors import MissingExtra, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.recording.write.input_log import PERIOD_NS as INPUT_PERIOD_NS
 from fasaco_edge.recording.write.part import Part
-from fasaco_edge.recording.write.writer import FLUSH_PERIOD_NS
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
@@ -76,6 +74,8 @@ def recorded(tmp_path_factory):
         mission.publish_status("done", 1.0, planning=False, latency_ms="none", errors=ERRORS)
         report = recorder.wait_until(lambda report: report["malformed"] > 0)
         assert bus.alive(Keys().of(topics.RECORDER_ALIVE))
+        # At the end there is not much time for what still waits.
+        recorder.at_rest()
         recorder.process.send_signal(signal.SIGTERM)
         exit_code = recorder.process.wait(60)
     path = Path(report["file"])
@@ -245,11 +245,10 @@ def test_killed_and_torn_recordings_read_after_the_next_start(tmp_path):
         mission = Mission(bus)
         with recorder_process(bus, endpoint, tmp_path) as recorder:
             play(mission, 20)
-            recorder.written(40)
             # By then all that is drawn of it is on the disk, of the rest what the mission heard.
-            time.sleep(FLUSH_PERIOD_NS / 1e9 + 0.3)
+            recorder.at_rest()
             play(mission, 5)
-            time.sleep(INPUT_PERIOD_NS / 1e9 + 0.3)
+            recorder.at_rest()
             recorder.process.kill()
             recorder.process.wait()
         (killed,) = tmp_path.glob("*.rrd")

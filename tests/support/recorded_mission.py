@@ -102,7 +102,7 @@ class MappingRobot:
 
     def __init__(self, bus: Bus, broken_poses: int = 0) -> None:
         self._bus, self._keys = bus, Keys()
-        self._broken_poses = broken_poses
+        self._broken_poses, self._broken_sent = broken_poses, 0
         keys = self._keys
         self._commands = list(COMMANDS)
         pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
@@ -159,9 +159,11 @@ class MappingRobot:
         if emission.pose is not None:
             pose = encode_pose_stamped(emission.pose)
             self._poses.put(pose)
-            if self._broken_poses:
-                self._broken_poses -= 1
+            if self._broken_sent < self._broken_poses:
+                self._broken_sent += 1
                 self._poses.put(pose[:-5])
+                # The next pose would take its place, were the daemon busy.
+                self.wait(lambda status: status["errors"]["total"] >= self._broken_sent)
 
     def _command(self, name: str) -> None:
         payload = encode_json({"command": name})
