@@ -127,11 +127,9 @@ class PlannedFloor:
             return "none is reachable"
         swept_m2 = self.swept_share * self.reachable_m2
         words = f"{swept_words(swept_m2, self.reachable_m2)} swept"
-        if self.patches_over_4_dm2:
-            words += (
-                f", {self.patches_over_4_dm2} patches over 4 dm2 left, "
-                f"the largest {self.largest_patch_m2:,.2f} m2"
-            )
+        if count := self.patches_over_4_dm2:
+            patches = "1 patch" if count == 1 else f"{count} patches"
+            words += f", {patches} over 4 dm2 left, the largest {self.largest_patch_m2:,.2f} m2"
         if self.seconds_per_m2 is not None:
             words += f", {self.seconds_per_m2:.1f} s/m2"
         if self.illegal_share:
