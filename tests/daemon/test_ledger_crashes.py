@@ -20,6 +20,7 @@ import pytest
 from fasaco_edge.daemon.ledger.codec import encode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.host import durable
+from tests.campaigns.file_calls import Failure, Kind, Watch, why_not
 from tests.support.ledgers import CELL_M, NAMES, contents, lane, load, names
 from tests.support.processes import ENVIRONMENT
 
@@ -135,6 +136,31 @@ def test_half_a_new_one_is_no_fault(written):
     (written / "robot.ledger.new").write_bytes(encode_ledger(lane(5))[:-1])
     found = load(written)
     assert (contents(found.ledger), found.fault) == (contents(lane(4)), None)
+
+
+LOADS = """
+import pathlib, sys
+from tests.support.ledgers import load, visits_of
+found = load(pathlib.Path(sys.argv[1]))
+print(len(visits_of(found.ledger)), found.fault)
+"""
+
+
+@pytest.mark.skipif(bool(why_not()), reason=why_not())
+@pytest.mark.parametrize("moved", [False, True])
+def test_a_new_one_that_the_disk_does_not_give_is_told_and_kept(written, moved):
+    """It may be the newest whole one: the process died before it had its name."""
+    (written / "robot.ledger.new").write_bytes(encode_ledger(lane(5)))
+    if moved:
+        (written / "robot.ledger").replace(written / "robot.ledger.previous")
+    with Watch([written], Failure(Kind.OPEN, 1, "EIO")) as watch:
+        environment = ENVIRONMENT | watch.environment
+        command = [sys.executable, "-c", LOADS, str(written)]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    told = "gone on from the ledger before the newest (robot.ledger.new: Input/output error)"
+    assert done.stdout.startswith(f"4 {told}; kept as robot.ledger.new.broken-"), done.stdout
+    (kept,) = written.glob("robot.ledger.new.broken-*")
+    assert kept.read_bytes() == encode_ledger(lane(5))
 
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])

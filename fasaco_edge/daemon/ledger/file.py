@@ -82,8 +82,9 @@ class LedgerFile:
                 fault = self._after_aside(error, self._generations, "mismatch")
                 return LoadedLedger(fault=fault)
             except (OSError, LedgerFileError) as error:
-                # A write that was cut short is no fault: what was there before still is.
-                if path != self._new:
+                # A write that was cut short is no fault: what was there before still is. One that
+                # the disk does not give may be whole.
+                if path != self._new or (isinstance(error, OSError) and os.path.lexists(path)):
                     broken[path] = reason_of(error)
                 continue
             return LoadedLedger(ledger, self._taken(path, broken))
@@ -159,7 +160,7 @@ class LedgerFile:
                 self._move_on()
             except OSError as error:
                 return LedgerFileError(f"cannot write {self.path}: {reason_of(error)}")
-        if path != self._previous:
+        if path != self._previous and not broken:
             return None
         fault = LedgerFileError(
             f"gone on from the ledger before the newest "
