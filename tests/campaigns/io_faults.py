@@ -58,8 +58,8 @@ MAY_FAIL = {
 LASTING_SHARE, STRIDE = 0.2, 3
 # What says, on standard error, that something was wrong.
 TELLS = ("WARNING", "ERROR", "fasaco-edge:", "kernels not ready")
-# What is said after a reset, where all is well.
-USUAL = "the ledger before is kept as robot.ledger.reset-"
+# What is said where no call fails: after a reset, and where the computer is busy with much else.
+USUAL = ("the ledger before is kept as robot.ledger.reset-", "recorder did not end in ")
 
 
 @dataclass(frozen=True)
@@ -106,8 +106,10 @@ def outcome_of(name: str, failure: Failure | None) -> tuple[Outcome, dict[Kind, 
 
 def _told_by(log: str) -> str:
     """Return the first line of a log that tells of something wrong."""
-    lines = [line for line in log.splitlines() if line.startswith(TELLS) and USUAL not in line]
-    return lines[0] if lines else ""
+    for line in log.splitlines():
+        if line.startswith(TELLS) and not any(usual in line for usual in USUAL):
+            return line
+    return ""
 
 
 def _check_end(code: int | None, log: str, said: str, failure: str) -> None:
