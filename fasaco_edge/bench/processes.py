@@ -21,7 +21,7 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 
 # On a computer that is busy with much else.
-START_TIMEOUT_S = 60.0
+START_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 8.0
 LOOK_EVERY_S = 0.002
 PROGRAM = python_program("fasaco_edge")

@@ -38,7 +38,7 @@ SPEED_M_S = 0.5
 # A crate moves so often [s]: each time the rest of the path is planned anew.
 MAP_EVERY_S = 1.0
 # The first path needs the kernels; on a slow computer their loading takes long.
-PATH_TIMEOUT_S = 120.0
+PATH_TIMEOUT_S = 300.0
 
 
 def building(side_px: int = 1000) -> OccupancyGrid:

@@ -66,7 +66,7 @@ class RosConfig(Section, frozen=True):
 
     @property
     def inputs(self) -> dict[str, RosTopic]:
-        """What the daemon subscribes to, by the topic's name in the daemon."""
+        """What daemon and recorder subscribe to, by the topic's name in the daemon."""
         poses = ("tf_static", "tf") if self.pose == "tf" else ("pose",)
         names = ("map", "map_updates", *poses)
         return {ROS_TOPICS[name].topic: self._topic(name) for name in names}

@@ -6,17 +6,13 @@ configuration. What a keep-out zone touches is as good as a wall.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bench.floor import JudgedFloor, SweepingRobot, judge_floor
-from fasaco_edge.grid.geometry import Polygon, Window
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
-from fasaco_edge.mission.orders.zones import cells_inside
+from fasaco_edge.mission.orders.zones import with_kept_out
 from fasaco_edge.review.run_data import RunData
 
 
@@ -49,23 +45,6 @@ def swept_floor(data: RunData, lattice: CoverageLattice, lost_pose_s: float) -> 
     x, y = track[-1].tolist()
     grid = with_kept_out(data.grid, data.keep_out)
     return judge_floor(grid, track, robot, driven=driven, stands_at=(x, y))
-
-
-def with_kept_out(grid: OccupancyGrid, keep_out: tuple[Polygon, ...]) -> OccupancyGrid:
-    """Return a map on which the pixels with their centre in a keep-out zone are occupied."""
-    if not keep_out:
-        return grid
-    cells, whole = grid.cells.copy(), Window(0, 0, *grid.cells.shape)
-    for polygon in keep_out:
-        corners = tuple(grid.geometry.to_pixels(x, y) for x, y in polygon)
-        cols, rows = zip(*corners, strict=True)
-        box = Window(
-            math.floor(min(rows)), math.floor(min(cols)), math.ceil(max(rows)), math.ceil(max(cols))
-        )
-        if common := box.intersection(whole):
-            inside = cells_inside(corners, common, 1.0)
-            cells[common.slices_in(whole)][inside] = OCCUPIED
-    return OccupancyGrid(grid.geometry, cells, grid.frame, grid.stamp_ns)
 
 
 def _driven(

@@ -92,7 +92,8 @@ class Topic:
         qos: how it is published; None for tokens.
         rate_hz: how often at least; 0 where that is not promised.
         queues: what waits at the receivers.
-        is_input: whether a recording holds it byte for byte, for a replay.
+        is_input: whether a replay feeds it to the mission, so that recordings hold it byte for
+            byte; what the recorder alone takes is none.
         limits: what bounds it, in ``protocol/limits.yaml``.
     """
 

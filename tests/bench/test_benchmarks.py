@@ -24,8 +24,9 @@ CHECKOUT = Path(__file__).parents[2]
 
 def figures(capsys, *words):
     code = main(["bench", *words, "--json"])
-    document = json.loads(capsys.readouterr().out)
-    assert code == 0
+    said = capsys.readouterr()
+    assert code == 0, said.err
+    document = json.loads(said.out)
     assert document["benchmark"] == words[0]
     assert document["interrupted"] is False
     assert set(document["machine"]) == MACHINE

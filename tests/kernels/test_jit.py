@@ -59,7 +59,7 @@ def test_a_caller_in_another_file_never_meets_the_old_code_of_its_callee(tmp_pat
             capture_output=True,
             text=True,
             check=True,
-            timeout=100,
+            timeout=600,
         )
         assert done.stdout.strip() == str(2 * value)
     assert len(list((tmp_path / "cache").glob("kernels-*/*.kernel"))) == 4

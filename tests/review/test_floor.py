@@ -10,7 +10,8 @@ import pytest
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.review.floor import swept_floor, with_kept_out
+from fasaco_edge.mission.orders.zones import with_kept_out
+from fasaco_edge.review.floor import swept_floor
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.status import LedgerReport, Status
 from tests.support.rooms import RADIUS_M, RESOLUTION_M, TOOL_M, room

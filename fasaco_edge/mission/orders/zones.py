@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Polygon, Window
 from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
+from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.mission.orders.order import Zone
@@ -108,3 +110,23 @@ def cells_near(
     cells |= inside
     cells.flags.writeable = False
     return cells
+
+
+def with_kept_out(grid: OccupancyGrid, keep_out: tuple[Polygon, ...]) -> OccupancyGrid:
+    """Return a map on which the pixels with their centre in a keep-out zone are occupied.
+
+    Cells that the robot must not touch are ``kept_out``, which is stricter.
+    """
+    if not keep_out:
+        return grid
+    cells, whole = grid.cells.copy(), Window(0, 0, *grid.cells.shape)
+    for polygon in keep_out:
+        corners = tuple(grid.geometry.to_pixels(x, y) for x, y in polygon)
+        cols, rows = zip(*corners, strict=True)
+        box = Window(
+            math.floor(min(rows)), math.floor(min(cols)), math.ceil(max(rows)), math.ceil(max(cols))
+        )
+        if common := box.intersection(whole):
+            inside = cells_inside(corners, common, 1.0)
+            cells[common.slices_in(whole)][inside] = OCCUPIED
+    return OccupancyGrid(grid.geometry, cells, grid.frame, grid.stamp_ns)
