@@ -22,7 +22,7 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Set
 from importlib import metadata
 from pathlib import Path
 
@@ -215,23 +215,31 @@ def _remove(folder: Path, maker: int) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def note_complete(folder: Path) -> None:
+def note_complete(folder: Path, used: Set[str] = frozenset()) -> None:
     """Record that all kernels are compiled, unless that is recorded already.
 
-    Damaged files are removed; where nothing can be written, nothing is recorded.
+    Damaged files are removed; where nothing can be written, nothing is recorded, which is logged.
+
+    Args:
+        folder: where they are kept.
+        used: names of the files that this process has loaded or written. Where one of them is not
+            sound any more, or cannot be read, nothing is recorded: another process may compile it.
     """
     if not missing_from(folder):
         return
     ours = processor()
     try:
         files = [file.name for file in sweep(folder, f"*{KERNEL_SUFFIX}")]
+        if lost := sorted(used - set(files)):
+            LOG.warning("%s could not be read again: not noted as complete", folder / lost[0])
+            return
         # The names are on the disk before the list of them.
         sync_folder(folder)
         note = json.dumps({"processor": ours, "files": files})
         write_sealed(_note_of(folder, ours), note.encode())
         sync_folder(folder)
-    except OSError:
-        pass
+    except OSError as error:
+        LOG.warning("%s cannot be noted as complete: %s", folder, error.strerror)
 
 
 def missing_from(folder: Path, user: int | None = None) -> str:

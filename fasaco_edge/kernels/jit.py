@@ -81,6 +81,8 @@ class CacheFaults:
 
 
 FAULTS = CacheFaults()
+# Names of the files that this process has loaded or written.
+_USED: set[str] = set()
 
 
 class _KernelCache:
@@ -114,6 +116,7 @@ class _KernelCache:
             # The file is sound, but numba cannot rebuild it.
             FAULTS.cannot_load(file, f"cannot be used ({type(error).__name__}: {error})")
             return None
+        _USED.add(file.name)
         return result
 
     def save_overload(self, signature: object, result: CompileResult) -> None:
@@ -125,6 +128,8 @@ class _KernelCache:
             write_sealed(file, dumps((signature, result._reduce())))
         except OSError as error:
             FAULTS.cannot_keep(file, error)
+        else:
+            _USED.add(file.name)
 
     def flush(self) -> None:
         """Do nothing: code that is compiled again replaces its file."""
@@ -175,4 +180,4 @@ def inlined(function: Kernel) -> Kernel:
 def note_all_compiled() -> None:
     """Record that every kernel has been compiled or loaded by now."""
     if not numba.config.DISABLE_JIT and CACHE_FOLDER is not None and not FAULTS.failure:
-        note_complete(CACHE_FOLDER)
+        note_complete(CACHE_FOLDER, _USED)

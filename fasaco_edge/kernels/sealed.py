@@ -100,7 +100,7 @@ def sweep(folder: Path, pattern: str) -> list[Path]:
         pattern: of the names of all sealed files that count.
 
     Returns:
-        those files that are left: each is sound.
+        those files that are sound.
 
     Raises:
         OSError: something could not be removed.
@@ -114,6 +114,9 @@ def sweep(folder: Path, pattern: str) -> list[Path]:
         try:
             read_sealed(file)
             sound.append(file)
-        except UnsoundFileError:
-            remove(file)
+        except UnsoundFileError as why:
+            # What cannot be read now may be sound, and is written again by who needs it. A link
+            # cannot be opened either.
+            if not isinstance(why.__cause__, OSError) or file.is_symlink():
+                remove(file)
     return sound

@@ -8,6 +8,7 @@ import pytest
 
 from fasaco_edge.kernels.cache import missing_from, note_complete
 from fasaco_edge.kernels.sealed import UnsoundFileError, read_sealed, write_sealed
+from tests.campaigns.file_calls import Failure, Kind, Watch, why_not
 from tests.kernels.harm import (
     HARMS,
     MISDEEDS,
@@ -52,6 +53,29 @@ def test_a_harmed_file_that_nobody_writes_again_is_cleared_away(tmp_path, harm):
     assert missing_from(file.parent) == ""
     assert kernel_files(tmp_path) == [before, after, note]
     assert not os.path.lexists(file)
+
+
+def test_a_kernel_that_is_lost_while_it_runs_is_not_noted_as_there(installed):
+    """The disk gives a file once, and not again: what the next process compiles is missing."""
+    lose = "for file in seven.jit.CACHE_FOLDER.glob('seven.eight-*'): file.write_bytes(b'')"
+    told = installed.tell(f"seven.eight(1)\n{lose}\nseven.tell()")
+    assert "could not be read again" in told.warnings[0]
+    second = installed.tell()
+    assert (second.missing != "", second.compiled) == (True, 1)
+    third = installed.tell()
+    assert (third.missing, third.compiled) == ("", 0)
+
+
+@pytest.mark.skipif(bool(why_not()), reason=why_not())
+def test_a_kernel_that_cannot_be_read_once_more_stays_and_is_not_noted(installed):
+    installed.tell("seven.tell(note=False)")
+    files = kernel_files(installed.cache)
+    with Watch([installed.cache], Failure(Kind.OPEN, 6, "EMFILE")) as watch:
+        told = installed.tell(env=watch.environment)
+        assert watch.failed_on() == str(files[0])
+    assert "could not be read again" in told.warnings[0]
+    assert kernel_files(installed.cache) == files
+    assert (installed.tell().compiled, installed.tell().missing) == (0, "")
 
 
 @pytest.mark.parametrize("harm", ALL)
