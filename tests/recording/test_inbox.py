@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.recording.write.inbox import (
-    BASE_BYTES,
     BEHIND_SAMPLES,
     LEAST_QUEUE_BYTES,
     QUEUE_BYTES,
@@ -114,4 +113,4 @@ def test_the_unit_has_what_the_recorder_needs():
 def test_what_waits_fits_into_the_limit(limit):
     capacity = afforded_bytes(limit)
     assert LEAST_QUEUE_BYTES <= capacity <= QUEUE_BYTES
-    assert needed_bytes(capacity) <= max(limit, BASE_BYTES + 15 * LEAST_QUEUE_BYTES)
+    assert needed_bytes(capacity) <= max(limit, needed_bytes(LEAST_QUEUE_BYTES))
