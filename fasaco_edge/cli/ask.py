@@ -42,6 +42,7 @@ EPILOG = """\
 examples:
   fasaco-edge ask status
   fasaco-edge ask path                      how long it is, and why it is what it is
+  fasaco-edge ask pheromone                 the living trail, and how decided it is
   fasaco-edge ask pheromone --param cohort=0
   fasaco-edge ask replan                    a full new plan, now
   fasaco-edge ask config --json
@@ -162,6 +163,8 @@ def _rows(told: replies.Reply) -> list[tuple[str, str]]:
         rows.append(("mission", f"{stage}, {began}"))
     if told.coverage is not None:
         rows.append(("covered", phrases.covered(told.coverage)))
+    if told.floor is not None:
+        rows.append(("floor swept", phrases.swept(told.floor)))
     if mission.keep_out:
         rows.append(("keep-out zones", str(mission.keep_out)))
     if mission.return_home:
@@ -238,14 +241,15 @@ def _coverage_figures(reply: Reply) -> dict[str, object]:
 
 def _trail_figures(reply: Reply) -> dict[str, object]:
     trail = decode_pheromone(reply.payload)
+    # The living trail comes with what is told of it; nobody walked for it.
+    colony = {"cohort": trail.cohort, "velocity": trail.velocity, "ants": trail.ants}
+    told = decode_json(reply.attachment) if reply.attachment else colony
     return {
         "frame": trail.frame,
         "rows": trail.geometry.rows,
         "cols": trail.geometry.cols,
         "cell_m": trail.geometry.resolution,
-        "cohort": trail.cohort,
-        "velocity": trail.velocity,
-        "ants": trail.ants,
+        **told,
         "best_steps": trail.best_steps,
         "trail_min": trail.trail_min,
         "trail_max": trail.trail_max,

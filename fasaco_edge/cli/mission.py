@@ -49,7 +49,7 @@ COMMANDS = {
     "pause": "let the robot stand; what it passes over still counts",
     "resume": "go on",
     "cancel": "stop, and forget the order; what is covered is remembered",
-    "replan": "make a full new plan now, which keeps nothing of the path there is",
+    "replan": "search for a full new plan now, beginning with the path there is",
     "reset": "stop, and forget the order and what is covered; the ledger is kept aside",
     "status": "tell state, progress, and what could not be reached",
 }

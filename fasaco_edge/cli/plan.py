@@ -16,7 +16,7 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, check_output, writing
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.plan_line import Ground, Line, PlannedFloor, judged_floor, write_line
-from fasaco_edge.cli.plan_options import ANYWHERE, CELLS, EPILOG, HOME, add_options, check, settle
+from fasaco_edge.cli.plan_options import CELLS, EPILOG, add_options, check, settle
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     line_xy = ground.line(args, path.cells, ends=problem.end is not None)
     judged = judged_floor(args, ground.grid, line_xy)
     floor = PlannedFloor.of(judged.figures) if judged else None
-    figures = figures_of(args, problem, path, search)
+    figures = figures_of(args, ground, problem, path, search)
     if args.path_out is not None:
         with writing(args.path_out):
             np.savetxt(args.path_out, path.cells, "%d", ",", header="row,col", comments="")
@@ -107,9 +107,8 @@ def _read(args: argparse.Namespace, file: Path) -> Ground:
 def _pose(args: argparse.Namespace, ground: Ground) -> CoverageProblem:
     from fasaco_edge.planners.problem import CoverageProblem
 
-    end = {ANYWHERE: None, HOME: ground.start}.get(args.end, args.end)
     cost = CoverageCost.for_robot(ground.lattice.cell_m, args.speed_m_s, args.turn_s)
-    return CoverageProblem.of(ground.lattice, ground.start, end=end, cost=cost)
+    return CoverageProblem.of(ground.lattice, ground.start, end=ground.end(args), cost=cost)
 
 
 def _start(args: argparse.Namespace, lattice: CoverageLattice, file: Path) -> Cell:
@@ -130,17 +129,17 @@ def _plan(
 
     A planner that knows no lower bound is given one, for its path and for ``--target-gap``.
     """
-    from fasaco_edge.planners.problem import lower_bound_steps
+    from fasaco_edge.planners.bound import lower_bound_of
 
     planner = planner_of(args.planner, colony, args.threads, args.local_search)
-    bound = 0 if args.local_search else lower_bound_steps(problem)
+    bound = None if args.local_search else lower_bound_of(problem)
     criteria = _criteria(args, asked)
     ended_by = "the search"
     with watching(args, colony) as show:
 
         def stop(search: SearchProgress) -> bool:
             nonlocal ended_by
-            known = replace(search, lower_bound_steps=max(search.lower_bound_steps, bound))
+            known = search if bound is None else replace(search, lower_bound_cost_s=bound.cost_s)
             show(known)
             over = [name for name, is_over in criteria.items() if is_over(known)]
             ended_by = over[0] if over else ended_by
@@ -154,8 +153,9 @@ def _plan(
             "wall_s": round(time.perf_counter() - wall, 6),
             "cpu_s": round(time.process_time() - cpu, 6),
         }
-    known = max(path.lower_bound_steps, bound)
-    return replace(path, lower_bound_steps=known), search
+    if bound is not None:
+        path = replace(path, lower_bound_steps=bound.steps, lower_bound_cost_s=bound.cost_s)
+    return path, search
 
 
 def _criteria(args: argparse.Namespace, asked: Interrupt) -> dict[str, StoppingCriterion]:
@@ -174,6 +174,7 @@ LEAST_INTERVAL_S = 0.05
 
 def figures_of(
     args: argparse.Namespace,
+    ground: Ground,
     problem: CoverageProblem,
     path: CoveragePath,
     search: dict[str, object],
@@ -194,6 +195,7 @@ def figures_of(
         "line": args.line,
         "tool_m": args.cell,
         "cell_m": problem.lattice.cell_m,
+        "lattice_deg": round(ground.lattice_deg, 3),
         "start": list(problem.start),
         "end": path.cells[-1].tolist(),
         **walk,
@@ -202,6 +204,7 @@ def figures_of(
         "length_m": round(path.steps * problem.lattice.cell_m, 3),
         "cost_s": path.cost_s,
         "lower_bound_steps": path.lower_bound_steps,
+        "lower_bound_cost_s": path.lower_bound_cost_s,
         "gap": None if path.gap is None else round(path.gap, 6),
         "unreachable_cells": int(np.count_nonzero(problem.unreachable)),
         "speed_m_s": args.speed_m_s,
@@ -231,11 +234,12 @@ def draw(
     colony = f" {figures['velocities']}, {counted}, seed {path.seed}" if ants else ""
     search = f", {path.work.perturbations} perturbations" if args.local_search else ""
     title = path.planner + colony + search
+    askew = f" at {figures['lattice_deg']:g} degrees" if figures["lattice_deg"] else ""
     lines = [
-        f"{Path(args.map).name}: {figures['cells']} cells of {figures['cell_m']} m, "
+        f"{Path(args.map).name}: {figures['cells']} cells of {figures['cell_m']:g} m{askew}, "
         f"{figures['steps']} steps, {figures['revisits']} revisits, "
         f"{figures['turns_90']} quarter-turns; "
-        f"at most {path.gap or 0.0:.1%} above the fewest steps there can be",
+        f"at most {path.gap or 0.0:.1%} above the least time there can be",
     ]
     if judged is not None:
         lines.append(f"reachable floor: {PlannedFloor.of(judged.figures)}")

@@ -21,6 +21,8 @@ from fasaco_edge.bench.floor import (
     judge_floor,
     swept_words,
 )
+from fasaco_edge.cli.plan_options import ANYWHERE, AXES, HOME, WALLS
+from fasaco_edge.errors import EndBlocked, MapTooFar, MapTooLarge
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.floor import Floor, StandLattice
@@ -39,6 +41,7 @@ class Ground:
         grid: the map; None for a coverage grid.
         start: the cell (row, col) it begins in.
         floor, stands: where the robot stands in the cells; None for their centres.
+        lattice_deg: the angle of the cells' rows to the x axis of the map frame [deg].
     """
 
     lattice: CoverageLattice
@@ -46,6 +49,7 @@ class Ground:
     start: Cell
     floor: Floor | None = None
     stands: StandLattice | None = None
+    lattice_deg: float = 0.0
 
     @classmethod
     def of_floor(
@@ -61,15 +65,51 @@ class Ground:
 
         Raises:
             StartOutsideMap, StartBlocked: the robot cannot stand there.
+            MapTooLarge, MapTooFar: see ``Floor.around``, ``StandLattice.over``.
         """
-        from fasaco_edge.grid.floor import Floor, RobotDiscs, StandLattice
+        from fasaco_edge.grid.fine_raster import RobotDiscs
+        from fasaco_edge.grid.floor import Floor
 
         (xy,) = cells.centres(np.array([start], np.int32)).tolist()
         if args.start_xy is not None:
             xy = args.start_xy
         floor = Floor.around(grid, RobotDiscs(args.robot_radius, args.cell), tuple(xy))
-        stands = StandLattice.over(floor, args.cell * (1.0 - args.overlap))
-        return cls(stands.lattice, grid, stands.start_cell(floor), floor, stands)
+        cell_m = args.cell * (1.0 - args.overlap)
+        lattice_deg = _lattice_deg(args, grid)
+        try:
+            stands = _stands(floor, cell_m, lattice_deg)
+        except (MapTooFar, MapTooLarge):
+            # Askew, a lattice spans up to twice the cells, and may lie farther from 0.
+            if args.align != WALLS or not lattice_deg:
+                raise
+            lattice_deg = 0.0
+            stands = _stands(floor, cell_m, lattice_deg)
+        return cls(stands.lattice, grid, stands.start_cell(floor), floor, stands, lattice_deg)
+
+    def end(self, args: argparse.Namespace) -> Cell | None:
+        """Return the cell to end in, None for anywhere.
+
+        Raises:
+            EndBlocked: the robot has no place in the cell that is asked for.
+        """
+        if args.end == ANYWHERE:
+            return None
+        if args.end == HOME:
+            return self.start
+        cell: Cell = args.end
+        if self.floor is None or self.stands is None:
+            return cell
+        from fasaco_edge.grid.fine_raster import map_to_raster
+
+        # Named is a cell as wide as the tool, along the axes of the map frame, as for the start.
+        middle = ((index + 0.5) * args.cell for index in reversed(cell))
+        place = np.array(map_to_raster(self.floor.geometry, *middle))
+        away = np.hypot(*np.moveaxis(self.stands.stands - place, 2, 0))
+        row, col = divmod(int(np.nanargmin(away)), away.shape[1])
+        if away[row, col] * self.floor.geometry.resolution > args.cell:
+            raise EndBlocked(f"end cell {cell} is out of reach, or the robot does not fit there")
+        window = self.stands.lattice.window
+        return row + window.row0, col + window.col0
 
     def line(self, args: argparse.Namespace, walk: NDArray[np.int32], *, ends: bool) -> Line:
         """Return the line along a walk, int32 (n, 2), n >= 1; ``ends`` where it ends there."""
@@ -79,6 +119,26 @@ class Ground:
             return line_through(self.lattice, walk)
         config = replace(LINES[args.line], speed_m_s=args.speed_m_s, quarter_turn_s=args.turn_s)
         return line_over(walk, self.stands, self.floor, config, is_end_fixed=ends).xy
+
+
+def _lattice_deg(args: argparse.Namespace, grid: OccupancyGrid) -> float:
+    """Return the angle that is asked for, or that of the walls [deg]."""
+    from fasaco_edge.grid.walls import wall_direction
+
+    if args.align == WALLS:
+        walls = wall_direction(grid)
+        return walls.turn_deg if walls else 0.0
+    return 0.0 if args.align == AXES else float(args.align)
+
+
+def _stands(floor: Floor, cell_m: float, lattice_deg: float) -> StandLattice:
+    """Return the stands in cells whose rows lie at an angle to the map frame's x axis."""
+    from fasaco_edge.grid.floor import StandLattice
+    from fasaco_edge.grid.walls import turned_geometry
+
+    # To lay cells askew over a map is to turn the map below them. Stands are pixels of it.
+    below = replace(floor, geometry=turned_geometry(floor.geometry, -lattice_deg))
+    return StandLattice.over(below, cell_m)
 
 
 def line_through(lattice: CoverageLattice, cells: NDArray[np.int32]) -> Line:

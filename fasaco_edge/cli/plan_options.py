@@ -25,6 +25,7 @@ examples:
   fasaco-edge plan basement --png basement.png
   fasaco-edge plan site.yaml --cell 0.35 --robot-radius 0.2 --start-xy 1.5,-2 --json
   fasaco-edge plan site.yaml --line thorough --xy-out line.csv --png line.png
+  fasaco-edge plan site.yaml --line quick --align axes --xy-out line.csv
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
   fasaco-edge plan basement --no-local-search --seed 7
@@ -34,7 +35,9 @@ figures:
   recovered_cells  distinct cells visited twice or more
   n_r_paper        revisits with the way home, to compare with the paper's Table I
   cost_s           seconds the robot drives and turns
-  gap              steps / lower_bound_steps - 1, of steps whatever turns cost
+  lattice_deg      angle of the cells' rows to the x axis of the map frame; cells
+                   (row, col) of a line over the floor are counted along them
+  gap              cost_s / lower_bound_cost_s - 1, of steps and turns together
   floor            of a YAML map, on its own pixels, by a tool as wide as --cell:
                    reachable_m2, all that the tool touches where the robot's disc can
                    come to; the share of it that the line sweeps; seconds_per_m2 swept;
@@ -57,6 +60,9 @@ SEARCH_VISIBILITY, PAPER_VISIBILITY = "fewest-open", "neighbour"
 # The line through the cells' centres; the others are in ``planners.line``.
 CELLS = "cells"
 OVERLAP, MOST_OVERLAP = 0.08, 0.5
+# What the cells of a line over the floor lie along; or an angle [deg].
+WALLS, AXES = "walls", "axes"
+MOST_ANGLE_DEG = 360.0
 # A quarter-turn on the spot of a line over the floor, where nobody says [s].
 TURN_S = 1.5
 
@@ -85,6 +91,11 @@ def check(args: argparse.Namespace) -> None:
     _require(0.0 < args.speed_m_s <= 10.0, "--speed-m-s", "be in (0, 10] m/s", args.speed_m_s)
     most = "be in [0, 0.5], of the tool's width"
     _require(0.0 <= args.overlap <= MOST_OVERLAP, "--overlap", most, args.overlap)
+    if args.line == CELLS and args.align != AXES:
+        raise BadConfiguration(
+            f"--align {args.align}: the centres of cells lie along the axes of the map frame",
+            hint="ask for --line quick or --line thorough too",
+        )
     _require(0.0 <= args.turn_s <= 3600.0, "--turn-s", "be in [0, 3600] s", args.turn_s)
     _require(1 <= args.threads <= 64, "--threads", "be in 1..64", args.threads)
     if args.budget is not None:
@@ -106,6 +117,8 @@ def settle(args: argparse.Namespace) -> None:
         args.turn_s = 0.0 if args.line == CELLS else TURN_S
     if args.overlap is None:
         args.overlap = OVERLAP
+    if args.align is None:
+        args.align = AXES if args.line == CELLS else WALLS
     if args.budget is None and args.local_search:
         args.budget = BUDGET_S
 
@@ -183,6 +196,15 @@ def _add_line(group: argparse._ArgumentGroup) -> None:
         f"(default: {OVERLAP:g})",
     )
 
+    group.add_argument(
+        "--align",
+        type=_alignment,
+        metavar="walls|axes|DEG",
+        help="what the cells of a line over the floor lie along: most of the building's walls, as "
+        "the map has them; the axes of the map frame; or so many degrees to these, "
+        f"counter-clockwise (default: {WALLS})",
+    )
+
 
 def _add_planner(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
@@ -237,7 +259,7 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         "--target-gap",
         type=float,
         metavar="G",
-        help="end it once the walk is proven to be at most so much longer than the shortest, "
+        help="end it once the walk is proven to take at most so much longer than the quickest, "
         "0.01 for 1 %% (default: none)",
     )
 
@@ -267,6 +289,21 @@ def _end(text: str) -> str | tuple[int, int]:
         raise argparse.ArgumentTypeError(
             f"must be {ANYWHERE}, {HOME} or row,column, got {text!r}"
         ) from None
+
+
+def _alignment(text: str) -> str | float:
+    """Read what cells lie along."""
+    if text in (WALLS, AXES):
+        return text
+    try:
+        angle_deg = float(text)
+    except ValueError:
+        angle_deg = math.nan
+    if not abs(angle_deg) <= MOST_ANGLE_DEG:
+        raise argparse.ArgumentTypeError(
+            f"must be {WALLS}, {AXES} or an angle up to {MOST_ANGLE_DEG:g} degrees, got {text!r}"
+        )
+    return angle_deg
 
 
 def _require(condition: bool, option: str, expectation: str, value: object) -> None:

@@ -3,14 +3,28 @@
 from __future__ import annotations
 
 import argparse
+import os
+import shutil
+import subprocess
+import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
 
 from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import err, progress
-from fasaco_edge.kernels import cache
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.processes import available_memory, end_with_parent, python_program
+from fasaco_edge.kernels import cache, release
 
+# The compiler has 850 MB in the end.
+TWO_NEED_BYTES = 2_000_000_000
 EPILOG = """\
+An installation from a release folder brings compiled kernels along and compiles nothing, as long as
+they are whole and numba, llvmlite and Python are those they were made for.
+
 The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Code in it is for
 these very sources, for one numba, llvmlite and Python, and for one processor; a daemon that finds
 none compiles it itself, with its first map. Each file is checked before it is used: one that is
@@ -33,15 +47,36 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--prune", action="store_true", help="then remove what other versions have left there"
     )
+    parser.add_argument(
+        "--for-release",
+        type=Path,
+        metavar="DIR",
+        help="compile for any processor of this kind into DIR, for a release to bring along",
+    )
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        choices=(1, 2),
+        metavar="N",
+        help="processes that compile (default: 2 where there are two cores and 2 GB to spare)",
+    )
+    # What the second of two runs: the last stage first.
+    parser.add_argument("--backward", action="store_true", help=argparse.SUPPRESS)
     add_json(parser, "the result")
 
 
 def run(args: argparse.Namespace) -> int:
     """Compile or check, and say where."""
-    seconds = 0.0 if args.check else compile_kernels()
+    if args.for_release is not None:
+        return compile_for_release(args.for_release)
+    if args.backward:
+        end_with_parent(os.getppid())
+        compile_all(backward=True)
+        return Exit.OK
+    seconds = 0.0 if args.check else compile_kernels(args.jobs)
     folder, passed_over = cache.usable_folder()
     missing = cache.missing_from(folder)
-    removed, freed_mb = cache.prune(folder) if args.prune else (0, 0.0)
+    removed, freed_mb = cache.prune(cache.wanted_folder()) if args.prune else (0, 0.0)
     if args.json:
         document = {
             "ready": not missing,
@@ -66,9 +101,49 @@ def run(args: argparse.Namespace) -> int:
     return Exit.ERROR if missing and args.check else Exit.OK
 
 
-def compile_kernels() -> float:
-    """Compile or load every kernel with a progress bar; return the seconds it took."""
+def compile_kernels(jobs: int | None = None) -> float:
+    """Compile or load every kernel with a progress bar; return the seconds it took.
+
+    Args:
+        jobs: processes that compile; without it two, where there is room for them.
+    """
     started = time.monotonic()
+    folder = cache.cache_folder()
+    has_work = folder is not None and bool(cache.missing_from(folder))
+    if jobs is None:
+        jobs = 2 if has_work and _has_room_for_two() else 1
+    with _from_the_end(folder) if jobs == 2 and folder else nullcontext():
+        compile_all()
+    return time.monotonic() - started
+
+
+def _has_room_for_two() -> bool:
+    return len(os.sched_getaffinity(0)) > 1 and available_memory() >= TWO_NEED_BYTES
+
+
+@contextmanager
+def _from_the_end(folder: Path) -> Iterator[None]:
+    """Let another process compile from the last stage on; each loads what the other one has made.
+
+    Nothing depends on it: what it leaves over this process compiles.
+    """
+    other = subprocess.Popen(
+        python_program("fasaco_edge", "warmup", "--backward"),
+        env=os.environ | {"NUMBA_CACHE_DIR": str(folder)},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        yield
+    finally:
+        # The stages that are left to it are compiled. Killed, it leaves no file that counts.
+        other.terminate()
+        other.wait()
+
+
+def compile_all(*, backward: bool = False) -> None:
+    """Compile or load every kernel with a progress bar; ``backward``: the last stage first."""
     with progress() as bar:
         task = bar.add_task("loading numba", total=None)
         from fasaco_edge.planners.warmup import STAGES, warm_up
@@ -78,8 +153,31 @@ def compile_kernels() -> float:
         def report(stage: str) -> None:
             bar.update(task, description=f"compiling kernels (first run only): {stage}", advance=1)
 
-        warm_up(report)
-    return time.monotonic() - started
+        warm_up(report, backward=backward)
+
+
+def compile_for_release(folder: Path) -> int:
+    """Compile every kernel for any processor of this kind; put them and their manifest there."""
+    if release.has_kernels():
+        raise BadConfiguration(
+            f"--for-release {folder}: this installation has its kernels from a release itself",
+            hint=f"copy {release.FOLDER}",
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    if left := next(folder.iterdir(), None):
+        raise BadConfiguration(
+            f"--for-release {folder} is not empty: {left.name}", hint="name a new folder"
+        )
+    with tempfile.TemporaryDirectory(dir=folder) as scratch:
+        environment = os.environ | release.FOR_ANY_PROCESSOR | {"NUMBA_CACHE_DIR": scratch}
+        # By one process: names in the code count what it has compiled before.
+        words = ("warmup", "--jobs", "1")
+        subprocess.run(python_program("fasaco_edge", *words), env=environment, check=True)
+        for file in sorted(Path(scratch).rglob(f"*{release.KERNEL_SUFFIX}")):
+            shutil.move(file, folder)
+    count = release.write_manifest(folder)
+    err().print(f"{count} compiled kernels and {release.MANIFEST} in {folder}", soft_wrap=True)
+    return Exit.OK
 
 
 COMMAND = Command(

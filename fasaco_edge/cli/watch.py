@@ -35,9 +35,10 @@ examples:
   fasaco-edge watch | tee mission.log                  lines, where there is no terminal
   fasaco-edge watch --json | jq .coverage.fraction
 
-q or Ctrl-C ends it. Row by row the picture is the map, north up: y grows upwards. Where no map is
-published on the native key `map` (under ROS 2, say) the coverage is drawn alone. NO_COLOR=1 and
-TERM=dumb are kept to.
+f shows the pheromone trail in place of coverage and path, and back: bright is where the paths so
+far lead. q or Ctrl-C ends it. Row by row the picture is the map, north up: y grows upwards. Where
+no map is published on the native key `map` (under ROS 2, say) the coverage is drawn alone.
+NO_COLOR=1 and TERM=dumb are kept to.
 
 exit codes: 0 ended as asked; 1 --once and nobody answered, or the terminal is gone
 """

@@ -46,7 +46,8 @@ class RobotConfig(Section, frozen=True):
     """The robot: its name on the bus, its size [m], and what driving takes it.
 
     ``quarter_turn_s`` is a turn by 90 degrees on the spot [s], braking and starting
-    included; 0 looks for the fewest steps whatever the turns.
+    included; 0 looks for the fewest steps whatever the turns. ``overlap`` is by what share of the
+    tool's width lanes overlap where a line is driven (``planner.line``).
     """
 
     name: str = "robot"
@@ -54,14 +55,16 @@ class RobotConfig(Section, frozen=True):
     tool_width_m: Metres = 0.3
     speed_m_s: Annotated[float, Meta(gt=0, le=10)] = 0.25
     quarter_turn_s: Annotated[float, Meta(ge=0, le=600)] = 1.5
+    overlap: Annotated[float, Meta(ge=0, le=0.5)] = 0.08
 
-    def cost(self) -> CoverageCost:
-        """Return what a step and a turn cost.
+    def cost(self, cell_m: float | None = None) -> CoverageCost:
+        """Return what a step over a cell, by default one as wide as the tool, and a turn cost.
 
         Raises:
             BadConfiguration: a step would take less than a millisecond or more than an hour.
         """
-        return CoverageCost.for_robot(self.tool_width_m, self.speed_m_s, self.quarter_turn_s)
+        step_m = self.tool_width_m if cell_m is None else cell_m
+        return CoverageCost.for_robot(step_m, self.speed_m_s, self.quarter_turn_s)
 
 
 class BusConfig(Section, frozen=True):
@@ -97,7 +100,7 @@ class MapConfig(Section, frozen=True):
     free_at_most: Percent = 25
     occupied_at_least: Percent = 65
     max_pixels: Annotated[int, Meta(ge=1, le=MAX_GRID_CELLS)] = 25_000_000
-    max_lattice_cells: Annotated[int, Meta(ge=1, le=100_000_000)] = 500_000
+    max_lattice_cells: Annotated[int, Meta(ge=1, le=100_000_000)] = 600_000
 
 
 class PoseConfig(Section, frozen=True):
@@ -137,6 +140,7 @@ class PlannerConfig(Section, frozen=True):
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
     budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.1
     spare_share: Annotated[float, Meta(ge=0, le=1)] = 0.05
+    line: Literal["cells", "quick", "thorough"] = "thorough"
 
     def colony(self) -> ColonyConfig:
         """Return these as a colony.
@@ -212,6 +216,14 @@ class DaemonConfig(Section, frozen=True):
     mission: MissionSettings = MissionSettings()
     recording: RecordingConfig = RecordingConfig()
     ros2: RosConfig | msgspec.UnsetType = msgspec.UNSET
+
+    @property
+    def cell_m(self) -> float:
+        """Edge of a cell [m]: lanes of a line overlap, those through centres lie side by side."""
+        robot = self.robot
+        if self.planner.line == "cells":
+            return robot.tool_width_m
+        return robot.tool_width_m * (1.0 - robot.overlap)
 
     def keys(self) -> Keys:
         """Return the keys of this robot.

@@ -18,6 +18,7 @@ import time
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.host.processes import python_program, resident_mb
+from fasaco_edge.kernels import release
 from fasaco_edge.kernels.cache import cache_folder, missing_from
 
 LOG = logging.getLogger(__name__)
@@ -43,6 +44,8 @@ class KernelCompiler:
         folder = cache_folder()
         if folder is None:
             return  # that is logged already; what it compiled would be lost
+        if folder == release.FOLDER:
+            return
         self._process = subprocess.Popen(
             python_program(MODULE),
             env=os.environ | {"NUMBA_CACHE_DIR": str(folder)},

@@ -4,9 +4,11 @@ A daemon whose maps have at most P pixels, on a lattice of at most C cells, take
 
     BASE_BYTES + MAPS * P + CELL_BYTES * C
 
-whatever comes in, how often, and at what resolution; ``MemoryHigh=`` of its unit is that for the
-default configuration, ``MemoryMax=`` a tenth more, and under another limit the daemon takes no
-larger maps than that affords (``afforded``). A test holds the units to this file, and one measures.
+and, where it lays a line over the floor, ``FLOOR_BYTES * P + STAND_BYTES * C`` more: its fine
+raster has no more pixels than a map may have (``grid.fine_raster``). That holds whatever comes in,
+how often, and at what resolution; ``MemoryHigh=`` of its unit is that for the default
+configuration, ``MemoryMax=`` a tenth more, and under another limit the daemon takes no larger maps
+than that affords (``afforded``). A test holds the units to this file, and one measures.
 
 A pixel is a byte, held in up to ten copies where updates are as large as the map:
 
@@ -17,7 +19,12 @@ A pixel is a byte, held in up to ten copies where updates are as large as the ma
 
 Larger messages are dropped on arrival, by their size alone. Nothing else grows with the
 pixels: kernels look at a map tile by tile, and a tile has a bound, see ``grid.lattice``. Of a
-lattice's cells it is the path that takes most: some 80 bytes a pose, twice while it is sent.
+lattice's cells it is the path that takes most: some 80 bytes a pose, twice while it is sent. The
+living trail takes 16 bytes a cell, as much again while a copy is planned on or written, and 8 in
+the ledger's file. Else the ledger takes 4 bytes a cell, with the copy that is being written; of
+swept floor a bit a pixel of 2.5 cm, 18 bytes a cell of 0.3 m, and as much again where it changed
+since that copy. Whatever cells there are it has a bound of its own: 34 MB of cells and twice 13 MB
+of floor, where jumping poses fill it.
 
 Measured (``python -m tests.campaigns.memory``, x86-64): a mission on a small map 195 MB, a path of
 440,000 cells 127 MB more, maps of 25 million pixels at 20 Hz 75 MB more, each followed by an
@@ -39,7 +46,17 @@ MIB = 1 << 20
 # Interpreter, numpy, Zenoh, compiler and kernels, and what a plan takes for itself.
 BASE_BYTES = 210 * MB
 MAPS = 10
-CELL_BYTES = 330
+CELL_BYTES = 370
+# Of a pixel of floor: 3 for what is to be swept and how often the line does, 2 more while they move
+# with a map that grows; a bit each for what is blocked and where places are, twice where an order
+# has keep-out zones, and once more while a map is taken in; some bits a block of 64; and a tenth of
+# that for the frame around the map. Counted, not measured.
+FLOOR_BYTES = 7
+# Pixels of a frame that every map may have: small ones have the widest for their size.
+FRAME_PIXELS = 100_000
+# Of a cell with stand and bends: 32, as much again with keep-out zones, once more while a map is
+# taken in; and of the line 26 a point. Counted, too.
+STAND_BYTES = 128
 # MemoryMax= above MemoryHigh=, beyond which the system only slows a service down.
 SPARE = 1.1
 
@@ -71,7 +88,24 @@ def queues(max_pixels: int) -> dict[str, Queue]:
 
 def needed_bytes(config: DaemonConfig) -> int:
     """Return the most memory that a daemon of this configuration takes [bytes]."""
-    return BASE_BYTES + MAPS * config.map.max_pixels + CELL_BYTES * config.map.max_lattice_cells
+    maps = config.map
+    pixel_bytes, cell_bytes = unit_bytes(config)
+    return BASE_BYTES + pixel_bytes * maps.max_pixels + cell_bytes * maps.max_lattice_cells
+
+
+def unit_bytes(config: DaemonConfig) -> tuple[int, int]:
+    """Return what a pixel and a cell take [bytes]."""
+    if config.planner.line == "cells":
+        return MAPS, CELL_BYTES
+    return MAPS + FLOOR_BYTES, CELL_BYTES + STAND_BYTES
+
+
+def floor_pixels(max_pixels: int) -> int:
+    """Return how many pixels the raster of floor may have for maps of ``max_pixels``.
+
+    As many as the map, and a frame around it: it has to fit every map that is taken.
+    """
+    return max_pixels + max_pixels // 10 + FRAME_PIXELS
 
 
 def limits_mib(config: DaemonConfig) -> tuple[int, int]:
@@ -94,10 +128,11 @@ def afforded(config: DaemonConfig, limit: int | None) -> DaemonConfig:
     maps, spare = config.map, limit - BASE_BYTES
     least_pixels = min(LEAST_PIXELS, maps.max_pixels)
     least_cells = min(LEAST_CELLS, maps.max_lattice_cells)
+    pixel_bytes, cell_bytes = unit_bytes(config)
     share = max(spare, 0) / (needed_bytes(config) - BASE_BYTES)
     cells = max(int(share * maps.max_lattice_cells), least_cells)
-    pixels = max(min((spare - CELL_BYTES * cells) // MAPS, maps.max_pixels), least_pixels)
+    pixels = max(min((spare - cell_bytes * cells) // pixel_bytes, maps.max_pixels), least_pixels)
     # Where the pixels cannot shrink alike, the cells have to make up for that.
-    cells = max(min((spare - MAPS * pixels) // CELL_BYTES, cells), least_cells)
+    cells = max(min((spare - pixel_bytes * pixels) // cell_bytes, cells), least_cells)
     smaller = structs.replace(maps, max_pixels=pixels, max_lattice_cells=cells)
     return structs.replace(config, map=smaller)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import socket
 import time
@@ -129,8 +130,13 @@ def status_line(status: Status) -> str:
     """Return a status as a line: its state and why, how much is covered, what is wrong."""
     parts = [_doing(status)]
     if coverage := status.coverage:
-        area = f"{coverage.covered_m2:.0f} of {coverage.to_cover_m2:.0f} m2"
-        parts.append(f"{100 * coverage.fraction:.0f} % covered, {area}")
+        # Never 100 % before all are.
+        parts.append(f"{math.floor(100 * coverage.fraction)} % of cells covered")
+    if floor := status.floor:
+        areas = f"{floor.swept_m2:.0f}"
+        if floor.reached_m2 is not None:
+            areas = f"{floor.reached_m2:.0f} of {floor.reachable_m2:.0f}"
+        parts.append(f"{areas} m2 of floor swept")
     if path := status.path:
         parts.append(f"path {path.revision} with {path.remaining_steps} steps to go")
     if fault := status.ledger.fault:

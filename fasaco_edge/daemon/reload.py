@@ -29,6 +29,8 @@ CHANGEABLE = frozenset(
         "mission.stale_map_s",
     }
 )
+# Of a section that can change: the ledger's cells follow from it.
+FIXED = frozenset({"planner.line"})
 
 
 class Reload:
@@ -74,6 +76,8 @@ class Reload:
 
 def is_changeable(key: str) -> bool:
     """Tell whether the value can change in a running daemon."""
+    if key in FIXED:
+        return False
     return key in CHANGEABLE or key.partition(".")[0] in CHANGEABLE
 
 

@@ -73,9 +73,8 @@ def run_daemon(
     config = _afforded(config)
     compiler = KernelCompiler(manager) if manager.is_there else None
     try:
-        robot = config.robot
         folder = state or config.mission.state_folder()
-        ledger = open_ledger(folder, robot.name, robot.tool_width_m, fresh=fresh)
+        ledger = open_ledger(folder, config.robot.name, config.cell_m, fresh=fresh)
         if compiler is not None:
             compiler.wait(stop)
         config.bus.security.warn_of_clock()
@@ -129,7 +128,7 @@ def _serve(
         turns=TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored),
         claim=NameClaim(bus, keys),
     )
-    keeper = LedgerKeeper(ledger, config.robot.tool_width_m, autostart=config.mission.autostart)
+    keeper = LedgerKeeper(ledger, config.cell_m, autostart=config.mission.autostart)
     loop = Loop(config, ports, keeper, Host(Watchdog(manager), reload, recorder))
     serve_about(bus, keys, lambda: loop.config)
     try:

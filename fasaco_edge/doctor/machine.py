@@ -18,6 +18,7 @@ from pathlib import Path
 from fasaco_edge.daemon.memory import afforded, limits_mib, needed_bytes
 from fasaco_edge.doctor.finding import CheckContext, Finding, Level, fail, ok, warn, worst
 from fasaco_edge.host.files import why_not_trusted
+from fasaco_edge.kernels import release
 from fasaco_edge.kernels.cache import missing_from, outdated, wanted_folder
 
 MACHINES = ("x86_64", "aarch64")
@@ -293,6 +294,12 @@ def _state_faults(context: CheckContext) -> list[Finding]:
 def kernels(context: CheckContext) -> Finding:
     """Check that the kernels are compiled, whole, and safe from other users."""
     folder, user = wanted_folder(context.environ), _user(context)
+    if not release.why_unusable(user):
+        return ok("came with this installation, all there and whole", details=[str(release.FOLDER)])
+    return _own_kernels(context, folder, user)
+
+
+def _own_kernels(context: CheckContext, folder: Path, user: int | None) -> Finding:
     command = _warmup(context)
     later = "the first plan waits for them, up to a minute"
     try:

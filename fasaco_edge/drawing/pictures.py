@@ -258,6 +258,7 @@ def draw_mission(
     lines: Sequence[str],
     space: tuple[int, int] = (MAX_WIDTH, MAX_HEIGHT),
     jump_m: float = math.inf,
+    swept: MapLayer | None = None,
     unswept: MapLayer | None = None,
 ) -> Image.Image:
     """Return a picture, RGB, of a mission's result.
@@ -271,12 +272,18 @@ def draw_mission(
         lines: caption below it.
         space: the most the map may take (width, height) [px].
         jump_m: two places further apart than this [m] are no drive, and not joined.
+        swept: reachable floor that was swept, shown in place of the cells; None to show these.
         unswept: reachable floor that was not swept; None where that is not known.
     """
     plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m, *space))
     plot.ground(grid)
     start = lattice.cell_at(*driven_xy[0].tolist())
-    key = draw_visits(plot, lattice, visits, start)
+    if swept is None:
+        key = draw_visits(plot, lattice, visits, start)
+    else:
+        plot.paint(swept, palette.COVERED)
+        label = f"reachable floor swept ({swept.area_m2:,.1f} m2)"
+        key = [*_ENDS, KeyEntry("tile", palette.COVERED, label)]
     if unswept is not None:
         key += draw_unswept(plot, unswept)
     lengths_m = np.hypot(*np.diff(driven_xy, axis=0).T)

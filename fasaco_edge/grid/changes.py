@@ -103,26 +103,34 @@ class LatticeChange:
         """
         window = lattice_window(grids[1].geometry, footprint.cell_m, max_cells)
         placement = placement_of(grids[1].geometry, footprint)
-        stale = _stale_cells(grids, lattice, window, placement, footprint.thresholds, within)
+        stale = stale_cells(grids, lattice, window, placement, footprint.thresholds, within)
         if window == lattice.window and not stale.any():
             return cls(lattice, lattice, np.empty((0, 2), np.int32))
-        old_states = carried(lattice.states, lattice.window, window)
-        old_steps = carried(lattice.steps, lattice.window, window)
-        states, steps = old_states.copy(), old_steps.copy()
+        states = carried(lattice.states, lattice.window, window).copy()
+        steps = carried(lattice.steps, lattice.window, window).copy()
         classify_cells(
             pixels_of(grids[1]),
             placement,
             footprint.thresholds,
             Cells(states, steps, stale, window.row0, window.col0),
         )
-        changed = _cells_where((states != old_states) | (steps != old_steps), window)
-        if window == lattice.window:
-            if not len(changed):
-                return cls(lattice, lattice, changed)
-        else:
-            lost = (lattice.states != UNKNOWN) & _new_to(window, lattice.window)
-            changed = np.concatenate((changed, _cells_where(lost, lattice.window)))
-        return cls(lattice, CoverageLattice(window, footprint.cell_m, states, steps), changed)
+        return cls.to(lattice, CoverageLattice(window, footprint.cell_m, states, steps))
+
+    @classmethod
+    def to(cls, before: CoverageLattice, after: CoverageLattice) -> Self:
+        """Compare two lattices; the one before stays where no cell has changed."""
+        old, new = before.window, after.window
+        changed = _cells_where(
+            (after.states != carried(before.states, old, new))
+            | (after.steps != carried(before.steps, old, new)),
+            new,
+        )
+        if new != old:
+            lost = (before.states != UNKNOWN) & _new_to(new, old)
+            changed = np.concatenate((changed, _cells_where(lost, old)))
+        elif not len(changed):
+            return cls(before, before, changed)
+        return cls(before, after, changed)
 
 
 def _regions_to_compare(
@@ -149,21 +157,26 @@ def _regions_to_compare(
     return (*shared, *new.without(old), *(part for part in lost if part is not None))
 
 
-def carried(array: NDArray[Scalar], old: Window, new: Window) -> NDArray[Scalar]:
-    """Return an array over the old window on the new one, 0 beyond the old one.
+def carried(array: NDArray[Scalar], old: Window, new: Window, beyond: float = 0) -> NDArray[Scalar]:
+    """Return an array (rows, cols, ...) over the old window on the new one.
 
     That is the array itself where the windows are the same.
+
+    Args:
+        array: of the old window.
+        old, new: the windows.
+        beyond: what there is beyond the old one.
     """
     if new == old:
         return array
-    result = np.zeros((new.rows, new.cols), array.dtype)
+    result = np.full((new.rows, new.cols, *array.shape[2:]), beyond, array.dtype)
     common = new.intersection(old)
     if common is not None:
         result[common.slices_in(new)] = array[common.slices_in(old)]
     return result
 
 
-def _stale_cells(
+def stale_cells(
     grids: tuple[OccupancyGrid, OccupancyGrid],
     lattice: CoverageLattice,
     window: Window,
@@ -171,7 +184,16 @@ def _stale_cells(
     thresholds: Thresholds,
     within: Window | None,
 ) -> NDArray[np.bool_]:
-    """Return which cells of the new window must be classified anew, bool (rows, cols)."""
+    """Return which cells of the new window must be classified anew, bool (rows, cols).
+
+    Args:
+        grids: the map before and the new one.
+        lattice: over the map before.
+        window: of the lattice over the new one.
+        placement: where its cells lie; a pixel matters for a cell as far as ``reach_of`` says.
+        thresholds: what counts as free and as occupied.
+        within: see ``LatticeChange.between``.
+    """
     regions = _regions_to_compare(grids, window, placement, within)
     if regions is None:
         return np.ones((window.rows, window.cols), np.bool_)

@@ -7,44 +7,36 @@ at the one nearest to the cell's middle, and may go round a corner between two c
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import MapTooLarge, StartBlocked, StartOutsideMap
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
-from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, CoverageLattice, lattice_window
+from fasaco_edge.errors import StartBlocked, StartOutsideMap
+from fasaco_edge.grid.changes import carried
+from fasaco_edge.grid.fine_raster import (
+    RobotDiscs,
+    blocked_pixels,
+    fine_geometry,
+    raster_to_map,
+    stand_placement,
+)
+from fasaco_edge.grid.geometry import GridGeometry, Window
+from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.floor.bits import Bits, packed, unpacked
 from fasaco_edge.kernels.floor.places import (
     choose_stands,
     connected,
-    find_places,
+    disc_rows,
     link_stands,
+    places_of,
     within,
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
 
-# Pixels are divided until they are about so fine: what a tool leaves at a wall is a few of them.
-FINE_M = 0.025
 # The most fine pixels, int8 and int32 arrays of which are held.
 MOST_PIXELS = 100_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class RobotDiscs:
-    """The robot and its tool, as discs around one point, and what counts as free.
-
-    Attributes:
-        radius_m: of the robot [m].
-        tool_m: width of the tool [m].
-        free_at_most: occupancy values up to this are free [percent].
-    """
-
-    radius_m: float
-    tool_m: float
-    free_at_most: int = 25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,16 +46,16 @@ class Floor:
     Attributes:
         geometry: of the fine raster, with a frame around the map.
         discs: robot and tool.
-        blocked: int32 (rows, cols + 1): how many of a row's first pixels are not known free.
-        places: bool (rows, cols): pixels at whose centre the robot may be, and can come to.
+        blocked: uint64 (rows, words), see ``kernels.floor.bits``: pixels not known free.
+        places: the same: pixels at whose centre the robot may be, and can come to.
         reachable: bool (rows, cols): pixels whose centre the tool reaches from these.
         start: y, x of the place nearest to where the robot stands [pixels].
     """
 
     geometry: GridGeometry
     discs: RobotDiscs
-    blocked: NDArray[np.int32]
-    places: NDArray[np.bool_]
+    blocked: Bits
+    places: Bits
     reachable: NDArray[np.bool_]
     start: tuple[int, int]
 
@@ -76,15 +68,15 @@ class Floor:
             StartBlocked: the robot fits nowhere within its radius of the start.
             MapTooLarge: the fine raster would have more than ``MOST_PIXELS``.
         """
-        geometry, free = _refined(grid, discs)
-        blocked = np.zeros((geometry.rows, geometry.cols + 1), np.int32)
-        np.cumsum(~free, axis=1, out=blocked[:, 1:])
-        places = np.zeros(free.shape, np.bool_)
+        geometry, parts = fine_geometry(grid.geometry, discs, MOST_PIXELS)
+        every_row = 0, geometry.rows
+        blocked = blocked_pixels(grid, geometry, parts, discs.free_at_most, every_row)
         radius = discs.radius_m / geometry.resolution
-        find_places(blocked, radius, places)
-        at = _nearest_place(geometry, places, start, radius)
-        places = connected(places, *at)
-        reachable = within(places, discs.tool_m / 2 / geometry.resolution)
+        fits = unpacked(places_of(blocked, disc_rows(radius)), geometry.cols)
+        at = _nearest_place(geometry, fits, start, radius)
+        places = packed(connected(fits, *at), beyond=False)
+        reached = within(places, discs.tool_m / 2 / geometry.resolution)
+        reachable = unpacked(reached, geometry.cols)
         return cls(geometry, discs, blocked, places, reachable, at)
 
     @property
@@ -94,10 +86,7 @@ class Floor:
 
     def to_map(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return points y, x [pixels], float64 (n, 2), as x, y [m] in the map frame."""
-        origin, unit = self.geometry.origin, self.geometry.resolution
-        u, v = (pixels[:, 1] + 0.5) * unit, (pixels[:, 0] + 0.5) * unit
-        cos, sin = math.cos(origin.yaw), math.sin(origin.yaw)
-        return np.stack([origin.x + cos * u - sin * v, origin.y + sin * u + cos * v], axis=1)
+        return raster_to_map(self.geometry, pixels)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,13 +96,13 @@ class StandLattice:
     Attributes:
         lattice: its cells are coverable where they have a place.
         stands: float64 (rows, cols, 2): y, x of the place [pixels]; NaN where there is none.
-        bends: float64 (rows, cols, 2, 2): y, x of the bend on the step to the east, and to the
-            north [pixels]; NaN for a straight step.
+        bends: float32 (rows, cols, 2, 2): y, x of the bend on the step to the east, and to the
+            north, a pixel's centre [pixels]; NaN for a straight step.
     """
 
     lattice: CoverageLattice
     stands: NDArray[np.float64]
-    bends: NDArray[np.float64]
+    bends: NDArray[np.float32]
 
     @classmethod
     def over(cls, floor: Floor, cell_m: float, max_cells: int = 4_000_000) -> StandLattice:
@@ -123,19 +112,48 @@ class StandLattice:
             MapTooLarge: it would have more than ``max_cells``.
             MapTooFar: it would reach too far from 0.
         """
-        geometry = floor.geometry
-        window = lattice_window(geometry, cell_m, max_cells)
-        placement = _placement(geometry, cell_m, floor.discs.radius_m)
+        window = lattice_window(floor.geometry, cell_m, max_cells)
+        placement = stand_placement(floor.geometry, cell_m, floor.discs.radius_m)
+        return cls.where(floor.blocked, floor.places, placement, window, cell_m)
+
+    @classmethod
+    def where(
+        cls,
+        blocked: Bits,
+        places: Bits,
+        placement: Placement,
+        window: Window,
+        cell_m: float,
+        unknown: NDArray[np.bool_] | None = None,
+        before: tuple[StandLattice, tuple[int, int], NDArray[np.bool_]] | None = None,
+    ) -> StandLattice:
+        """Return the lattice over places.
+
+        Args:
+            blocked, places: see ``Floor``.
+            placement: where the cells lie on the raster.
+            window: the cells.
+            cell_m: their width [m].
+            unknown: bool (rows, cols): cells that are unknown where they have no place.
+            before: the lattice before, by how many rows and columns pixels have moved since, and
+                the cells to look at again, bool (rows, cols); None to look at all.
+        """
         shape = window.rows, window.cols
-        stands = np.empty((*shape, 2))
-        blocked, places = floor.blocked, floor.places
-        distances = np.empty(shape)
-        choose_stands(blocked, places, placement, window.row0, window.col0, stands, distances)
-        steps = np.empty(shape, np.uint8)
-        bends = np.empty((*shape, 2, 2))
-        cell = cell_m / geometry.resolution
-        link_stands(blocked, places, stands, cell, placement.radius, steps, bends)
-        states = np.where(np.isnan(stands[..., 0]), BLOCKED, COVERABLE).astype(np.uint8)
+        if before is None:
+            stands = np.full((*shape, 2), np.nan)
+            bends = np.full((*shape, 2, 2), np.nan, np.float32)
+            steps, stale = np.zeros(shape, np.uint8), np.ones(shape, np.bool_)
+        else:
+            old, shift, stale = before
+            there = old.lattice.window
+            stands = carried(old.stands, there, window, np.nan).copy()
+            bends = carried(old.bends, there, window, np.nan).copy()
+            steps = carried(old.lattice.steps, there, window).copy()
+            stands += np.array(shift)
+            bends += np.array(shift, np.float32)
+        choose_stands(blocked, places, placement, stale, window.row0, window.col0, stands)
+        link_stands(blocked, places, placement, stale, stands, steps, bends)
+        states = states_of(stands, unknown)
         return cls(CoverageLattice(window, cell_m, states, steps), stands, bends)
 
     def start_cell(self, floor: Floor) -> tuple[int, int]:
@@ -144,10 +162,23 @@ class StandLattice:
         row, col = divmod(int(np.nanargmin(squares)), squares.shape[1])
         return row + self.lattice.window.row0, col + self.lattice.window.col0
 
+    def stand(self, cell: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Return where the robot stands in a cell (row, col), int32 (2,): y, x [pixels]."""
+        row, col = self.lattice.local((int(cell[0]), int(cell[1])))
+        at: NDArray[np.float64] = self.stands[row, col]
+        return at
+
     def points(self, walk: NDArray[np.int32]) -> NDArray[np.float64]:
         """Return the line along a walk, cells (row, col), int32 (n, 2): float64 (m, 2), y, x.
 
         Where it goes straight on it has no points between.
+        """
+        return self.line(walk)[0]
+
+    def line(self, walk: NDArray[np.int32]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return the same, and of which cell of the walk each point is, int64 (m,).
+
+        A bend is of the cell that the step leaves.
         """
         window: Window = self.lattice.window
         cells = walk - np.array((window.row0, window.col0), np.int32)
@@ -157,38 +188,52 @@ class StandLattice:
         lower = np.minimum(cells[:-1], cells[1:])
         bends = self.bends[lower[:, 0], lower[:, 1], (moves[:, 0] != 0).astype(np.intp)]
         line = np.concatenate([np.stack([at[:-1], bends], axis=1).reshape(-1, 2), at[-1:]])
-        return straightened(line[~np.isnan(line[:, 0])])
+        numbers = np.arange(len(line)) // 2
+        there = ~np.isnan(line[:, 0])
+        line, numbers = line[there], numbers[there]
+        kept = corners(line)
+        return line[kept], numbers[kept]
+
+
+def states_of(stands: NDArray[np.float64], unknown: NDArray[np.bool_] | None) -> NDArray[np.uint8]:
+    """Return the states of cells, uint8 (rows, cols): coverable where the robot can stand.
+
+    Args:
+        stands: see ``StandLattice``.
+        unknown: bool (rows, cols): others that are unknown, not blocked; None for none.
+    """
+    states = np.full(stands.shape[:2], BLOCKED, np.uint8)
+    if unknown is not None:
+        states[unknown] = UNKNOWN
+    states[~np.isnan(stands[..., 0])] = COVERABLE
+    return states
+
+
+def corners(line: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the numbers of points that neither repeat the one before nor lie on a straight way.
+
+    Args:
+        line: float64 (n, 2), n >= 1.
+
+    Returns:
+        int (m,), with the first and the last place.
+    """
+    new = np.concatenate([[True], (np.abs(np.diff(line, axis=0)) > 1e-9).any(axis=1)])
+    numbers = np.flatnonzero(new)
+    if len(numbers) < 3:
+        return numbers
+    there = line[numbers]
+    before, behind = np.diff(there[:-1], axis=0), np.diff(there[1:], axis=0)
+    across = before[:, 0] * behind[:, 1] - before[:, 1] * behind[:, 0]
+    turns = (np.abs(across) > 1e-9) | ((before * behind).sum(axis=1) < 0.0)
+    kept: NDArray[np.intp] = numbers[np.concatenate([[True], turns, [True]])]
+    return kept
 
 
 def straightened(line: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a line, float64 (n, 2), without points that repeat, or lie on the straight way."""
-    line = line[np.concatenate([[True], (np.abs(np.diff(line, axis=0)) > 1e-9).any(axis=1)])]
-    if len(line) < 3:
-        return line
-    before, behind = np.diff(line[:-1], axis=0), np.diff(line[1:], axis=0)
-    across = before[:, 0] * behind[:, 1] - before[:, 1] * behind[:, 0]
-    turns = (np.abs(across) > 1e-9) | ((before * behind).sum(axis=1) < 0.0)
-    straight: NDArray[np.float64] = line[np.concatenate([[True], turns, [True]])]
+    """Return a line, float64 (n, 2), of its ``corners`` alone."""
+    straight: NDArray[np.float64] = line[corners(line)]
     return straight
-
-
-def _refined(grid: OccupancyGrid, discs: RobotDiscs) -> tuple[GridGeometry, NDArray[np.bool_]]:
-    """Return a fine raster of a map with a frame around it, and which pixels are free."""
-    coarse = grid.geometry
-    parts = max(1, round(coarse.resolution / FINE_M))
-    unit = coarse.resolution / parts
-    frame = math.ceil(max(discs.tool_m / 2, discs.radius_m) / unit) + 2
-    rows, cols = coarse.rows * parts + 2 * frame, coarse.cols * parts + 2 * frame
-    if rows * cols > MOST_PIXELS:
-        raise MapTooLarge(
-            f"a raster of {rows} x {cols} pixels of {unit:g} m exceeds {MOST_PIXELS} pixels"
-        )
-    free = np.zeros((rows, cols), np.bool_)
-    known = (grid.cells >= 0) & (grid.cells <= discs.free_at_most)
-    inner = np.repeat(np.repeat(known, parts, axis=0), parts, axis=1)
-    free[frame : rows - frame, frame : cols - frame] = inner
-    x, y = coarse.to_map(-frame / parts, -frame / parts)
-    return GridGeometry(rows, cols, unit, Pose2D(x, y, coarse.origin.yaw)), free
 
 
 def _nearest_place(
@@ -205,12 +250,3 @@ def _nearest_place(
         )
     i, j = found[np.argmin(squares)].tolist()
     return i, j
-
-
-def _placement(geometry: GridGeometry, cell_m: float, radius_m: float) -> Placement:
-    """Return where the lattice's cells lie, seen from the centre of the raster's first pixel."""
-    unit, yaw = geometry.resolution, geometry.origin.yaw
-    x0, y0 = geometry.to_pixels(0.0, 0.0)
-    scale = cell_m / unit
-    ux, uy = scale * math.cos(yaw), -scale * math.sin(yaw)
-    return Placement(x0 - 0.5, y0 - 0.5, ux, uy if abs(uy) > 1e-9 * scale else 0.0, radius_m / unit)

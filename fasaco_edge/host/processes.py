@@ -76,6 +76,14 @@ def memory_limit(root: Path = Path("/")) -> int | None:
     return min(limits, default=None)
 
 
+def available_memory(root: Path = Path("/")) -> int:
+    """Return the memory that this process could still have without swapping [bytes]."""
+    text = (root / "proc/meminfo").read_text(encoding="ascii")
+    free = next(line for line in text.splitlines() if line.startswith("MemAvailable:"))
+    available = int(free.split()[1]) * 1024
+    return min(available, memory_limit(root) or available)
+
+
 def thread_count() -> int:
     """Return how many threads this process has."""
     return len(os.listdir("/proc/self/task"))

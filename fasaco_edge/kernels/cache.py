@@ -7,7 +7,8 @@ processor a list of all that a mission needs, once all of it is compiled.
 A cache is code. It is used only from a folder that nobody but root and this user could have
 written, and each file in it is checked (``kernels.sealed``) before use; a damaged one counts as
 missing and is compiled again. Where the user's cache cannot be used, a temporary folder is; where
-there is none either, nothing is kept.
+there is none either, nothing is kept. An installation that brings compiled kernels along
+(``kernels.release``) needs no such folder.
 """
 
 from __future__ import annotations
@@ -28,34 +29,19 @@ from pathlib import Path
 
 from fasaco_edge.host.durable import make_folder, sync_folder
 from fasaco_edge.host.files import why_not_trusted
+from fasaco_edge.kernels import release
+from fasaco_edge.kernels.release import COMPILERS, KERNEL_SUFFIX, sources_digest
 from fasaco_edge.kernels.sealed import UnsoundFileError, read_sealed, sweep, write_sealed
 
 LOG = logging.getLogger(__name__)
 
-KERNELS = Path(__file__).parent
-KERNEL_SOURCES = sorted(KERNELS.rglob("*.py"))
-COMPILERS = ("numba", "llvmlite")
 # Free space to have: twice the size of the code of all kernels [MB].
 NEEDED_MB = 20
 _FOLDER = re.compile(r"kernels-[0-9a-f]{12}$")
 _NOTE = "complete-"
-KERNEL_SUFFIX = ".kernel"
 # Then the number of the process that made it, and random letters.
 _FRESH = "fasaco-edge-of-"
 _WARNED: set[str] = set()
-
-
-def kernel_module(source: Path) -> str:
-    """Return the name of a kernel source below ``fasaco_edge.kernels``, as ``ants.colony``."""
-    return ".".join(source.relative_to(KERNELS).with_suffix("").parts)
-
-
-def sources_digest() -> str:
-    """Return a hash of every kernel source file, 12 hex digits: what the kernels compute."""
-    digest = hashlib.sha256()
-    for source in KERNEL_SOURCES:
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:12]
 
 
 def code_digest(version_of: Callable[[str], str] = metadata.version) -> str:
@@ -87,7 +73,15 @@ def wanted_folder(environ: Mapping[str, str] = os.environ) -> Path:
 
 
 def cache_folder() -> Path | None:
-    """Return the folder for compiled kernels, made if it was missing; None if none can be used.
+    """Return the folder that kernels come from: the installation's, or else the user's own.
+
+    It is made if it was missing; None if none can be used.
+    """
+    return own_folder() if release.why_unusable() else release.FOLDER
+
+
+def own_folder() -> Path | None:
+    """Return the user's folder for compiled kernels, made if it was missing; None if none can be.
 
     A folder other than the wanted one is logged with the reason.
     """
@@ -121,6 +115,8 @@ def usable_folder() -> tuple[Path, str]:
 
     Nothing is made. Where none can be used it is the wanted one.
     """
+    if not release.why_unusable():
+        return release.FOLDER, ""
     wanted, reason = wanted_folder(), ""
     for folder in _places(wanted):
         why = why_unusable(folder)
@@ -138,7 +134,8 @@ def why_unusable(folder: Path) -> str:
     if why := why_not_trusted(folder):
         return why
     there = folder
-    while not there.exists():
+    # Not Path.exists, which raises what the disk may say for a moment.
+    while not os.path.exists(there) and there != there.parent:
         there = there.parent
     why = _why_not_writable(there)
     # A complete folder need not be written.
@@ -179,8 +176,9 @@ def _directly_in(base: Path, name: str) -> Path:
 
 def _temporary() -> list[Path]:
     """Return the temporary folders in which nobody else can replace our files."""
-    bases = dict.fromkeys((os.path.abspath(tempfile.gettempdir()), "/tmp", "/var/tmp"))
-    return [base for base in map(Path, bases) if base.is_dir() and not why_not_trusted(base / "x")]
+    names = dict.fromkeys((os.path.abspath(tempfile.gettempdir()), "/tmp", "/var/tmp"))
+    bases = map(Path, filter(os.path.isdir, names))
+    return [base for base in bases if not why_not_trusted(base / "x")]
 
 
 def _fresh_folder() -> Path | None:
@@ -245,10 +243,14 @@ def note_complete(folder: Path, used: Set[str] = frozenset()) -> None:
 def missing_from(folder: Path, user: int | None = None) -> str:
     """Return why kernels in ``folder`` would be compiled again; "" where none would.
 
+    Those of the installation are looked at once a process.
+
     Args:
         folder: where they are kept.
         user: who would load them; without it this process's.
     """
+    if folder == release.FOLDER:
+        return release.why_unusable(user)
     if why := why_not_trusted(folder, user):
         return why
     place = _note_of(folder, processor())
@@ -278,7 +280,7 @@ def _never(folder: Path, user: int | None) -> str:
 
 def outdated(folder: Path) -> list[Path]:
     """Return this user's folders beside ``folder`` that hold code of other kernels."""
-    beside = folder.parent.glob("kernels-*") if folder.parent.is_dir() else ()
+    beside = folder.parent.glob("kernels-*") if os.path.isdir(folder.parent) else ()
     return sorted(
         other
         for other in beside
@@ -296,7 +298,7 @@ def prune(folder: Path) -> tuple[int, float]:
     for other in outdated(folder):
         held = sum(file.lstat().st_size for file in other.rglob("*") if file.is_file())
         shutil.rmtree(other, ignore_errors=True)
-        if not other.exists():
+        if not os.path.exists(other):
             gone, size = gone + 1, size + held
     return gone, round(size / 1e6, 1)
 

@@ -10,10 +10,12 @@ from msgspec import Meta
 
 from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
+from fasaco_edge.planners.living_trail import PAPERS_RULES, TrailRules
 
 if TYPE_CHECKING:
     # It loads the compiler; the configuration takes only the policy from here.
     from fasaco_edge.grid.lattice import Footprint
+    from fasaco_edge.planners.line import LineConfig
 
 Period = Annotated[float, Meta(ge=0, le=86_400)]
 
@@ -40,6 +42,21 @@ NO_PATIENCE = MissionPolicy(retries=0, lost_pose_s=0.0)
 
 
 @dataclass(frozen=True, slots=True)
+class Sweeping:
+    """What is swept, and what that is worth.
+
+    Attributes:
+        tool_m: width of the tool [m]; cells may be narrower, so that lanes overlap.
+        most_pixels: the most pixels of the fine raster of a map's floor.
+        line: prices of the line.
+    """
+
+    tool_m: float
+    most_pixels: int
+    line: LineConfig
+
+
+@dataclass(frozen=True, slots=True)
 class MissionConfig:
     """Robot, cost, limits and policy of a mission; by default it tries nothing again.
 
@@ -50,6 +67,9 @@ class MissionConfig:
         policy: retries and patience.
         spare_share: share of a processor core for improving a path that need not change; 0 for
             none.
+        sweeping: how floor is swept; None to drive through the centres of cells.
+        trail: rules of the living trail.
+        plans_on_trail: whether the planner's ants walk on it.
     """
 
     footprint: Footprint
@@ -57,3 +77,6 @@ class MissionConfig:
     cost: CoverageCost = STEPS_ALONE
     policy: MissionPolicy = NO_PATIENCE
     spare_share: float = 0.0
+    sweeping: Sweeping | None = None
+    trail: TrailRules = PAPERS_RULES
+    plans_on_trail: bool = False

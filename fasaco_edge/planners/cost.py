@@ -70,6 +70,11 @@ class CoverageCost:
         """A quarter-turn in whole microseconds."""
         return round(self.quarter_turn_s * MICROSECONDS)
 
+    def quality(self, cells: int, cost_us: int) -> float:
+        """Return delta phi of equation (8): a step for each of so many cells over the cost [us]."""
+        # Whole numbers divided once: for steps alone it is cells / steps to the last bit.
+        return cells * self.step_us / max(cost_us, self.step_us)
+
     def of_walk(self, cells: NDArray[np.int32]) -> float:
         """Return what a walk costs [s].
 
@@ -78,10 +83,14 @@ class CoverageCost:
         Args:
             cells: int32 (n, 2), cells (row, col), each a step from the one before.
         """
+        return self.of_walk_us(cells) / MICROSECONDS
+
+    def of_walk_us(self, cells: NDArray[np.int32]) -> int:
+        """Return what a walk costs in whole microseconds, see ``of_walk``."""
         turns = count_turns(cells)
         steps = max(len(cells) - 1, 0)
         quarters = turns.quarter + 2 * turns.half
-        return (steps * self.step_us + quarters * self.quarter_turn_us) / MICROSECONDS
+        return steps * self.step_us + quarters * self.quarter_turn_us
 
 
 def count_turns(cells: NDArray[np.int32]) -> Turns:

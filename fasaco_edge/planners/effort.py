@@ -12,6 +12,9 @@ from fasaco_edge.planners.cost import CoverageCost
 # The temperatures of an annealing: from 1.5 down to 0.2.
 LEVELS = tuple(1.5 * (0.2 / 1.5) ** (level / 15) for level in range(16))
 
+# The robot is about to drive these cells: about 5 m at usual tool widths.
+HELD_CELLS = 18
+
 WHOLE_WALK = -1
 EVERY_CELL = 1 << 30
 
@@ -72,11 +75,14 @@ class RepairEffort:
         rules: how to perturb.
         perturbations: in each neighbourhood.
         held: so many of them leave the walk just ahead of the robot as it is.
+        steady_us: a walk that costs so much more, but leaves the robot's next cells as they
+            were, is taken [us].
     """
 
     rules: PerturbationRules
     perturbations: int
     held: int
+    steady_us: int
 
 
 def repair_for(cost: CoverageCost) -> RepairEffort:
@@ -96,7 +102,7 @@ def repair_for(cost: CoverageCost) -> RepairEffort:
         strict=True,
     )
     if not cost.quarter_turn_us:
-        return RepairEffort(rules, 50, 40)
+        return RepairEffort(rules, 50, 40, 0)
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
     rules = rules._replace(proposals=40, radius=6, temperature_us=unit * 3 // 2, loops_of_256=128)
-    return RepairEffort(rules, 80, 60)
+    return RepairEffort(rules, 80, 60, 2 * cost.step_us)

@@ -11,6 +11,11 @@ over what the walk costs. For steps alone that is ``cells / steps``, proportiona
 to 1 over the length as the paper has it and about 1 at best on any map, so that
 tau0 needs no tuning to the map's size. A walk may have to end in a given cell:
 ants go there by a shortest way when all is covered.
+
+Where a mission has a living trail (``planners.living_trail``) and a walk that was still to be
+driven, the search goes on instead of beginning anew: ants walk on that trail, as large a share of
+them as is new of the cells to cover, and the best walk so far is the one before, with what no
+longer holds cut out and what is new put in.
 """
 
 from __future__ import annotations
@@ -28,7 +33,9 @@ from fasaco_edge.kernels.ants.colony import ColonyState, Rules, deposit, settle,
 from fasaco_edge.kernels.ants.graph import Graph
 from fasaco_edge.planners.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.cost import MICROSECONDS
-from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.effort import HELD_CELLS
+from fasaco_edge.planners.living_trail import mean_into
+from fasaco_edge.planners.path import CoveragePath, Saved
 from fasaco_edge.planners.planner import (
     ColonySnapshot,
     Observer,
@@ -38,7 +45,8 @@ from fasaco_edge.planners.planner import (
     ignore,
     never,
 )
-from fasaco_edge.planners.problem import CoverageProblem, graph_of, scratch_for
+from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of, scratch_for
+from fasaco_edge.planners.repair import can_repair, completed
 
 # Ants of a group walk at the same time. Larger groups keep more threads busy,
 # smaller ones end the search sooner when it is to stop: a group covers
@@ -46,6 +54,9 @@ from fasaco_edge.planners.problem import CoverageProblem, graph_of, scratch_for
 LARGEST_GROUP = 32
 SMALLEST_GROUP = 2
 CELLS_PER_GROUP = 64_000
+
+# So many ants walk where hardly anything is new.
+FEWEST_ANTS = 64
 
 # Initial capacity for a walk; one that needs more is walked again with more.
 STEPS_PER_CELL = 2
@@ -62,10 +73,10 @@ class Colony:
         pool: ThreadPoolExecutor,
         threads: int,
     ) -> None:
-        self.trail = np.full((graph.steps.size, 4), config.tau0)
+        self.trail = _first_trail(config, problem)
         self.best = np.empty(0, np.int32)
         self.best_us = 0
-        self._cells = problem.cells
+        self._cells, self._cost = problem.cells, problem.cost
         self._state = ColonyState(graph, self.trail, _rules(config, problem))
         self._pool = pool
         self._scratches = [scratch_for(graph) for _ in range(threads)]
@@ -103,10 +114,7 @@ class Colony:
 
     def strengthen(self) -> None:
         """Strengthen the trail along the best walk by equation (8)."""
-        # Whole numbers divided once: for steps alone it is cells / steps to the last bit.
-        step_us = self._state.rules.step_us
-        amount = self._cells * step_us / max(self.best_us, step_us)
-        deposit(self._state, amount, self.best)
+        deposit(self._state, self._cost.quality(self._cells, self.best_us), self.best)
 
     def progress(self, walked: int) -> SearchProgress:
         """Return how far the search is after so many ants."""
@@ -133,6 +141,14 @@ class Colony:
         share(0)
         for other in others:
             other.result()
+
+
+def _first_trail(config: ColonyConfig, problem: CoverageProblem) -> NDArray[np.float64]:
+    """Return the living trail, or a flat one: pheromone by flat cell and direction, above 0."""
+    if problem.trail is None:
+        return np.full((problem.to_cover.size, 4), config.tau0)
+    trail = problem.trail.on(problem.lattice.window).astype(np.float64).reshape(-1, 4)
+    return np.where(trail > 0, trail, config.tau0)
 
 
 class Group(NamedTuple):
@@ -166,6 +182,26 @@ def groups_of(config: ColonyConfig, cells: int) -> Iterator[Group]:
             yield Group(number, cohort.velocity, streams[end - size : end], end >= cohort.ants)
 
 
+def ants_for(config: ColonyConfig, problem: CoverageProblem) -> int:
+    """Return how many ants walk: all, or beside a walk before as large a share as is new of it."""
+    if problem.trail is None or problem.before is None or not can_repair(problem):
+        return config.ants
+    window = problem.lattice.window
+    new = problem.to_cover.copy()
+    at = problem.before - np.array((window.row0, window.col0))
+    new[tuple(at[((at >= 0) & (at < new.shape)).all(axis=1)].T)] = False
+    ants = -(-config.ants * int(np.count_nonzero(new)) // problem.cells)
+    return min(config.ants, max(ants, FEWEST_ANTS, len(config.velocities)))
+
+
+def _walk_before(problem: CoverageProblem) -> NDArray[np.int32] | None:
+    """Return the walk before, made legal and complete, flat cells int32 (n,); None for none."""
+    if problem.trail is None or problem.before is None or not can_repair(problem):
+        return None
+    framed = FramedGround.of(problem)
+    return framed.unframed(completed(problem, framed, problem.before, HELD_CELLS))
+
+
 def _rules(config: ColonyConfig, problem: CoverageProblem) -> Rules:
     # An ant goes as far as it is fast; a cell has three open neighbours at most.
     reach = max(*config.velocities, 4)
@@ -194,23 +230,8 @@ def snapshot_of(
 ) -> ColonySnapshot:
     """Return what an observer sees after so many ants; ``trail`` is float64 (n, 4)."""
     lattice = problem.lattice
-    rows, cols = lattice.steps.shape
-    trail = trail.reshape(rows, cols, 4)
-    into, moves = np.zeros((rows, cols)), np.zeros((rows, cols), np.uint8)
-    # From where a move leads, and to where: one array at a time is several times as fast as all
-    # four directions at once.
-    ahead, behind = np.s_[1:], np.s_[:-1]
-    for direction, here, there in (
-        (0, np.s_[:, behind], np.s_[:, ahead]),
-        (1, np.s_[behind], np.s_[ahead]),
-        (2, np.s_[:, ahead], np.s_[:, behind]),
-        (3, np.s_[ahead], np.s_[behind]),
-    ):
-        legal = (lattice.steps >> np.uint8(direction)) & np.uint8(1)
-        into[there] += trail[..., direction][here] * legal[here]
-        # A step is legal both ways or not at all, so moves in are as many as moves out.
-        moves += legal
-    mean = np.divide(into, moves, out=into, where=moves > 0).astype(np.float32)
+    legal = (lattice.steps[..., np.newaxis] >> np.arange(4, dtype=np.uint8)) & np.uint8(1)
+    mean = mean_into(trail.reshape(legal.shape) * legal)
     return ColonySnapshot(lattice.window, lattice.cell_m, mean, cohort, velocity, ants, steps)
 
 
@@ -229,11 +250,16 @@ class Fasaco:
         observe: Observer = ignore,
     ) -> CoveragePath:
         """Return the cheapest walk the colony found; see ``CoveragePlanner.plan``."""
-        began, first_walk_s, walked = time.perf_counter(), 0.0, 0
+        began, first_walk_s, walked, first_us = time.perf_counter(), 0.0, 0, 0
+        config = replace(self.config, ants=ants_for(self.config, problem))
         with ThreadPoolExecutor(self.threads) as pool:
-            colony = Colony(self.config, problem, graph_of(problem), pool, self.threads)
-            for cohort, velocity, streams, is_last in groups_of(self.config, problem.cells):
+            colony = Colony(config, problem, graph_of(problem), pool, self.threads)
+            if (before := _walk_before(problem)) is not None:
+                colony.offer(before, problem.cost_us(before))
+                first_us = colony.best_us
+            for cohort, velocity, streams, is_last in groups_of(config, problem.cells):
                 colony.walk(velocity, streams)
+                first_us = first_us or colony.best_us
                 first_walk_s = first_walk_s or time.perf_counter() - began
                 walked += len(streams)
                 if stop(colony.progress(walked)):
@@ -251,6 +277,7 @@ class Fasaco:
             work=progress.work,
             cost_s=progress.cost_s,
             first_walk_s=first_walk_s,
+            saved=Saved(ants=(first_us - colony.best_us) / MICROSECONDS),
         )
 
 

@@ -8,20 +8,39 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.floor import Floor, StandLattice, straightened
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.kernels.floor import line as kernel
-from fasaco_edge.kernels.floor.capsule import BLOCK, MOST_CAPSULES, NEVER, Scratch, Sweeps, sweep
-from fasaco_edge.kernels.floor.polish import polish, sweep_patches
+from fasaco_edge.kernels.floor.anneal import anneal
+from fasaco_edge.kernels.floor.capsule import (
+    BLOCK,
+    COLUMNS,
+    NEVER,
+    Scratch,
+    Sweeps,
+    count_left,
+    sweep_edges,
+)
+from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
+from fasaco_edge.kernels.floor.polish import polish
 
 # What is left further from an edge is no reason for a detour of that edge [m].
 FARTHEST_M = 1.0
 # What is left in one place counts as a patch from here on [m2].
 PATCH_M2 = 0.04
+# Of all moves, those that only descend come first: far ones that gain much. Patches have moves of
+# their own, a share of all others.
+DESCENT_SHARE, PATCH_SHARE = 0.08, 0.12
+# So many moves for each point that the walk has are enough, however much floor there is.
+MOST_A_POINT = 2000
+# From the hottest temperature to none.
+COOLED = (1.0, 0.0)
+# Seed of the random moves.
+SEED = 0x9E3779B97F4A7C15
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +55,22 @@ class LineConfig:
         patch_s: a patch is swept at the end where that takes no longer than this [s].
     """
 
-    price_s_m2: float = 180.0
+    price_s_m2: float = 200.0
     speed_m_s: float = 0.25
     quarter_turn_s: float = 1.5
-    moves_m2: int = 8000
+    moves_m2: int = 5000
     patch_s: float = 20.0
 
+    def prices(self, unit_m: float) -> kernel.Price:
+        """Return the prices on a raster of pixels ``unit_m`` wide [m]."""
+        return kernel.Price(
+            drive_s=unit_m / self.speed_m_s,
+            turn_s=self.quarter_turn_s / (0.5 * math.pi),
+            left_s=self.price_s_m2 * unit_m * unit_m,
+        )
 
-LINES = {"quick": LineConfig(price_s_m2=60.0, patch_s=0.0), "thorough": LineConfig()}
+
+LINES = {"quick": LineConfig(price_s_m2=45.0, patch_s=0.0), "thorough": LineConfig()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,25 +113,25 @@ def line_over(
     sweeps = _sweeps(floor)
     unit = floor.geometry.resolution
     tool = floor.discs.tool_m / 2 / unit
-    memory = _memory()
-    for a, b in pairwise(points if len(points) > 1 else points[[0, 0]]):
-        sweep(sweeps, a[0], a[1], b[0], b[1], tool, 1, memory.capsules)
+    memory = memory_for_moves()
+    along = points if len(points) > 1 else points[[0, 0]]
+    edges = np.concatenate([along[:-1], along[1:]], axis=1)
+    sweep_edges(sweeps, edges, tool, 1, memory.capsules)
     tried = 0
     if config.price_s_m2 > 0.0 and len(points) > 1:
-        line = _linked(points, sweeps.left.shape, is_end_fixed=is_end_fixed)
-        price = kernel.Price(
-            drive_s=unit / config.speed_m_s,
-            turn_s=config.quarter_turn_s / (0.5 * math.pi),
-            left_s=config.price_s_m2 * unit * unit,
-        )
+        line = linked(points, sweeps.left.shape, is_end_fixed=is_end_fixed)
+        price = config.prices(unit)
         on = kernel.Floor(floor.blocked, floor.places, sweeps, floor.discs.radius_m / unit, tool)
-        most = int(config.moves_m2 * floor.reachable_m2)
-        polish(line, on, price, memory, FARTHEST_M / unit, most)
+        most = min(int(config.moves_m2 * floor.reachable_m2), MOST_A_POINT * len(points))
+        farthest = FARTHEST_M / unit
+        polish(line, on, price, memory, farthest, int(DESCENT_SHARE * most))
+        anneal(line, on, price, memory, np.array([SEED], np.uint64), 0, COOLED, most)
         patch = price._replace(left_s=config.patch_s / PATCH_M2 * unit * unit)
         if patch.left_s > price.left_s:
-            least = math.ceil(PATCH_M2 / (unit * unit))
-            sweep_patches(line, on, patch, memory, FARTHEST_M / unit, least)
-        points = straightened(_points(line))
+            most += int(PATCH_SHARE * most)
+            patches = find_patches(sweeps, math.ceil(PATCH_M2 / (unit * unit)))
+            sweep_patches(line, on, patch, memory, farthest, patches, most)
+        points = straightened(line.points[numbers_along(line)])
         tried = int(line.state[kernel.TRIED])
     left = int(np.count_nonzero(sweeps.counts == 0)) * unit * unit
     return DrivenLine(floor.to_map(points), floor.reachable_m2 - left, floor.reachable_m2, tried)
@@ -112,17 +139,27 @@ def line_over(
 
 def _sweeps(floor: Floor) -> Sweeps:
     counts = np.where(floor.reachable, 0, NEVER).astype(np.int16)
-    rows, cols = counts.shape
-    side = 1 << BLOCK
-    padded = np.zeros((-(-rows // side) * side, -(-cols // side) * side), np.bool_)
-    padded[:rows, :cols] = floor.reachable
-    blocks = padded.reshape(padded.shape[0] // side, side, padded.shape[1] // side, side)
-    return Sweeps(counts, blocks.sum(axis=(1, 3)).astype(np.int32))
+    shape = floor.geometry.rows, floor.geometry.cols
+    sweeps = Sweeps(counts, np.zeros(blocks_of(shape), np.int32))
+    count_blocks(sweeps, Window(0, 0, *shape))
+    return sweeps
 
 
-def _linked(
+def blocks_of(shape: tuple[int, int]) -> tuple[int, int]:
+    """Return how many blocks (rows, cols) there are on a raster of a shape."""
+    rows, cols = shape
+    return (rows - 1 >> BLOCK) + 1, (cols - 1 >> BLOCK) + 1
+
+
+def count_blocks(sweeps: Sweeps, part: Window) -> None:
+    """Count what is left in the blocks of a part of the pixels again."""
+    count_left(sweeps, part.row0, part.col0, part.row1, part.col1)
+
+
+def linked(
     points: NDArray[np.float64], blocks: tuple[int, ...], *, is_end_fixed: bool
 ) -> kernel.Line:
+    """Return points, float64 (n, 2), as a line of the kernels, on so many blocks (rows, cols)."""
     count = len(points)
     capacity = 3 * count + 4096
     room = np.zeros((capacity, 2))
@@ -131,24 +168,27 @@ def _linked(
     following[: count - 1] = np.arange(1, count)
     previous[1:count] = np.arange(count - 1)
     seen = np.zeros(capacity, np.int64)
-    state = np.array([count, 0, 0], np.int64)
+    state = np.array([count, 0, 0, kernel.NONE], np.int64)
     changed = np.zeros(blocks, np.int64)
     return kernel.Line(room, following, previous, seen, changed, state, is_end_fixed)
 
 
-def _points(line: kernel.Line) -> NDArray[np.float64]:
+def numbers_along(line: kernel.Line) -> list[int]:
+    """Return the numbers of a line's points in order."""
     numbers = [0]
     while (number := int(line.next[numbers[-1]])) != kernel.NONE:
         numbers.append(number)
-    return line.points[numbers]
+    return numbers
 
 
-def _memory() -> kernel.Memory:
+def memory_for_moves() -> kernel.Memory:
+    """Return what the kernels compare in."""
+
     def points(count: int) -> NDArray[np.float64]:
         return np.zeros((count, 2))
 
     def stretches() -> NDArray[np.int64]:
-        return np.zeros((MOST_CAPSULES, 2), np.int64)
+        return np.zeros((kernel.MOST_CAPSULES, 2), np.int64)
 
     return kernel.Memory(
         before=points(kernel.MOST_CHAIN),
@@ -156,5 +196,5 @@ def _memory() -> kernel.Memory:
         new=points(kernel.MOST_NEW),
         best=points(kernel.MOST_NEW),
         place=np.zeros(2),
-        capsules=Scratch(np.zeros((MOST_CAPSULES, 8)), stretches(), stretches()),
+        capsules=Scratch(np.zeros((kernel.MOST_CAPSULES, len(COLUMNS))), stretches(), stretches()),
     )

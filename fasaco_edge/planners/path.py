@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,21 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.planner import NO_WORK, SearchWork, gap_to
+
+
+class Saved(NamedTuple):
+    """What a search took off the cost of the walk that it began with [s].
+
+    Attributes:
+        ants: by walks of ants, and by what local search made of these.
+        local_search: by local search on the first walk, or on the one that was still to be driven.
+    """
+
+    ants: float = 0.0
+    local_search: float = 0.0
+
+
+NOTHING_SAVED = Saved()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,6 +41,8 @@ class CoveragePath:
         cost_s: what it costs by the problem's cost [s].
         lower_bound_steps: no walk that solves the problem has fewer steps; 0 where no
             bound is known.
+        lower_bound_cost_s: none costs less by the problem's cost [s]; 0 where no bound is known.
+        saved: what ants and local search each saved of the walk that the search began with.
         first_walk_s: how long the search took to its first complete walk [s]: measured,
             so the one thing here that a repetition does not repeat.
     """
@@ -35,7 +53,9 @@ class CoveragePath:
     work: SearchWork = NO_WORK
     cost_s: float = 0.0
     lower_bound_steps: int = 0
+    lower_bound_cost_s: float = 0.0
     first_walk_s: float = 0.0
+    saved: Saved = NOTHING_SAVED
 
     def __post_init__(self) -> None:
         self.cells.flags.writeable = False
@@ -47,7 +67,12 @@ class CoveragePath:
 
     @property
     def gap(self) -> float | None:
-        """How much longer than the bound it is (``steps / bound - 1``); None without a bound."""
+        """How far its cost is above the bound (``cost / bound - 1``); None without a bound."""
+        return gap_to(self.lower_bound_cost_s, self.cost_s)
+
+    @property
+    def step_gap(self) -> float | None:
+        """How far its steps are above their bound, whatever turns cost; None without a bound."""
         return gap_to(self.lower_bound_steps, self.steps)
 
 
@@ -95,3 +120,10 @@ def walk_figures(lattice: CoverageLattice, cells: NDArray[np.int32]) -> WalkFigu
         turns_90=turns.quarter,
         turns_180=turns.half,
     )
+
+
+def common_beginning(first: NDArray[np.generic], second: NDArray[np.generic]) -> int:
+    """Return how many rows two arrays (n, 2) and (m, 2) have in common at their beginning."""
+    count = min(len(first), len(second))
+    differ = (first[:count] != second[:count]).any(axis=1)
+    return int(np.argmax(differ)) if differ.any() else count

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.planners.cost import MICROSECONDS
 
 if TYPE_CHECKING:
     from fasaco_edge.planners.path import CoveragePath
@@ -30,7 +31,8 @@ class SearchWork:
 
     Attributes:
         ants: ants that walked, and the sweeps that a search begins with.
-        perturbations: changes by which a local search left a local optimum.
+        perturbations: changes by which a local search left a local optimum, and windows that
+            were solved anew.
         proposals: moves that a local search tried.
     """
 
@@ -65,26 +67,27 @@ class SearchProgress:
         work: what it has done so far.
         cost_s: cost of the best walk so far [s].
         steps: its steps.
-        lower_bound_steps: no walk has fewer steps; 0 where no bound is known.
+        lower_bound_cost_s: no walk costs less [s]; 0 where no bound is known.
     """
 
     work: SearchWork
     cost_s: float
     steps: int
-    lower_bound_steps: int = 0
+    lower_bound_cost_s: float = 0.0
 
     @property
     def gap(self) -> float | None:
-        """How much longer than the bound the best walk is; None without a bound."""
-        return gap_to(self.lower_bound_steps, self.steps)
+        """How far above the bound the cost of the best walk is; None without a bound."""
+        return gap_to(self.lower_bound_cost_s, self.cost_s)
 
 
-def gap_to(lower_bound_steps: int, steps: int) -> float | None:
-    """Return ``steps / lower_bound_steps - 1``; None where the bound is 0, not known.
+def gap_to(lower_bound_s: float, cost_s: float) -> float | None:
+    """Return ``cost_s / lower_bound_s - 1``; None where the bound is 0, not known.
 
-    One division of whole numbers: 115 steps over a bound of 100 are 0.15 to the last bit.
+    One division of whole microseconds: 115 s over a bound of 100 s are 0.15 to the last bit.
     """
-    return (steps - lower_bound_steps) / lower_bound_steps if lower_bound_steps > 0 else None
+    least, cost = round(lower_bound_s * MICROSECONDS), round(cost_s * MICROSECONDS)
+    return (cost - least) / least if least > 0 else None
 
 
 # Called again and again while a search runs; True ends it with the best walk it has. There
@@ -120,7 +123,7 @@ class WorkLimit:
 
 @dataclass(frozen=True, slots=True)
 class GapReached:
-    """Stop when the walk is proven to be at most ``target`` longer than the shortest: 0.01, 1 %.
+    """Stop when the walk is proven to cost at most ``target`` more than the best: 0.01, 1 %.
 
     Without a bound this never stops a search.
     """
@@ -197,8 +200,8 @@ class ColonySnapshot:
     Attributes:
         window: which cells of the lattice ``trail`` spans.
         cell_m: edge of a cell [m].
-        trail: float32 (rows, cols): mean pheromone on the moves into a cell; 0 where
-            the cell is not coverable.
+        trail: float32 (rows, cols): pheromone on the moves into a cell, the mean of them after a
+            cohort, the strongest of a living trail; 0 where the cell is not coverable.
         cohort: index of the cohort that walked last, from 0.
         velocity: its velocity [cells/move].
         ants: how many ants have walked so far.

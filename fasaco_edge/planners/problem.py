@@ -22,10 +22,10 @@ from fasaco_edge.errors import (
 )
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.ants.graph import Graph, Scratch
-from fasaco_edge.kernels.bound.covering import covering_bound
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, walk_cost
 from fasaco_edge.kernels.local_search.walk_array import FRAME, Ground, Prices
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
+from fasaco_edge.planners.living_trail import TrailSnapshot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,8 +44,10 @@ class CoverageProblem:
         cost: what a walk is to minimise.
         before: int32 (n, 2), the walk that was still to be driven when the problem changed
             to this one; a planner that repairs keeps what is still valid of it. None for none.
+        is_full: whether all is to be searched, beginning with ``before``, and not only repaired.
         attempt: where all of ``before`` is valid and is only to be improved, the number of the
             attempt, from 1: each looks elsewhere. 0 for a plan that is needed.
+        trail: the mission's living trail, for a planner whose ants walk on it; None for none.
         whole: the problem that this one is the end of, see ``after``: a path that solves this
             one begins with what comes before, and its figures are those of the whole. None for
             a problem that is whole itself.
@@ -60,6 +62,8 @@ class CoverageProblem:
     before: NDArray[np.int32] | None = None
     attempt: int = 0
     whole: CoverageProblem | None = None
+    trail: TrailSnapshot | None = None
+    is_full: bool = False
 
     @classmethod
     def of(
@@ -271,12 +275,3 @@ class FramedGround:
         """Return flat cells of the framed lattice, int32 (n,), as those of the lattice."""
         row, col = np.divmod(walk, np.int32(self.width))
         return ((row - FRAME) * self.cols + col - FRAME).astype(np.int32)
-
-
-def lower_bound_steps(problem: CoverageProblem) -> int:
-    """Return a number of steps that no walk which solves ``problem`` can beat.
-
-    Turns do not count. The proof is in ``kernels.bound.covering``.
-    """
-    required = problem.to_cover.astype(np.uint8)
-    return covering_bound(problem.lattice.steps, required, problem.flat_start, problem.flat_end)

@@ -17,13 +17,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.errors import NothingToCover
 from fasaco_edge.kernels.local_search.regions import changed_cells
 from fasaco_edge.kernels.local_search.repair import keep_legal, put_in_new
+from fasaco_edge.planners.bound import GLANCE, lower_bound_of
 from fasaco_edge.planners.cost import MICROSECONDS
-from fasaco_edge.planners.effort import repair_for
-from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import NO_WORK, SearchProgress, StoppingCriterion
-from fasaco_edge.planners.problem import CoverageProblem, FramedGround, lower_bound_steps
+from fasaco_edge.planners.effort import HELD_CELLS, RepairEffort, repair_for
+from fasaco_edge.planners.path import CoveragePath, Saved, common_beginning
+from fasaco_edge.planners.planner import (
+    NO_WORK,
+    SearchProgress,
+    SearchWork,
+    StoppingCriterion,
+)
+from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.regions import Neighbourhood, WalkRegion, neighbourhoods, spot, stream_of
 
 
@@ -68,12 +75,18 @@ PERTURBATIONS_AT_ONCE = 10
 # spot (about), and passes over all spots without gain after which the search ends.
 STRIDE, SPOT_CELLS, PASSES = 997, 400, 4
 
-# The robot is about to drive these cells: about 5 m at usual tool widths.
-HELD_CELLS = 18
+# A walk over more cells is repaired without a bound, which would take longer than all else, and
+# once: a second time for the way ahead would take as long again.
+BOUNDED_CELLS = 2_000
 
 
 def can_repair(problem: CoverageProblem) -> bool:
-    """Return whether there is a walk to repair."""
+    """Return whether there is a walk to repair, and that is enough."""
+    return not problem.is_full and has_walk(problem)
+
+
+def has_walk(problem: CoverageProblem) -> bool:
+    """Return whether there is a walk that was still to be driven."""
     return problem.before is not None and len(problem.before) > 0
 
 
@@ -87,12 +100,56 @@ def repaired(
         name, seed: of the planner.
         stop: when to end early.
     """
-    repair = _Repair(problem, seed)
-    for _ in repair.run():
-        if stop(repair.progress()):
-            break
+    repair = _Repair(problem, seed, repair_for(problem.cost))
+    is_stopped = _run(repair, stop)
     path = repair.path(name, seed)
-    return path if problem.whole is None else _with_lead(problem, problem.whole, path)
+    if problem.whole is not None:
+        return _with_lead(problem, problem.whole, path)
+    assert problem.before is not None
+    next_cells = problem.before[: HELD_CELLS + 1]
+    held = common_beginning(next_cells, repair.completed)
+    is_large = problem.cells > BOUNDED_CELLS
+    if is_stopped or is_large or common_beginning(next_cells, path.cells) >= held:
+        return path
+    return _steady(problem, path, held - 1, repair.completed_us, stop)
+
+
+def _run(repair: _Repair, stop: StoppingCriterion) -> bool:
+    """Let a repair run; return whether it was stopped."""
+    return any(stop(repair.progress()) for _ in repair.run())
+
+
+def _steady(
+    problem: CoverageProblem,
+    path: CoveragePath,
+    held: int,
+    completed_us: int,
+    stop: StoppingCriterion,
+) -> CoveragePath:
+    """Return a path that begins with ``held`` steps of the walk before, if it is about as good.
+
+    A change that gains something is taken wherever it is, though another one further on may gain
+    as much. So where a repair has changed the way ahead, but need not have, the rest of the walk
+    is repaired alone, with half the perturbations. What comes of that costs no more than the
+    completed walk.
+    """
+    assert problem.before is not None
+    try:
+        rest = replace(problem.after(held), whole=None)
+    except NothingToCover:
+        return path
+    effort = repair_for(problem.cost)
+    half = replace(effort, perturbations=effort.perturbations // 2, held=0)
+    repair = _Repair(rest, path.seed, half, path.work)
+    _run(repair, stop)
+    other = repair.path(path.planner, path.seed)
+    cells = np.concatenate((problem.before[:held], other.cells))
+    cost_us, path_us = problem.cost.of_walk_us(cells), problem.cost.of_walk_us(path.cells)
+    if cost_us > min(path_us + effort.steady_us, max(path_us, completed_us)):
+        return replace(path, work=other.work)
+    cost_s = cost_us / MICROSECONDS
+    saved = Saved(local_search=(completed_us - cost_us) / MICROSECONDS)
+    return replace(path, cells=cells, work=other.work, cost_s=cost_s, saved=saved)
 
 
 def _with_lead(
@@ -101,29 +158,51 @@ def _with_lead(
     """Return a path with the walk before it; steps, cost and bound are of the whole problem."""
     assert problem.before is not None
     cells = np.concatenate((problem.lead, path.cells))
+    cost_s = whole.cost.of_walk(cells)
     # A path that is no better is dropped: its bound is not used.
-    bound = 0 if np.array_equal(path.cells, problem.before) else lower_bound_steps(whole)
-    return replace(path, cells=cells, cost_s=whole.cost.of_walk(cells), lower_bound_steps=bound)
+    if np.array_equal(path.cells, problem.before):
+        return replace(path, cells=cells, cost_s=cost_s, lower_bound_steps=0, lower_bound_cost_s=0)
+    bound = lower_bound_of(whole, GLANCE)
+    return replace(
+        path,
+        cells=cells,
+        cost_s=cost_s,
+        lower_bound_steps=bound.steps,
+        lower_bound_cost_s=bound.cost_s,
+    )
 
 
 class _Repair:
-    """A running repair, a generator of pauses like ``near_optimal.Search``."""
+    """A running repair, a generator of pauses like ``search.Search``.
 
-    def __init__(self, problem: CoverageProblem, seed: int) -> None:
+    Attributes:
+        completed: int32 (n, 2), the walk's next cells before it was improved.
+        completed_us: what that walk cost [us].
+    """
+
+    def __init__(
+        self,
+        problem: CoverageProblem,
+        seed: int,
+        effort: RepairEffort,
+        work: SearchWork = NO_WORK,
+    ) -> None:
         assert problem.before is not None
         began = time.perf_counter()
         self._problem = problem
         self._framed = FramedGround.of(problem)
-        self._effort = repair_for(problem.cost)
+        self._effort = effort
         self._walk = completed(problem, self._framed, problem.before, HELD_CELLS)
+        self.completed = problem.cells_of(self._framed.unframed(self._walk[: HELD_CELLS + 1]))
         self._first_walk_s = time.perf_counter() - began
         before = framed_cells(problem, self._framed, problem.before)
         self._changed = _changed(self._framed, before, self._walk)
-        self._cost_us = problem.cost_us(self._walk)
-        self._bound = lower_bound_steps(problem)
+        self.completed_us = self._cost_us = problem.cost_us(self._walk)
+        has_bound = problem.only_better or problem.cells <= BOUNDED_CELLS
+        self._bound = lower_bound_of(problem, GLANCE) if has_bound else None
         self._random = stream_of(seed, len(self._walk))
         # Work on the regions before, and the region that is being improved.
-        self._work = NO_WORK
+        self._work = work
         self._region: WalkRegion | None = None
 
     def run(self) -> Iterator[None]:
@@ -168,7 +247,10 @@ class _Repair:
 
     def _is_proven(self) -> bool:
         """Return whether no walk can be better."""
-        return not self._framed.prices.quarter_turn_us and self.progress().steps == self._bound
+        if self._bound is None:
+            return False
+        progress = self.progress()
+        return progress.cost_s <= progress.lower_bound_cost_s
 
     def _unload(self) -> None:
         """Put the region that is being improved back into the walk."""
@@ -185,7 +267,11 @@ class _Repair:
             cost_us += self._region.gain_us
             steps += self._region.longer_by
             work += self._region.work
-        return SearchProgress(work, cost_us / MICROSECONDS, steps, self._bound)
+        return SearchProgress(work, cost_us / MICROSECONDS, steps, self._least_s)
+
+    @property
+    def _least_s(self) -> float:
+        return 0.0 if self._bound is None else self._bound.cost_s
 
     def path(self, name: str, seed: int) -> CoveragePath:
         """Return the walk as it is now."""
@@ -197,8 +283,10 @@ class _Repair:
             seed=seed,
             work=progress.work,
             cost_s=progress.cost_s,
-            lower_bound_steps=self._bound,
+            lower_bound_steps=0 if self._bound is None else self._bound.steps,
+            lower_bound_cost_s=self._least_s,
             first_walk_s=self._first_walk_s,
+            saved=Saved(local_search=(self.completed_us - self._cost_us) / MICROSECONDS),
         )
 
 

@@ -2,105 +2,182 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property, partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange
-from fasaco_edge.grid.floor import Floor, RobotDiscs, StandLattice
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.fine_raster import RobotDiscs
+from fasaco_edge.grid.floor import Floor, StandLattice
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
+from fasaco_edge.kernels.floor.capsule import Sweeps
+from fasaco_edge.kernels.floor.driven import note_driven
+from fasaco_edge.kernels.floor.runs import common_runs
 from fasaco_edge.kernels.jit import note_all_compiled
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
 from fasaco_edge.kernels.lattice.pixels import count_free_beside
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.kernels.lattice.reach import update_reach
+from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.line import LineConfig, line_over
+from fasaco_edge.planners.effort import effort_for
+from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.path import walk_figures
+from fasaco_edge.planners.path import CoveragePath, walk_figures
 from fasaco_edge.planners.planner import SearchProgress, ignore, never
-from fasaco_edge.planners.problem import CoverageProblem, lower_bound_steps
+from fasaco_edge.planners.problem import CoverageProblem, FramedGround
+from fasaco_edge.planners.regions import WalkRegion, regions_of, stream_of
 from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
 from fasaco_edge.planners.repair import repaired
+from fasaco_edge.planners.windows import WindowSearch
 
 LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
 WALKS, BOUND = "shortest walks", "lower bound"
 LOCAL_SEARCH, REPAIR, LINE = "local search", "repair", "driven line"
-STAGES = (
-    *(LATTICE, CHANGES, REACH, AREAS, WALKS, BOUND, LOCAL_SEARCH, REPAIR, LINE),
-    *PLANNER_NAMES,
-)
+WINDOWS = "windows of the walk"
 
 
-def warm_up(report: Callable[[str], None] | None = None) -> None:
-    """Run every kernel once on a tiny map; ``report`` gets each stage's name first."""
-    for stage in _stages():
+def warm_up(report: Callable[[str], None] | None = None, *, backward: bool = False) -> None:
+    """Run every kernel once on a tiny map.
+
+    Args:
+        report: gets each stage's name before it begins.
+        backward: the last stage first. Of two processes that compile into one cache from both
+            ends, each loads what the other one has compiled by then.
+    """
+    room = _TinyRoom()
+    for name in reversed(STAGES) if backward else STAGES:
         if report is not None:
-            report(stage)
+            report(name)
+        _STAGES[name](room)
     note_all_compiled()
 
 
-def _stages() -> Iterator[str]:
-    yield LATTICE
-    # Read-only, as maps off the bus are: numba compiles for that apart.
-    cells = np.zeros((4, 4), np.int8)
-    grid = OccupancyGrid(GridGeometry(4, 4, 1.0, Pose2D(0.0, 0.0)), cells)
-    footprint = Footprint(cell_m=1.0, robot_radius_m=0.4)
-    lattice = CoverageLattice.from_map(grid, footprint)
-    yield CHANGES
-    _take_changes_in(grid, lattice, footprint)
-    yield REACH
-    problem = CoverageProblem.of(lattice, (0, 0))
-    yield AREAS
-    _take_areas(lattice)
-    yield WALKS
-    walk_figures(lattice, np.array([[0, 0], [0, 1]], np.int32))
-    yield BOUND
-    lower_bound_steps(problem)
-    yield LOCAL_SEARCH
-    # Turns at a price: no walk is proven to be the best, so the search perturbs it.
-    costly = CoverageProblem.of(lattice, (0, 0), cost=CoverageCost(1.0, 1.0))
-    path = NearOptimal(ColonyConfig(ants=1, velocities=(1,))).plan(costly, _perturbed, ignore)
-    yield REPAIR
-    repaired(replace(costly, before=path.cells[2:]), path.planner, 0, _perturbed)
-    yield LINE
-    _take_line(grid)
-    for name in PLANNER_NAMES:
-        yield name
-        planner_of(name, ColonyConfig(ants=1, velocities=(1,))).plan(problem, never, ignore)
+class _TinyRoom:
+    """Sixteen free cells, and what is planned in them."""
+
+    def __init__(self) -> None:
+        # Read-only, as maps off the bus are: numba compiles for that apart.
+        self.grid = OccupancyGrid(
+            GridGeometry(4, 4, 1.0, Pose2D(0.0, 0.0)), np.zeros((4, 4), np.int8)
+        )
+        self.footprint = Footprint(cell_m=1.0, robot_radius_m=0.4)
+
+    @cached_property
+    def lattice(self) -> CoverageLattice:
+        return CoverageLattice.from_map(self.grid, self.footprint)
+
+    @cached_property
+    def problem(self) -> CoverageProblem:
+        return CoverageProblem.of(self.lattice, (0, 0))
+
+    @cached_property
+    def costly(self) -> CoverageProblem:
+        return CoverageProblem.of(self.lattice, (0, 0), cost=CoverageCost(1.0, 1.0))
+
+    @cached_property
+    def path(self) -> CoveragePath:
+        search = NearOptimal(ColonyConfig(ants=1, velocities=(1,)))
+        return search.plan(self.costly, _perturbed, ignore)
+
+    def framed(self) -> tuple[FramedGround, NDArray[np.int32]]:
+        """Return the ground with a frame, and the walk as its indices."""
+        framed = FramedGround.of(self.costly)
+        cells = (self.path.cells @ (self.lattice.window.cols, 1)).astype(np.int32)
+        return framed, framed.framed(cells)
 
 
-def _take_changes_in(grid: OccupancyGrid, lattice: CoverageLattice, footprint: Footprint) -> None:
+def _take_changes_in(room: _TinyRoom) -> None:
     cells = np.zeros((4, 5), np.int8)
     cells[1, 1] = OCCUPIED
     grown = OccupancyGrid(GridGeometry(4, 5, 1.0, Pose2D(0.0, 0.0)), cells)
-    change = LatticeChange.between((grid, grown), lattice, footprint)
+    change = LatticeChange.between((room.grid, grown), room.lattice, room.footprint)
     steps, reachable = change.after.steps, np.ones((4, 5), np.bool_)
     update_reach(steps, steps, change.cells.copy(), reachable, 0, 0)
-    raster, _ = grid.geometry.on_raster()
-    place = placement_on(raster, footprint.cell_m)
+    raster, _ = room.grid.geometry.on_raster()
+    place = placement_on(raster, room.footprint.cell_m)
     count_free_beside(pixels_of(grown), 25, place, reachable, 0, 0)
 
 
-def _take_areas(lattice: CoverageLattice) -> None:
-    cells = np.zeros(lattice.states.shape, np.bool_)
-    cells_beside(find_areas(lattice.states.copy()), cells)
+def _take_areas(room: _TinyRoom) -> None:
+    states = room.lattice.states
+    cells = np.zeros(states.shape, np.bool_)
+    cells_beside(find_areas(states.copy()), cells)
     corners = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])
     turn_inside(corners, 0, 0, 1.0, cells)
     add_near(corners, 0, 0, 1.0, 0.5, np.zeros((4, 5), np.int32))
     count_in(np.packbits(cells)[np.newaxis], np.packbits(cells))
 
 
-def _take_line(grid: OccupancyGrid) -> None:
-    floor = Floor.around(grid, RobotDiscs(radius_m=0.4, tool_m=0.6), (0.5, 0.5))
+def _take_local_search(room: _TinyRoom) -> None:
+    """Improve and perturb a walk even if it is proven that none is better, as no search does."""
+    framed, walk = room.framed()
+    region = WalkRegion(framed.rows, framed.cols, 4 * walk.size, 1)
+    (box,) = regions_of(framed, room.costly.cells, 0)
+    is_loaded = region.load(framed, walk, box)
+    assert is_loaded
+    region.improve(0, 1, stream_of(0))
+    region.perturb(effort_for(room.costly.cost).rules, 1, stream_of(0))
+    region.go_back()
+
+
+def _take_windows(room: _TinyRoom) -> None:
+    framed, walk = room.framed()
+    windows = WindowSearch(room.costly, framed, lower_bound_of(room.costly))
+    windows.load(walk)
+    for _ in windows.solve_whole(1, stream_of(0)):
+        pass
+    windows.solve(1, stream_of(0))
+    windows.walk()
+
+
+def _take_repair(room: _TinyRoom) -> None:
+    problem = replace(room.costly, before=room.path.cells[2:])
+    repaired(problem, room.path.planner, 0, _perturbed)
+
+
+def _take_line(room: _TinyRoom) -> None:
+    discs = RobotDiscs(radius_m=0.4, tool_m=0.6)
+    floor = Floor.around(room.grid, discs, (0.5, 0.5))
     stands = StandLattice.over(floor, 1.0)
     walk = np.array([(0, 0), (0, 1), (1, 1)], np.int32)
     line_over(walk, stands, floor, LineConfig(moves_m2=20), is_end_fixed=False)
+    under_maps = FloorMap(room.grid, room.lattice, room.footprint, discs, 100_000)
+    shape = under_maps.geometry.rows, under_maps.geometry.cols
+    under_maps.reached(np.zeros(room.lattice.states.shape, np.bool_), Window(0, 0, *shape))
+    sweeps = Sweeps(np.zeros(shape, np.int16), np.zeros(shape, np.int32))
+    points = np.array([(2.0, 2.0), (3.0, 2.0)])
+    state = np.zeros(shape, np.uint8)
+    note_driven(sweeps, state, points, 1.0, memory_for_moves().capsules)
+    common_runs(walk, walk, 1)
+
+
+def _plan_with(name: str, room: _TinyRoom) -> None:
+    planner_of(name, ColonyConfig(ants=1, velocities=(1,))).plan(room.problem, never, ignore)
 
 
 def _perturbed(progress: SearchProgress) -> bool:
     return progress.work.perturbations > 0
+
+
+_STAGES: dict[str, Callable[[_TinyRoom], object]] = {
+    LATTICE: lambda room: room.lattice,
+    CHANGES: _take_changes_in,
+    REACH: lambda room: room.problem,
+    AREAS: _take_areas,
+    WALKS: lambda room: walk_figures(room.lattice, np.array([[0, 0], [0, 1]], np.int32)),
+    BOUND: lambda room: lower_bound_of(room.costly),
+    LOCAL_SEARCH: _take_local_search,
+    WINDOWS: _take_windows,
+    REPAIR: _take_repair,
+    LINE: _take_line,
+    **{name: partial(_plan_with, name) for name in PLANNER_NAMES},
+}
+STAGES = tuple(_STAGES)

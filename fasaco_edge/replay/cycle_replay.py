@@ -186,7 +186,7 @@ class CycleReplay:
     def __init__(self, config: DaemonConfig, record: CycleRecord) -> None:
         self._record = record
         ledger = record.beginning.ledger
-        restored = decode_ledger(ledger, config.robot.tool_width_m) if ledger else None
+        restored = decode_ledger(ledger, config.cell_m) if ledger else None
         self._drive = MissionDrive(config, restored)
         self.mission = self._drive.mission
         self._untaken = UntakenSamples(record.taken)

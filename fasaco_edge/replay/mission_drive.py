@@ -77,9 +77,7 @@ class MissionDrive:
         self.planner = planner_of(
             planner.name, planner.colony(), planner.threads, planner.local_search
         )
-        keeper = LedgerKeeper(
-            _NoDisk(ledger), config.robot.tool_width_m, autostart=config.mission.autostart
-        )
+        keeper = LedgerKeeper(_NoDisk(ledger), config.cell_m, autostart=config.mission.autostart)
         self._runner = MissionRunner(config, keeper, self.mailbox, lambda *_: loader)
         self.began: float | None = None
         self.state = ""

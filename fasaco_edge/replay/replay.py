@@ -27,7 +27,9 @@ from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.planners.planner import AnyOf, CoveragePlanner, SearchWork, WorkLimit, ignore
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
-from fasaco_edge.wire.status import PathAttachment, Settings, Status
+from fasaco_edge.wire.path_documents import PathAttachment
+from fasaco_edge.wire.settings import Settings
+from fasaco_edge.wire.status import Status
 from fasaco_edge.wire.topics import COMMAND, RECORDED_INPUTS, TURNS
 
 # How long the mission goes on after the last sample [s]: plans come, patience ends.
@@ -86,8 +88,13 @@ class RecordedRun:
         Raises:
             BadConfiguration: it is of a release whose settings this one does not know.
         """
+        # Before there were lines, cells were driven.
+        planner = self.config.get("planner", {})
+        config = dict(self.config)
+        if isinstance(planner, Mapping):
+            config["planner"] = {"line": "cells", **planner}
         try:
-            return msgspec.convert(self.config, DaemonConfig)
+            return msgspec.convert(config, DaemonConfig)
         except msgspec.ValidationError as error:
             raise BadConfiguration(
                 f"recorded configuration, of release {self.version}: {error}",

@@ -19,14 +19,14 @@ SETTINGS = {
     "turn time": "robot.turn_s",
 }
 # Where these differ, walks, cells and times belong to different problems.
-ANOTHER_PROBLEM = ("tool width", "robot radius", "building", "orders")
+ANOTHER_PROBLEM = ("tool width", "robot radius", "line", "width of lanes", "building", "orders")
 # These members compare in any case.
 ANYWAY = (
     *("faults", "faults_by_code", "recorder_lost", "samples_missing"),
     *("memory_mb_max", "recorder_memory_mb_max", "processor_percent_max", "threads_max"),
 )
-# Maps of one building from two missions differ a little: its sides [m], and its floor [share].
-SIDE_M, FLOOR_SHARE = 1.0, 0.15
+# Maps of one building from two missions differ a little: its sides [m], and its cells [share].
+SIDE_M, CELLS_SHARE = 1.0, 0.15
 
 Difference = tuple[str, str, str]
 """What differs, and its value in the first run and in the other."""
@@ -48,6 +48,12 @@ def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Differ
         mine, theirs = one.config.get(key), other.config.get(key)
         if mine is not None and theirs is not None and mine != theirs:
             found.append((name, str(mine), str(theirs)))
+    if _line(one) != _line(other):
+        found.append(("line", _line(one), _line(other)))
+    elif all(_lane_m(each) is not None for each in (one, other)):
+        mine, theirs = (f"{_lane_m(each):.3f} m" for each in (one, other))
+        if mine != theirs and not any(name == "tool width" for name, *_ in found):
+            found.append(("width of lanes", mine, theirs))
     if not _is_one_building(one, other):
         found.append(("building", _building(one), _building(other)))
     if len(one.orders) != len(other.orders):
@@ -141,19 +147,38 @@ def _is_one_building(one: ReviewDocument, other: ReviewDocument) -> bool:
     pairs = zip(one.map.sides_m, other.map.sides_m, strict=True)
     if any(abs(mine - theirs) > SIDE_M for mine, theirs in pairs):
         return False
-    mine, theirs = _floor_m2(one), _floor_m2(other)
+    # A line reaches into cells whose centres the robot cannot stand at.
+    if _line(one) != _line(other):
+        return True
+    mine, theirs = _cells_m2(one), _cells_m2(other)
     if mine is None or theirs is None:
         return True
-    return abs(mine - theirs) <= FLOOR_SHARE * max(mine, theirs)
+    return abs(mine - theirs) <= CELLS_SHARE * max(mine, theirs)
 
 
-def _floor_m2(document: ReviewDocument) -> float | None:
+def _line(document: ReviewDocument) -> str:
+    """Return what was driven; recordings of before know nothing but cells."""
+    return str(document.config.get("planner.line", "cells"))
+
+
+def _lane_m(document: ReviewDocument) -> float | None:
+    """Return how far apart lanes lie, which is the edge of a cell [m]; None where not stated."""
+    width_m, overlap = (
+        document.config.get(f"robot.{name}", 0.0) for name in ("tool_width_m", "overlap")
+    )
+    if not isinstance(width_m, int | float) or not isinstance(overlap, int | float) or not width_m:
+        return None
+    return width_m if _line(document) == "cells" else width_m * (1.0 - overlap)
+
+
+def _cells_m2(document: ReviewDocument) -> float | None:
     """Return the area of all cells that were coverable at the end [m2]."""
-    cells, width_m = document.coverable_cells, document.config.get("robot.tool_width_m")
-    return cells * width_m**2 if cells is not None and isinstance(width_m, int | float) else None
+    cells, edge_m = document.coverable_cells, _lane_m(document)
+    return None if cells is None or edge_m is None else cells * edge_m**2
 
 
 def _building(document: ReviewDocument) -> str:
     width, depth = document.map.sides_m if document.map else (0.0, 0.0)
-    floor = _floor_m2(document)
-    return f"{width:.1f} x {depth:.1f} m" + ("" if floor is None else f", {floor:.1f} m2 to cover")
+    cells_m2 = _cells_m2(document)
+    cells = "" if cells_m2 is None else f", {cells_m2:.1f} m2 of cells to cover"
+    return f"{width:.1f} x {depth:.1f} m{cells}"

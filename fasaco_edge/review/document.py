@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fasaco_edge.review.orders import OrderChapter
     from fasaco_edge.review.review import Review
     from fasaco_edge.review.run_data import PublishedPath
-    from fasaco_edge.wire.status import Rectangle
+    from fasaco_edge.wire.path_documents import Rectangle
 
 
 MILESTONES = (50, 90, 99, 100)
@@ -59,6 +59,7 @@ class Replan(msgspec.Struct):
     steps: int
     planned_steps: int | None
     lower_bound_steps: int | None
+    lower_bound_cost_s: float | None
     gap: float | None
     cost_s: float | None
     changed: Rectangle | None
@@ -78,6 +79,14 @@ class Trouble(msgspec.Struct):
     reason: str
     at_s: float | None
     seconds: float | None
+
+
+class PheromoneFigures(msgspec.Struct, frozen=True):
+    """The pheromone that was drawn; None where nothing tells."""
+
+    fields: int
+    cells_share: float | None
+    branching: float | None
 
 
 class ReviewDocument(msgspec.Struct):
@@ -104,6 +113,7 @@ class ReviewDocument(msgspec.Struct):
             the tool's disc touches where the robot's disc can come to, and what of it the tool
             passed over along the recorded poses [m2].
         patches_over_4_dm2, largest_patch_m2: what of it was left, in one piece [m2].
+        ledger_swept_m2: floor that the daemon had as swept at the end, in reach or not [m2].
         coverage_from: who counted: `status` (the daemon) or `trail` (from the recorded poses and
             the last map, where the daemon's last recorded count is outdated).
         reached_s: when 50, 90, 99 and 100 % of the cells coverable at the end were covered [s].
@@ -118,13 +128,16 @@ class ReviewDocument(msgspec.Struct):
         replan_ms_p50, replan_ms_p99, replan_ms_max: how long replans took [ms], nearest rank.
         replan_ms_by_reason: median (p50) and slowest (max) of each kind of reason [ms].
         replan_list: each replan: at_s, revision, reason, plan_ms, steps (to drive); of the plan as
-            it was made, from where the robot was then: planned_steps, lower_bound_steps, gap (steps
-            over that bound, as a share of it) and cost_s (driving it, by the configuration);
-            changed, the rectangle of the map that led to it [m].
+            it was made, from where the robot was then: planned_steps, lower_bound_steps, cost_s
+            (driving it, by the configuration), lower_bound_cost_s and gap (cost_s over that
+            bound, as a share of it); changed, the rectangle of the map that led to it [m].
         plans, plans_unused: by the turn log: plans that were made, those of them that became no
             path, because they found the one there was or did not hold any more.
         plan_ms_p50, plan_ms_p99, plan_ms_max: how long they took, the unused ones too [ms].
         attempts, attempts_used: plans that were only to make the path better, and did.
+        pheromone: fields (how often the field was drawn), cells_share (cells that the last field
+            spans over those where the robot would fit, reachable or not), branching (at the end:
+            mean number of directions of a cell within reach of its strongest).
         memory_mb_max, recorder_memory_mb_max: most memory of daemon and recorder [MB].
         processor_percent_max, threads_max: of the daemon: processor time over half a minute [% of
             a core], threads.
@@ -161,6 +174,7 @@ class ReviewDocument(msgspec.Struct):
     swept_m2: float | None = None
     patches_over_4_dm2: int | None = None
     largest_patch_m2: float | None = None
+    ledger_swept_m2: float | None = None
     coverage_from: str | None = None
     reached_s: dict[str, float | None] | None = None
     steps: int | None = None
@@ -184,6 +198,7 @@ class ReviewDocument(msgspec.Struct):
     plan_ms_max: float | None = None
     attempts: int | None = None
     attempts_used: int | None = None
+    pheromone: PheromoneFigures = PheromoneFigures(0, None, None)
     memory_mb_max: float | None = None
     recorder_memory_mb_max: float | None = None
     processor_percent_max: float | None = None
@@ -270,6 +285,7 @@ def document_of(review: Review) -> ReviewDocument:
     )
     _add_coverage(told, review)
     _add_plans(told, review)
+    told.pheromone = _pheromone(review)
     for member, entity in PLOTTED.items():
         if (points := record.plots.get(entity)) is not None:
             setattr(told, member, _rounded(float(points[:, 1].max())))
@@ -298,6 +314,7 @@ def _add_coverage(told: ReviewDocument, review: Review) -> None:
         told.swept_m2 = _rounded(figures.swept_m2)
         told.patches_over_4_dm2 = figures.patches_over_4_dm2
         told.largest_patch_m2 = _rounded(figures.largest_patch_m2)
+    told.ledger_swept_m2 = review.data.ledger_swept_m2
     if (walk := review.walk) is not None:
         told.steps, told.revisits = walk.steps, walk.revisits
         told.turns_90, told.turns_180 = walk.turns_90, walk.turns_180
@@ -322,6 +339,18 @@ def _add_plans(told: ReviewDocument, review: Review) -> None:
     told.attempts, told.attempts_used = len(attempts), sum(plan.is_used for plan in attempts)
 
 
+def _pheromone(review: Review) -> PheromoneFigures:
+    plots = review.record.plots
+    spanned, branching = (
+        float(points[-1, 1]) if (points := plots.get(entity)) is not None else None
+        for entity in (entities.TRAIL_CELLS, entities.BRANCHING)
+    )
+    counts = review.counts
+    fitting = counts.coverable + (counts.unreachable or 0) if counts is not None else 0
+    share = spanned / fitting if spanned is not None and fitting else None
+    return PheromoneFigures(review.record.field_count, _rounded(share), _rounded(branching))
+
+
 def _replan(path: PublishedPath) -> Replan:
     about = path.about
     return Replan(
@@ -332,6 +361,7 @@ def _replan(path: PublishedPath) -> Replan:
         steps=about.steps,
         planned_steps=about.planned_steps,
         lower_bound_steps=about.lower_bound_steps,
+        lower_bound_cost_s=about.lower_bound_cost_s,
         gap=about.gap,
         cost_s=about.planned_cost_s,
         changed=about.changed,
@@ -354,6 +384,8 @@ def _not_recorded(review: Review) -> dict[str, str]:
         why["reached_s"] = why[FLOOR] = before
     elif review.floor is None:
         why[FLOOR] = "no pose lies on the map"
+    if data.ledger_swept_m2 is None:
+        why["ledger_swept_m2"] = "no recorded status tells of floor"
     if review.counts is None:
         why["covered_cells, coverable_cells, recovered_cells"] = (
             "the daemon's last recorded count is outdated, and the trail does not tell all"

@@ -18,7 +18,7 @@ from fasaco_edge.text import one_line
 FORMULA = re.compile(r"[=@]|[+-](?![\d.]+(e[+-]?\d+)?\Z)")
 PATH_COLUMNS = (
     *("at_s", "revision", "steps", "planner", "plan_ms"),
-    *("planned_steps", "lower_bound_steps", "gap", "cost_s"),
+    *("planned_steps", "lower_bound_steps", "gap", "cost_s", "lower_bound_cost_s"),
     *("x_min", "y_min", "x_max", "y_max", "reason"),
 )
 
@@ -65,7 +65,8 @@ def _tables(review: Review) -> dict[str, tuple[Sequence[str], Iterable[Sequence[
             (
                 (
                     *(f"{at_s:.6f}", a.revision, a.steps, a.planner, plan_ms),
-                    *(a.planned_steps, a.lower_bound_steps, a.gap, a.planned_cost_s),
+                    *(a.planned_steps, a.lower_bound_steps, a.gap),
+                    *(a.planned_cost_s, a.lower_bound_cost_s),
                     *(astuple(a.changed) if a.changed else none),
                     a.reason,
                 )

@@ -14,6 +14,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.mission.orders.zones import with_kept_out
 from fasaco_edge.review.run_data import RunData
+from fasaco_edge.wire.settings import known_settings
 
 
 def swept_floor(data: RunData, lattice: CoverageLattice, lost_pose_s: float) -> JudgedFloor | None:
@@ -38,9 +39,8 @@ def swept_floor(data: RunData, lattice: CoverageLattice, lost_pose_s: float) -> 
     if not len(track):
         return None
     driven = _driven(track, at_s, JUMP_CELLS * lattice.cell_m, lost_pose_s)
-    robot = SweepingRobot(
-        footprint.cell_m, footprint.robot_radius_m, free_at_most=footprint.free_at_most
-    )
+    tool_m = known_settings(data.config).robot.tool_width_m
+    robot = SweepingRobot(tool_m, footprint.robot_radius_m, free_at_most=footprint.free_at_most)
     # What can be reached is told from where the robot was in the end, as with the cells.
     x, y = track[-1].tolist()
     grid = with_kept_out(data.grid, data.keep_out)

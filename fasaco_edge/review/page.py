@@ -12,6 +12,8 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+from PIL import Image
+
 from fasaco_edge.bench.floor import share_words
 from fasaco_edge.drawing.chart import COLOURS, Line, Panel, Placer
 from fasaco_edge.review import rows
@@ -22,7 +24,14 @@ from fasaco_edge.review.comparison import (
     setup_words,
 )
 from fasaco_edge.review.document import ReviewDocument, document_of
-from fasaco_edge.review.pictures import coverage_panel, draw_map, replan_panel, state_panel
+from fasaco_edge.review.pictures import (
+    branching_panel,
+    coverage_panel,
+    draw_fields,
+    draw_map,
+    replan_panel,
+    state_panel,
+)
 from fasaco_edge.review.review import Review
 from fasaco_edge.text import Html, element, html
 
@@ -97,6 +106,7 @@ INTRODUCTION = (
 GLOSSARY = {
     "reachable floor": "all that the tool touches at the places that the robot can come to, on the "
     "pixels of the last map; swept is what of it the tool passed over",
+    "floor swept by the ledger": "what the robot itself had as swept in the end, in reach or not",
     "patch left": "reachable floor in one piece that was not swept; 4 dm2 are 20 x 20 cm",
     "covered again": "cells that were passed over more than once",
     "out of reach": "cells where the robot would fit, but that it cannot come to",
@@ -104,8 +114,7 @@ GLOSSARY = {
     "revisits": "visits of cells beyond the first of each",
     "replan": "a plan made anew; its time is that of planning alone",
     "map: cells more, fewer": "a new map showed more or less ground to cover than the one before",
-    "gap": "steps of a plan above those that no plan can do without; where turns cost, more steps "
-    "may be the better way",
+    "gap": "time of a plan, steps and turns, above the time that no plan can do without",
     "changed on the map": "the rectangle in which cells came, went or have other neighbours",
     "plans that became no path": "they found the path there was, or the map had changed meanwhile",
     "better further on": "spare time was used to find a better rest of the way",
@@ -132,6 +141,10 @@ def page_of(review: Review, other: Review | None = None) -> str:
         ),
         _tiles(documents[0]) if other is None else _setup(*documents),
         _maps(reviews, documents),
+        *(
+            _fields(each, len(documents), figures.recording)
+            for each, figures in zip(reviews, documents, strict=True)
+        ),
         _section("Over time", *_charts(reviews, documents)),
         _section("Figures", _figures(documents)),
         _section("Replans", *_reasons(reviews, documents)),
@@ -184,8 +197,8 @@ def _tiles(figures: ReviewDocument) -> Html:
     swept_m2, reachable_m2 = figures.swept_m2, figures.reachable_m2
     swept = share_words(swept_m2 / reachable_m2) if swept_m2 and reachable_m2 else "-"
     tiles = (
-        (figures.share_covered or "-", "of the reachable cells covered"),
         (swept, "of the reachable floor swept"),
+        (figures.share_covered or "-", "of the reachable cells covered"),
         (rows.clock(figures.duration_s), "recorded"),
         (rows.amount(figures.driven_m, "m"), "driven"),
         (rows.amount(figures.revisits, ""), "revisits"),
@@ -203,14 +216,38 @@ def _maps(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> Htm
         picture = draw_map(review, MAP_ROOM)
         shown = element("p", review.no_lattice or "no pose was recorded")
         if picture is not None:
-            buffer = io.BytesIO()
-            picture.save(buffer, "PNG", optimize=True)
-            content = base64.b64encode(buffer.getvalue()).decode()
             text = "map, covered cells, floor not swept, and the way of the robot"
-            shown = Html(f'<img alt="{text}" src="data:image/png;base64,{content}">')
+            shown = _image(picture, text)
         maps.append(element("figure", shown, _table(("", ""), rows.card_rows(figures), "plain")))
     kind = "maps two" if len(maps) > 1 else "maps"
     return _section("The map in the end", element("div", *maps, class_=kind))
+
+
+def _image(picture: Image.Image, text: str) -> Html:
+    buffer = io.BytesIO()
+    picture.save(buffer, "PNG", optimize=True)
+    content = base64.b64encode(buffer.getvalue()).decode()
+    return Html(f'<img alt="{text}" src="data:image/png;base64,{content}">')
+
+
+def _fields(review: Review, of: int, name: str) -> Html:
+    """Return the pheromone field at four moments; nothing where none was drawn."""
+    pictures = draw_fields(review)
+    if not pictures:
+        return Html()
+    words = (
+        "Where the robot means to drive next is bright: each path that was published has "
+        "strengthened the steps it takes. What it has driven is half as strong, and what no path "
+        "leads over, or the map has just shown, is dark."
+    )
+    figures = (
+        element(
+            "figure", _image(picture, "pheromone field"), element("figcaption", rows.clock(at_s))
+        )
+        for at_s, picture in pictures
+    )
+    title = "The pheromone trail" + (f" in {name}" if of > 1 else "")
+    return _section(title, element("p", words), element("div", *figures, class_="fields"))
 
 
 def _charts(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> list[Html]:
@@ -227,6 +264,8 @@ def _charts(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> l
         panel = state_panel(review)
         name = f" ({label})" if len(reviews) > 1 else ""
         charts.append(_chart(panel, 66 + 30 * len(panel.y.ticks), name))
+        if (decided := branching_panel(review)) is not None:
+            charts.append(_chart(decided, 240, name))
     return [key, element("div", *charts, class_="charts")]
 
 

@@ -15,7 +15,9 @@ from fasaco_edge.drawing.chart import COLOURS, Axis, Line, Panel, draw_panels
 from fasaco_edge.drawing.palette import Colour
 from fasaco_edge.drawing.pictures import draw_mission
 from fasaco_edge.drawing.plot import MapLayer
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
+from fasaco_edge.recording import entities
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.rows import clock
 
@@ -144,6 +146,46 @@ def state_panel(review: Review) -> Panel:
     ticks = tuple((float(level), SHORT.get(name, name)) for level, name in enumerate(names))
     y = Axis("", -0.7, max(len(names) - 0.3, 0.7), ticks)
     return Panel("What the mission was doing", "", time.axis, y, tuple(lines))
+
+
+def branching_panel(review: Review) -> Panel | None:
+    """Return how decided the trail was; None where that is not recorded."""
+    points = review.record.plots.get(entities.BRANCHING)
+    if points is None:
+        return None
+    time = TimeAxis.over(review.duration_s)
+    curve = time.points(points[:, 0], points[:, 1])
+    y = Axis.linear("", [0.0, *points[:, 1].tolist()])
+    caption = "mean number of directions of a cell within reach of its strongest; 1: all is decided"
+    line = Line("", COLOURS[0], curve, dotted=False, width=2.2)
+    return Panel("How decided the trail was", caption, time.axis, y, (line,))
+
+
+# Fields on a page; the edge of the square that each has to fit into [px].
+FIELDS, FIELD_PX = 4, 440
+
+
+def draw_fields(review: Review) -> list[tuple[float, Image.Image]]:
+    """Return the pheromone field at four moments: when [s], and RGB pictures of one place."""
+    fields, record = review.record.fields, review.record
+    around = Window.around(*(field.window for field in fields))
+    if around is None:
+        return []
+    first, last = fields[0].at_ns, fields[-1].at_ns
+    wanted = [first + (last - first) * number // FIELDS for number in range(1, FIELDS + 1)]
+    chosen = [max((f for f in fields if f.at_ns <= at), key=lambda f: f.at_ns) for at in wanted]
+    scale = max(FIELD_PX // max(around.rows, around.cols), 1)
+    pictures = []
+    for field in dict.fromkeys(chosen):
+        levels = np.zeros((around.rows, around.cols), np.uint8)
+        levels[field.window.slices_in(around)] = field.levels
+        pixels = palette.gradient(levels.ravel() / 255.0).reshape(*levels.shape, 3)
+        pixels[levels == 0] = palette.UNKNOWN
+        size = around.cols * scale, around.rows * scale
+        shown = Image.fromarray(pixels[::-1]).resize(size, Image.Resampling.NEAREST)
+        shown.thumbnail((FIELD_PX, FIELD_PX))
+        pictures.append((1e-9 * (field.at_ns - record.began_ns), shown))
+    return pictures
 
 
 def _curve(time: TimeAxis, review: Review) -> tuple[tuple[float, float], ...]:

@@ -14,10 +14,11 @@ from fasaco_edge.review.document import MILESTONES, ReviewDocument
 if TYPE_CHECKING:
     from fasaco_edge.review.moments import Span
     from fasaco_edge.review.review import Review
-    from fasaco_edge.wire.status import Rectangle
+    from fasaco_edge.wire.path_documents import Rectangle
 
 NOT_KNOWN = "not known"
 NUMBERS = (
+    ("floor swept by the ledger", "ledger_swept_m2", "m2"),
     ("covered again", "recovered_cells", "cells"),
     ("out of reach", "unreachable_cells", "cells"),
     ("steps", "steps", ""),

@@ -17,9 +17,11 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.orders.order import MissionOrder, read_command
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.path_documents import PathAttachment
 from fasaco_edge.wire.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
-from fasaco_edge.wire.status import PathAttachment, Settings, Status, known_settings
+from fasaco_edge.wire.settings import Settings, known_settings
+from fasaco_edge.wire.status import Status
 from fasaco_edge.wire.turns import Cycle, TurnBatch, decode_turns
 
 # The reasons that the mission gives when it asks for a better path, and when it takes one.
@@ -141,10 +143,16 @@ class RunData:
         return max((each.status.ledger.restored_cells for each in self.statuses), default=0)
 
     @property
+    def ledger_swept_m2(self) -> float | None:
+        """Floor that the daemon had as swept last [m2]; None where it did not tell."""
+        floors = (each.status.floor for each in reversed(self.statuses))
+        return next((floor.swept_m2 for floor in floors if floor is not None), None)
+
+    @property
     def footprint(self) -> Footprint | None:
         """Tool, robot and thresholds by the configuration; None where it does not tell."""
         known = known_settings(self.config)
-        cell_m, radius_m = known.robot.tool_width_m, known.robot.radius_m
+        cell_m, radius_m = known.cell_m, known.robot.radius_m
         if not cell_m or not radius_m:
             return None
         free, occupied = known.map.free_at_most, known.map.occupied_at_least

@@ -32,8 +32,10 @@ ARRIVED_M = 1e-3
 # rest [rad].
 ALIGNED_RAD = 1e-4
 MISALIGNED_RAD = 0.05
-# A bend below this is none: it is steered, not stopped for [rad].
+# A bend below this may be none: it is steered, not stopped for [rad].
 STRAIGHT_RAD = 0.02
+# It is one where the straight way past it is further off than this [m].
+CUT_M = 0.002
 # A waypoint is driven through if a point of the track is this near; it must not be less
 # than half the track's spacing [m].
 PASSED_WITHIN_M = 0.02
@@ -181,11 +183,16 @@ def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     if len(points) < 3:
         return points
     runs = np.diff(points, axis=0)
-    runs /= np.hypot(runs[:, 0], runs[:, 1])[:, np.newaxis]
+    lengths = np.hypot(runs[:, 0], runs[:, 1])
+    runs /= lengths[:, np.newaxis]
     across = runs[:-1, 0] * runs[1:, 1] - runs[:-1, 1] * runs[1:, 0]
     along = (runs[:-1] * runs[1:]).sum(axis=1)
     bend = np.ones(len(points), bool)
-    bend[1:-1] = (np.abs(across) > STRAIGHT_RAD) | (along < 0.0)
+    # How far the robot would pass a corner that it cut.
+    shorter = np.minimum(lengths[:-1], lengths[1:])
+    bend[1:-1] = (
+        (np.abs(across) > STRAIGHT_RAD) | (along < 0.0) | (across**2 > (CUT_M / shorter) ** 2)
+    )
     return points[bend]
 
 

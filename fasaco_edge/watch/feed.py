@@ -13,12 +13,14 @@ from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.watch.robot_view import Token
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
-from fasaco_edge.wire.topics import NEWEST, TOPICS
+from fasaco_edge.wire.topics import NEWEST, PHEROMONE, TOPICS, Topic
 
-SUBSCRIBED = [topic for topic in TOPICS if topic.queues.watch is not None]
+WATCHED = [topic for topic in TOPICS if topic.queues.watch is not None]
+# The daemon makes the field for who listens: that is asked for.
+SUBSCRIBED = [topic for topic in WATCHED if topic is not PHEROMONE]
 QUEUED = {"token": Queue(256)} | {
     topic.name: Queue(topic.queues.watch, MAX_MESSAGE_BYTES)
-    for topic in SUBSCRIBED
+    for topic in WATCHED
     if topic.queues.watch is not None and topic.queues.watch > NEWEST
 }
 RETRY_S = 0.5
@@ -44,6 +46,7 @@ class Feed:
         self._mailbox: Mailbox[object] = Mailbox(QUEUED, size_of=_size_of)
         self._ended = threading.Event()
         self._bus: Bus | None = None
+        self._wants_field = False
         self._lock = threading.Lock()
         # In a thread: a host that does not answer would block the caller.
         self._joining = threading.Thread(target=self._join, name="join-bus", daemon=True)
@@ -63,6 +66,13 @@ class Feed:
     def take(self, timeout_s: float) -> list[tuple[str, object]]:
         """Return what came, as (topic, Sample or Token); wait up to ``timeout_s`` [s] for it."""
         return self._mailbox.take(timeout_s)
+
+    def want_field(self) -> None:
+        """Have the pheromone field sent, too, from now on."""
+        with self._lock:
+            if self._bus is not None and not self._wants_field:
+                self._subscribe(self._bus, PHEROMONE)
+            self._wants_field = True
 
     def _join(self) -> None:
         while not self._ended.is_set():
@@ -84,8 +94,11 @@ class Feed:
     def _listen(self, bus: Bus) -> None:
         prefix = f"{self._keys.base}/{VERSION}"
         bus.watch_tokens(f"{prefix}/*/alive", self._note_token)
-        for topic in SUBSCRIBED:
-            bus.listen(self._keys, topic, partial(self._post, topic.name))
+        for topic in (*SUBSCRIBED, PHEROMONE) if self._wants_field else SUBSCRIBED:
+            self._subscribe(bus, topic)
+
+    def _subscribe(self, bus: Bus, topic: Topic) -> None:
+        bus.listen(self._keys, topic, partial(self._post, topic.name))
 
     def _note_token(self, key: str, here: bool) -> None:
         self._mailbox.post("token", Token(key.split("/")[-2], here))

@@ -30,6 +30,22 @@ _LOOKS = {
     picture.AHEAD: ((72, 128, 240), "bright_blue", "+"),
     picture.NEXT: ((255, 240, 110), "bright_magenta", "*"),
     picture.ROBOT: ((222, 36, 56), "red", "@"),
+} | {
+    # From black over violet and orange to yellow; few terminals' own colours go as far.
+    kind: ((red, green, blue), ansi, plain)
+    for kind, (red, green, blue, ansi, plain) in zip(
+        picture.FIELD,
+        (
+            (34, 12, 74, "black", "1"),
+            (84, 15, 109, "blue", "2"),
+            (132, 32, 107, "magenta", "3"),
+            (181, 50, 90, "red", "4"),
+            (221, 81, 58, "bright_red", "5"),
+            (246, 125, 21, "yellow", "6"),
+            (252, 226, 100, "bright_yellow", "7"),
+        ),
+        strict=True,
+    )
 }
 
 _SYSTEMS = {

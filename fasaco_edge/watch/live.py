@@ -45,6 +45,8 @@ def take(feed: Feed, view: RobotView, timeout_s: float) -> list[tuple[str, objec
 def watch_on_screen(feed: Feed, view: RobotView, console: Console) -> None:
     """Show the mission until somebody types q, or a signal asks for the end.
 
+    f shows the living trail in place of coverage and path, and back.
+
     Raises:
         OSError: the terminal is gone.
     """
@@ -57,8 +59,13 @@ def watch_on_screen(feed: Feed, view: RobotView, console: Console) -> None:
             if came or key != shown_at:
                 shown_at, size = key, key[1]
                 screen.show(page.lines(view, now, *size), size)
-            if "q" in screen.keys(FRAME_S).lower():
+            typed = screen.keys(FRAME_S).lower()
+            if "q" in typed:
                 return
+            if typed.count("f") % 2:
+                shown_at = (0, (0, 0), "")
+                if page.toggle_field():
+                    feed.want_field()
 
 
 def watch_in_lines(feed: Feed, view: RobotView) -> None:
@@ -116,7 +123,7 @@ def status_line(view: RobotView, now: float) -> str:
     if view.silent_s(now):
         return "the daemon is silent"
     fraction = status.coverage.fraction if status.coverage else 0.0
-    return f"{phrases.percent(fraction)}  {phrases.figures(status)}"
+    return f"{phrases.percent(fraction)} of cells  {phrases.figures(status)}"
 
 
 def print_json(payload: bytes) -> None:

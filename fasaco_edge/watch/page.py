@@ -15,8 +15,9 @@ from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.phrases import age, clock, percent
 from fasaco_edge.watch.picture import MissionPicture
 from fasaco_edge.watch.robot_view import BAD, GOOD, ORDER, PLAIN, Event, RobotView
-from fasaco_edge.wire.replies import CoverageReport, MissionReport
-from fasaco_edge.wire.status import PathReport, Status, SupervisedRecorder
+from fasaco_edge.wire.path_documents import PathReport
+from fasaco_edge.wire.replies import CoverageReport, FloorReport, MissionReport
+from fasaco_edge.wire.status import Status, SupervisedRecorder
 
 Row = tuple[str, Text]
 
@@ -57,6 +58,8 @@ def _rows(status: Status, width: int, glyphs: GlyphSet) -> list[Row]:
         rows += _coverage(
             status.coverage, glyphs.bar(status.coverage.fraction, min(width, LONGEST_BAR))
         )
+    if status.floor is not None:
+        rows += _floor(status.floor)
     if status.path is not None:
         rows += _path(status.path, width)
     rows += _mission(status.mission)
@@ -72,11 +75,15 @@ def state_colour(state: str) -> str:
 def _coverage(coverage: CoverageReport, bar: Text) -> list[Row]:
     share = Text(phrases.percent(coverage.fraction), "bold")
     share.append(f", {coverage.covered} of {coverage.coverable} cells", "not bold")
-    areas = f"{coverage.covered_m2:.1f} m2, {coverage.to_cover_m2:.1f} m2 to go"
-    rows: list[Row] = [("covered", share), ("", bar), ("", _text(areas))]
+    rows: list[Row] = [("covered", share), ("", bar)]
     if coverage.recovered:
         rows.append(("twice", _text(_cells(coverage.recovered))))
     return rows
+
+
+def _floor(floor: FloorReport) -> list[Row]:
+    left = [_text(f"{left.m2:.1f} m2 left: {left.reason}") for left in floor.left or ()]
+    return [("swept", _text(phrases.swept(floor))), *(("", each) for each in left)]
 
 
 def _path(path: PathReport, width: int) -> list[Row]:
@@ -87,7 +94,7 @@ def _path(path: PathReport, width: int) -> list[Row]:
         if path.lower_bound_steps is not None:
             plan += f", bound {path.lower_bound_steps}"
         if path.gap is not None and width >= WIDE:
-            plan += f", gap {100 * path.gap:.1f} %"
+            plan += f", gap {100 * path.gap:.1f} % of time"
         rows.append(("plan", _text(plan)))
     return rows
 
@@ -172,6 +179,15 @@ LEGEND = (
 )
 
 
+FIELD_LEGEND = (
+    (picture.FIELD[0], "no path leads there"),
+    (picture.FIELD[len(picture.FIELD) // 2], "did, or was driven"),
+    (picture.FIELD[-1], "each path leads there"),
+    (picture.WALL, "wall"),
+    (picture.HEADING, "robot"),
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Layout:
     """How a screen is divided [characters]; figures of width 0 are left out.
@@ -218,14 +234,19 @@ class Page:
         page = self._block(headline(view, now), width, 1)
         if layout.lines:
             page += self._middle(view, layout)
-            whole = self._picture.path_is_whole
-            key: object = (width, whole)
+            whole, field = self._picture.path_is_whole, self._picture.shows_field
+            key: object = (width, whole, field)
             page += self._keep("legend", key, lambda: self._block(self._legend(whole), width, 1))
         if layout.entries:
             key = (view.events.count, self._picture.pixel_m, width, layout)
             page += self._keep("log", key, lambda: self._log(view, width, layout))
         page += [" " * width] * (height - len(page))
         return page[:height]
+
+    def toggle_field(self) -> bool:
+        """Show the living trail in place of coverage and path, or no more; return whether."""
+        self._picture.shows_field = not self._picture.shows_field
+        return self._picture.shows_field
 
     def _middle(self, view: RobotView, layout: Layout) -> list[str]:
         drawn = self._picture.kinds(view, layout.columns, layout.lines)
@@ -246,7 +267,7 @@ class Page:
 
     def _legend(self, path_is_whole: bool) -> Text:
         legend = Text()
-        for kind, name in LEGEND:
+        for kind, name in FIELD_LEGEND if self._picture.shows_field else LEGEND:
             cut = kind == picture.AHEAD and not path_is_whole
             label = f"to {picture.NEAR_M:g} m" if cut else name
             legend.append_text(self._glyphs.sample(kind)).append(f" {label} ", FAINT)
@@ -296,10 +317,10 @@ def headline(view: RobotView, now: float) -> Text:
     else:
         line.append(one_line(status.state).upper(), f"bold {state_colour(status.state)}")
         if status.coverage is not None:
-            line.append(f"  {percent(status.coverage.fraction)} covered")
+            line.append(f"  {percent(status.coverage.fraction)} of cells")
         if status.path is not None:
             line.append(f"  path {status.path.revision}")
-    return _on_a_line(line.append(f"   {clock(now)}   q quits", FAINT))
+    return _on_a_line(line.append(f"   {clock(now)}   f trail   q quits", FAINT))
 
 
 def _entry(entry: Event) -> Text:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.replies import CoverageReport, MissionReport, ZoneReport
+from fasaco_edge.wire.replies import CoverageReport, FloorReport, MissionReport, ZoneReport
 from fasaco_edge.wire.status import Status
 
 # Of the wall clock to the monotonic one, when this module was imported [s].
@@ -14,8 +14,15 @@ _OFFSET_S = time.time() - time.monotonic()
 
 def covered(coverage: CoverageReport) -> str:
     """Return how much is covered."""
-    cells = f"{coverage.covered} of {coverage.coverable} cells"
-    return f"{percent(coverage.fraction)}: {cells}, {coverage.covered_m2:.1f} m2"
+    return f"{percent(coverage.fraction)}: {coverage.covered} of {coverage.coverable} cells"
+
+
+def swept(floor: FloorReport) -> str:
+    """Return how much floor is swept."""
+    reached_m2, reachable_m2 = floor.reached_m2, floor.reachable_m2
+    if reached_m2 is None or not reachable_m2:
+        return f"{floor.swept_m2:.1f} m2"
+    return f"{percent(reached_m2 / reachable_m2)}: {reached_m2:.1f} of {reachable_m2:.1f} m2"
 
 
 def percent(fraction: float) -> str:
@@ -45,8 +52,9 @@ def figures(status: Status) -> str:
     """Return state and progress in a line."""
     coverage, path = status.coverage or CoverageReport(), status.path
     revision, steps = (path.revision, path.remaining_steps) if path else (0, 0)
+    floor = f"{status.floor.swept_m2:.1f} m2 swept, " if status.floor else ""
     return (
-        f"{one_line(status.state)}: {coverage.covered}/{coverage.coverable} cells, "
+        f"{one_line(status.state)}: {coverage.covered}/{coverage.coverable} cells, {floor}"
         f"path {revision} ({steps} steps to go), {status.plan.plans} plans, "
         f"last {status.latency_ms.plan or 0.0:.0f} ms"
     )

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Bounds, Pose2D, union_bounds
 from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
-from fasaco_edge.watch.robot_view import RobotView
+from fasaco_edge.watch.robot_view import FIELD_LEVELS, RobotView
 from fasaco_edge.wire.maps import CoverageValue
-from fasaco_edge.wire.status import known_settings
+from fasaco_edge.wire.settings import known_settings
 
 LEAST_PIXEL_M = 0.01
 # Pictures grow by so much at once [m]: with every row of a growing map they would jump.
@@ -93,6 +93,8 @@ class Frame:
 
 # Where several things meet in one character without colours, the larger number is shown.
 UNKNOWN, FLOOR, TO_COVER, COVERED, RECOVERED, WALL, AHEAD, NEXT, ROBOT = range(9)
+# The living trail, from least to most, where it is shown instead of coverage and path.
+FIELD = range(9, 9 + FIELD_LEVELS)
 HEADING = 16
 """The character of the robot's centre: this plus its heading in eighths of a turn."""
 
@@ -124,6 +126,16 @@ def ground(frame: Frame, grid: OccupancyGrid | None, coverage: OccupancyGrid | N
     if cells is not None:
         tinted = (kinds == FLOOR) & (cells != UNKNOWN)
         kinds[tinted] = cells[tinted]
+    return kinds
+
+
+def field_ground(frame: Frame, grid: OccupancyGrid | None, field: OccupancyGrid | None) -> Kinds:
+    """Return the kinds of all pixels with the living trail on them, uint8 (2 * lines, columns)."""
+    kinds = ground(frame, grid, None)
+    if field is not None:
+        levels = frame.sampled(field, 1, 0).view(np.uint8)
+        shown = (levels > 0) & (kinds != WALL)
+        kinds[shown] = FIELD.start - 1 + levels[shown]
     return kinds
 
 
@@ -189,11 +201,13 @@ class MissionPicture:
     Attributes:
         pixel_m: edge of a pixel of that picture [m]; None before the first.
         path_is_whole: whether all of the path was drawn.
+        shows_field: whether it shows the living trail, in place of coverage and path.
     """
 
     def __init__(self) -> None:
         self.pixel_m: float | None = None
         self.path_is_whole = True
+        self.shows_field = False
         self._key: tuple[object, ...] = ()
         self._bounds: Bounds | None = None
         self._frame: Frame | None = None
@@ -202,9 +216,10 @@ class MissionPicture:
     def kinds(self, view: RobotView, columns: int, lines: int) -> Kinds | None:
         """Return a picture, uint8 (2 * lines, columns); None as long as nothing is to be seen."""
         # Grids are values: a new one is another object.
-        if (key := (view.map, view.coverage)) != self._key:
+        grids = view.map, view.coverage
+        if (key := (*grids, view.field, self.shows_field)) != self._key:
             self._key, self._frame = key, None
-            self._bounds = union_bounds(*(known_bounds(grid) for grid in key if grid is not None))
+            self._bounds = union_bounds(*(known_bounds(grid) for grid in grids if grid is not None))
         if self._bounds is None:
             return None  # a robot alone is no picture
         pose = view.pose
@@ -212,10 +227,15 @@ class MissionPicture:
         bounds = union_bounds(self._bounds, robot) or self._bounds
         frame = Frame.over(bounds, columns, lines)
         if frame != self._frame or self._ground is None:
-            self._frame, self._ground = frame, ground(frame, view.map, view.coverage)
+            self._frame = frame
+            if self.shows_field:
+                self._ground = field_ground(frame, view.map, view.field)
+            else:
+                self._ground = ground(frame, view.map, view.coverage)
         kinds = self._ground.copy()
         self.pixel_m = frame.pixel_m
-        self.path_is_whole = draw_path(kinds, frame, view.path_ahead)
+        if not self.shows_field:
+            self.path_is_whole = draw_path(kinds, frame, view.path_ahead)
         if pose is not None:
             settings = known_settings(view.status.config if view.status else {})
             draw_robot(kinds, frame, pose, settings.robot.radius_m)

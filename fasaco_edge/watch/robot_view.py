@@ -17,12 +17,17 @@ from fasaco_edge.text import one_line
 from fasaco_edge.wire.json_text import decode_document, decode_json
 from fasaco_edge.wire.limits import MAX_COORDINATE_M
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.path_documents import PathAttachment
 from fasaco_edge.wire.paths import decode_path
+from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.poses import decode_pose
 from fasaco_edge.wire.schemas import POSE_STAMPED
-from fasaco_edge.wire.status import PathAttachment, Status, known_settings
+from fasaco_edge.wire.settings import known_settings
+from fasaco_edge.wire.status import Status
 
 KEPT = 200
+# The field is shown in so many steps.
+FIELD_LEVELS = 7
 # How an entry is to be taken.
 PLAIN, GOOD, BAD, ORDER = "plain", "good", "bad", "order"
 TROUBLED = ("blocked", "degraded")
@@ -95,6 +100,8 @@ class RobotView:
 
     Attributes:
         map, coverage: None before the first.
+        field: the living trail, on the cells: 0 for none, else 1 to ``FIELD_LEVELS``; None as long
+            as it is not asked for, and before the first.
         pose: where the robot is; None before the first pose.
         status: the newest one; None before the first.
         document: the same as it came, b"" before the first.
@@ -110,6 +117,7 @@ class RobotView:
         self.events = EventLog()
         self.map: OccupancyGrid | None = None
         self.coverage: OccupancyGrid | None = None
+        self.field: OccupancyGrid | None = None
         self.pose: Pose2D | None = None
         self.status: Status | None = None
         self.document = b""
@@ -125,6 +133,7 @@ class RobotView:
             "pose": self._read_pose,
             "path": self._read_path,
             "coverage": self._read_coverage,
+            "pheromone": self._read_field,
             "status": self._read_status,
             "command": self._read_command,
         }
@@ -196,6 +205,13 @@ class RobotView:
 
     def _read_coverage(self, sample: Sample, _: float) -> None:
         self.coverage = decode_occupancy_grid(sample.payload)
+
+    def _read_field(self, sample: Sample, _: float) -> None:
+        # Without an attachment it is what a cohort has left.
+        if sample.attachment:
+            message = decode_pheromone(sample.payload)
+            levels = -(-message.levels.astype(np.int16) * FIELD_LEVELS // 255)
+            self.field = OccupancyGrid(message.geometry, levels.astype(np.int8), message.frame)
 
     def _read_status(self, sample: Sample, now: float) -> None:
         status = decode_document(sample.payload, Status)

@@ -127,6 +127,45 @@ def _least_and_most(cells: NDArray[np.int8]) -> tuple[int, int]:
     return cells.item(cells.argmin()), cells.item(cells.argmax())
 
 
+# Values of a grid of directions: so many for each direction.
+DIRECTION_VALUES = 25
+
+
+def directions_grid(
+    window: Window,
+    cell_m: float,
+    pointed: NDArray[np.int8],
+    share: NDArray[np.float32],
+    frame: str = "map",
+    stamp_ns: int = 0,
+) -> OccupancyGrid:
+    """Return where a trail points to, to be sent by ``encode_occupancy_grid``.
+
+    Args:
+        window: which cells of the lattice.
+        cell_m: edge of a cell [m].
+        pointed: int8 (rows, cols), direction 0..3 of the strongest step, -1 for none.
+        share: float32 (rows, cols), its share of the cell's pheromone, 0 to 1.
+        frame: name of the map frame.
+        stamp_ns: time of the trail [ns].
+    """
+    steps = np.rint(share * (DIRECTION_VALUES - 1)).astype(np.int8)
+    values = np.where(pointed < 0, np.int8(UNKNOWN), pointed * np.int8(DIRECTION_VALUES) + steps)
+    return OccupancyGrid(GridGeometry.of_cells(window, cell_m), values, frame, stamp_ns)
+
+
+def directions_of(grid: OccupancyGrid) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
+    """Return the directions, int8, and shares, float32 (rows, cols), in a grid of directions.
+
+    Where there is no step, or a value that stands for none, they are -1 and 0.
+    """
+    values = grid.cells
+    is_step = (values >= 0) & (values < 4 * DIRECTION_VALUES)
+    pointed = np.where(is_step, values // np.int8(DIRECTION_VALUES), np.int8(-1))
+    share = np.where(is_step, values % np.int8(DIRECTION_VALUES), 0) / (DIRECTION_VALUES - 1)
+    return pointed, share.astype(np.float32)
+
+
 def coverage_grid(
     window: Window,
     cell_m: float,

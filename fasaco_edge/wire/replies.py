@@ -28,7 +28,7 @@ class Point(Document, frozen=True):
 
 
 class CoverageReport(Document, frozen=True):
-    """How many cells are covered.
+    """How many cells are covered; areas are of cells, of floor see FloorReport.
 
     Attributes:
         coverable: cells that are coverable and that the robot can reach.
@@ -49,6 +49,35 @@ class CoverageReport(Document, frozen=True):
     to_cover_m2: Amount = 0.0
     free_out_of_reach_m2: Amount = 0.0
     fraction: Annotated[float, allowed(minimum=0, maximum=1)] = 0.0
+
+
+class FloorLeft(Document, frozen=True):
+    """Reachable floor that is not swept, for one reason."""
+
+    m2: Amount = 0.0
+    reason: str = ""
+
+
+class FloorReport(Document, frozen=True):
+    """How much floor is swept, by what the tool passed over and not by cells.
+
+    Attributes:
+        swept_m2: floor that the tool has passed over, within reach now or not.
+        reachable_m2: floor that the tool can reach and is asked to sweep, as far as that is known;
+            null where the robot drives through the middles of cells.
+        left: what of that is not swept, and why, the largest first; null where that is not known.
+    """
+
+    swept_m2: Amount = 0.0
+    reachable_m2: Amount | None = None
+    left: Annotated[tuple[FloorLeft, ...], allowed(maxItems=20)] | None = None
+
+    @property
+    def reached_m2(self) -> float | None:
+        """What of the reachable floor is swept [m2]; None where that is not known."""
+        if self.reachable_m2 is None or self.left is None:
+            return None
+        return max(self.reachable_m2 - sum(left.m2 for left in self.left), 0.0)
 
 
 class ZoneReport(Document, frozen=True):
@@ -127,6 +156,7 @@ class Reply(Document, frozen=True):
     state: State = ""
     reason: str = ""
     coverage: CoverageReport | None = None
+    floor: FloorReport | None = None
     mission: MissionReport = MissionReport()
 
 

@@ -6,24 +6,19 @@ default, so that a reader takes a document of another version (``json_text.decod
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Final, Self
+from typing import Annotated, Final
 
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from fasaco_edge.wire.json_text import Amount, Count, Document, Name, Ordinal, allowed, tolerant
-from fasaco_edge.wire.replies import CoverageReport, MissionReport, Point, State
-
-if TYPE_CHECKING:
-    from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.wire.json_text import Amount, Count, Document, Name, Ordinal, allowed
+from fasaco_edge.wire.path_documents import PathReport
+from fasaco_edge.wire.replies import CoverageReport, FloorReport, MissionReport, Point, State
+from fasaco_edge.wire.settings import Settings
 
 RECORDER_STATES: Final = ("recording", "disk full", "stalled", "stopping")
 SUPERVISED_STATES: Final = ("starting", *RECORDER_STATES, "silent", "restarting")
 CLAIMS: Final = ("looks", "waits", "yields", "plans")
-
-
-Settings = dict[str, object]
-"""The configuration in force, without secrets, by sections."""
 
 
 class ClaimReport(Document, frozen=True):
@@ -66,101 +61,6 @@ class PoseReport(Point, frozen=True):
     """
 
     yaw: float = 0.0
-
-
-class PlanFigures(Document, frozen=True):
-    """The plan that a path follows, as it was made; all null without one.
-
-    Attributes:
-        planner: name of the planner.
-        seed: of all random streams.
-        ants: ants that walked.
-        kicks: perturbations of the local search.
-        proposals: moves that the local search tried.
-        planned_steps: steps of the plan as it was made.
-        planned_cost_s: seconds the plan takes, by configured speed and turn time.
-        lower_bound_steps: no walk has fewer steps.
-        gap: planned_steps / lower_bound_steps - 1.
-    """
-
-    planner: str | None = None
-    seed: Count | None = None
-    ants: Count | None = None
-    kicks: Count | None = None
-    proposals: Count | None = None
-    planned_steps: Count | None = None
-    planned_cost_s: Amount | None = None
-    lower_bound_steps: Ordinal | None = None
-    gap: float | None = None
-
-    @classmethod
-    def of(cls, plan: CoveragePath | None) -> Self:
-        """Return what is known of the plan a path follows."""
-        if plan is None:
-            return cls()
-        return cls(
-            planner=plan.planner,
-            seed=plan.seed,
-            ants=plan.work.ants,
-            kicks=plan.work.perturbations,
-            proposals=plan.work.proposals,
-            planned_steps=plan.steps,
-            planned_cost_s=round(plan.cost_s, 3),
-            lower_bound_steps=plan.lower_bound_steps or None,
-            gap=None if plan.gap is None else round(plan.gap, 6),
-        )
-
-
-class PathReport(PlanFigures, frozen=True):
-    """The path being driven.
-
-    Attributes:
-        revision: counts the published paths.
-        steps: as published.
-        remaining_steps: still to be driven.
-        reason: why it replaced the one before.
-    """
-
-    revision: Ordinal = 1
-    steps: Count = 0
-    remaining_steps: Count = 0
-    reason: str = ""
-
-
-class Rectangle(Document, frozen=True):
-    """A rectangle along the axes.
-
-    Attributes:
-        x_min, y_min, x_max, y_max: [m] in the frame of the map.
-    """
-
-    x_min: float
-    y_min: float
-    x_max: float
-    y_max: float
-
-
-class PathAttachment(PlanFigures, frozen=True):
-    """What comes with each path, as its Zenoh attachment.
-
-    Attributes:
-        revision: counts the published paths.
-        map_stamp_ns: stamp of the map it was planned on [ns].
-        map_revision: revision of that map, as in the status.
-        reason: why it replaces the one before.
-        steps: steps from pose to pose.
-        plan_ms: how long planning took; 0 where no plan was needed.
-        changed: rectangle of the map whose cells came, went or have other neighbours; null where
-            that is not the reason.
-    """
-
-    revision: Ordinal = 0
-    map_stamp_ns: int = 0
-    map_revision: Ordinal = 0
-    reason: Name = ""
-    steps: Count = 0
-    plan_ms: Amount = 0.0
-    changed: Rectangle | None = None
 
 
 class PlanCounts(Document, frozen=True):
@@ -316,6 +216,7 @@ class Status(Document, frozen=True):
     map: MapReport | None = None
     pose: PoseReport | None = None
     coverage: CoverageReport | None = None
+    floor: FloorReport | None = None
     path: PathReport | None = None
     plan: PlanCounts = PlanCounts()
     latency_ms: Latencies = Latencies()
@@ -330,57 +231,3 @@ class Status(Document, frozen=True):
         default_factory=dict
     )
     mission: MissionReport = MissionReport()
-
-
-class RobotSettings(Document, frozen=True):
-    """The robot's size, and the cell's [m]; 0 where not sent."""
-
-    radius_m: float = 0.0
-    tool_width_m: float = 0.0
-
-
-class MapSettings(Document, frozen=True):
-    """What is free and what is occupied [percent]."""
-
-    free_at_most: int | None = None
-    occupied_at_least: int | None = None
-
-
-class PoseSettings(Document, frozen=True):
-    """The type of poses whose sender names none."""
-
-    schema: str = ""
-
-
-class MissionSettings(Document, frozen=True):
-    """How long the mission goes on without a pose [s]."""
-
-    lost_pose_s: float = 0.0
-
-
-class Frames(Document, frozen=True):
-    """Names of the frames of map and robot."""
-
-    map: str = ""
-    robot: str = ""
-
-
-class RosSettings(Document, frozen=True):
-    """What poses as transforms are read by."""
-
-    frames: Frames | None = None
-
-
-class KnownSettings(Document, frozen=True):
-    """The settings of a daemon that its readers use."""
-
-    robot: RobotSettings = RobotSettings()
-    map: MapSettings = MapSettings()
-    pose: PoseSettings = PoseSettings()
-    mission: MissionSettings = MissionSettings()
-    ros2: RosSettings = RosSettings()
-
-
-def known_settings(config: Settings) -> KnownSettings:
-    """Return the settings of a status that readers use; what does not fit keeps its default."""
-    return tolerant(config, KnownSettings)

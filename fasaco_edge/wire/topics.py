@@ -260,14 +260,38 @@ COVERAGE = Topic(
     queues=Queues(recorder=NEWEST, watch=NEWEST),
     limits=("max_grid_cells",),
 )
+FLOOR = Topic(
+    name="floor",
+    direction="out",
+    when="floor was swept, every two seconds at most, and only while someone listens",
+    speaker="robot",
+    listeners=("viewer",),
+    schemas=(schemas.OCCUPANCY_GRID,),
+    qos=Qos("data_low", why="for display: whoever comes late gets it within two seconds"),
+    queues=Queues(recorder=NEWEST),
+    limits=("max_grid_cells",),
+)
 PHEROMONE = Topic(
     name="pheromone",
     direction="out",
-    when="a cohort has walked, and only while someone listens",
+    when="the trail has changed, twice a second at most, or a cohort has walked; only while "
+    "someone listens",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.PHEROMONE_GRID,),
-    qos=Qos("background", "best_effort", why="for display: never before a path"),
+    attachment="trail_attachment.json",
+    qos=Qos("background", cache=1, why="for display: never before a path"),
+    queues=Queues(recorder=NEWEST, watch=NEWEST),
+    limits=("max_grid_cells",),
+)
+DIRECTIONS = Topic(
+    name="directions",
+    direction="out",
+    when="with each field of the living trail, only while someone listens",
+    speaker="robot",
+    listeners=("viewer",),
+    schemas=(schemas.OCCUPANCY_GRID,),
+    qos=Qos("background", cache=1, why="as the pheromone"),
     queues=Queues(recorder=NEWEST),
     limits=("max_grid_cells",),
 )
@@ -350,7 +374,7 @@ RECORDER_ALIVE = Topic(
 # there, that subscriber receives everything else, too.
 TOPICS = (
     *(MAP, MAP_UPDATE, POSE),
-    *(PATH, COVERAGE, PHEROMONE, STATUS, COMMAND, TURNS, ALIVE, CLAIM),
+    *(PATH, COVERAGE, FLOOR, PHEROMONE, DIRECTIONS, STATUS, COMMAND, TURNS, ALIVE, CLAIM),
     *(RECORDER, RECORDER_ALIVE),
 )
 QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}

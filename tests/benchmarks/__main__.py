@@ -14,15 +14,19 @@ from fasaco_edge.bench.benchmark import Benchmark
 from fasaco_edge.cli import run_command
 from fasaco_edge.cli.bench import EPILOG, add_benchmarks
 from tests.benchmarks.codec import CODEC
+from tests.benchmarks.floor import FLOOR
+from tests.benchmarks.full import FULL
 from tests.benchmarks.ingest import INGEST
 from tests.benchmarks.online.benchmark import ONLINE
 from tests.benchmarks.quality.benchmark import QUALITY
+from tests.benchmarks.replan import REPLAN
 from tests.benchmarks.scale.benchmark import SCALE
 from tests.benchmarks.table1.benchmark import TABLE1
+from tests.benchmarks.turns.benchmark import TURNS
 from tests.benchmarks.twins import TWINS
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    TABLE1, QUALITY, ONLINE, SCALE, CODEC, INGEST, TWINS,
+    TABLE1, QUALITY, TURNS, FLOOR, REPLAN, FULL, ONLINE, SCALE, CODEC, INGEST, TWINS,
 )  # fmt: skip
 
 

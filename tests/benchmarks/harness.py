@@ -9,9 +9,10 @@ import numpy as np
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.near_optimal import ANTS, NearOptimal
+from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.search import ANTS
 from tests.benchmarks.judge import WalkVerdict, check_walk
 
 
@@ -48,6 +49,8 @@ def judged(problem: CoverageProblem, path: CoveragePath) -> WalkVerdict:
         wrong.append(f"costs {cost_us / 1e6} s, said to cost {path.cost_s} s")
     if verdict.steps < path.lower_bound_steps:
         wrong.append(f"{verdict.steps} steps are below the bound of {path.lower_bound_steps}")
+    if cost_us < round(path.lower_bound_cost_s * 1e6):
+        wrong.append(f"costs {cost_us / 1e6} s, below the bound of {path.lower_bound_cost_s} s")
     if wrong:
         raise WrongWalkError(
             f"{path.planner}, seed {path.seed}, from {problem.start}: {'; '.join(wrong)}"

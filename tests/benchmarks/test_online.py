@@ -18,8 +18,9 @@ from tests.benchmarks.online.cases import CASES
 from tests.benchmarks.online.figures import Summary, goals
 from tests.benchmarks.online.judge import judged
 from tests.benchmarks.online.mission import Conditions, CountedPlanning, OnlineMission, Watch
+from tests.benchmarks.online.report import report
 from tests.benchmarks.online.robot import Pace, Robot
-from tests.benchmarks.online.runs import OnlinePlan, measure
+from tests.benchmarks.online.runs import OnlinePlan, count, measure
 from tests.benchmarks.online.sight import Senses, Sight
 
 CELL_M = 0.3
@@ -329,6 +330,24 @@ def test_a_loop_closure_moves_the_pose_with_the_map():
     assert moved.geometry.to_pixels(after.x, after.y) == pytest.approx(
         value.geometry.to_pixels(before.x, before.y)
     )
+
+
+def test_every_planner_has_a_row_and_the_first_the_figures(tmp_path):
+    file = tmp_path / "room.npy"
+    np.save(file, np.ones((5, 9), bool))
+    names = ("fasaco", "fasaco-anew", "zigzag")
+    plan = plan_of(choice=BuildingChoice((str(file),), 0, 0, 0), ranges_m=(0.7,), planners=names)
+    runs = list(measure(plan, lambda _: None))
+    assert len(runs) == count(plan) == 3
+    assert [run.planner for run in runs] == list(names)
+    assert all(run.covered_all for run in runs)
+    told = report(0.0, with_turns=False, about={}, runs=runs)
+    assert told.figures["missions"] == 1
+    assert list(told.figures["planners"]) == list(names)
+    steps = [one["steps_ratio_median"] for one in told.figures["planners"].values()]
+    assert steps == pytest.approx([run.steps_ratio for run in runs])
+    (*_, table) = told.tables
+    assert [row[0] for row in table.rows] == list(names)
 
 
 def test_nowhere_to_go(tmp_path):

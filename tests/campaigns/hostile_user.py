@@ -28,7 +28,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fasaco_edge.bench.processes import warm_kernels
-from fasaco_edge.kernels.jit import CACHE_FOLDER
+from fasaco_edge.kernels.cache import own_folder
 from tests.campaigns.trap import NOBODY, Trap
 from tests.deploy import installed, lab, releases
 from tests.deploy.installing import Robot, bare_robot
@@ -71,7 +71,7 @@ class Campaign:
         program.write_text(PROGRAM.format(python=sys.executable))
         program.chmod(0o755)
         self.program = str(program)
-        self.own_cache = {"NUMBA_CACHE_DIR": str(Path(CACHE_FOLDER).parent)}
+        self.own_cache = {"NUMBA_CACHE_DIR": str(own_folder().parent)}
 
     @contextmanager
     def judged(self, what: str) -> Iterator[None]:
@@ -248,7 +248,7 @@ def try_scripts(campaign: Campaign) -> None:
     place.mkdir()
     with bare_robot(place, folders) as robot:
         # In the lab's own folder: what is bound into it is read-only.
-        trap = Trap(Path(f"{robot.root}{shown}"), Path(CACHE_FOLDER))
+        trap = Trap(Path(f"{robot.root}{shown}"), own_folder())
         inside = {
             name: value.replace(str(robot.root), "") for name, value in trap.environment.items()
         }
@@ -348,7 +348,7 @@ def run_campaign(folder: Path, say: Callable[[str], None], *, short: bool) -> Ca
     place = folder / "trap"
     own = folder / "own"
     own.mkdir(mode=0o700)
-    campaign = Campaign(own, Trap(place, Path(CACHE_FOLDER)), not short, say)
+    campaign = Campaign(own, Trap(place, own_folder()), not short, say)
     try_alone(campaign)
     try_together(campaign)
     try_scripts_dry(campaign)

@@ -39,7 +39,7 @@ from tests.support.rooms import begin, drive, lanes
 DRIVEN, MESSAGES = 6, 60
 # To compile all kernels takes a minute; on a busy computer, many.
 COMPILE_S = 900.0
-STATE, RECORDINGS, CACHE = "state", "recordings", "cache"
+STATE, RECORDINGS, CACHE, TEMPORARY = "state", "recordings", "cache", "tmp"
 
 Completed = subprocess.CompletedProcess[str]
 
@@ -77,7 +77,11 @@ def _lay_ledgers(folder: Path) -> None:
 
 
 def _lay_config(folder: Path) -> None:
-    sections = {"bus": {"listen": [free_endpoint()]}, "mission": {"lost_pose_s": 0.0}}
+    sections = {
+        "bus": {"listen": [free_endpoint()]},
+        "mission": {"lost_pose_s": 0.0},
+        "planner": {"line": "cells"},  # what was driven is known by its cells
+    }
     (folder / "etc").mkdir()
     (folder / "etc" / "config.yaml").write_text(yaml.safe_dump(sections))
 
@@ -217,6 +221,7 @@ def _recordings_read(folder: Path, is_told: bool) -> None:
 def _lay_cache(folder: Path) -> None:
     """Copy a complete cache, all but a few kernels and the note that it is complete."""
     compiled = _compiled_kernels()
+    _kernel_names()
     copied = folder / CACHE / compiled.name
     shutil.copytree(compiled, copied)
     for start in TO_COMPILE:
@@ -225,11 +230,16 @@ def _lay_cache(folder: Path) -> None:
             raise WrongError(f"no kernel is named {start} any more: see TO_COMPILE")
         for file in gone:
             file.unlink()
+    # Whoever may not use that folder has this one, and need not compile for minutes.
+    (folder / TEMPORARY).mkdir()
+    (folder / TEMPORARY).chmod(0o1777)
+    shutil.copytree(compiled, folder / TEMPORARY / f"fasaco-edge-{os.geteuid()}-{compiled.name}")
 
 
 def _lay_empty_cache(folder: Path) -> None:
-    _compiled_kernels()  # to compare with
-    (folder / CACHE).mkdir()
+    _kernel_names()
+    for name in (CACHE, TEMPORARY):
+        (folder / name).mkdir()
 
 
 @functools.cache
@@ -240,13 +250,20 @@ def _compiled_kernels() -> Path:
     return Path(json.loads(told.stdout)["folder"])
 
 
+@functools.cache
+def _kernel_names() -> frozenset[str]:
+    """Return the files of all kernels, before a test compiles some for types of its own."""
+    return frozenset(name for name in os.listdir(_compiled_kernels()) if PARTIAL not in name)
+
+
 def _warm_up(folder: Path, environment: dict[str, str]) -> tuple[int | None, str]:
-    done = _command(folder, environment, "warmup")
+    done = _command(folder, environment, "warmup", "--jobs", "1")
     return done.returncode, done.stderr
 
 
 def _command(folder: Path, environment: dict[str, str], *words: str) -> Completed:
-    environment = ENVIRONMENT | {"NUMBA_CACHE_DIR": str(folder / CACHE)} | environment
+    places = {"NUMBA_CACHE_DIR": str(folder / CACHE), "TMPDIR": str(folder / TEMPORARY)}
+    environment = ENVIRONMENT | places | environment
     try:
         return subprocess.run(
             [*PROGRAM, *words],
@@ -263,7 +280,7 @@ def _command(folder: Path, environment: dict[str, str], *words: str) -> Complete
 def _is_warm(folder: Path, is_told: bool) -> None:
     """Check that the kernels are there, or were said not to be and are with the next try."""
     if is_told:
-        again = _command(folder, {}, "warmup")
+        again = _command(folder, {}, "warmup", "--jobs", "1")
         if again.returncode != 0:
             raise WrongError(f"the next try ends with {again.returncode}: {again.stderr[-600:]}")
     check = _command(folder, {}, "warmup", "--check")
@@ -271,7 +288,7 @@ def _is_warm(folder: Path, is_told: bool) -> None:
         raise WrongError(f"not ready: {check.stderr[-600:]}")
     compiled = _compiled_kernels()
     left = set(os.listdir(folder / CACHE / compiled.name))
-    if gone := {name for name in os.listdir(compiled) if PARTIAL not in name} - left:
+    if gone := _kernel_names() - left:
         raise WrongError(f"said to be ready, without {sorted(gone)}")
     if begun := [name for name in left if PARTIAL in name]:
         raise WrongError(f"left behind: {sorted(begun)}")

@@ -153,6 +153,8 @@ def run_flood(
 ) -> Row:
     """Run a daemon on a small map, pour, and see what has become of it."""
     program = (*group.program, *PROGRAM) if group else PROGRAM
+    # Other tests count cells; what the unit has room for is the default.
+    config = {"planner": {"line": DaemonConfig().planner.line}} | config
     processes.PROGRAM = program
     try:
         with daemon_process(folder, **config) as daemon, Outsider(daemon.endpoint) as outsider:

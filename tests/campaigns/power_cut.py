@@ -128,7 +128,11 @@ def _run(folder: Path, connect: str, *words: str) -> list[str]:
     """Return the words that start a daemon without a listener of its own."""
     config = folder / "config.yaml"
     bus = {"mode": "client", "listen": [], "connect": [connect]} if connect else {}
-    sections = {"bus": bus or {"listen": [free_endpoint()]}, "mission": {"lost_pose_s": 0.0}}
+    sections = {
+        "bus": bus or {"listen": [free_endpoint()]},
+        "mission": {"lost_pose_s": 0.0},
+        "planner": {"line": "cells"},  # what was driven is known by its cells
+    }
     config.write_text(yaml.safe_dump(sections))
     return ["run", "--config", str(config), *words]
 
@@ -261,7 +265,7 @@ def watched_first_start(folder: Path) -> Trace:
     root = folder / "computer"
     root.mkdir()
     with Watch([root], is_logged=True) as watch:
-        _warm_up(root / CACHE, watch.environment)
+        _warm_up(root / CACHE, watch.environment, "--jobs", "1")
         return Trace(root, watch.calls(), {}, set())
 
 

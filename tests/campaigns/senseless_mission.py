@@ -273,6 +273,11 @@ class MissionTrial:
         _hold(set(again.tiles) == set(snapshot.tiles), "tiles")
         for place, tile in snapshot.tiles.items():
             _hold(bool((again.tiles[place] == tile).all()), f"tile {place}")
+        floor, floor_again = snapshot.floor.tiles, again.floor.tiles
+        _hold(set(floor_again) == set(floor), "tiles of floor")
+        for place, swept in floor.items():
+            _hold(bool((floor_again[place] == swept).all()), f"tile of floor {place}")
+        _hold(snapshot.floor.pixels == self._mission.floor.pixels, "swept pixels")
         _hold(OrderState.from_json(again.note).to_json() == snapshot.note, "note")
         self.counts["ledgers read again"] += 1
         self.counts["largest ledger [tiles]"] = max(

@@ -6,7 +6,9 @@ import pytest
 
 pytest.importorskip("rerun")
 
+from fasaco_edge.kernels.cache import own_folder
 from tests.campaigns import hostile_user
+from tests.campaigns.trap import Trap
 
 
 @pytest.mark.timeout(600)
@@ -17,3 +19,14 @@ def test_nothing_that_another_user_has_prepared_is_loaded_or_written_through(tmp
     campaign = hostile_user.run_campaign(folder, print, short=True)
     assert campaign.violations == []
     assert campaign.counted["runs"] >= 20
+
+
+@pytest.mark.skipif(bool(hostile_user.why_not()), reason=hostile_user.why_not())
+def test_a_trap_tells_what_was_laid_out_from_what_a_neighbour_of_ours_wrote(tmp_path_factory):
+    trap = Trap(tmp_path_factory.mktemp("hostile") / "trap", own_folder())
+    ours, theirs = trap.state / "run00004.rrd", trap.work / "json.py"
+    ours.write_bytes(b"recorded by another process of ours")
+    with trap.watched() as opened:
+        ours.read_bytes()
+        theirs.read_bytes()
+    assert opened == {theirs}

@@ -10,7 +10,7 @@ import pytest
 
 from tests.campaigns.file_calls import Failure, Kind, Watch, why_not
 from tests.campaigns.io_faults import failures_of, outcome_of
-from tests.support.processes import ENVIRONMENT
+from tests.support.processes import ENVIRONMENT, PROGRAM
 
 pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not())
 
@@ -107,3 +107,16 @@ def test_a_part_whose_end_the_disk_does_not_take_is_told(tmp_path, at):
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
         assert bool(watch.failed_on()) == (at is not None)
     assert done.stdout == ("run-part1.rrd: the disk did not take its end\n" if at else "")
+
+
+@pytest.mark.parametrize(
+    "failure", [f"look:{at}:{error}+" for at in (1, 2, 3) for error in ("EIO", "EACCES")]
+)
+def test_kernels_are_looked_for_in_a_folder_that_the_disk_does_not_show(tmp_path, failure):
+    with Watch([tmp_path], Failure.of_text(failure)) as watch:
+        environment = ENVIRONMENT | {"NUMBA_CACHE_DIR": str(tmp_path)} | watch.environment
+        command = [*PROGRAM, "warmup", "--check"]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert watch.failed_on()
+    assert "Traceback" not in done.stderr
+    assert done.stderr.startswith(("kernels not ready: ", str(tmp_path)))

@@ -183,12 +183,13 @@ class Trap:
         libc = ctypes.CDLL(None, use_errno=True)
         queue = libc.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC)
         assert queue >= 0, os.strerror(ctypes.get_errno())
-        folders = {}
-        for folder, _, _ in os.walk(self.place):
+        folders, theirs = {}, set()
+        for folder, _, files in os.walk(self.place):
+            paths = [Path(folder, name) for name in files]
+            theirs.update(path for path in paths if _is_theirs(path))
             number = libc.inotify_add_watch(queue, os.fsencode(folder), IN_OPEN)
             assert number >= 0, os.strerror(ctypes.get_errno())
             folders[number] = Path(folder)
-        theirs = {Path(folder, name) for folder, _, files in os.walk(self.place) for name in files}
         opened: set[Path] = set()
         try:
             yield opened
@@ -201,10 +202,18 @@ class Trap:
                     at += EVENT.size + length
                     if not mask & IN_ISDIR:
                         opened.add(folders[number] / os.fsdecode(name))
-            # What a program has written there itself it may read again.
+            # What a program of ours has written there, it or one beside it may read again.
             opened.intersection_update(theirs)
         finally:
             os.close(queue)
+
+
+def _is_theirs(path: Path) -> bool:
+    """Return whether a file was laid out by the other user."""
+    try:
+        return path.lstat().st_uid == NOBODY
+    except FileNotFoundError:  # a program of ours has taken its own away meanwhile
+        return False
 
 
 def _read(queue: int) -> bytes:

@@ -57,7 +57,7 @@ def test_what_is_wrong_is_told(endpoint):
     assert ended.code == 1
     assert json.loads(ended.out)["code"] == "not_yet"
     assert "no trail of cohort 77" in ended.err
-    assert "\n  hint: leave cohort out" in ended.err
+    assert "\n  hint: ask for newest, 0, or leave cohort out" in ended.err
     ended = fasaco_edge("ask", "status", "--robot", "other", "--connect", endpoint)
     assert ended.code == 1
     assert "there are robot: give one as --robot" in ended.err

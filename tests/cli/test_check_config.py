@@ -127,6 +127,7 @@ def test_what_is_in_order_is_shown_as_it_is_in_force(check, capsys):
         "tool_width_m": 0.3,
         "speed_m_s": 0.25,
         "quarter_turn_s": 1.5,
+        "overlap": 0.08,
     }
     assert "secret" not in json.dumps(told["config"])
     assert main(["check-config", str(EXAMPLE), "--show"]) == 0

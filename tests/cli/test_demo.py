@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from fasaco_edge.grid.map_files import find_map, read_map
+from fasaco_edge.simulation.robot import SimulationConfig
 from tests.support.processes import fasaco_edge, is_running
 
 CELL_M, RADIUS_M = 0.3, 0.18
@@ -33,11 +34,11 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path):
     grid = read_map(find_map("office"))
     trail = np.loadtxt(out / "trail.csv", delimiter=",", skiprows=1)
     reachable = reachable_cells(grid, trail[0])
-    assert reachable - visited_cells(trail) == set()
-    assert summary["reachable_cells"] == summary["covered_cells"] == len(reachable)
-    # 27 % of the office lie beside the cells: cells are not the floor.
+    # The line leaves out what is not worth the way, and takes in what lies beside the middles.
+    assert len(reachable - visited_cells(trail)) < 0.05 * len(reachable)
+    assert summary["reachable_cells"] == summary["covered_cells"] > len(reachable)
     assert summary["reachable_m2"] == pytest.approx(40.9, abs=0.1)
-    assert 0.6 < summary["swept_m2"] / summary["reachable_m2"] < 0.8
+    assert summary["swept_m2"] / summary["reachable_m2"] > 0.93
     driven = sum(math.dist(a, b) for a, b in pairwise(trail))
     assert summary["driven_m"] == pytest.approx(driven, abs=0.1)
     check_clearance(grid, trail)
@@ -132,5 +133,10 @@ def visited_cells(trail):
 
 
 def check_clearance(grid, trail):
-    """Check that the robot touched nothing."""
-    assert clearance(grid, trail[:: max(1, len(trail) // 500)]).min() > RADIUS_M - 0.01
+    """Check that the robot touched nothing.
+
+    The line is as far from everything as the radius; the robot joins a new one by the straight way
+    if its hull, which is narrower by the padding, can.
+    """
+    hull_m = RADIUS_M - SimulationConfig().padding_m
+    assert clearance(grid, trail[:: max(1, len(trail) // 500)]).min() > hull_m - 1e-3

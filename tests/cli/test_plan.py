@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import deque
 from itertools import pairwise
 
@@ -31,13 +32,22 @@ KEYS = {
         "line",
         "tool_m",
         "cell_m",
+        "lattice_deg",
         "start",
         "end",
         "cells",
         "steps",
     ),
     *("revisits", "recovered_cells", "n_r_paper", "turns_90", "turns_180", "length_m"),
-    *("kicks", "proposals", "cost_s", "lower_bound_steps", "gap", "first_walk_ms"),
+    *(
+        "kicks",
+        "proposals",
+        "cost_s",
+        "lower_bound_steps",
+        "lower_bound_cost_s",
+        "gap",
+        "first_walk_ms",
+    ),
     *("unreachable_cells", "wall_s", "cpu_s", "ended_by"),
     *("speed_m_s", "turn_s", "budget_s", "target_gap", "threads", "floor"),
 }
@@ -122,7 +132,7 @@ def check(figures, walk, free, start, speed_m_s=0.25, turn_s=0.0):
     assert 0 <= figures["lower_bound_steps"] <= len(moves)
     assert figures["lower_bound_steps"] >= len(area) - 1
     if len(area) > 1:
-        gap = len(moves) / figures["lower_bound_steps"] - 1
+        gap = cost_s / figures["lower_bound_cost_s"] - 1
         assert figures["gap"] == pytest.approx(gap, abs=1e-6)
     assert figures["wall_s"] > 0
     assert figures["cpu_s"] > 0
@@ -211,6 +221,74 @@ def test_a_line_over_the_floor_sweeps_more_of_it(plan, tmp_path, origin):
     assert png.read_bytes().startswith(b"\x89PNG")
 
 
+def test_cells_lie_along_the_walls(plan, tmp_path):
+    pixels = pillared_room()
+    csv, png = tmp_path / "line.csv", tmp_path / "line.png"
+    level, askew = tmp_path / "level.yaml", tmp_path / "askew.yaml"
+    for file, yaw in ((level, 0.0), (askew, 0.4)):
+        geometry = GridGeometry(*pixels.shape, 0.05, Pose2D(0.0, 0.0, yaw))
+        write_map(OccupancyGrid(geometry, pixels), file)
+    start = (2.0 * math.cos(0.4) - 0.6 * math.sin(0.4), 2.0 * math.sin(0.4) + 0.6 * math.cos(0.4))
+    search = ("--line", "thorough", "--planner", "spiral-stc")
+    options = (*search, "--start-xy", f"{start[0]},{start[1]}", "--xy-out", csv)
+    expected, _ = plan(level, *search, "--start-xy", "2,0.6")
+    walls, _ = plan(askew, *options, "--png", png)
+    line = np.loadtxt(csv, delimiter=",", skiprows=1)
+    assert expected["lattice_deg"] == 0.0
+    assert walls["lattice_deg"] == pytest.approx(math.degrees(0.4), abs=1e-3)
+    # Seen from its walls it is the same room.
+    assert (walls["cells"], walls["steps"]) == (expected["cells"], expected["steps"])
+    for figure in ("reachable_m2", "swept_share", "seconds_per_m2"):
+        assert walls["floor"][figure] == pytest.approx(expected["floor"][figure], rel=0.03)
+    assert line[0] == pytest.approx(start, abs=0.2)
+    axes, _ = plan(askew, *options, "--align", "axes")
+    assert axes["lattice_deg"] == 0.0
+    assert walls["floor"]["seconds_per_m2"] < 0.95 * axes["floor"]["seconds_per_m2"]
+    asked, _ = plan(askew, *options, "--align", "-67.0817")
+    assert asked["lattice_deg"] == -67.082
+    assert asked["floor"]["seconds_per_m2"] == pytest.approx(
+        expected["floor"]["seconds_per_m2"], rel=0.05
+    )
+
+
+def test_where_cells_cannot_lie_along_the_walls_they_lie_along_the_axes(plan, tmp_path, capsys):
+    pixels, file = pillared_room(), tmp_path / "far.yaml"
+    # Nearly as far from 0 as can be; turned back by as much, its x would be larger by 0.4.
+    geometry = GridGeometry(*pixels.shape, 0.05, Pose2D(1.9e7, 1.9e7, 0.7))
+    write_map(OccupancyGrid(geometry, pixels), file)
+    figures, _ = plan(file, "--line", "quick")
+    assert figures["lattice_deg"] == 0.0
+    assert figures["floor"]["swept_share"] > 0.9
+    assert main(["plan", str(file), "--line", "quick", "--align", "40"]) == Exit.ERROR
+    assert "reaches beyond 20000000 m" in capsys.readouterr().err
+
+
+def test_an_end_is_named_as_a_start_is(plan, tmp_path, capsys):
+    pixels = pillared_room()
+    file, csv = tmp_path / "room.yaml", tmp_path / "line.csv"
+    write_map(OccupancyGrid(GridGeometry(*pixels.shape, 0.05, Pose2D(0.0, 0.0, 0.4)), pixels), file)
+    # The cell of the plain lattice at (2.9, 3.1) m, wherever the cells of the line lie.
+    plan(file, "--line", "quick", "--end", "10,9", "--xy-out", csv)
+    line = np.loadtxt(csv, delimiter=",", skiprows=1)
+    assert line[-1] == pytest.approx((2.85, 3.15), abs=0.25)
+    assert main(["plan", str(file), "--line", "quick", "--end", "0,30"]) == Exit.ERROR
+    assert "end cell (0, 30)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("align", ["wall", "nan", "361", "1,2"])
+def test_cells_lie_along_walls_or_axes_or_at_an_angle(capsys, align):
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", "office", "--line", "quick", f"--align={align}"])
+    assert ended.value.code == 2
+    assert "must be walls, axes or an angle" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("align", ["walls", "30"])
+def test_the_centres_of_cells_lie_along_the_axes(capsys, align):
+    assert main(["plan", "office", "--align", align]) == Exit.CONFIG
+    assert "--line thorough" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("overlap", ["0.9", "-0.1", "nan"])
 def test_an_overlap_is_a_share_of_the_tool(capsys, overlap):
     assert main(["plan", "office", "--line", "quick", f"--overlap={overlap}"]) == Exit.CONFIG
@@ -296,7 +374,10 @@ def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
     assert figures["ants"] < 1_000_000
     assert figures["ended_by"] == "budget"
     assert figures["wall_s"] < 300
-    # Turns at a price: no walk is proven to be the best, so only the clock ends the search.
+    # Pillars, and turns at a price: no walk is proven to be the best, so only the clock ends it.
+    pillars = np.ones((11, 13), bool)
+    pillars[2::3, 1::4] = False
+    np.save(grid_file, pillars)
     options = ("--ants", 1_000_000, "--budget", 1)
     figures, walk = plan(grid_file, *options, "--turn-s", 1)
     check(figures, walk, cells_in(grid_file), (0, 0), turn_s=1.0)

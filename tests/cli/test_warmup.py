@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 from fasaco_edge.kernels.cache import code_digest
 from tests.kernels.harm import zeroed
@@ -14,7 +16,7 @@ from tests.support.processes import ENVIRONMENT, fasaco_edge
 
 COUNT = """
 import importlib
-from fasaco_edge.kernels.cache import KERNEL_SOURCES, kernel_module
+from fasaco_edge.kernels.release import KERNEL_SOURCES, kernel_module
 from fasaco_edge.planners.warmup import warm_up
 warm_up()
 modules = [importlib.import_module(f"fasaco_edge.kernels.{kernel_module(file)}")
@@ -42,6 +44,33 @@ def test_what_is_ready_is_loaded_and_never_compiled():
         [sys.executable, "-c", COUNT], env=ENVIRONMENT, capture_output=True, text=True, check=True
     )
     assert counted.stdout == "0\n"
+
+
+def test_two_processes_compile_what_is_missing(tmp_path, monkeypatch):
+    complete = Path(json.loads(fasaco_edge("warmup", "--json").out)["folder"])
+    folder = tmp_path / complete.name
+    shutil.copytree(complete, folder)
+    # Of both ends; called from Python: who loads a kernel does not compile what that one calls.
+    names = ("lattice.areas.cells_beside", "lattice.polygons.count_in", "ants.colony.deposit")
+    missing = [file for name in names for file in folder.glob(f"{name}-*")]
+    for file in [*missing, *folder.glob("complete-*")]:
+        file.unlink()
+    monkeypatch.setitem(ENVIRONMENT, "NUMBA_CACHE_DIR", str(tmp_path))
+    told = json.loads(fasaco_edge("warmup", "--jobs", "2", "--json").out)
+    assert (told["ready"], told["folder"]) == (True, str(folder))
+    assert len(missing) >= len(names)
+    assert all(file.exists() for file in missing)
+
+
+def test_the_same_sources_make_the_same_code():
+    """The compiler names the code of an expression over whole arrays after an address."""
+    folder = Path(json.loads(fasaco_edge("warmup", "--json").out)["folder"])
+    named = [
+        file.name
+        for file in folder.glob("*.kernel")
+        if b"__numba_array_expr_0x" in file.read_bytes()
+    ]
+    assert named == [], "loop over the elements instead, or a release differs with each build"
 
 
 def test_a_check_compiles_nothing_and_makes_no_folder(tmp_path, monkeypatch):

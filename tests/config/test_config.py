@@ -90,6 +90,7 @@ def test_every_section_is_read(load):
         ("robot: {radius_m: true}", "robot.radius_m: expected float, got True"),
         ("robot: {radius_m: }", "robot.radius_m: expected float, got None"),
         ("robot: {tool_width_m: .inf}", "robot.tool_width_m: expected float <= 10.0, got inf"),
+        ("robot: {overlap: 0.9}", "robot.overlap: expected float <= 0.5, got 0.9"),
         ("robot: 3", "robot: expected object, got 3"),
         ("robot: {name: 3}", "robot.name: expected str, in quotes, got 3"),
         ("robot: {name: a/b}", "robot must be chunks of letters, digits, '_' and '-', got 'a/b'"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import tracemalloc
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,22 +14,36 @@ from hypothesis import strategies as st
 
 from fasaco_edge.daemon.ledger.codec import MOST_BYTES, decode_ledger, encode_ledger
 from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
-from fasaco_edge.mission.coverage.ledger import MOST_TILES
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR
+from fasaco_edge.mission.coverage.ledger import MOST_TILES, LedgerSnapshot
+from fasaco_edge.mission.coverage.swept_floor import MOST_FLOOR_TILES
+from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot
 from tests.support.ledgers import CELL_M, contents, driven, lane
 
 CELLS = st.tuples(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
 
 
-def enveloped(body: bytes, version: int = 1, magic: bytes = b"FASACOLG") -> bytes:
+def enveloped(body: bytes, version: int = 3, magic: bytes = b"FASACOLG") -> bytes:
     """Return a file by the letter of its description."""
     checksum = zlib.crc32(struct.pack("<IQ", version, len(body)) + body)
     return struct.pack("<8sIIQ", magic, version, checksum, len(body)) + body
 
 
+def trail_of(*values: float) -> TrailSnapshot:
+    """Return a trail of two cells, from cell (-7, 9) on."""
+    return TrailSnapshot(Window(-7, 9, -6, 11), np.array(values, np.float32).reshape(1, 2, 4))
+
+
+def all_of(ledger: LedgerSnapshot) -> object:
+    """Return all that a ledger holds, its trail to the last bit."""
+    return contents(ledger), ledger.trail.window, ledger.trail.tau.tobytes()
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     st.lists(st.one_of(CELLS, st.tuples(st.integers(-3, 3), st.integers(-70, 70))), max_size=30),
-    st.sampled_from([0.3, 0.1 + 0.2, 1e-3, 10.0]),
+    st.sampled_from([0.3, 0.1 + 0.2, 1e-3, 1.0]),
     st.text(max_size=20).filter(str.isprintable),
 )
 def test_what_is_written_is_read(cells, cell_m, frame):
@@ -43,19 +58,70 @@ def test_an_empty_ledger_is_a_ledger():
 def test_the_bytes_are_as_described():
     tile = np.zeros((64, 64), "<u2")
     tile[63, 5] = 1
-    plain = struct.pack("<dQIII", 0.3, 1, 3, 1, 1) + b"map"
+    # The tool's disc, on pixels of 2.5 cm; its middle is at x = 1.65 m, y = -0.15 m.
+    rows, cols = np.mgrid[-128:0, 0:128] + 0.5
+    swept = np.hypot(0.025 * cols - 1.65, 0.025 * rows + 0.15) <= 0.15
+    plain = struct.pack("<dQIIIIII", 0.3, 1, 3, 1, 1, 1, 1, 2) + b"map"
     plain += struct.pack("<qq", -1, 5) + struct.pack("<qq", -1, 0) + tile.tobytes()
-    ledger = driven((-1, 5))
-    assert contents(decode_ledger(enveloped(zlib.compress(plain)), CELL_M)) == contents(ledger)
+    plain += struct.pack("<qq", -1, 0) + np.packbits(swept, axis=1).tobytes()
+    plain += struct.pack("<qq", -7, 9)
+    plain += bytes.fromhex("3d00003f3d003f00") + bytes.fromhex("cd000080cd008000")
+    ledger = replace(driven((-1, 5)), trail=trail_of(0.1, 0, 0, 1.0, 0.1, 0, 1.0, 0))
+    read = decode_ledger(enveloped(zlib.compress(plain)), CELL_M)
+    # 0.1 is 0x3dcccccd as float32: its first half is rounded up.
+    rounded = trail_of(0.10009765625, 0, 0, 1.0, 0.10009765625, 0, 1.0, 0)
+    assert all_of(read) == all_of(replace(ledger, trail=rounded))
     payload = encode_ledger(ledger)
     assert payload == enveloped(payload[24:])
     assert zlib.decompress(payload[24:]) == plain
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(1e-12, 1e6), min_size=8, max_size=8))
+def test_a_trail_is_kept_to_a_share_of_itself_and_then_as_it_is(values):
+    ledger = replace(lane(3), trail=trail_of(*values))
+    read = decode_ledger(encode_ledger(ledger), CELL_M)
+    np.testing.assert_allclose(read.trail.tau, ledger.trail.tau, rtol=0.004)
+    assert all_of(decode_ledger(encode_ledger(read), CELL_M)) == all_of(read)
+
+
+def test_a_ledger_without_a_trail_is_read_with_none():
+    plain = struct.pack("<dQIIII", 0.3, 0, 3, 0, 0, 0) + b"map" + b"{}"
+    ledger = decode_ledger(enveloped(zlib.compress(plain), version=2), CELL_M)
+    assert ledger.trail is NO_TRAIL
+    assert ledger.note == "{}"
+
+
+@pytest.mark.parametrize("value", ["ff80", "7f80", "7fc0", "bf80"])
+def test_impossible_pheromone_is_refused(value):
+    plain = struct.pack("<dQIIIIII", 0.3, 0, 3, 0, 0, 0, 1, 1) + b"map" + bytes(16)
+    plain += bytes.fromhex(value[:2]) * 4 + bytes.fromhex(value[2:]) * 4
+    with pytest.raises(LedgerFileError, match="pheromone below 0, or not finite"):
+        decode_ledger(enveloped(zlib.compress(plain)), CELL_M)
+
+
+def test_a_trail_larger_than_any_lattice_is_not_read():
+    plain = struct.pack("<dQIIIIII", 0.3, 0, 3, 0, 0, 0, 2**31, 2**31) + b"map" + bytes(16)
+    with pytest.raises(LedgerFileError, match="trail of 2147483648 x 2147483648 cells"):
+        decode_ledger(enveloped(zlib.compress(plain)), CELL_M)
+
+
+def test_a_ledger_of_the_version_before_is_read_with_no_floor_swept():
+    tile = np.zeros((64, 64), "<u2")
+    tile[63, 5] = 1
+    plain = struct.pack("<dQIII", 0.3, 1, 3, 1, 1) + b"map"
+    plain += struct.pack("<qq", -1, 5) + struct.pack("<qq", -1, 0) + tile.tobytes() + b"{}"
+    ledger = decode_ledger(enveloped(zlib.compress(plain), version=1), CELL_M)
+    assert contents(ledger) == contents(replace(driven((-1, 5)), floor=NO_FLOOR))
+    assert ledger.note == "{}"
+    assert not ledger.is_empty
+
+
 def test_what_is_read_cannot_be_changed():
-    (tile,) = decode_ledger(encode_ledger(lane(3)), CELL_M).tiles.values()
-    with pytest.raises(ValueError, match="read-only"):
-        tile[0, 0] = 9
+    ledger = decode_ledger(encode_ledger(lane(3)), CELL_M)
+    for tile in (*ledger.tiles.values(), *ledger.floor.tiles.values()):
+        with pytest.raises(ValueError, match="read-only"):
+            tile[0, 0] = 9
 
 
 def test_a_ledger_of_a_large_building_is_small():
@@ -63,7 +129,7 @@ def test_a_ledger_of_a_large_building_is_small():
     ledger = driven(*((row, col) for row in range(150) for col in range(150)))
     size = len(encode_ledger(ledger))
     print(f"{ledger.cells} cells: {size} bytes")
-    assert size < 8_000
+    assert size < 12_000
 
 
 def test_a_file_cut_at_any_byte_is_refused():
@@ -114,11 +180,13 @@ def test_a_body_that_is_none_is_refused_although_its_checksum_holds(body):
         decode_ledger(enveloped(body), CELL_M)
 
 
+@pytest.mark.parametrize("version", [1, 2, 3])
 @pytest.mark.parametrize("cell_m", [0.0, -0.3, float("nan"), float("inf")])
-def test_impossible_cells_are_refused(cell_m):
-    body = zlib.compress(struct.pack("<dQIII", cell_m, 0, 0, 0, 0))
-    with pytest.raises(LedgerFileError):
-        decode_ledger(enveloped(body), cell_m)
+def test_impossible_cells_are_refused(cell_m, version):
+    counts = (0,) * (3, 4, 6)[version - 1]
+    body = zlib.compress(struct.pack(f"<dQ{len(counts)}I", cell_m, 0, *counts) + bytes(16))
+    with pytest.raises(LedgerFileError, match="cells of"):
+        decode_ledger(enveloped(body, version), cell_m)
 
 
 def test_another_file_is_no_ledger():
@@ -128,9 +196,9 @@ def test_another_file_is_no_ledger():
 
 def test_another_version_is_named_with_what_to_do():
     with pytest.raises(
-        LedgerMismatchError, match="version 2, this release reads version 1"
+        LedgerMismatchError, match="version 4, this release reads versions 1 to 3"
     ) as told:
-        decode_ledger(enveloped(b"whatever it holds", version=2), CELL_M)
+        decode_ledger(enveloped(b"whatever it holds", version=4), CELL_M)
     assert "install the release that wrote it" in told.value.hint
     assert "give the file its name back" in told.value.hint
 
@@ -140,7 +208,8 @@ def test_other_cells_are_named_with_what_to_do():
         LedgerMismatchError, match=r"are 0\.3 m wide, the configuration's 0\.5"
     ) as t:
         decode_ledger(encode_ledger(lane(3)), 0.5)
-    assert "robot.tool_width_m to 0.3, and give the file its name back" in t.value.hint
+    assert "set robot.tool_width_m to 0.3 (and robot.overlap, planner.line" in t.value.hint
+    assert "give the file its name back" in t.value.hint
 
 
 def test_cells_that_differ_by_a_hair_are_told_apart():
@@ -148,24 +217,39 @@ def test_cells_that_differ_by_a_hair_are_told_apart():
         decode_ledger(encode_ledger(lane(3)), 0.1 + 0.2)
 
 
-def bomb(tiles):
+def bomb(tiles, floor):
     """A file whose tiles take a thousand times its size."""
-    head = struct.pack("<dQIII", CELL_M, 1, 3, 0, tiles) + b"map"
-    places = np.array([(0, number) for number in range(tiles)], "<i8").tobytes()
-    return enveloped(zlib.compress(head + places + bytes(8192 * tiles), 9))
+    head = struct.pack("<dQIIIIII", CELL_M, 1, 3, 0, tiles, floor, 0, 0) + b"map"
+    places = [np.array([(0, n) for n in range(count)], "<i8").tobytes() for count in (tiles, floor)]
+    plain = head + places[0] + bytes(8192 * tiles) + places[1] + bytes(2048 * floor + 16)
+    return enveloped(zlib.compress(plain, 9))
 
 
 def test_a_ledger_of_as_many_tiles_as_there_may_be_is_read():
-    assert len(decode_ledger(bomb(MOST_TILES), CELL_M).tiles) == MOST_TILES
+    ledger = decode_ledger(bomb(MOST_TILES, MOST_FLOOR_TILES), CELL_M)
+    assert (len(ledger.tiles), len(ledger.floor.tiles)) == (MOST_TILES, MOST_FLOOR_TILES)
 
 
-@pytest.mark.parametrize("tiles", [MOST_TILES + 1, MOST_TILES + 1000, 30_000])
-def test_what_would_take_too_much_memory_is_not_read(tiles):
-    payload = bomb(tiles)
+@pytest.mark.parametrize(
+    ("tiles", "floor"),
+    [(MOST_TILES + 1, 0), (MOST_TILES + 1000, 9), (30_000, 0), (0, MOST_FLOOR_TILES + 1)],
+)
+def test_what_would_take_too_much_memory_is_not_read(tiles, floor):
+    payload = bomb(tiles, floor)
     tracemalloc.start()
     try:
         with pytest.raises(LedgerFileError, match="malformed: "):
             decode_ledger(payload, CELL_M)
         assert tracemalloc.get_traced_memory()[1] < 3 * MOST_BYTES
+    finally:
+        tracemalloc.stop()
+
+
+def test_writing_the_largest_ledger_takes_no_more_memory_than_its_file():
+    ledger = decode_ledger(bomb(MOST_TILES, MOST_FLOOR_TILES), CELL_M)
+    tracemalloc.start()
+    try:
+        payload = encode_ledger(ledger)
+        assert tracemalloc.get_traced_memory()[1] < 4 * len(payload) + 2_000_000
     finally:
         tracemalloc.stop()

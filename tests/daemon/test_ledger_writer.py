@@ -17,20 +17,27 @@ from msgspec.structs import asdict
 from fasaco_edge.daemon.ledger import writer as ledger_writer
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
-from fasaco_edge.daemon.ledger.writer import LedgerWriter, open_ledger
+from fasaco_edge.daemon.ledger.writer import (
+    FLOOR_PERIOD_S,
+    PERIOD_S,
+    LedgerKeeper,
+    LedgerWriter,
+    open_ledger,
+)
 from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
+from tests.mission.world import CELL, Drive, MapReceived, building, pose_at
 from tests.support.ledgers import CELL_M, contents, lane
 
 DEADLINE_S = 60.0
 
 
-def on_disk(folder: Path) -> object:
+def on_disk(folder: Path, cell_m: float = CELL_M) -> object:
     """Return what the newest holds; changes nothing, as the writer may be at work."""
     try:
         payload = (folder / "robot.ledger").read_bytes()
     except FileNotFoundError:
         return None
-    return contents(decode_ledger(payload, CELL_M))
+    return contents(decode_ledger(payload, cell_m))
 
 
 def wait_until(holds: Callable[[], bool]) -> None:
@@ -227,4 +234,42 @@ def test_a_ledger_that_somebody_writes_is_refused(tmp_path):
     writer = open_ledger(tmp_path, "robot", CELL_M)
     with pytest.raises(LedgerFileError, match="another daemon"):
         open_ledger(tmp_path, "robot", CELL_M)
+    writer.close(1.0)
+
+
+def test_floor_that_is_swept_between_two_cells_is_written_once_a_second(tmp_path):
+    drive = Drive((0, 0), MapReceived(building("....")), pose_at(0, 0))
+    writer = open_ledger(tmp_path, "robot", CELL)
+    keeper = LedgerKeeper(writer, CELL, autostart=True)
+
+    def is_written():
+        return on_disk(tmp_path, CELL) == contents(drive.mission.snapshot())
+
+    keeper.keep(drive.mission, 0.0)
+    wait_until(lambda: is_written() and not writer.is_behind())
+    visits = drive.mission.ledger.total
+    drive.tell(pose_at(0, 0.2))
+    assert drive.mission.ledger.total == visits
+    keeper.keep(drive.mission, PERIOD_S)
+    assert not writer.is_behind()
+    assert not is_written()
+    keeper.keep(drive.mission, FLOOR_PERIOD_S)
+    wait_until(is_written)
+    # A cell does not wait for it.
+    drive.tell(pose_at(0, 1))
+    keeper.keep(drive.mission, FLOOR_PERIOD_S + PERIOD_S)
+    wait_until(is_written)
+    writer.close(1.0)
+
+
+def test_floor_alone_is_restored_too(tmp_path):
+    """A robot that never came over the middle of a cell."""
+    first = Drive((0, 0), MapReceived(building("....")), pose_at(0.45, 0.45))
+    snapshot = first.mission.snapshot()
+    assert not snapshot.cells
+    LedgerFile(tmp_path, "robot").write(snapshot)
+    writer = open_ledger(tmp_path, "robot", CELL)
+    drive = Drive((0, 0))
+    LedgerKeeper(writer, CELL, autostart=True).restore(drive.mission)
+    assert drive.mission.floor.pixels == snapshot.floor.pixels > 0
     writer.close(1.0)

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec import structs
 
-from fasaco_edge.config.config import DaemonConfig, MapConfig
+from fasaco_edge.config.config import DaemonConfig, MapConfig, PlannerConfig
 from fasaco_edge.daemon.memory import (
     BASE_BYTES,
-    CELL_BYTES,
+    FLOOR_BYTES,
+    FRAME_PIXELS,
     LEAST_CELLS,
     LEAST_PIXELS,
-    MAPS,
     MIB,
     afforded,
+    floor_pixels,
     limits_mib,
     most_bytes,
     needed_bytes,
     queues,
+    unit_bytes,
 )
+from fasaco_edge.grid.fine_raster import RobotDiscs, fine_geometry
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import MOST_REACH_PX
 from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_POSE_BYTES
 from fasaco_edge.wire.topics import QUEUE_LENGTHS
@@ -29,6 +34,7 @@ from tests.support.service_manager import unit_limit
 
 ROOT = Path(__file__).parents[2]
 DEFAULT = DaemonConfig()
+CELLS = DaemonConfig(planner=PlannerConfig(line="cells"))
 
 
 def test_the_unit_has_what_the_daemon_needs():
@@ -40,8 +46,10 @@ def test_the_unit_has_what_the_daemon_needs():
 
 def test_the_guides_say_the_formula():
     guide = " ".join((ROOT / "deploy" / "README.md").read_text().split())
-    formula = f"{BASE_BYTES:,} + {MAPS} x map.max_pixels + {CELL_BYTES} x map.max_lattice_cells"
-    assert formula in guide
+    for config in (DEFAULT, CELLS):
+        pixel, cell = unit_bytes(config)
+        formula = f"{BASE_BYTES:,} + {pixel} x map.max_pixels + {cell} x map.max_lattice_cells"
+        assert formula in guide
     assert f"MemoryMax={limits_mib(DEFAULT)[1]}M" in guide
     contract = " ".join((ROOT / "protocol" / "README.md").read_text().split())
     maps = DEFAULT.map
@@ -68,10 +76,23 @@ def test_under_any_limit_no_more_is_taken_than_it_affords(limit, pixels, cells):
     maps = MapConfig(max_pixels=pixels, max_lattice_cells=cells)
     config = structs.replace(DEFAULT, map=maps)
     smaller = afforded(config, limit)
-    least = BASE_BYTES + MAPS * LEAST_PIXELS + CELL_BYTES * LEAST_CELLS
+    pixel, cell = unit_bytes(config)
+    least = BASE_BYTES + pixel * LEAST_PIXELS + cell * LEAST_CELLS
     assert needed_bytes(smaller) <= max(limit, least)
     assert smaller.map.max_pixels <= pixels
     assert smaller.map.max_lattice_cells <= cells
     if needed_bytes(config) <= limit:
         assert smaller is config
     assert afforded(config, None) is config
+
+
+@pytest.mark.parametrize("side", [500, 2000, 5000])
+@pytest.mark.parametrize("resolution_m", [0.02, 0.03, 0.05])
+def test_a_map_that_is_taken_has_room_for_its_floor(side, resolution_m):
+    """The frame around it is no reason to refuse it."""
+    coarse = GridGeometry(side, side, resolution_m, Pose2D(0.0, 0.0))
+    robot = DEFAULT.robot
+    discs = RobotDiscs(robot.radius_m, robot.tool_width_m)
+    fine, parts = fine_geometry(coarse, discs, floor_pixels(side * side))
+    assert parts == 1
+    assert fine.rows * fine.cols * 6 <= side * side * FLOOR_BYTES + 6 * FRAME_PIXELS

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 
 import numpy as np
 import pytest
 
+from fasaco_edge.wire.maps import decode_occupancy_grid
+from fasaco_edge.wire.pheromone import decode_pheromone
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import (
@@ -120,7 +123,8 @@ def test_encoding_and_attachment_say_what_it_is(path):
     assert (note["planner"], note["seed"]) == ("fasaco", 0)
     assert note["ants"] > 0
     assert note["proposals"] > 0
-    assert note["gap"] == pytest.approx(note["steps"] / note["lower_bound_steps"] - 1, abs=1e-6)
+    least_s = note["lower_bound_cost_s"]
+    assert note["gap"] == pytest.approx(note["planned_cost_s"] / least_s - 1, abs=1e-3)
     assert note["plan_ms"] > 0
     stamp = oracle.from_bytes("nav_msgs/msg/Path", path.payload).header.stamp
     assert (stamp.sec, stamp.nanosec) == (12, 34)
@@ -169,7 +173,7 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     assert set(status) == {
         *("robot", "version", "state", "reason", "uptime_s", "map", "pose", "coverage", "path"),
         *("plan", "latency_ms", "loop_ms", "errors", "ledger", "recorder", "rss_mb", "cpu_s"),
-        *("threads", "config", "mission", "claim"),
+        *("threads", "config", "mission", "claim", "floor"),
     }
     assert (status["robot"], status["state"], status["reason"]) == ("robot", "covering", "path 1")
     assert status["map"] == {
@@ -192,14 +196,21 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
         "free_out_of_reach_m2": pytest.approx(free_pixels * RESOLUTION_M**2, abs=1e-3),
         "fraction": pytest.approx(1 / count, abs=1e-4),
     }
+    # The tool's disc, in pixels of 2.5 cm.
+    swept_m2 = pytest.approx(math.pi / 4 * TOOL_M**2, rel=0.05)
+    assert status["floor"] == {"swept_m2": swept_m2, "reachable_m2": None, "left": None}
     note = about(path)
     figures = ("planner", "seed", "ants", "kicks", "proposals", "planned_steps", "planned_cost_s")
+    saved = ("saved_by_ants_s", "saved_by_local_search_s")
     assert status["path"] == {
         "revision": 1,
         "steps": note["steps"],
         "remaining_steps": note["steps"],
         "reason": "first plan",
-        **{name: note[name] for name in (*figures, "lower_bound_steps", "gap")},
+        **{
+            name: note[name]
+            for name in (*figures, *saved, "lower_bound_steps", "lower_bound_cost_s", "gap")
+        },
     }
     attempts = status["plan"].pop("attempts")
     assert attempts >= 0
@@ -361,6 +372,23 @@ def test_a_map_beyond_the_limit_is_refused_and_counted(tmp_path):
         client.wait_status(lambda status: status["state"] == "covering")
 
 
+def test_the_swept_floor_is_sent_to_who_listens(fresh):
+    fresh.put("map", map_bytes(room(3.0, 3.0)))
+    fresh.put("pose", pose_bytes(*START))
+    fresh.wait_status(lambda status: status["floor"] and status["floor"]["swept_m2"] > 0)
+    heard = fresh.listen("floor", late=False).wait(lambda heard: True)
+    assert heard.encoding == "application/cdr;nav_msgs/msg/OccupancyGrid"
+    grid = oracle.from_bytes("nav_msgs/msg/OccupancyGrid", heard.payload)
+    assert grid.header.frame_id == "map"
+    assert grid.info.resolution == pytest.approx(0.025)
+    swept = np.flatnonzero(grid.data)
+    assert len(swept) == pytest.approx(math.pi / 4 * TOOL_M**2 / 0.025**2, rel=0.05)
+    rows, cols = np.divmod(swept, grid.info.width)
+    x = grid.info.origin.position.x + 0.025 * (cols.mean() + 0.5)
+    y = grid.info.origin.position.y + 0.025 * (rows.mean() + 0.5)
+    assert (x, y) == pytest.approx(START[:2], abs=0.01)
+
+
 def test_the_pheromone_is_sent_only_to_who_listens(fresh):
     ear = fresh.listen("pheromone", late=False)
     fresh.put("map", map_bytes(room(3.0, 3.0)))
@@ -371,3 +399,45 @@ def test_the_pheromone_is_sent_only_to_who_listens(fresh):
     assert grid.header.frame_id == "map"
     assert grid.levels.size == grid.info.width * grid.info.height
     assert grid.levels.max() > 0
+
+
+def test_the_living_trail_is_sent_with_how_decided_it_is(fresh):
+    ear = fresh.listen("pheromone", late=False)
+    fresh.put("map", map_bytes(room(3.0, 3.0)))
+    fresh.put("pose", pose_bytes(*START))
+    first = ear.wait(lambda heard: bool(heard.attachment) and about(heard)["revision"] == 1)
+    trail, told = decode_pheromone(first.payload), about(first)
+    assert (trail.velocity, trail.ants, trail.cohort) == (0, 0, 0)
+    assert told["cells"] == np.count_nonzero(trail.levels)
+    assert 1.0 <= told["branching"] < 2.0
+    # What was driven fades: the robot goes on along its path, and no new one comes.
+    ahead = planned(fresh.listen("path").wait(lambda heard: True))[0]
+    for x, y in ahead[1:4].tolist():
+        fresh.put("pose", pose_bytes(x, y))
+    last = ear.wait(lambda heard: bool(heard.attachment) and heard.payload != first.payload)
+    assert about(last)["cells"] == told["cells"]
+    # Who comes late gets the newest, though nothing changes any more.
+    late = fresh.listen("pheromone").wait(lambda heard: True)
+    assert late.attachment
+
+
+def test_where_the_trail_points_to_is_sent_to_who_listens(fresh):
+    ear = fresh.listen("directions", late=False)
+    fresh.put("map", map_bytes(room(3.0, 3.0)))
+    fresh.put("pose", pose_bytes(*START))
+    ahead = planned(fresh.listen("path").wait(lambda heard: True))[0]
+    # Every step of the path that no other one leaves its cell by is where the trail points to.
+    cells = [tuple(cell) for cell in np.floor(ahead / 0.3).astype(int)[:, ::-1].tolist()]
+    (row, col), (then_row, then_col) = next(
+        pair for pair in itertools.pairwise(cells) if cells.count(pair[0]) == 1
+    )
+    direction = {(0, 1): 0, (1, 0): 1, (0, -1): 2, (-1, 0): 3}[then_row - row, then_col - col]
+
+    def points_along(heard) -> bool:
+        grid = decode_occupancy_grid(heard.payload)
+        origin = grid.geometry.origin
+        at = row - round(origin.y / 0.3), col - round(origin.x / 0.3)
+        value = int(grid.cells[at])
+        return value // 25 == direction and value % 25 > 24 / 4
+
+    ear.wait(points_along)

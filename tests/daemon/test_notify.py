@@ -98,8 +98,10 @@ def test_a_busy_manager_hears_that_it_is_ready(tmp_path):
         manager = ServiceManager({"NOTIFY_SOCKET": name})
         for _ in range(1000):  # it waits for nobody: the test would never end
             manager.alive()
-        threading.Timer(0.2, lambda: [heard.recv(4096) for _ in range(5)]).start()
+        room = threading.Timer(0.2, lambda: [heard.recv(4096) for _ in range(5)])
+        room.start()
         manager.ready()
+        room.join()
         heard.settimeout(60.0)
         said = []
         while not said or said[-1] != b"READY=1":

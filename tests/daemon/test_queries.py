@@ -7,6 +7,7 @@ import time
 from importlib import metadata
 from typing import Any
 
+import numpy as np
 import pytest
 import zenoh
 
@@ -128,7 +129,7 @@ def test_parameters_of_zenoh_are_stepped_over(covering):
 def test_the_trail_of_each_cohort(covering):
     newest, *cohorts = (
         decode_pheromone(covering.ask(f"@rpc/pheromone{parameters}").payload)
-        for parameters in ("", "?cohort=0", "?cohort=1", "?cohort=02")
+        for parameters in ("?cohort=newest", "?cohort=0", "?cohort=1", "?cohort=02")
     )
     assert [(trail.cohort, trail.velocity, trail.ants) for trail in cohorts] == [
         (0, 8, 8),
@@ -137,14 +138,30 @@ def test_the_trail_of_each_cohort(covering):
     ]
     assert newest.levels.tobytes() == cohorts[2].levels.tobytes()
     assert newest.trail_max > newest.trail_min > 0
-    assert covering.ask("pheromone").payload == covering.ask("@rpc/pheromone").payload
     assert error(covering, "@rpc/pheromone?cohort=3") == {
         "code": "not_yet",
         "message": "the newest full plan has no trail of cohort 3",
-        "hint": "leave cohort out, or ask for 0, 1, 2",
+        "hint": "ask for newest, 0, 1, 2, or leave cohort out for the living trail",
     }
     for wrong in ("-1", "x", "", "1e1", "9" * 5000, "٣"):
         assert error(covering, f"@rpc/pheromone?cohort={wrong}")["code"] == "bad_query"
+
+
+def test_the_living_trail_is_told_though_nobody_listens(covering):
+    def told() -> tuple[bytes, dict]:
+        reply = covering.ask("@rpc/pheromone")
+        return reply.payload, json.loads(reply.attachment)
+
+    revision, deadline = covering.ask_status()["path"]["revision"], time.monotonic() + 10
+    while told()[1]["revision"] != revision and time.monotonic() < deadline:
+        time.sleep(0.05)
+    payload, note = told()
+    trail = decode_pheromone(payload)
+    assert (trail.ants, trail.velocity) == (0, 0)
+    assert note["revision"] == revision
+    assert note["cells"] == np.count_nonzero(trail.levels)
+    assert 1.0 <= note["branching"] < 2.0
+    assert covering.ask("pheromone").payload == payload
 
 
 def test_a_full_plan_is_made_when_asked_for_but_not_all_the_time(covering):
@@ -180,5 +197,5 @@ def test_a_path_that_was_asked_for_says_so(tmp_path):
         assert planned(heard)[0][0].tolist() == pytest.approx([1.05, 0.75])
         outsider.wait_status(lambda status: status["plan"]["plans"] >= answer["plan"])
         # With local search the colony leaves one trail, of the cohort that walked last.
-        trail = decode_pheromone(outsider.ask("@rpc/pheromone").payload)
+        trail = decode_pheromone(outsider.ask("@rpc/pheromone?cohort=newest").payload)
         assert trail.best_steps > 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import shutil
 import signal
 import time
@@ -13,6 +14,7 @@ import pytest
 
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.writer import PERIOD_S
+from fasaco_edge.wire.pheromone import PheromoneMessage, decode_pheromone
 from tests.campaigns.kill_daemon import MOST_LOST_S, run_campaign
 from tests.support.ledgers import CELL_M
 from tests.support.outsider import Outsider
@@ -104,6 +106,35 @@ def test_what_is_on_the_disk_outlives_a_kill(tmp_path):
         running.process.wait()
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         assert 20 <= outsider.ask_status()["ledger"]["restored_cells"] <= 23
+
+
+def trail_of(outsider: Outsider) -> tuple[PheromoneMessage, int]:
+    """Return the living trail, once there is one, and the revision of the path in force."""
+    deadline = time.monotonic() + 10
+    while outsider.get("@rpc/pheromone")[0].ok is None and time.monotonic() < deadline:
+        time.sleep(0.05)
+    told = outsider.ask("@rpc/pheromone")
+    return decode_pheromone(told.payload), json.loads(told.attachment)["revision"]
+
+
+def test_the_trail_goes_on_where_it_was_after_a_kill(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider)
+        drive(outsider, lanes(30))
+        wait_cells(tmp_path, 30)
+        time.sleep(2 * PERIOD_S)  # it is written once more, and told
+        told, _ = trail_of(outsider)
+        running.process.send_signal(signal.SIGKILL)
+        running.process.wait()
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        # Before it knows where the robot is there is no path to strengthen it.
+        outsider.put("map", map_bytes(HALL))
+        again, revision = trail_of(outsider)
+        assert revision == 0
+    # To the last half step of the scale, and of the ledger's 16 bits.
+    np.testing.assert_array_equal(again.levels > 0, told.levels > 0)
+    np.testing.assert_allclose(again.trail(), told.trail(), rtol=0.03)
+    assert told.trail_max > 2 * told.trail_min
 
 
 def test_it_writes_now_and_then_while_the_robot_drives(tmp_path):

@@ -70,7 +70,8 @@ def test_a_robot_with_a_latched_map_and_tf_gets_its_path(naming, tmp_path):
             covered = oracle.from_bytes(GRID, grid.wait(is_walk).payload)
             assert {0, 100} <= set(covered.data.tolist()) <= {-1, 0, 50, 75, 100}
             assert covered.header.frame_id == "map"
-            status = native.ask_status()
+            # A status may be older than the path.
+            status = native.wait_status(lambda status: status["pose"])
             assert status["pose"] == {"x": 1.0, "y": 1.0, "yaw": 1.5708}
             assert status["errors"]["total"] == 0
             assert native.ask("path").payload in [each.payload for each in path.heard]
@@ -207,7 +208,7 @@ def test_two_robots_on_one_router_do_not_hear_each_other(tmp_path):
                 put_map(robot)
                 robot.put_tf("map", "base_link", Pose2D(1.0, 1.0))
                 check_path(path.wait(is_walk), near=(1.0, 1.0))
-                assert other.ask_status()["map"] is not None
+                other.wait_status(lambda status: status["map"])
                 assert native.ask_status()["map"] is None
                 assert other_path.heard == []
 

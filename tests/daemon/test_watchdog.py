@@ -17,8 +17,9 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import PlanRequest
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.wire.replies import CoverageReport
-from fasaco_edge.wire.status import LedgerReport, LoopTimes, PathReport, Status
+from fasaco_edge.wire.path_documents import PathReport
+from fasaco_edge.wire.replies import CoverageReport, FloorLeft, FloorReport
+from fasaco_edge.wire.status import LedgerReport, LoopTimes, Status
 
 
 class Told:
@@ -106,13 +107,17 @@ def test_it_is_fed_in_time_and_not_at_every_turn():
 def test_a_status_is_told_in_a_line():
     status = Status(
         state="covering",
-        coverage=CoverageReport(covered_m2=12.3, to_cover_m2=48.9, fraction=0.2515),
+        coverage=CoverageReport(covered_m2=12.3, to_cover_m2=48.9, fraction=0.9991),
+        floor=FloorReport(12.3),
         path=PathReport(revision=3, remaining_steps=120),
         ledger=LedgerReport(fault="cannot write: no space"),
     )
     assert status_line(status) == (
-        "covering; 25 % covered, 12 of 49 m2; path 3 with 120 steps to go; cannot write: no space"
+        "covering; 99 % of cells covered; 12 m2 of floor swept; path 3 with 120 steps to go; "
+        "cannot write: no space"
     )
+    known = Status(floor=FloorReport(12.3, 20.0, (FloorLeft(9.0, "too narrow"),)))
+    assert "11 of 20 m2 of floor swept" in status_line(known)
     assert status_line(Status(state="waiting", reason="no map")) == "waiting: no map"
 
 

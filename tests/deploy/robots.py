@@ -25,7 +25,7 @@ def robot(lab: Lab) -> Iterator[subprocess.Popen[bytes]]:
         process.wait(10.0)
 
 
-def covered_m2(service: Service) -> int:
-    """Return what the unit's status says is covered [m2]."""
-    said = re.search(r"% covered, (\d+) of", service.show("StatusText"))
+def swept_m2(service: Service) -> int:
+    """Return how much floor the unit's status says is swept [m2]."""
+    said = re.search(r"(\d+)(?: of \d+)? m2 of floor swept", service.show("StatusText"))
     return int(said[1]) if said else 0

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from tests.deploy.recordings import recordings
-from tests.deploy.robots import covered_m2, robot
+from tests.deploy.robots import robot, swept_m2
 from tests.deploy.service import Service, wait_for
 from tests.support.processes import STOP_S
 
@@ -18,16 +18,16 @@ def test_a_hang_is_ended_and_the_mission_goes_on(service: Service):
     service.drop_in("watchdog", "[Service]\nWatchdogSec=2\nTimeoutAbortSec=2\n")
     service.start()
     with robot(service.lab):
-        wait_for(lambda: covered_m2(service) >= 4, 40.0, "4 m2 covered")
+        wait_for(lambda: swept_m2(service) >= 4, 40.0, "4 m2 swept")
         time.sleep(1.0)  # what is a second old is on the disk
-        before, process = covered_m2(service), service.pid
+        before, process = swept_m2(service), service.pid
         service.signal("STOP")
         hung = wait_for(lambda: service.pid not in (0, process), 15.0, "another process")
         wait_for(lambda: service.show("ActiveState") == "active", 10.0, "ready again")
         print(f"another process {hung:.1f} s after the hang")
         status = service.ask()
         assert status["ledger"]["restored_cells"] >= 40
-        wait_for(lambda: covered_m2(service) > before, 30.0, "more covered than before")
+        wait_for(lambda: swept_m2(service) > before, 30.0, "more swept than before")
     assert "Watchdog timeout" in service.text()
     assert service.show("NRestarts") == "1"
 
@@ -52,7 +52,7 @@ def test_a_full_disk_is_said_and_the_mission_goes_on(service: Service):
         lab.run("sh", "-c", "cat /dev/zero >/var/lib/private/fasaco-edge/ballast || true")
         service.start()
         with robot(lab):
-            wait_for(lambda: covered_m2(service) >= 2, 40.0, "2 m2 covered")
+            wait_for(lambda: swept_m2(service) >= 2, 40.0, "2 m2 swept")
             fault = service.ask()["ledger"]["fault"]
             assert "No space left on device" in fault
             assert "No space left on device" in service.show("StatusText")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.deploy.robots import covered_m2, robot
+from tests.deploy.robots import robot, swept_m2
 from tests.deploy.service import QUIET, Service, wait_for
 
 
@@ -16,15 +16,15 @@ def test_a_good_configuration_is_taken_and_the_mission_goes_on(service: Service)
     service.start()
     process = service.pid
     with robot(service.lab):
-        wait_for(lambda: covered_m2(service) >= 3, 40.0, "3 m2 covered")
-        before = covered_m2(service)
+        wait_for(lambda: swept_m2(service) >= 3, 40.0, "3 m2 swept")
+        before = swept_m2(service)
         service.configure(planner={"ants": 77, "spare_share": 0.0}, robot={"name": "other"})
         reload(service)
         wait_for(lambda: service.ask("config")["planner"]["ants"] == 77, 5.0, "taken")
         status = service.ask()
         assert status["robot"] == "robot"
-        assert status["coverage"]["covered_m2"] > before - 0.5  # it is told rounded
-        wait_for(lambda: covered_m2(service) > before, 30.0, "more covered than before")
+        assert status["floor"]["swept_m2"] > before - 0.5  # it is told rounded
+        wait_for(lambda: swept_m2(service) > before, 30.0, "more swept than before")
     assert service.pid == process
     assert "robot.name: needs a restart" in service.text()
     assert "configuration read again: planner.ants" in service.text()

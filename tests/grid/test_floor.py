@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from fasaco_edge.errors import MapTooLarge, StartBlocked, StartOutsideMap
-from fasaco_edge.grid.floor import Floor, RobotDiscs, StandLattice, straightened
+from fasaco_edge.grid.fine_raster import RobotDiscs
+from fasaco_edge.grid.floor import Floor, StandLattice, straightened
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.floor.bits import unpacked
 
 DISCS = RobotDiscs(radius_m=0.18, tool_m=0.3)
 
@@ -31,7 +33,9 @@ def test_the_reachable_floor_of_a_room():
     floor = Floor.around(room(3.0, 2.0), DISCS, (3.0, 2.0))
     # Of fine pixels of 0.025 m the robot may be from 0.1875 m on; at 0.18 m a disc would fit.
     inner = (3.0 - 0.35) * (2.0 - 0.35)
-    assert np.count_nonzero(floor.places) * 0.025**2 == pytest.approx(inner)
+    assert np.count_nonzero(
+        unpacked(floor.places, floor.geometry.cols)
+    ) * 0.025**2 == pytest.approx(inner)
     # Beside it the tool reaches 6 pixels; in the corners it is round.
     rim = 2 * 0.15 * (3.0 + 2.0 - 0.7) + math.pi * 0.15**2
     assert floor.reachable_m2 == pytest.approx(inner + rim, abs=0.03)
@@ -63,8 +67,8 @@ def test_a_start_has_to_be_where_the_robot_fits():
 
 
 def test_a_raster_too_large_is_refused(monkeypatch):
-    monkeypatch.setattr("fasaco_edge.grid.floor.MOST_PIXELS", 10_000)
-    with pytest.raises(MapTooLarge, match=r"pixels of 0\.025 m exceeds 10000 pixels"):
+    monkeypatch.setattr("fasaco_edge.grid.floor.MOST_PIXELS", 3_000)
+    with pytest.raises(MapTooLarge, match=r"pixels of 0\.05 m exceeds 3000 pixels"):
         Floor.around(room(3.0, 2.0), DISCS, (3.0, 2.0))
 
 
@@ -77,7 +81,7 @@ def test_cells_at_walls_have_stands_beside_their_middles():
     own = np.floor(at / 0.275).astype(int)[:, ::-1]
     assert (own == cells + np.array((lattice.window.row0, lattice.window.col0))).all()
     # Of all places in the cell it is the nearest to the middle, to half a pixel.
-    places = floor.to_map(np.argwhere(floor.places))
+    places = floor.to_map(np.argwhere(unpacked(floor.places, floor.geometry.cols)))
     middles = lattice.centres(own.astype(np.int32))
     for cell, middle, stand in zip(own, middles, at, strict=True):
         inside = places[(np.floor(places / 0.275)[:, ::-1] == cell).all(axis=1)]

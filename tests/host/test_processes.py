@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.host.processes import memory_limit
+from fasaco_edge.host.processes import available_memory, memory_limit
 
 TELL = """\
 import subprocess
@@ -93,3 +93,13 @@ def written(root, files):
 )
 def test_the_limit_is_that_of_the_group_and_those_above(tmp_path, files, limit):
     assert memory_limit(written(tmp_path, files)) == limit
+
+
+def test_what_is_available_is_no_more_than_the_limit(tmp_path):
+    free = {"proc/meminfo": "MemTotal: 4000000 kB\nMemAvailable: 2000000 kB\n"}
+    assert available_memory(written(tmp_path / "free", free)) == 2_048_000_000
+    limited = free | {
+        "proc/self/cgroup": "0::/b.service\n",
+        "sys/fs/cgroup/b.service/memory.max": "800000000\n",
+    }
+    assert available_memory(written(tmp_path / "limited", limited)) == 800_000_000

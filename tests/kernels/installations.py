@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fasaco_edge.host import durable, files
-from fasaco_edge.kernels import cache, jit, sealed
-from fasaco_edge.kernels.cache import KERNEL_SUFFIX, note_complete
+from fasaco_edge.kernels import cache, jit, release, sealed
+from fasaco_edge.kernels.cache import note_complete
+from fasaco_edge.kernels.release import KERNEL_SUFFIX
 from tests.kernels.harm import kernel_files
 
 KERNELS = """
@@ -47,7 +48,7 @@ def tell(x=1, note=True):
         sum(sum(getattr(stat, kind).values()) for stat in stats)
         for kind in ("cache_hits", "cache_misses")
     )
-    place = jit.CACHE_FOLDER and str(jit.CACHE_FOLDER)
+    place = (folder := jit.kernel_folder()) and str(folder)
     print(json.dumps([missing, passed_over, loaded, compiled, said, place]))
 """
 
@@ -145,6 +146,6 @@ def package_in(folder: Path) -> Path:
     (host / "__init__.py").touch()
     for module in (durable, files):
         shutil.copy(module.__file__, host)
-    for module in (jit, cache, sealed):
+    for module in (jit, cache, release, sealed):
         shutil.copy(module.__file__, package)
     return package

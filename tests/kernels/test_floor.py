@@ -9,18 +9,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fasaco_edge.kernels.floor.bits import any_between, is_marked, packed, spread, unpacked
 from fasaco_edge.kernels.floor.capsule import (
-    MOST_CAPSULES,
+    COLUMNS,
     NEVER,
     Scratch,
     Sweeps,
+    exchange,
     is_clear,
     prepare,
     sweep,
     swept_more,
 )
-from fasaco_edge.kernels.floor.line import turn_between
-from fasaco_edge.kernels.floor.places import connected, find_places, within
+from fasaco_edge.kernels.floor.line import MOST_CAPSULES
+from fasaco_edge.kernels.floor.places import connected, disc_rows, places_of, within
+from fasaco_edge.kernels.floor.seconds import turn_between
 
 SIDE = 40
 COORDINATES = st.floats(8.0, 31.0)
@@ -29,7 +32,7 @@ POINTS = st.tuples(COORDINATES, COORDINATES) | st.tuples(st.integers(8, 31), st.
 
 def scratch() -> Scratch:
     rows = (np.zeros((MOST_CAPSULES, 2), np.int64) for _ in range(2))
-    return Scratch(np.zeros((MOST_CAPSULES, 8)), *rows)
+    return Scratch(np.zeros((MOST_CAPSULES, len(COLUMNS))), *rows)
 
 
 def distances(a: tuple[float, float], b: tuple[float, float]) -> np.ndarray:
@@ -49,11 +52,8 @@ def square_distance(a: tuple[float, float], b: tuple[float, float], i: int, j: i
     return float(np.hypot(np.maximum(abs(y - i) - 0.5, 0), np.maximum(abs(x - j) - 0.5, 0)).min())
 
 
-def sums(blocked: np.ndarray) -> np.ndarray:
-    rows, cols = blocked.shape
-    table = np.zeros((rows, cols + 1), np.int32)
-    np.cumsum(blocked, axis=1, out=table[:, 1:])
-    return table
+def bits_of(blocked: np.ndarray) -> np.ndarray:
+    return packed(blocked, beyond=True)
 
 
 @given(POINTS, POINTS, st.integers(0, SIDE - 1), st.integers(0, SIDE - 1), st.floats(1.0, 7.5))
@@ -62,19 +62,18 @@ def test_a_way_is_clear_of_a_pixel_that_is_a_radius_away(a, b, i, j, radius):
     blocked[i, j] = True
     away = square_distance(a, b, i, j)
     if abs(away - radius) > 0.02:
-        assert is_clear(sums(blocked), *map(float, (*a, *b)), radius) == (away > radius)
+        assert is_clear(bits_of(blocked), *map(float, (*a, *b)), radius) == (away > radius)
 
 
 def test_a_wall_as_far_as_the_radius_is_not_touched():
     blocked = np.zeros((SIDE, SIDE), np.bool_)
     blocked[:, 25] = True
-    assert is_clear(sums(blocked), 10.0, 17.5, 30.0, 17.5, 7.0)
-    assert not is_clear(sums(blocked), 10.0, 17.6, 30.0, 17.6, 7.0)
+    assert is_clear(bits_of(blocked), 10.0, 17.5, 30.0, 17.5, 7.0)
+    assert not is_clear(bits_of(blocked), 10.0, 17.6, 30.0, 17.6, 7.0)
 
 
 def test_what_lies_outside_is_blocked():
-    free = np.zeros((SIDE, SIDE), np.int32)
-    table = np.concatenate([free, free[:, :1]], axis=1)
+    table = bits_of(np.zeros((SIDE, SIDE), np.bool_))
     assert is_clear(table, 10.0, 10.0, 10.0, 32.0, 7.0)
     assert not is_clear(table, 10.0, 10.0, 10.0, 33.0, 7.0)
 
@@ -113,13 +112,20 @@ def test_what_a_change_sweeps_more_is_what_sweeping_it_shows(before, after, othe
     memory, was = scratch(), counts.copy()
     for number, (a, b) in enumerate((*before, *after)):
         prepare(memory.capsules, number, *map(float, (*a, *b)), radius)
-    more = swept_more(counts, memory, len(before), len(after), radius)
+    more = swept_more(counts, memory, len(before), len(after), radius, np.inf)
     assert (counts == was).all()
+    # Once more is lost than may be, the rest is not looked at.
+    least = swept_more(counts, memory, len(before), len(after), radius, 5.0)
+    assert least == more or least < -5
+    exchange(sweeps, memory, len(before), len(after), radius)
+    exchanged = counts.copy()
+    counts[:] = was
     for a, b in before:
         sweep(sweeps, *map(float, (*a, *b)), radius, -1, scratch())
     for a, b in after:
         sweep(sweeps, *map(float, (*a, *b)), radius, 1, scratch())
     assert more == np.count_nonzero(was == 0) - np.count_nonzero(counts == 0)
+    assert (exchanged == counts).all()
 
 
 @given(st.floats(0.0, 2 * math.pi), st.floats(-math.pi, math.pi))
@@ -137,18 +143,59 @@ def test_pixels_within_reach_of_marked_ones(seed, radius):
         away = distances((i, j), (i, j))
         expected |= away <= radius
         near |= abs(away - radius) < 1e-3
-    assert (within(marked, radius) == expected)[~near].all()
+    found = unpacked(within(packed(marked, beyond=False), radius), SIDE)
+    assert (found == expected)[~near].all()
+
+
+@given(st.floats(0.6, 12.0) | st.integers(1, 24).map(lambda halves: halves / 2), st.randoms())
+@settings(max_examples=60)
+def test_a_place_is_where_a_way_of_no_length_is_clear(radius, random):
+    blocked = np.zeros((SIDE, SIDE), np.bool_)
+    for _ in range(6):
+        blocked[random.randrange(SIDE), random.randrange(SIDE)] = True
+    rim = disc_rows(radius)[0] + 1
+    blocked[:rim] = blocked[-rim:] = blocked[:, :rim] = blocked[:, -rim:] = True
+    table = bits_of(blocked)
+    places = unpacked(places_of(table, disc_rows(radius)), SIDE)
+    for i, j in np.ndindex(places.shape):
+        y, x = float(i), float(j)
+        assert places[i, j] == is_clear(table, y, x, y, x, radius)
 
 
 def test_places_are_where_the_disc_fits_and_connected_ones_can_be_come_to():
     free = np.zeros((SIDE, SIDE), np.bool_)
     free[3:37, 3:18] = free[3:37, 22:37] = True
     free[10:13, 18:22] = True  # a door, too narrow
-    places = np.zeros_like(free)
-    find_places(sums(~free), 4.0, places)
+    places = unpacked(places_of(bits_of(~free), disc_rows(4.0)), SIDE)
     assert places[7:33, 7:14].all()
     assert places[7:33, 26:33].all()
     assert np.count_nonzero(places) == 2 * 26 * 7
     one_side = connected(places, 8, 8)
     assert np.count_nonzero(one_side) == 26 * 7
     assert one_side[20, 10]
+
+
+@given(st.integers(1, 200), st.integers(0, 2**32 - 1), st.floats(0.0, 1.0))
+def test_bits_are_what_was_packed(cols, seed, share):
+    mask = np.random.default_rng(seed).random((3, cols)) < share
+    for beyond in (False, True):
+        bits = packed(mask, beyond=beyond)
+        assert (unpacked(bits, cols) == mask).all()
+        assert (unpacked(bits, 64 * bits.shape[1])[:, cols:] == beyond).all()
+    first = seed % cols
+    last = first + seed // 7 % (cols - first)
+    assert any_between(bits[1], first, last) == mask[1, first : last + 1].any()
+    assert is_marked(bits, 2, last) == mask[2, last]
+
+
+@given(st.integers(1, 150), st.integers(0, 2**32 - 1), st.floats(0.5, 9.0))
+@settings(max_examples=40)
+def test_bits_spread_as_far_as_a_disc(cols, seed, radius):
+    mask = np.random.default_rng(seed).random((24, cols)) < 0.02
+    reach = disc_rows(radius)
+    expected = np.zeros_like(mask)
+    for i, j in np.argwhere(mask):
+        for away, half in enumerate(reach):
+            for row in {i - away, i + away} & set(range(24)):
+                expected[row, max(j - half, 0) : j + half + 1] = True
+    assert (unpacked(spread(packed(mask, beyond=False), reach), cols) == expected).all()

@@ -10,7 +10,7 @@ import fasaco_edge.mission
 
 SOURCES = sorted(Path(fasaco_edge.mission.__path__[0]).rglob("*.py"))
 # What a method may assign to: its object, a private part of it, and what it has just made.
-OWN = re.compile(r"self(\._\w+)?|run|ledger")
+OWN = re.compile(r"self(\._\w+)?|run|ledger|floor")
 
 
 def foreign_assignments(source: str) -> list[str]:

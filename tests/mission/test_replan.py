@@ -13,14 +13,15 @@ from tests.mission.world import Drive, building, pose_at, started
 ROOM = ("........",) * 6
 
 
-def test_it_plans_anew_and_keeps_nothing_of_the_path():
+def test_all_is_searched_beginning_with_the_path():
     drive = started(*ROOM)
     drive.go()
     decision = drive.command("replan")
     assert drive.refused is None
     assert decision.plan.reason == "asked for"
     assert decision.answers[0].plan == decision.plan.number == 2
-    assert len(decision.plan.problem.before) == 0
+    assert decision.plan.problem.is_full
+    assert (decision.plan.problem.before == drive.mission.route.path.ahead).all()
     assert drive.mission.state == "covering", "it drives on meanwhile"
     drive.plan()
     drive.finish()
@@ -33,7 +34,7 @@ def test_only_the_plan_that_was_asked_for_is_a_full_one():
     drive.plan()
     drive.tell(MapReceived(building(*ROOM, "...#....")))
     assert drive.request.reason != "asked for"
-    assert len(drive.request.problem.before) > 0
+    assert not drive.request.problem.is_full
 
 
 def test_one_under_way_comes_first():
@@ -109,6 +110,19 @@ def test_a_path_cut_off_says_where():
     assert decision.path.changed == Window(0, 4, 1, 8)
     drive.plan()
     assert drive.updates[-1].changed == Window(0, 4, 1, 8)
+
+
+def test_what_was_cut_off_is_kept_where_it_holds():
+    drive = started(*ROOM)
+    ahead = drive.mission.route.path.ahead
+    row, col = ahead[12].tolist()
+    rows = ["".join("#" if (r, c) == (row, col) else "." for c in range(8)) for r in range(6)]
+    drive.tell(MapReceived(building(*reversed(rows))))
+    assert len(drive.mission.route.path.ahead) == 12
+    assert (drive.request.problem.before == ahead).all()
+    drive.plan()
+    # Another command than the repair forgets it.
+    assert (drive.mission.route.path_to_keep == drive.mission.route.path.ahead).all()
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,13 @@ import itertools
 
 import numpy as np
 
-from fasaco_edge.planners import near_optimal, regions
+from fasaco_edge.planners import regions, search
+from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import SearchWork, WorkLimit, never
-from fasaco_edge.planners.problem import CoverageProblem, lower_bound_steps
+from fasaco_edge.planners.problem import CoverageProblem
 from tests.benchmarks.buildings import building
 from tests.benchmarks.judge import check_walk
 
@@ -66,12 +67,12 @@ def take_apart(monkeypatch):
     """Let grounds of some hundred cells be taken apart into regions."""
     monkeypatch.setattr(regions, "ONE_REGION", 100)
     monkeypatch.setattr(regions, "EDGE", 16)
-    monkeypatch.setattr(near_optimal, "EDGE", 16)
+    monkeypatch.setattr(search, "EDGE", 16)
     ask_often(monkeypatch)
 
 
 def ask_often(monkeypatch):
-    monkeypatch.setattr(near_optimal, "PROPOSALS_AT_ONCE", 3_000)
+    monkeypatch.setattr(search, "PROPOSALS_AT_ONCE", 3_000)
 
 
 def hall(home=False, cost=STEPS_ALONE, covered=0.0, cells=1_000):

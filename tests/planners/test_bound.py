@@ -5,10 +5,20 @@ import json
 import numpy as np
 import pytest
 
+from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.map_files import builtin_maps
 from fasaco_edge.planners.baselines import spiral_stc, stc, zigzag
+from fasaco_edge.planners.bound import (
+    FEWEST,
+    MOST,
+    THOROUGH,
+    LowerBound,
+    lower_bound_of,
+    lower_bound_steps,
+)
+from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.grids import read_grid
-from fasaco_edge.planners.problem import CoverageProblem, lower_bound_steps
+from fasaco_edge.planners.problem import CoverageProblem
 from tests.support.grids import REFERENCE, lattice, placed, reference
 
 MAPS = [name for name, _ in builtin_maps()]
@@ -82,3 +92,53 @@ def test_the_bound_is_the_optimum_or_one_below_on_small_grids(name, anywhere, ho
     ground, start = reference(name)
     assert lower_bound_steps(CoverageProblem.of(ground, start)) == anywhere
     assert lower_bound_steps(CoverageProblem.of(ground, start, end=start)) == home
+
+
+def test_a_step_and_turns_are_bound_in_whole_microseconds():
+    # A hall of two rows: along, around the corner and back is the best walk.
+    hall = lattice("......", "......")
+    cost = CoverageCost(0.5, 2.0)
+    bound = lower_bound_of(CoverageProblem.of(hall, (0, 0), cost=cost))
+    assert (bound.steps, bound.cost_us) == (11, 9_500_000)
+    assert lower_bound_of(CoverageProblem.of(lattice("."), (0, 0), cost=cost)).cost_us == 0
+
+
+def test_free_turns_leave_the_bound_of_steps():
+    problem = CoverageProblem.of(
+        lattice("......", "..##..", "......"), (0, 0), cost=CoverageCost(0.7)
+    )
+    bound = lower_bound_of(problem)
+    assert bound.cost_us == 700_000 * bound.steps == 700_000 * lower_bound_steps(problem)
+
+
+def test_the_bound_rises_with_work_and_is_the_same_each_time():
+    grid = read_grid("office")
+    problem = CoverageProblem.of(grid.lattice, grid.start, cost=CoverageCost(1.0, 5.0))
+    seen = []
+    for _ in range(2):
+        bound = LowerBound(problem)
+        seen.append([bound.cost_us])
+        for iterations in (FEWEST, 40, MOST):
+            bound.tighten(iterations * problem.cells)
+            seen[-1].append(bound.cost_us)
+    assert seen[0] == seen[1] == sorted(set(seen[0]))
+
+
+def instances():
+    """Turn-cost grids with what is proven of tours over them, a few of many."""
+    file = REFERENCE / "turncost" / "results.json"
+    known = json.loads(file.read_text()) if file.exists() else {}
+    return {name: known[name] for name in sorted(known)[5::31]}
+
+
+@pytest.mark.parametrize("name", instances())
+def test_the_bound_is_below_the_best_known_tour_and_not_far(name):
+    free = np.load(REFERENCE / "turncost" / "grids.npz")[name]
+    known = instances()[name]
+    ground = CoverageLattice.from_free(free)
+    start = tuple(np.argwhere(free)[0].tolist())
+    cost = CoverageCost(1.0, 50.0)
+    problem = CoverageProblem.of(ground, start, end=start, cost=cost)
+    least_s = lower_bound_of(problem, THOROUGH).cost_s
+    # A walk home need not turn at its ends, as a tour does.
+    assert 0.75 * known["tour_best"] < least_s <= known["tour_best"]

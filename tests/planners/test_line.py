@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fasaco_edge.bench.floor import SweepingRobot, judge_floor
-from fasaco_edge.grid.floor import Floor, RobotDiscs, StandLattice
+from fasaco_edge.grid.fine_raster import RobotDiscs
+from fasaco_edge.grid.floor import Floor, StandLattice
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -117,3 +118,13 @@ def test_a_walk_of_one_cell_sweeps_what_is_below_the_tool(planned):
     line = line_over(walk[:1], stands, floor, LineConfig(), is_end_fixed=False)
     assert len(line.xy) == 1
     assert 0.0 < line.swept_m2 <= math.pi * 0.15**2 * 1.05
+
+
+@pytest.mark.parametrize("resolution", [0.02, 0.025, 0.03, 0.04, 0.05, 0.06, 0.1])
+def test_a_line_is_polished_on_pixels_as_fine_as_the_judge_s(resolution):
+    cells = np.zeros((60, 60), np.int8)
+    grid = OccupancyGrid(GridGeometry(60, 60, resolution, Pose2D(0.0, 0.0)), cells)
+    middle = 30 * resolution
+    floor = Floor.around(grid, RobotDiscs(0.18, 0.3), (middle, middle))
+    judged = judge_floor(grid, np.array([(middle, middle)]), ROBOT)
+    assert floor.geometry.resolution == judged.figures.pixel_m

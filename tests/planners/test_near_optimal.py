@@ -11,7 +11,7 @@ import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.map_files import builtin_maps
-from fasaco_edge.planners import near_optimal, regions
+from fasaco_edge.planners import regions, search
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.grids import read_grid
 from fasaco_edge.planners.problem import CoverageProblem
@@ -162,7 +162,7 @@ def print_twin_paths():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(regions, "ONE_REGION", 60)
         patch.setattr(regions, "EDGE", 6)
-        patch.setattr(near_optimal, "EDGE", 6)
+        patch.setattr(search, "EDGE", 6)
         for path in twin_paths():
             print(path.work, path.cells.tolist())
 

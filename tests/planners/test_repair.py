@@ -1,5 +1,6 @@
 """A completed walk: legal, complete, and the same where nothing changed."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,8 +9,10 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import reachable_from
+from fasaco_edge.planners.bound import lower_bound_steps
+from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.effort import repair_for
+from fasaco_edge.planners.effort import HELD_CELLS, repair_for
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import SearchWork, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
@@ -110,15 +113,16 @@ def test_what_can_wait_leaves_the_next_steps_alone():
 def test_a_repaired_walk_costs_no_more_than_the_completed_one(seed, change, home, cost):
     problem = driven_halfway(seed, change, end=home, cost=cost)
     framed = FramedGround.of(problem)
-    flat = framed.unframed(completed(problem, framed, problem.before))
+    flat = framed.unframed(completed(problem, framed, problem.before, HELD_CELLS))
     only_completed = np.column_stack(np.divmod(flat, framed.cols)).astype(np.int32)
     path = repaired(problem, "fasaco", 0, never)
     verdict = judge(problem, path.cells)
     assert path.cost_s == cost.of_walk(path.cells)
     assert path.cost_s <= cost.of_walk(only_completed)
     assert path.lower_bound_steps <= verdict.steps == path.steps
-    # Two that change no parity come before, around what changed.
-    assert path.work.perturbations <= repair_for(cost).perturbations + 2
+    # Two that change no parity come before, around what changed; and all of it once more for a
+    # path that keeps the way ahead.
+    assert path.work.perturbations <= 2 * repair_for(cost).perturbations + 4
 
 
 def test_a_repair_is_worth_its_while():
@@ -160,6 +164,23 @@ def test_the_planner_keeps_what_holds_of_the_walk_before():
     assert len(new - old) < 40
 
 
+def test_a_full_search_begins_with_the_walk_before():
+    free = np.random.default_rng(8).random((24, 24)) > 0.12
+    lattice = CoverageLattice.from_free(free)
+    row, col = np.argwhere(lattice.coverable)[0].tolist()
+    first = CoverageProblem.of(lattice, (row, col))
+    before = NearOptimal().plan(first, WorkLimit(SearchWork(proposals=1_000_000))).cells
+    little = WorkLimit(SearchWork(proposals=100_000))
+    other = NearOptimal(ColonyConfig(seed=1))
+    path = other.plan(replace(first, before=before, is_full=True), little)
+    judge(first, path.cells)
+    assert path.work.ants > 0, "it was searched, not repaired"
+    assert path.steps <= len(before) - 1
+    assert path.saved.local_search == len(before) - 1 - path.steps
+    assert np.array_equal(path.cells[:HELD_CELLS], before[:HELD_CELLS])
+    assert other.plan(first, little).steps > path.steps
+
+
 def test_many_changes_on_a_large_ground_are_all_repaired():
     """More than one neighbourhood holds, on more cells than are searched as a whole."""
     rng = np.random.default_rng(5)
@@ -174,7 +195,9 @@ def test_many_changes_on_a_large_ground_are_all_repaired():
     path = repaired(problem, "fasaco", 0, never)
     judge(problem, path.cells)
     assert path.work.perturbations > repair_for(problem.cost).perturbations + 2
-    assert path.gap < 0.5 * (only_completed / path.lower_bound_steps - 1)
+    assert path.lower_bound_steps == 0  # to find one would take longer than the repair
+    least = lower_bound_steps(problem)
+    assert path.steps / least - 1 < 0.5 * (only_completed / least - 1)
 
 
 def test_a_walk_far_above_its_bound_is_planned_anew():

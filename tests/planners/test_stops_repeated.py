@@ -35,7 +35,7 @@ def stopping_at(*questions):
 def test_a_repair_that_was_stopped_and_the_search_after_it_are_repeated():
     """The work of the path says nothing of the repair: by that alone another path comes."""
     problem = poor_problem()
-    assert is_poor(repaired(problem, "fasaco", 0, lambda progress: True))
+    assert is_poor(problem, repaired(problem, "fasaco", 0, lambda progress: True))
     stop = stopping_at(1, 3)
     path = NearOptimal().plan(problem, stop)
     assert stop.stops == [1, 3]

@@ -5,13 +5,15 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.kernels.cache import KERNEL_SOURCES, kernel_module
+from fasaco_edge.kernels.release import KERNEL_SOURCES, kernel_module
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived, PlanReady, PoseReceived
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
+from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
@@ -51,19 +53,26 @@ def changes(grid: OccupancyGrid) -> Iterator[MapReceived | PatchReceived]:
         yield MapReceived(decode_occupancy_grid(payload))
 
 
-def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up():
+@pytest.mark.parametrize("turn_s", [0.0, 1.5])
+def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up(turn_s):
     heard = []
     warm_up(heard.append)
     assert heard == list(STAGES)
     before = compiled_signatures()
 
-    grid = OccupancyGrid(GridGeometry(40, 40, 0.05, Pose2D(0, 0)), np.zeros((40, 40), np.int8))
+    # A room in which no bound proves the first walk: the search has to go on.
+    pixels = np.zeros((80, 80), np.int8)
+    for row, col in ((18, 20), (22, 50), (47, 8), (50, 33), (44, 62), (68, 46)):
+        pixels[row : row + 5, col : col + 9] = 100
+    grid = OccupancyGrid(GridGeometry(80, 80, 0.05, Pose2D(0, 0)), pixels)
     off_the_bus = decode_occupancy_grid(encode_occupancy_grid(grid))
-    mission = Mission(MissionConfig(Footprint(0.3, 0.18)))
+    cost = CoverageCost.for_robot(0.3, 0.25, turn_s)
+    mission = Mission(MissionConfig(Footprint(0.3, 0.18), cost=cost))
     pose = PoseReceived(StampedPose(Pose2D(1.0, 1.0)))
     asked = mission.step([MapReceived(off_the_bus), pose], 0.0).plan
     assert asked is not None
     path = NearOptimal().plan(asked.problem, WorkLimit(SearchWork(perturbations=5)))
+    assert path.work.perturbations >= 5 or not turn_s  # steps alone are soon proven
     answer = mission.step([PlanReady(asked.number, path, 0.0)], 0.0)
     assert answer.path is not None
     assert mission.coverage() is not None
@@ -76,3 +85,14 @@ def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up():
         assert mission.coverage() is not None
 
     assert compiled_signatures() == before
+
+
+def test_two_processes_meet_where_one_begins_with_the_last_stage():
+    heard = []
+    warm_up(heard.append, backward=True)
+    assert heard == list(reversed(STAGES))
+
+
+def test_no_kernel_is_compiled_again_for_a_constant_that_it_is_called_with():
+    warm_up()
+    assert [found for found in sorted(compiled_signatures()) if "iteral" in found] == []

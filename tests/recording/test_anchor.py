@@ -43,6 +43,9 @@ def recorded(tmp_path_factory):
     return Path(report["file"]), mission
 
 
+GRIDS = [entities.MAP, entities.COVERAGE, entities.FLOOR, entities.PHEROMONE]
+
+
 def test_near_zero_nothing_is_moved():
     assert not Anchor.near(-3.0, 9_999.0)
     assert Anchor.near(NEAR_M, -0.5) == Anchor(NEAR_M, 0.0)
@@ -50,7 +53,7 @@ def test_near_zero_nothing_is_moved():
     assert Anchor(1000.0, 0.0).pose(Pose2D(1000.5, 2.0, 0.1)) == Pose2D(0.5, 2.0, 0.1)
 
 
-@pytest.mark.parametrize("entity", [entities.MAP, entities.COVERAGE, entities.PHEROMONE])
+@pytest.mark.parametrize("entity", GRIDS)
 def test_grids_lie_where_they_are_drawn(recorded, entity):
     corner = read_column(recorded[0], entity, "GridMap:translation").values[-1][0]
     assert np.array_equal(corner, [12.0, 34.0, 0.0])

@@ -38,10 +38,14 @@ def shot(tmp_path_factory):
 
 def test_no_view_complains(shot):
     assert shot.complaints == ()
-    assert len(shot.views) == 9
-    assert {"Map, coverage and path", "Pheromone, main directions", "States", "Log", "Run"} < set(
-        shot.views
-    )
+    assert len(shot.views) == 11
+    assert {
+        "Map, coverage and path",
+        "Pheromone, where it points to",
+        "States",
+        "Log",
+        "Run",
+    } < set(shot.views)
 
 
 def test_the_map_is_framed_upright_and_large(shot):

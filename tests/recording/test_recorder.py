@@ -85,9 +85,9 @@ def recorded(tmp_path_factory):
 def test_everything_on_the_bus_becomes_an_entity(recorded):
     rows = recorded.summary.rows
     assert rows[entities.PATH] == rows[entities.PATH_LOG] == recorded.mission.revision
-    assert rows[entities.PHEROMONE] == 3 * recorded.mission.revision
+    assert rows[entities.PHEROMONE] == 4 * recorded.mission.revision
     assert rows[entities.ROBOT] == FRAMES
-    assert rows[entities.COVERAGE] == FRAMES // 4
+    assert rows[entities.COVERAGE] == rows[entities.FLOOR] == FRAMES // 4
     assert {entities.MAP, entities.DRIVEN_PATH, f"{entities.LATENCY}/plan"} <= set(rows)
     assert rows[entities.MAP_CHANGE] == 1
     assert recorded.summary.timelines == (entities.ITER, entities.REPLAN, entities.WALL_CLOCK)
@@ -111,7 +111,9 @@ def test_what_the_mission_hears_is_there_byte_for_byte(recorded):
 def test_the_end_is_orderly(recorded):
     assert recorded.exit_code == 0
     assert recorded.summary.complete
-    assert recorded.summary.states[-1] == "done"
+    # On a busy computer the recorder may find the daemon silent before it is told to stop.
+    said = [state for state in recorded.summary.states if state != "silent"]
+    assert said[-1] == "done"
     assert "blocked" not in recorded.summary.states
     assert read_column(recorded.path, entities.RECORDER_STATE, "StateChange:state").values == [
         ["recording"],
@@ -171,12 +173,16 @@ def test_the_numbers_of_statuses_and_paths_are_curves(recorded):
     assert curve(f"{entities.ERRORS}/malformed_message") == [2]
 
 
-def test_main_directions_are_drawn_with_the_path(recorded):
-    strips = read_column(recorded.path, entities.DIRECTIONS, "LineStrips3D:strips").values
-    spans = np.ptp(np.array(strips[0]), axis=1)
-    # Up and down the columns of cells.
-    assert (spans[:, 1] > spans[:, 0]).all()
-    assert len(spans) > 3
+def test_arrows_show_where_the_trail_points_to(recorded):
+    vectors = read_column(recorded.path, entities.DIRECTIONS, "Arrows3D:vectors").values[-1]
+    origins = read_column(recorded.path, entities.DIRECTIONS, "Arrows3D:origins").values[-1]
+    spans = np.abs(np.array(vectors)[:, :2])
+    # Up and down the columns of cells, each run of cells an arrow.
+    assert (spans.max(axis=0) >= (CELL_M - 1e-6, 10 * CELL_M)).all()
+    assert np.count_nonzero(spans[:, 1]) > 10
+    assert np.allclose(np.array(origins)[0, :2] / CELL_M % 1, 0.5)
+    (label,) = read_column(recorded.path, entities.HERE, "Points3D:labels").values[-1]
+    assert label.endswith(": 75 %")
 
 
 def test_the_map_is_not_mirrored(recorded):
@@ -199,9 +205,18 @@ def test_the_pheromone_is_neither_flat_nor_misplaced(recorded):
     assert image[1:5, 24:26].all()
     cell = read_column(recorded.path, entities.PHEROMONE, "GridMap:cell_size").values[-1][0]
     assert cell == pytest.approx(CELL_M)
-    label = read_column(recorded.path, entities.COHORT, "Points3D:labels").values[-1]
+    *_, cohort, trail = read_column(recorded.path, entities.COHORT, "Points3D:labels").values
     best = recorded.mission.best_steps
-    assert label == [f"cohort 3, 1 cell a move\n60 ants in all, best walk {best} steps"]
+    assert cohort == [f"cohort 3, 1 cell a move\n60 ants in all, best walk {best} steps"]
+    path = f"path {recorded.mission.revision}"
+    decided = "12 cells, 1.03 directions in reach of the best"
+    assert trail == [f"living trail at {path}, {best} steps to drive\n{decided}"]
+
+
+def test_how_decided_the_trail_is_is_a_curve(recorded):
+    (first,), *_, (last,) = read_column(recorded.path, entities.BRANCHING, "Scalars:scalars").values
+    assert first == pytest.approx(2.0)
+    assert last == pytest.approx(1.03, abs=0.01)
 
 
 def test_a_malformed_sample_costs_that_sample(recorded):

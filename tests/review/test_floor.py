@@ -11,8 +11,11 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.orders.zones import with_kept_out
+from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.floor import swept_floor
+from fasaco_edge.review.rows import Figure, figures
 from fasaco_edge.review.run_data import RunData, StatusSample
+from fasaco_edge.wire.replies import FloorReport
 from fasaco_edge.wire.status import LedgerReport, Status
 from tests.support.rooms import RADIUS_M, RESOLUTION_M, TOOL_M, room
 
@@ -95,3 +98,13 @@ def test_a_map_without_zones_is_left_as_it_is():
 def test_floor_swept_before_is_not_guessed_at():
     before = StatusSample(0.0, Status(ledger=LedgerReport(restored_cells=7)))
     assert told(LANE, statuses=[before]) is None
+
+
+def test_what_the_ledger_had_last_is_told_beside():
+    told = [Status(floor=FloorReport(2.0)), Status(floor=FloorReport(3.5)), Status()]
+    samples = [StatusSample(float(at), status) for at, status in enumerate(told)]
+    assert RunData(statuses=samples).ledger_swept_m2 == 3.5
+    assert RunData(statuses=samples[2:]).ledger_swept_m2 is None
+    assert Figure("floor swept by the ledger", "3.5 m2", 3.5) in list(
+        figures(ReviewDocument(ledger_swept_m2=3.5))
+    )

@@ -117,6 +117,17 @@ def run(**changes):
     return ReviewDocument(**(base | dict.fromkeys(names, 3) | changes))
 
 
+def test_lanes_of_another_width_are_another_problem_in_the_same_building():
+    one, other = (
+        run(config={"planner.line": "thorough", "robot.overlap": overlap}, coverable_cells=cells)
+        for overlap, cells in ((0.0, 400), (0.1, 494))
+    )
+    both = side_by_side(one, other)
+    setup = {"what": "width of lanes", "recording": "0.300 m", "against": "0.270 m"}
+    assert both["setup"] == [setup]
+    assert both["compare"] is False
+
+
 OFFICE = MapSize(rows=400, cols=600, resolution_m=0.05)
 
 
@@ -127,6 +138,12 @@ OFFICE = MapSize(rows=400, cols=600, resolution_m=0.05)
         (run(version="2.0", config={"planner.name": "stc"}), ["version", "planner"], True),
         (run(config={"robot.tool_width_m": 0.5}, coverable_cells=144), ["tool width"], False),
         (run(config={"robot.radius_m": 0.3}), ["robot radius"], False),
+        (run(config={"planner.line": "cells", "robot.overlap": 0.2}), [], True),
+        (
+            run(config={"planner.line": "thorough", "robot.overlap": 0.08}, coverable_cells=600),
+            ["line"],
+            False,
+        ),
         (run(map=OFFICE), ["building"], False),
         (run(coverable_cells=900), ["building"], False),
         (run(coverable_cells=410), [], True),

@@ -12,7 +12,8 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.review.drive import walk_figures
-from fasaco_edge.review.pictures import covered_share
+from fasaco_edge.review.page import page_of
+from fasaco_edge.review.pictures import FIELDS, branching_panel, covered_share, draw_fields
 from fasaco_edge.review.review import read_review
 from tests.benchmarks.judge import check_walk
 from tests.review.naive import nearest_rank, passed_cells, quarter_turns
@@ -141,6 +142,7 @@ def test_each_replan_says_why_and_where(told, recording):
         note = notes[replan["revision"]]
         assert replan["reason"] == note["reason"]
         assert replan["lower_bound_steps"] == note["lower_bound_steps"]
+        assert replan["lower_bound_cost_s"] == note["lower_bound_cost_s"]
         assert (replan["gap"], replan["cost_s"]) == (note["gap"], note["planned_cost_s"])
         assert replan["changed"] == note["changed"]
         assert (note["changed"] is not None) == note["reason"].startswith(("map: ", "path blocked"))
@@ -179,6 +181,28 @@ def test_states_are_those_heard(told, review, recording):
     paused = next(span for span in review.states if span.name == "paused")
     assert paused.begin_s == pytest.approx(entered["paused"] - began, abs=0.3)
     assert sum(told["states"].values()) <= told["duration_s"] + 0.01
+
+
+def test_the_living_trail_spans_the_building(told):
+    pheromone = told["pheromone"]
+    assert pheromone["fields"] > 10
+    assert 0.95 <= pheromone["cells_share"] <= 1.0
+    assert 1.0 <= pheromone["branching"] <= 4.0
+
+
+def test_the_trail_is_shown_at_some_moments_and_how_decided_it_was(review):
+    pictures = draw_fields(review)
+    times = [at_s for at_s, _ in pictures]
+    # Four, where fields came often enough.
+    assert 2 <= len(times) <= FIELDS
+    assert times == sorted(times)
+    assert times[-1] <= review.duration_s
+    assert len({picture.size for _, picture in pictures}) == 1
+    assert len({picture.tobytes() for _, picture in pictures}) > 1
+    assert branching_panel(review) is not None
+    page = page_of(review)
+    assert page.count('alt="pheromone field"') == len(pictures)
+    assert "How decided the trail was" in page
 
 
 def test_faults_are_those_of_the_status(told, recording):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.mission.coverage.ledger import TILE, CoverageLedger, LedgerSnapshot
+from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 
 CELL_M = 0.3
 # The newest and the one before.
@@ -18,10 +20,12 @@ Cell = tuple[int, int]
 
 def driven(*cells: Cell, cell_m: float = CELL_M, frame: str = "map") -> LedgerSnapshot:
     """Return the ledger of a robot that stood in one cell (row, col) after the other."""
-    ledger = CoverageLedger(cell_m, frame)
+    ledger, floor = CoverageLedger(cell_m, frame), SweptFloor(cell_m)
     for row, col in cells:
-        ledger.record(Pose2D((col + 0.5) * cell_m, (row + 0.5) * cell_m))
-    return ledger.snapshot()
+        pose = Pose2D((col + 0.5) * cell_m, (row + 0.5) * cell_m)
+        ledger.record(pose)
+        floor.record(pose)
+    return replace(ledger.snapshot(), floor=floor.snapshot())
 
 
 def lane(length: int) -> LedgerSnapshot:
@@ -42,7 +46,9 @@ def contents(ledger: LedgerSnapshot | None) -> object:
     """Return all that a ledger holds, to be compared."""
     if ledger is None:
         return None
-    return ledger.cell_m, ledger.frame, ledger.total, ledger.under_tool, visits_of(ledger)
+    swept = {place: tile.tobytes() for place, tile in ledger.floor.tiles.items()}
+    visits = visits_of(ledger)
+    return ledger.cell_m, ledger.frame, ledger.total, ledger.under_tool, visits, swept
 
 
 def load(folder: Path) -> LoadedLedger:

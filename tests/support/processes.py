@@ -86,6 +86,8 @@ def daemon_process(
     sections.setdefault("mission", {}).setdefault("lost_pose_s", 0.0)
     # What they count is what was forced; tests/daemon/test_spare_time.py has the rest.
     sections.setdefault("planner", {}).setdefault("spare_share", 0.0)
+    # Cells are what most of them count; tests/daemon/test_line.py has the line.
+    sections["planner"].setdefault("line", "cells")
     sections.setdefault("bus", {}).setdefault("listen", [free_endpoint()])
     endpoint = [*sections["bus"]["listen"], *sections["bus"].get("connect", ())][0]
     number = len(list(folder.glob("daemon*.yaml")))

@@ -15,9 +15,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fasaco_edge.bus.session import Bus
-from fasaco_edge.config.config import DaemonConfig, RobotConfig
+from fasaco_edge.config.config import DaemonConfig, PlannerConfig, RobotConfig
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -25,7 +26,7 @@ from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import CoverageValue, encode_occupancy_grid
+from fasaco_edge.wire.maps import CoverageValue, directions_grid, encode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
 from fasaco_edge.wire.poses import encode_pose_stamped
@@ -33,10 +34,14 @@ from fasaco_edge.wire.poses import encode_pose_stamped
 RESOLUTION_M = 0.05
 CELL_M = 0.25
 RADIUS_M = 0.17
-CONFIG = DaemonConfig(robot=RobotConfig(tool_width_m=CELL_M, radius_m=RADIUS_M))
+CONFIG = DaemonConfig(
+    robot=RobotConfig(tool_width_m=CELL_M, radius_m=RADIUS_M), planner=PlannerConfig(line="cells")
+)
 ORIGIN = (-1.0, -2.0)
 ROWS, COLS = 120, 160
 # The box that turns up half-way, where the map said free: rows and columns of pixels.
+# What the robot leaves of each square that it passes is little.
+SWEPT_PERCENT = 90
 SURPRISE = (slice(80, 92), slice(40, 52))
 
 
@@ -53,7 +58,9 @@ class Mission:
         self._pose = bus.advertise(keys, topics.POSE)
         self._path = bus.advertise(keys, topics.PATH)
         self._coverage = bus.advertise(keys, topics.COVERAGE)
+        self._floor = bus.advertise(keys, topics.FLOOR)
         self._pheromone = bus.advertise(keys, topics.PHEROMONE)
+        self._directions = bus.advertise(keys, topics.DIRECTIONS)
         self._status = bus.advertise(keys, topics.STATUS)
         self.walk = _walk()
         self.rest = self.walk
@@ -82,11 +89,12 @@ class Mission:
         self._map.put(encode_occupancy_grid(occupancy(truth)))
 
     def replan(self, done: float, reason: str) -> None:
-        """Publish three cohorts and the walk they led to."""
+        """Publish three cohorts, the living trail, and the walk they led to."""
         self.revision += 1
         self.publish_status("planning", done, planning=True)
         for cohort in range(3):
             self.publish_cohort(cohort, done)
+        self.publish_trail(done)
         self.rest = self.walk[round(done * (len(self.walk) - 1)) :]
         seen = cells(self.rest)[1] < self.seen_cells - 1
         rest = self.rest = self.rest[: np.argmin(seen) if not seen.all() else None]
@@ -102,7 +110,8 @@ class Mission:
             "planned_steps": len(rest) - 1,
             "lower_bound_steps": len(rest) - 4,
             "planned_cost_s": 1.2 * len(rest),
-            "gap": 3 / (len(rest) - 4),
+            "lower_bound_cost_s": 1.2 * (len(rest) - 4),
+            "gap": 4 / (len(rest) - 4),
             "changed": self.changed(done) if reason == "the map grew" else None,
         }
         yaw = np.zeros(len(rest))
@@ -116,19 +125,42 @@ class Mission:
 
     def publish_cohort(self, cohort: int, done: float) -> None:
         """Publish pheromone that gathers along the walk."""
+        self.best_steps = round(len(self.walk) * (1.3 - 0.1 * cohort) - 40 * done)
+        self._pheromone.put(self._field(done, cohort, 1, 20 * (cohort + 1)))
+
+    def publish_trail(self, done: float) -> None:
+        """Publish the living trail, the more decided the later."""
+        note = {"revision": self.revision, "cells": 12, "branching": 2.0 - done}
+        self._pheromone.put(self._field(done, 3, 0, 0), json.dumps(note).encode())
+
+        # It points along the walk, up and down its columns, and is sure of that.
+        pointed = np.full((self.visits.shape[0], self.seen_cells), -1, np.int8)
+        (rows, cols), moves = cells(self.walk[:-1]), np.diff(self.walk, axis=0)
+        ways = np.select(
+            [moves[:, 0] > 0.01, moves[:, 1] > 0.01, moves[:, 0] < -0.01], [0, 1, 2], 3
+        )
+        seen = cols < self.seen_cells
+        pointed[rows[seen], cols[seen]] = ways[seen]
+        share = np.where(pointed < 0, 0, 0.75).astype(np.float32)
+        window = self._window(pointed)
+        grid = directions_grid(window, CELL_M, pointed, share)
+        self._directions.put(encode_occupancy_grid(grid))
+
+    def _window(self, shown: NDArray[np.generic]) -> Window:
+        col, row = (round(at / CELL_M) for at in ORIGIN)
+        return Window(0, 0, *shown.shape).moved(row, col)
+
+    def _field(self, done: float, cohort: int, velocity: int, ants: int) -> bytes:
         trail = np.full(self.visits.shape, 0.1, np.float32)
         rows, cols = cells(self.walk)
         along = np.arange(len(rows)) / len(rows)
         np.add.at(trail, (rows, cols), 5.0 * (cohort + 1) * (0.2 + along).astype(np.float32))
         trail[blocked_cells(done)] = 0.0
         trail = trail[:, : self.seen_cells]
-        self.best_steps = round(len(rows) * (1.3 - 0.1 * cohort) - 40 * done)
-        col, row = (round(at / CELL_M) for at in ORIGIN)
-        window = Window(0, 0, *trail.shape).moved(row, col)
         snapshot = ColonySnapshot(
-            window, CELL_M, trail, cohort, 1, 20 * (cohort + 1), self.best_steps
+            self._window(trail), CELL_M, trail, cohort, velocity, ants, self.best_steps
         )
-        self._pheromone.put(encode_pheromone(snapshot, "map", _stamp()))
+        return encode_pheromone(snapshot, "map", _stamp())
 
     def drive(self, done: float) -> None:
         """Publish the robot's pose, and remember which cell it is in."""
@@ -157,6 +189,8 @@ class Mission:
         self._coverage.put(
             encode_occupancy_grid(OccupancyGrid(grid.geometry, values, "map", _stamp()))
         )
+        swept = np.where(self.visits > 0, SWEPT_PERCENT, 0).astype(np.int8)
+        self._floor.put(encode_occupancy_grid(OccupancyGrid(grid.geometry, swept, "map", _stamp())))
 
     def publish_status(self, state: str, done: float, planning: bool, **more: Any) -> None:
         """Publish a status as the daemon would."""
@@ -169,6 +203,7 @@ class Mission:
             "cpu_s": 8.0 * self.revision,
             "threads": 9,
             "coverage": {"coverable": 500, "covered": round(500 * done), "recovered": 3},
+            "floor": {"swept_m2": round(70.0 * done, 3)},
             "plan": {"plans": self.revision, "unchanged": 2, "outdated": 1, "planning": planning},
             "latency_ms": {"ingest": 4.0 + done, "plan": 45.0, "map_to_path": 60.0 + 20 * done},
             "errors": {"total": 0, "last": "", "by_code": {}},

@@ -84,7 +84,18 @@ def shoot(viewer: ViewerClient, recordings: Sequence[Path], at: float) -> Shot:
     complaints = [f"{view.name}: {report}" for view in views for report in view.reports]
     complaints += [log.message for log in viewer.get_logs() if log.level == "ERROR"]
     names = tuple(view.name for view in views)
-    return Shot(viewer.take_screenshot(), names, tuple(complaints))
+    return Shot(_screenshot(viewer), names, tuple(complaints))
+
+
+def _screenshot(viewer: ViewerClient) -> bytes:
+    """Return the window as PNG; the viewer waits 15 s for its frame, which may take longer."""
+    deadline = time.monotonic() + START_TIMEOUT_S
+    while True:
+        try:
+            return viewer.take_screenshot()
+        except TimeoutError:
+            if time.monotonic() > deadline:
+                raise
 
 
 def _connected(port: int, process: subprocess.Popen[bytes]) -> ViewerClient:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from rich.cells import cell_len
 from rich.color import ColorSystem
 
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
 from fasaco_edge.watch.robot_view import RobotView, Token
+from fasaco_edge.wire.pheromone import encode_pheromone
 from tests.watch.grids import NOW, console, mid_mission, plain, status, tell
 
 SIZES = [(80, 24), (120, 40), (200, 60), (64, 14), (63, 13), (30, 10), (12, 4), (1, 1), (400, 5)]
@@ -75,12 +79,34 @@ def test_the_robot_drives_east_in_the_lower_half_over_what_is_covered():
     assert row > 8
 
 
+def test_the_trail_takes_the_place_of_coverage_and_path():
+    view, page = mid_mission(), Page(console(80, colours=None))
+    trail = np.full((8, 12), 0.1, np.float32)
+    trail[2] = 1.0
+    seen = ColonySnapshot(Window(0, 0, 8, 12), 0.5, trail, 0, 0, 0, 30)
+    # What a cohort has left is another field.
+    tell(view, "pheromone", encode_pheromone(replace(seen, trail=trail + 1), "map", 1))
+    assert view.field is None
+    tell(view, "pheromone", encode_pheromone(seen, "map", 1), b"{}")
+    before = page.lines(view, NOW, 80, 24)
+    assert page.toggle_field()
+    shown = page.lines(view, NOW, 80, 24)
+    lane = next(number for number, line in enumerate(shown) if "→" in line)
+    assert "777777" in shown[lane]
+    assert "111111" in shown[lane - 4]
+    assert "*" not in "".join(line[:45] for line in shown[1:-6])
+    assert "each path leads there" in "".join(shown)
+    assert not page.toggle_field()
+    assert page.lines(view, NOW, 80, 24) == before
+
+
 def test_it_says_how_it_stands():
     page = page_of(mid_mission())
     for said in (
         "COVERING",
         "25.0 %, 10 of 40 cells",
-        "0.9 m2, 2.7 m2 to go",
+        "25.0 % of cells",
+        "swept     1.4 m2",
         "map: 2 cells more",
         "30 steps, bound 29",
         "everything reachable",
@@ -110,6 +136,19 @@ def test_it_says_how_far_an_order_is():
         "hall      to come",
         "keep-out zones: 3, returns home",
         "5 cells, 0.0 m2",
+    ):
+        assert said in page, page
+
+
+def test_it_says_how_much_floor_is_swept_and_what_is_left_and_why():
+    view = mid_mission()
+    left = [{"m2": 1.5, "reason": "too narrow"}, {"m2": 0.5, "reason": "in a keep-out zone"}]
+    tell(view, "status", status(floor={"swept_m2": 9.0, "reachable_m2": 10.0, "left": left}))
+    page = page_of(view, 120, 40)
+    for said in (
+        "swept     80.0 %: 8.0 of 10.0 m2",
+        "1.5 m2 left: too narrow",
+        "0.5 m2 left: in a keep-out zone",
     ):
         assert said in page, page
 

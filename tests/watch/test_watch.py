@@ -56,6 +56,18 @@ def test_it_shows_how_the_mission_stands(covering):
         assert terminal.is_clean()
 
 
+def test_a_key_switches_the_map_to_the_trail_and_back(covering):
+    with Terminal("--connect", covering.endpoint, NO_COLOR="1", LANG="C") as terminal:
+        terminal.wait(lambda seen: "COVERING" in seen and "to cover" in seen)
+        terminal.type("f")
+        # Where the path leads it is strong.
+        terminal.wait(lambda seen: "to cover" not in seen and "777" in seen.split("\n", 1)[1])
+        terminal.type("f")
+        terminal.wait(lambda seen: "to cover" in seen and "777" not in seen)
+        terminal.type("q")
+        assert terminal.end() == 0
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_leaves_the_terminal_as_it_was(covering, number):
     with Terminal("--connect", covering.endpoint) as terminal:
@@ -185,7 +197,7 @@ def test_lines_where_there_is_no_terminal(covering):
         process.send_signal(signal.SIGTERM)
         assert process.wait(60.0) == 0
     assert any("the daemon is there" in line for line in said)
-    assert any("234 cells, path 1" in line for line in said), said
+    assert any("234 cells, " in line and " m2 swept, path 1" in line for line in said), said
     assert not any("\x1b" in line for line in said)
 
 

@@ -17,8 +17,9 @@ import msgspec
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.mission.orders.order import CommandDocument
+from fasaco_edge.wire.path_documents import PathAttachment, TrailAttachment
 from fasaco_edge.wire.replies import Error, Replan, Reply, Version
-from fasaco_edge.wire.status import PathAttachment, Recorder, Status
+from fasaco_edge.wire.status import Recorder, Status
 from fasaco_edge.wire.turns import TurnBatch
 
 HEAD = {
@@ -33,6 +34,7 @@ DOCUMENTS = {
     "replan": Replan,
     "reply": Reply,
     "status": Status,
+    "trail_attachment": TrailAttachment,
     "turns": TurnBatch,
     "version": Version,
 }

@@ -19,14 +19,10 @@ from fasaco_edge.wire.json_text import (
     encode_json,
     tolerant,
 )
+from fasaco_edge.wire.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.replies import STATES, CoverageReport, ZoneReport
-from fasaco_edge.wire.status import (
-    PathAttachment,
-    Rectangle,
-    Status,
-    SupervisedRecorder,
-    known_settings,
-)
+from fasaco_edge.wire.settings import known_settings
+from fasaco_edge.wire.status import Status, SupervisedRecorder
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=8),

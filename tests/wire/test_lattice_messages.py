@@ -13,9 +13,15 @@ from hypothesis.extra import numpy as hnp
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid import lattice
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import maps
-from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
+from fasaco_edge.wire.maps import (
+    decode_occupancy_grid,
+    directions_grid,
+    directions_of,
+    encode_occupancy_grid,
+)
 from fasaco_edge.wire.pheromone import decode_pheromone, encode_pheromone
 
 # The float32s from the least normal one up: trails do not come smaller.
@@ -96,3 +102,22 @@ def test_counts_must_fit() -> None:
         encode_pheromone(snapshot(trail, best_steps=-1), "map", 1)
     with pytest.raises(MalformedMessage, match="levels must be"):
         encode_pheromone(ColonySnapshot(Window(0, 0, 2, 2), 0.3, trail, 0, 1, 1, 1), "map", 1)
+
+
+def test_directions_are_told_to_a_twenty_fourth():
+    pointed = np.array([[-1, 0, 1], [2, 3, 3]], np.int8)
+    share = np.array([[0.0, 0.25, 1.0], [0.52, 0.7, 1.0]], np.float32)
+    grid = directions_grid(Window(-2, 4, 0, 7), 0.3, pointed, share, "hall", 7)
+    assert grid.cells.tolist() == [[-1, 6, 49], [62, 92, 99]]
+    there = decode_occupancy_grid(encode_occupancy_grid(grid))
+    assert (there.frame, there.stamp_ns) == ("hall", 7)
+    again, told = directions_of(there)
+    np.testing.assert_array_equal(again, pointed)
+    np.testing.assert_allclose(told, share, atol=0.5 / 24)
+
+
+def test_values_that_stand_for_no_direction_are_none():
+    cells = np.array([[100, -1, 99, 0]], np.int8)
+    pointed, share = directions_of(OccupancyGrid(GridGeometry(1, 4, 0.3, Pose2D(0.0, 0.0)), cells))
+    assert pointed.tolist() == [[-1, -1, 3, 0]]
+    assert share.tolist() == [[0.0, 0.0, 1.0, 0.0]]

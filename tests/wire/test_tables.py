@@ -12,6 +12,7 @@ import fasaco_edge
 from fasaco_edge.daemon.loop.answers import REPLAN_PERIOD_S
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.coverage.ledger import MOST_TILES
+from fasaco_edge.mission.coverage.swept_floor import MOST_FLOOR_TILES
 from fasaco_edge.mission.orders import order
 from fasaco_edge.wire import limits
 from fasaco_edge.wire.keys import Keys
@@ -111,6 +112,7 @@ def test_limits_are_those_of_the_code():
         **{f"queue_{name}": length for name, length in QUEUE_LENGTHS.items()},
         "replan_period_s": REPLAN_PERIOD_S,
         "most_ledger_tiles": MOST_TILES,
+        "most_floor_tiles": MOST_FLOOR_TILES,
     }
     named = {name for entry in load("keys.yaml")["keys"] for name in entry["limits"]}
     assert named <= load("limits.yaml").keys()

@@ -34,6 +34,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="simulated seconds per second (default: %(default)g)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="the planner's seed")
+    parser.add_argument(
+        "--line",
+        choices=("cells", "quick", "thorough"),
+        default="thorough",
+        help="what the robot is given: the centres of cells, or a line polished against the floor "
+        "(default: %(default)s)",
+    )
     parser.add_argument("--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="[m]")
     parser.add_argument(
         "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="[m]"

@@ -155,7 +155,7 @@ class DemoMission:
         return {
             "robot": {"radius_m": self._args.robot_radius, "tool_width_m": self._args.cell},
             "bus": {"listen": [self._endpoint]},
-            "planner": {"seed": self._args.seed},
+            "planner": {"seed": self._args.seed, "line": self._args.line},
         }
 
     def _spawn(self, name: str, words: list[str]) -> None:

@@ -67,6 +67,9 @@ def summarise(args: argparse.Namespace, out: Path, ending: Ending) -> Summary:
     driven = np.hypot(*np.diff(truth.trail, axis=0).T).sum()
     reachable, done = int(truth.reachable.sum()), int(covered.sum())
     status = ending.status
+    if args.line != "cells" and status.coverage is not None:
+        # Over a line the robot stands beside the middles of cells: the daemon's own count.
+        reachable, done = status.coverage.coverable, status.coverage.covered
     summary = Summary(
         map=str(args.map),
         complete=done == reachable and not ending.timed_out,
@@ -156,6 +159,7 @@ def _draw(args: argparse.Namespace, out: Path, truth: _Truth, summary: Summary) 
         truth.visits,
         title=title,
         lines=lines,
+        swept=None if args.line == "cells" else MapLayer(truth.floor.geometry, truth.floor.swept),
         unswept=MapLayer(truth.floor.geometry, truth.floor.unswept),
     )
     picture.save(out / "mission.png")

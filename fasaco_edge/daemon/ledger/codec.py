@@ -7,16 +7,26 @@ broken one. Little endian:
     version    uint32
     checksum   uint32    CRC-32 of version, length and body
     length     uint64    of the body; nothing follows it
-    body                 version 1: compressed by zlib
+    body                 compressed by zlib
 
     cell_m     float64   edge of a cell [m]
     total      uint64    visits in all
-    counts     3 uint32  bytes of the frame, cells under the tool, tiles
+    counts     6 uint32  bytes of the frame, cells under the tool, tiles, tiles of floor, rows and
+                         columns of the trail
     frame      UTF-8
     cells      int64 (row, col) of each cell under the tool
     places     int64 (row, col) of each tile
     tiles      uint16 (TILE, TILE) of each tile
+    floor      int64 (row, col) of each tile of floor
+    swept      uint8 (FLOOR_TILE, FLOOR_TILE / 8) of each: a bit for each pixel of 0.025 m, the
+               first of eight the highest
+    corner     int64 (row, col) where the trail begins
+    trail      uint8 (2, rows, cols, 4): the high bytes of the pheromone, then the low ones, of its
+               first 16 bits as float32, rounded
     note       UTF-8, up to the end: JSON of the order, with a version of its own; may be empty
+
+Versions before are read, too. Version 2 knows no trail: its counts, ``corner`` and ``trail`` are
+not in it. Version 1 knows no floor, either: nor are the fourth count, ``floor`` and ``swept``.
 """
 
 from __future__ import annotations
@@ -24,45 +34,71 @@ from __future__ import annotations
 import math
 import struct
 import zlib
+from collections.abc import Iterator
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
+from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Window
+from fasaco_edge.mission.coverage.floor_tiles import FLOOR_TILE, ROW_BYTES, FloorSnapshot
 from fasaco_edge.mission.coverage.ledger import MOST_TILES, TILE, LedgerSnapshot
+from fasaco_edge.mission.coverage.swept_floor import MOST_FLOOR_TILES
+from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot
 
 MAGIC = b"FASACOLG"
-VERSION = 1
+VERSION = 3
 
 _ENVELOPE = struct.Struct("<8sIIQ")
 _CHECKED = struct.Struct("<IQ")
-_HEAD = struct.Struct("<dQIII")
-_CELL_BYTES, _TILE_BYTES = 16, 2 * TILE * TILE
+_HEADS = {version: struct.Struct(f"<dQ{3 + n}I") for version, n in ((1, 0), (2, 1), (3, 3))}
+_PLACE_BYTES, _TILE_BYTES, _FLOOR_BYTES = 16, 2 * TILE * TILE, FLOOR_TILE * ROW_BYTES
+# Of a cell: two for each direction.
+_TRAIL_BYTES = 8
 # What a ledger holds beside its tiles is small: frame, cells under the tool, the order.
-MOST_BYTES = MOST_TILES * (_TILE_BYTES + _CELL_BYTES) + 2_000_000
+MOST_BYTES = (
+    MOST_TILES * (_TILE_BYTES + _PLACE_BYTES)
+    + MOST_FLOOR_TILES * (_FLOOR_BYTES + _PLACE_BYTES)
+    + MAX_LATTICE_CELLS * _TRAIL_BYTES
+    + 2_000_000
+)
 """Of a body, and of a file, which is smaller; longer ones are not read."""
+# Pheromone is rounded so much at once.
+_AT_ONCE = 1 << 18
 # Mostly zeros and ones: the fastest level takes a hundredth of the size.
 _LEVEL = 1
 
 
 def encode_ledger(snapshot: LedgerSnapshot) -> bytes:
     """Return a ledger as the bytes of a file."""
-    frame = snapshot.frame.encode()
-    places, under_tool = sorted(snapshot.tiles), sorted(snapshot.under_tool)
-    counts = (len(frame), len(under_tool), len(places))
-    plain = b"".join(
-        (
-            _HEAD.pack(snapshot.cell_m, snapshot.total, *counts),
-            frame,
-            np.array(under_tool, "<i8").tobytes(),
-            np.array(places, "<i8").tobytes(),
-            *(snapshot.tiles[place].astype("<u2").tobytes() for place in places),
-            snapshot.note.encode(),
-        )
-    )
-    body = zlib.compress(plain, _LEVEL)
+    # Part by part: a large ledger is not in memory as a whole once more.
+    deflater = zlib.compressobj(_LEVEL)
+    body = b"".join([*map(deflater.compress, _parts(snapshot)), deflater.flush()])
     return _ENVELOPE.pack(MAGIC, VERSION, _checksum(VERSION, body), len(body)) + body
+
+
+def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
+    frame, floor = snapshot.frame.encode(), snapshot.floor.tiles
+    counts = (len(frame), len(snapshot.under_tool), len(snapshot.tiles), len(floor))
+    # A larger one than is read would cost the whole ledger.
+    trail = snapshot.trail if snapshot.trail.tau.size <= 4 * MAX_LATTICE_CELLS else NO_TRAIL
+    yield _HEADS[VERSION].pack(snapshot.cell_m, snapshot.total, *counts, *trail.tau.shape[:2])
+    yield frame
+    yield np.array(sorted(snapshot.under_tool), "<i8").tobytes()
+    yield np.array(sorted(snapshot.tiles), "<i8").tobytes()
+    for place in sorted(snapshot.tiles):
+        yield snapshot.tiles[place].astype("<u2").tobytes()
+    yield np.array(sorted(floor), "<i8").tobytes()
+    for place in sorted(floor):
+        yield floor[place].tobytes()
+    yield np.array((trail.window.row0, trail.window.col0), "<i8").tobytes()
+    for plane in (24, 16):
+        for bits in np.array_split(trail.tau.view(np.uint32), -(-trail.tau.size // _AT_ONCE) or 1):
+            rounded = bits + 0x7FFF + ((bits >> 16) & 1)
+            yield (rounded >> plane).astype(np.uint8).tobytes()
+    yield snapshot.note.encode()
 
 
 def decode_ledger(payload: bytes, cell_m: float | None) -> LedgerSnapshot:
@@ -82,20 +118,21 @@ def decode_ledger(payload: bytes, cell_m: float | None) -> LedgerSnapshot:
         raise LedgerFileError(f"torn: {len(body)} of {length} bytes")
     if checksum != _checksum(version, body):
         raise LedgerFileError("wrong checksum")
-    if version != VERSION:
+    if version not in _HEADS:
         raise LedgerMismatchError(
-            f"the ledger is of version {version}, this release reads version {VERSION}",
+            f"the ledger is of version {version}, this release reads versions 1 to {VERSION}",
             hint="to go on with it, install the release that wrote it, and give the file its "
             "name back",
         )
     try:
-        snapshot = _decode_body(_inflated(body))
+        snapshot = _decode_body(_inflated(body), version)
     except (zlib.error, struct.error, ValueError) as error:
         raise LedgerFileError(f"malformed: {error}") from error
     if cell_m is not None and snapshot.cell_m != cell_m:
         raise LedgerMismatchError(
             f"the ledger's cells are {snapshot.cell_m} m wide, the configuration's {cell_m} m",
-            hint=f"to go on with it, set robot.tool_width_m to {snapshot.cell_m}, and give the "
+            hint=f"to go on with it, set robot.tool_width_m to {snapshot.cell_m} (and "
+            "robot.overlap, planner.line to what they were), and give the "
             "file its name back",
         )
     return snapshot
@@ -111,33 +148,63 @@ def _inflated(body: bytes) -> bytes:
     return plain
 
 
-def _decode_body(plain: bytes) -> LedgerSnapshot:
-    cell_m, total, frame_bytes, cell_count, tile_count = _HEAD.unpack_from(plain)
-    if tile_count > MOST_TILES:
-        raise ValueError(f"{tile_count} tiles, {MOST_TILES} are read at most")
-    frame_end = _HEAD.size + frame_bytes
-    cells_end = frame_end + _CELL_BYTES * cell_count
-    places_end = cells_end + _CELL_BYTES * tile_count
-    tiles_end = places_end + _TILE_BYTES * tile_count
-    if len(plain) < tiles_end:
-        raise ValueError(f"{len(plain)} bytes do not hold {tile_count} tiles")
+def _decode_body(plain: bytes, version: int) -> LedgerSnapshot:
+    head = _HEADS[version]
+    cell_m, total, *counts = head.unpack_from(plain)
+    frame_bytes, cell_count, tile_count, floor_count, rows, cols = (*counts, 0, 0, 0)[:6]
+    for count, most in ((tile_count, MOST_TILES), (floor_count, MOST_FLOOR_TILES)):
+        if count > most:
+            raise ValueError(f"{count} tiles, {most} are read at most")
+    if rows * cols > MAX_LATTICE_CELLS:
+        raise ValueError(f"trail of {rows} x {cols} cells, {MAX_LATTICE_CELLS} are read at most")
+    frame_end = head.size + frame_bytes
+    cells_end = frame_end + _PLACE_BYTES * cell_count
+    tiles_end = cells_end + (_PLACE_BYTES + _TILE_BYTES) * tile_count
+    floor_end = tiles_end + (_PLACE_BYTES + _FLOOR_BYTES) * floor_count
+    trail_end = floor_end + (_PLACE_BYTES + _TRAIL_BYTES * rows * cols if version >= 3 else 0)
+    if len(plain) < trail_end:
+        raise ValueError(
+            f"{len(plain)} bytes do not hold {tile_count} + {floor_count} tiles and "
+            f"{rows} x {cols} cells of trail"
+        )
     if not (math.isfinite(cell_m) and cell_m > 0):
         raise ValueError(f"cells of {cell_m} m")
-    # A view of the bytes: read-only, and nothing is copied.
-    tiles = np.frombuffer(plain, "<u2", tile_count * TILE * TILE, places_end)
-    tiles = tiles.reshape(tile_count, TILE, TILE)
-    places = _cells(plain[cells_end:places_end])
+    tiles = _tiles(plain, cells_end, tile_count, np.dtype("<u2"), (TILE, TILE))
+    swept = _tiles(plain, tiles_end, floor_count, np.dtype(np.uint8), (FLOOR_TILE, ROW_BYTES))
     return LedgerSnapshot(
         cell_m=cell_m,
-        frame=plain[_HEAD.size : frame_end].decode(),
+        frame=plain[head.size : frame_end].decode(),
         total=total,
-        tiles=MappingProxyType(dict(zip(places, tiles.astype(np.uint16, copy=False), strict=True))),
-        under_tool=frozenset(_cells(plain[frame_end:cells_end])),
-        note=plain[tiles_end:].decode(),
+        tiles=MappingProxyType(
+            {place: tile.astype(np.uint16, copy=False) for place, tile in tiles.items()}
+        ),
+        under_tool=frozenset(_places(plain[frame_end:cells_end])),
+        floor=FloorSnapshot(MappingProxyType(swept)),
+        note=plain[trail_end:].decode(),
+        trail=_trail(plain[floor_end:trail_end], rows, cols) if version >= 3 else NO_TRAIL,
     )
 
 
-def _cells(plain: bytes) -> list[tuple[int, int]]:
+def _trail(plain: bytes, rows: int, cols: int) -> TrailSnapshot:
+    row0, col0 = np.frombuffer(plain, "<i8", 2).tolist()
+    shape = 2, rows, cols, 4
+    high, low = np.frombuffer(plain, np.uint8, offset=_PLACE_BYTES).reshape(shape)
+    tau = ((high.astype(np.uint32) << 24) | (low.astype(np.uint32) << 16)).view(np.float32)
+    if not (np.isfinite(tau).all() and (tau >= 0).all()):
+        raise ValueError("pheromone below 0, or not finite")
+    return TrailSnapshot(Window(row0, col0, row0 + rows, col0 + cols), tau)
+
+
+def _tiles(
+    plain: bytes, start: int, count: int, kind: np.dtype[Any], shape: tuple[int, int]
+) -> dict[tuple[int, int], NDArray[Any]]:
+    """Return tiles by place: views of the bytes, read-only, so that nothing is copied."""
+    begin = start + _PLACE_BYTES * count
+    tiles = np.frombuffer(plain, kind, count * math.prod(shape), begin).reshape(count, *shape)
+    return dict(zip(_places(plain[start:begin]), tiles, strict=True))
+
+
+def _places(plain: bytes) -> list[tuple[int, int]]:
     pairs: NDArray[np.int64] = np.frombuffer(plain, "<i8").reshape(-1, 2)
     return [(row, col) for row, col in pairs.tolist()]
 

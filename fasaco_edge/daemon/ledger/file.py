@@ -4,7 +4,7 @@
 written to ``<robot>.ledger.new`` and on to the disk itself; only then the names move on: at
 every moment a whole ledger stands under one of them, and ``load`` finds the newest. Files
 that cannot be used are set aside under a name that says why: of each kind the newest few and the
-largest, unless they have no covered cell.
+largest, unless they have no covered cell and no swept floor.
 """
 
 from __future__ import annotations
@@ -225,9 +225,9 @@ def _read(path: Path) -> bytes:
 
 
 def _is_empty(path: Path) -> bool:
-    """Tell whether a ledger can be read, and has no covered cell."""
+    """Tell whether a ledger can be read, and nothing is covered or swept."""
     with contextlib.suppress(OSError, FasacoError):
-        return not decode_ledger(_read(path), None).cells
+        return decode_ledger(_read(path), None).is_empty
     return False
 
 

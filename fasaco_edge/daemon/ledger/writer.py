@@ -11,7 +11,7 @@ import time
 from collections import deque
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from fasaco_edge.daemon.figures import fault_text, log_fault
 from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger, reason_of
@@ -28,10 +28,28 @@ LOG = logging.getLogger(__name__)
 # Coverage that is a second old is on disk, although a cycle takes up to a tenth of a second, and
 # a memory card some tenths.
 PERIOD_S = 0.5
+# Of floor and trail alone, so much may wait: they change with every pose or path, and a memory card
+# wears out.
+FLOOR_PERIOD_S = 1.0
 # Time between tries after a failure [s].
 RETRY_S = 2.0
 # How long the answer to a command waits for a slow disk [s].
 MOST_WAIT_S = 1.0
+
+
+class _Kept(NamedTuple):
+    """What was last given to be written: visits, changes of swept floor and trail, the order."""
+
+    visits: int
+    floor_changes: int
+    trail_changes: int
+    order_state: OrderState
+
+    def may_wait_s(self, before: _Kept) -> float:
+        """Return how long after the former one this may wait [s]."""
+        if self.order_state != before.order_state:
+            return 0.0
+        return PERIOD_S if self.visits != before.visits else FLOOR_PERIOD_S
 
 
 class LedgerKeeper:
@@ -46,12 +64,12 @@ class LedgerKeeper:
         self._writer = writer
         self._before = writer.restored or LedgerSnapshot(cell_m, "", 0, {})
         self.order_state = self._first_order_state(autostart)
-        self._kept = self._before.total, self.order_state
+        self._kept = _Kept(self._before.total, self._before.floor.changes, 0, self.order_state)
         self._kept_at = float("-inf")
 
     def restore(self, mission: Mission) -> None:
         """Let a mission go on where the former one ended."""
-        if self._before.cells:
+        if not self._before.is_empty:
             mission.restore_ledger(self._before)
         mission.restore_order(self.order_state)
 
@@ -61,18 +79,18 @@ class LedgerKeeper:
 
     def keep(self, mission: Mission | None, now: float) -> None:
         """Have changes written: an order at once, coverage once a period."""
-        total = mission.ledger.total if mission else self._before.total
-        order_state = mission.order_state if mission else self.order_state
-        kept_total, kept_order_state = self._kept
-        if total == kept_total and order_state == kept_order_state:
+        if mission is not None:
+            changes = mission.floor.changes, mission.trail.changes
+            held = _Kept(mission.ledger.total, *changes, mission.order_state)
+        else:
+            held = _Kept(self._before.total, self._before.floor.changes, 0, self.order_state)
+        if held == self._kept or now - self._kept_at < held.may_wait_s(self._kept):
             return
-        if order_state == kept_order_state and now - self._kept_at < PERIOD_S:
-            return
-        self._kept, self._kept_at = (total, order_state), now
+        self._kept, self._kept_at = held, now
         if mission is not None:
             self._writer.put(mission.snapshot())
         else:
-            self._before = replace(self._before, note=order_state.to_json())
+            self._before = replace(self._before, note=held.order_state.to_json())
             self._writer.put(self._before)
 
     def is_kept(self, now: float) -> bool:
@@ -101,7 +119,7 @@ class LedgerKeeper:
 
     def _begin_anew(self, fault: FasacoError | None, why: str) -> None:
         self._writer.begin_anew(fault, why)
-        self._kept, self._kept_at = (-1, OrderState()), float("-inf")
+        self._kept, self._kept_at = _Kept(-1, -1, -1, OrderState()), float("-inf")
 
     def _first_order_state(self, autostart: bool) -> OrderState:
         """Return the order that was under way, or the one to begin with."""

@@ -31,7 +31,7 @@ from fasaco_edge.wire.json_text import decode_json, encode_json
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
 from fasaco_edge.wire.replies import Version, encode_error
-from fasaco_edge.wire.status import Settings
+from fasaco_edge.wire.settings import Settings
 
 # A robot whose path changes all the time drives badly: it is planned anew no more often [s].
 REPLAN_PERIOD_S = 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import threading
 import time
@@ -18,8 +19,9 @@ from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.answers import Commands
 from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Inbox, take_batch
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
-from fasaco_edge.daemon.loop.outbox import CoveragePublisher, Outbox
+from fasaco_edge.daemon.loop.outbox import CoveragePublisher, FloorPublisher, Outbox
 from fasaco_edge.daemon.loop.status import StatusBoard
+from fasaco_edge.daemon.loop.trail_publisher import TrailPublisher
 from fasaco_edge.daemon.loop.turn_log import TurnLog, TurnNote
 from fasaco_edge.daemon.notify import Watchdog
 from fasaco_edge.daemon.reload import Reload
@@ -78,8 +80,11 @@ class Loop:
         self._status = StatusBoard(config)
         self._latency = MapLatency()
         self._coverage = CoveragePublisher(bus.outbox)
+        self._floor = FloorPublisher(bus.outbox)
+        self._trail = TrailPublisher(bus.outbox)
         self._guard = bus.outbox.guard
         self._failed_at = float("-inf")
+        self._is_warm = False
 
     @property
     def config(self) -> DaemonConfig:
@@ -221,6 +226,8 @@ class Loop:
             self._runner.interrupt()  # what is needed comes before what is only better
         self._perform(mission, decision)
         self._guard.attempt("coverage", partial(self._coverage.publish, mission, now))
+        self._guard.attempt("floor", partial(self._floor.publish, mission, now))
+        self._guard.attempt("pheromone", partial(self._trail.publish, mission, now))
         return decision
 
     def _perform(self, mission: Mission, decision: Decision) -> None:
@@ -272,6 +279,10 @@ class Loop:
         self._status.path = update
         if update.plan is not None and (seconds := self._latency.answer()) is not None:
             self._status.map_to_path_s = seconds
+        if update.plan is not None and not self._is_warm:
+            # Modules and kernels stay: to look through them for garbage holds the loop up by 80 ms.
+            gc.freeze()
+            self._is_warm = True
 
     def _log_cycle(self, note: TurnNote) -> None:
         turns = self._bus.turns

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import ClaimState
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
+from fasaco_edge.daemon.memory import floor_pixels
 from fasaco_edge.errors import CommandError, FasacoError, PatchWithoutBase
 from fasaco_edge.grid.occupancy import MapPatch, without_base
 from fasaco_edge.host.processes import release_unused
-from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.config import MissionConfig, Sweeping
 from fasaco_edge.mission.core.events import (
     Answer,
     CommandReceived,
@@ -276,6 +278,8 @@ class Loader:
         from fasaco_edge.daemon.loop.worker import PlanningWorker  # noqa: PLC0415
         from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
         from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415
+        from fasaco_edge.planners.fasaco import Fasaco  # noqa: PLC0415
+        from fasaco_edge.planners.living_trail import TrailRules  # noqa: PLC0415
         from fasaco_edge.planners.near_optimal import NearOptimal  # noqa: PLC0415
         from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
@@ -283,22 +287,34 @@ class Loader:
         warm_up(self._report)
         release_unused()
         robot, maps, planner = self._config.robot, self._config.map, self._config.planner
-        footprint = Footprint(
-            robot.tool_width_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least
-        )
-        chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
+        cell_m = self._config.cell_m
+        footprint = Footprint(cell_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least)
+        colony = planner.colony()
+        chosen = planner_of(planner.name, colony, planner.threads, planner.local_search)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
         config = MissionConfig(
             footprint,
             maps.max_lattice_cells,
-            robot.cost(),
+            robot.cost(cell_m),
             self._config.mission,
             planner.spare_share if isinstance(chosen, NearOptimal) else 0.0,
+            self._sweeping(),
+            TrailRules(colony.alpha, colony.tau0),
+            isinstance(chosen, Fasaco),
         )
         first = (
             OrderState.autostart() if self._config.mission.autostart else OrderState.idle(NO_ORDER)
         )
         return Mission(config, first), worker
+
+    def _sweeping(self) -> Sweeping | None:
+        from fasaco_edge.planners.line import LINES  # noqa: PLC0415
+
+        robot, line = self._config.robot, LINES.get(self._config.planner.line)
+        if line is None:
+            return None
+        line = replace(line, speed_m_s=robot.speed_m_s, quarter_turn_s=robot.quarter_turn_s)
+        return Sweeping(robot.tool_width_m, floor_pixels(self._config.map.max_pixels), line)
 
     def _report(self, stage: str) -> None:
         self.stage = f"kernels: {stage}"

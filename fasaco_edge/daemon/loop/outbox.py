@@ -1,13 +1,11 @@
 """The outbox: publishers of path, coverage, pheromone, status and commands.
 
-What was published last is kept, to answer who asks for it.
+What was published last is kept (``daemon.loop.last_samples``), to answer who asks for it.
 """
 
 from __future__ import annotations
 
 import logging
-import re
-import threading
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -17,13 +15,14 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from fasaco_edge.bus.queries import Reply, Request, Shared
+from fasaco_edge.bus.queries import Reply, Shared
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.figures import log_fault
-from fasaco_edge.daemon.loop.answers import Said, answering, check
 from fasaco_edge.daemon.loop.inbox import PlanSnapshot
+from fasaco_edge.daemon.loop.last_samples import LastSamples
+from fasaco_edge.daemon.loop.trail_publisher import ShownTrail
 from fasaco_edge.daemon.ros_bridge import RosBridge
-from fasaco_edge.errors import BadQuery, FasacoError, NotPublished, NotYet
+from fasaco_edge.errors import FasacoError, NotPublished
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import command_document
@@ -31,9 +30,10 @@ from fasaco_edge.wire import schemas, topics
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import coverage_grid, encode_occupancy_grid
+from fasaco_edge.wire.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
-from fasaco_edge.wire.status import PathAttachment, Rectangle, Status
+from fasaco_edge.wire.status import Status
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.geometry import Window
@@ -44,12 +44,13 @@ LOG = logging.getLogger(__name__)
 
 # The coverage is published no more often than this [s].
 COVERAGE_PERIOD_S = 0.5
+# Neither is the swept floor; in so many squares at most, which are larger where it is large.
+FLOOR_PERIOD_S = 2.0
+MOST_SQUARES = 1_000_000
 # Of what fails again and again one is logged in so long [s].
 LOG_PERIOD_S = 10.0
 # So many failures wait to be counted at most.
 MOST_FAULTS = 100
-# The cohort that stands for the last one.
-NEWEST = "newest"
 
 
 class Outbox:
@@ -65,18 +66,21 @@ class Outbox:
         self._last = LastSamples(bus, keys)
         self._path = bus.advertise(keys, topics.PATH)
         self._coverage = bus.advertise(keys, topics.COVERAGE)
+        self._floor = bus.advertise(keys, topics.FLOOR)
         self._pheromone = bus.advertise(keys, topics.PHEROMONE)
+        self._directions = bus.advertise(keys, topics.DIRECTIONS)
         self._status = bus.advertise(keys, topics.STATUS)
         self._command = bus.advertise(keys, topics.COMMAND)
 
     def path(self, mission: Mission, update: PathUpdate) -> None:
-        """Publish a path through the centres of cells, facing along the way.
+        """Publish the line to drive, or a path through centres of cells, facing along the way.
 
         Where that fails an empty one is published: the robot must not follow the former path.
         """
         assert mission.grid is not None
         assert mission.lattice is not None
-        grid, xy = mission.grid, mission.lattice.centres(update.cells)
+        grid = mission.grid
+        xy = mission.lattice.centres(update.cells) if update.xy is None else update.xy
         about = path_attachment(mission, update)
         if not self.guard.attempt("path", lambda: self._say_path(xy, grid, about)):
             nothing = replace(about, steps=0)
@@ -94,8 +98,8 @@ class Outbox:
             self._ros.path.put(path)
 
     def forget(self) -> None:
-        """Drop path and coverage cached for late joiners: another daemon publishes them."""
-        for publisher in (self._path, self._coverage):
+        """Drop what is cached for late joiners: another daemon publishes it."""
+        for publisher in (self._path, self._coverage, self._pheromone, self._directions):
             publisher.forget()
         if self._ros is not None:
             self._ros.path.forget()
@@ -128,6 +132,29 @@ class Outbox:
         if self._ros is not None:
             self._ros.coverage.put(coverage)
 
+    @property
+    def shows_floor(self) -> bool:
+        """Whether someone listens to the swept floor."""
+        return self._floor.has_listeners()
+
+    def floor(self, grid: OccupancyGrid) -> None:
+        """Publish the swept floor; the caller guards that."""
+        self._floor.put(encode_occupancy_grid(grid))
+
+    @property
+    def shows_pheromone(self) -> bool:
+        """Whether someone listens to the pheromone field, or to where it points to."""
+        return self._pheromone.has_listeners() or self._directions.has_listeners()
+
+    def trail(self, shown: ShownTrail) -> None:
+        """Publish the living trail, and where it points to; the caller guards that."""
+        self._pheromone.put(*shown.field())
+        self._directions.put(shown.directions())
+
+    def keep_trail(self, shown: ShownTrail) -> None:
+        """Keep the living trail for who asks for it."""
+        self._last.keep_living(shown)
+
     def pheromone(self, seen: PlanSnapshot, frame: str) -> None:
         """Keep the pheromone field, and publish it if anyone listens."""
         self.guard.attempt("pheromone", lambda: self._say_pheromone(seen, frame))
@@ -136,7 +163,7 @@ class Outbox:
         payload = encode_pheromone(seen.snapshot, frame, time.time_ns())
         reply = Reply(payload, schemas.PHEROMONE_GRID)
         self._last.keep_trail(seen.plan, seen.snapshot.cohort, reply)
-        if self._pheromone.has_listeners():
+        if self.shows_pheromone:
             self._pheromone.put(payload)
 
 
@@ -203,6 +230,30 @@ class CoveragePublisher:
         )
 
 
+class FloorPublisher:
+    """Publishes the swept floor when it has changed and someone listens, every two seconds."""
+
+    def __init__(self, outbox: Outbox) -> None:
+        self._outbox = outbox
+        self._published_at = float("-inf")
+        self._key: tuple[object, ...] = ()
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish the swept floor if that is due."""
+        if not self._outbox.shows_floor:
+            self._key = ()  # who listens next has not got it
+            return
+        floor, grid = mission.floor, mission.grid
+        key = (floor, floor.changes)
+        is_early = now - self._published_at < FLOOR_PERIOD_S
+        if key == self._key or is_early or grid is None:
+            return
+        self._published_at, self._key = now, key
+        shown = floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
+        if shown is not None:
+            self._outbox.floor(shown)
+
+
 class PublishGuard:
     """Publishes what the loop sends: a failure costs that message alone.
 
@@ -238,62 +289,3 @@ class PublishGuard:
         """Return what was not published since the last call; it is logged already."""
         faults, self._faults = self._faults, []
         return faults
-
-
-class LastSamples:
-    """Keeps what was said last on some topics, and answers with it.
-
-    The answer is the same on the topic itself, as a storage would give it.
-    """
-
-    def __init__(self, bus: Bus, keys: Keys) -> None:
-        self._lock = threading.Lock()
-        self._last: dict[str, Said] = {}
-        # Of the newest full plan: by cohort, and the newest; and the number of its request.
-        self._trails: dict[str, Said] = {}
-        self._plan = 0
-        for topic in (topics.PATH, topics.STATUS, topics.COVERAGE):
-            answer = answering(partial(self._answer, topic.name))
-            for key in (keys.rpc(topic.name), keys.of(topic)):
-                bus.serve(key, answer)
-        for key in (keys.rpc("pheromone"), keys.of(topics.PHEROMONE)):
-            bus.serve(key, answering(self._trail))
-
-    def keep(self, topic: str, reply: Said) -> None:
-        """Keep what was said on ``topic``."""
-        with self._lock:
-            self._last[topic] = reply
-
-    def keep_trail(self, plan: int, cohort: int, reply: Said) -> None:
-        """Keep the trail that ``cohort`` of plan ``plan`` has left."""
-        with self._lock:
-            if plan != self._plan:
-                self._plan, self._trails = plan, {}
-            self._trails[str(cohort)] = self._trails[NEWEST] = reply
-
-    def _answer(self, topic: str, request: Request) -> Said:
-        check(request)
-        with self._lock:
-            reply = self._last.get(topic)
-        if reply is None:
-            raise NotYet(f"there is no {topic} yet")
-        return reply
-
-    def _trail(self, request: Request) -> Said:
-        check(request, "cohort")
-        cohort = request.parameters.get("cohort", NEWEST)
-        if cohort != NEWEST:
-            if not re.fullmatch("[0-9]{1,9}", cohort):
-                raise BadQuery(f"cohort must be a whole number from 0, got {cohort!r}")
-            cohort = str(int(cohort))
-        with self._lock:
-            reply = self._trails.get(cohort)
-            kept = [name for name in self._trails if name != NEWEST]
-        if reply is not None:
-            return reply
-        if not kept:
-            raise NotYet("there is no pheromone yet: no full plan was made")
-        raise NotYet(
-            f"the newest full plan has no trail of cohort {cohort}",
-            hint=f"leave cohort out, or ask for {', '.join(kept)}",
-        )

@@ -16,8 +16,11 @@ from fasaco_edge.daemon.figures import CycleTimes, Faults
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.host.processes import resident_mb, thread_count
 from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.wire.path_documents import PathReport
 from fasaco_edge.wire.replies import (
     CoverageReport,
+    FloorLeft,
+    FloorReport,
     MissionReport,
     Point,
     Reply,
@@ -30,7 +33,6 @@ from fasaco_edge.wire.status import (
     Latencies,
     LedgerReport,
     MapReport,
-    PathReport,
     PlanCounts,
     PoseReport,
     Status,
@@ -104,6 +106,7 @@ class StatusBoard:
             map=_map(mission),
             pose=_pose(mission),
             coverage=_coverage(mission),
+            floor=floor_report(mission),
             path=self._path(mission),
             plan=_plans(mission),
             latency_ms=Latencies(_ms(self.ingest_s), _ms(self.plan_s), _ms(self.map_to_path_s)),
@@ -126,6 +129,7 @@ class StatusBoard:
             state=state,
             reason=reason,
             coverage=_coverage(runner.mission),
+            floor=floor_report(runner.mission),
             mission=mission_report(runner.mission, runner.order_state),
         )
 
@@ -190,6 +194,21 @@ def _coverage(mission: Mission | None) -> CoverageReport | None:
         free_out_of_reach_m2=round(coverage.free_out_of_reach_m2, 3),
         fraction=round(coverage.fraction, 4),
     )
+
+
+def floor_report(mission: Mission | None) -> FloorReport | None:
+    """Return this part of the status."""
+    if mission is None:
+        return None
+    swept_m2, to_sweep = round(mission.floor.swept_m2, 3), mission.floor_to_sweep()
+    if to_sweep is None:
+        return FloorReport(swept_m2)
+    parts = (
+        FloorLeft(round(to_sweep.ahead_m2, 3), "on the path"),
+        FloorLeft(round(to_sweep.left_m2, 3), "beside the path, and not worth the way"),
+    )
+    left = tuple(sorted((part for part in parts if part.m2), key=lambda part: -part.m2))
+    return FloorReport(swept_m2, round(to_sweep.asked_m2, 3), left)
 
 
 def _plans(mission: Mission | None) -> PlanCounts:

@@ -269,7 +269,10 @@ def spanning_tree_walk(
     cols, size = steps.shape[1], steps.size
     # A node of its own for "to be covered, not yet labelled".
     unlabelled = size
-    node = np.where(to_cover.ravel() == 1, unlabelled, NO_NODE).astype(np.int32)
+    node = np.full(size, NO_NODE, np.int32)
+    for cell in range(size):
+        if to_cover[cell // cols, cell % cols] == 1:
+            node[cell] = unlabelled
     offsets = np.array([1, cols, -1, -cols], np.int64)
     blocks = Blocks(steps.ravel(), node, np.zeros((size, 2), np.int8), offsets)
     nodes = 0

@@ -1,1 +1,1 @@
-"""Kernels for the lower bound on the number of steps."""
+"""Kernels for lower bounds: of steps, and of what steps and turns cost."""

@@ -41,7 +41,9 @@ def biconnected_blocks(steps: NDArray[np.uint8], offsets: NDArray[np.int64], roo
         offsets: int64 (4,), difference of flat index for a step in each direction.
         root: where the search begins.
     """
-    most = np.count_nonzero(steps) + 1
+    most = 1
+    for mask in steps:
+        most += mask != 0
     # Every cell but the root is below the top of one block, and each block has one top.
     cells, first = np.empty(2 * most, np.int32), np.empty(most + 1, np.int32)
     open_cells = np.empty(most, np.int32)

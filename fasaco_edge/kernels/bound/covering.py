@@ -116,7 +116,9 @@ def covering_bound(
     # Steps saved, against a walk back to the cell, by an end in it or beyond it.
     saved = np.full(steps.size, NO_END, np.int32)
     if end < 0:
-        saved[ground.wanted != 0] = 0
+        for cell in range(steps.size):
+            if ground.wanted[cell]:
+                saved[cell] = 0
     else:
         ground.wanted[end] = 1
         saved[end] = 0

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.kernels.floor.bits import any_between
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 # A robot exactly as wide as a door fits: so much nearer counts as not touched.
@@ -20,12 +21,11 @@ RIM = 1e-7
 BLOCK = 3
 # Counts of sweeps of pixels that the tool can never reach begin here.
 NEVER = 10_000
-# So many capsules are compared at most, those taken away and those put in their place.
-MOST_CAPSULES = 24
+# A line that rises by less counts as level.
+LEVEL = 1e-9
 
-# Columns of a prepared capsule: its lower and its upper end, then of its right side, for one that
-# is not level: columns a row, and from the line to it; whether it is.
-Y0, X0, Y1, X1, SLOPE, SIDE_Y, SIDE_X, IS_SLANTED = range(8)
+# Columns of a prepared capsule: its lower and its upper end, and its right side, see ``_right_of``.
+Y0, X0, Y1, X1, SIDE_Y, SIDE_X, SLOPE = COLUMNS = range(7)
 
 
 class Sweeps(NamedTuple):
@@ -45,8 +45,8 @@ class Scratch(NamedTuple):
     """Memory to compare capsules in.
 
     Attributes:
-        capsules: float64 (MOST_CAPSULES, 8), prepared ones.
-        before, after: int64 (MOST_CAPSULES, 2), stretches of one row.
+        capsules: float64 (n, len(COLUMNS)), prepared ones.
+        before, after: int64 (n, 2), stretches of one row.
     """
 
     capsules: NDArray[np.float64]
@@ -56,29 +56,50 @@ class Scratch(NamedTuple):
 
 @inlined
 def _right_of(
-    y: float, ay: float, ax: float, by: float, bx: float, radius: float, length: float
+    y: float,
+    ay: float,
+    ax: float,
+    by: float,
+    bx: float,
+    side_y: float,
+    side_x: float,
+    slope: float,
+    square: float,
 ) -> float:
-    """Return the largest x of a capsule at height y, which has to lie within it."""
+    """Return the largest x of a capsule at height y; -inf where it has none.
+
+    Args:
+        y: height.
+        ay, ax, by, bx: its ends, the lower one first.
+        side_y, side_x: from these to its right side, which has columns a row, ``slope``; ``side_y``
+            is infinite for a level one, whose sides are rows.
+        square: of its radius.
+    """
     x = -np.inf
-    square = radius * radius
     if (y - ay) * (y - ay) <= square:
         x = ax + np.sqrt(square - (y - ay) * (y - ay))
     if (y - by) * (y - by) <= square:
         x = max(x, bx + np.sqrt(square - (y - by) * (y - by)))
-    dy, dx = by - ay, bx - ax
-    if abs(dy) > 1e-12:
-        side_y, side_x = -dx / length * radius, dy / length * radius
-        if side_x < 0.0:
-            side_y, side_x = -side_y, -side_x
-        along = (y - ay - side_y) / dy
-        if 0.0 <= along <= 1.0:
-            x = max(x, ax + side_x + along * dx)
+    if ay <= y - side_y <= by:
+        x = max(x, ax + side_x + (y - side_y - ay) * slope)
     return x
+
+
+@inlined
+def _right_side(
+    ay: float, ax: float, by: float, bx: float, radius: float
+) -> tuple[float, float, float]:
+    """Return ``side_y``, ``side_x`` and ``slope`` of a capsule whose lower end is the first."""
+    dy, dx = by - ay, bx - ax
+    if dy <= LEVEL:
+        return np.inf, 0.0, 0.0
+    length = np.sqrt(dy * dy + dx * dx)
+    return -dx / length * radius, dy / length * radius, dx / dy
 
 
 @lean_kernel
 def is_clear(
-    blocked: NDArray[np.int32], ay: float, ax: float, by: float, bx: float, radius: float
+    blocked: NDArray[np.uint64], ay: float, ax: float, by: float, bx: float, radius: float
 ) -> bool:
     """Tell whether no blocked pixel comes nearer than ``radius`` to the way from a to b.
 
@@ -86,15 +107,17 @@ def is_clear(
     row is nearest to the height of the capsule's outermost point.
 
     Args:
-        blocked: int32 (rows, cols + 1): how many of a row's first pixels are blocked. What lies
-            outside is blocked, too.
+        blocked: uint64 (rows, words), see ``bits``. What lies outside is blocked, too.
         ay, ax, by, bx: the way [pixels].
         radius: of the robot [pixels].
     """
-    rows, cols = blocked.shape[0], blocked.shape[1] - 1
+    rows, cols = blocked.shape[0], blocked.shape[1] << 6
     radius -= TOUCH
-    length = np.sqrt((by - ay) * (by - ay) + (bx - ax) * (bx - ax))
-    low, high = min(ay, by) - radius, max(ay, by) + radius
+    if ay > by:
+        ay, ax, by, bx = by, bx, ay, ax
+    side_y, side_x, slope = _right_side(ay, ax, by, bx, radius)
+    square = radius * radius
+    low, high = ay - radius, by + radius
     first, last = int(np.floor(low + 0.5)), int(np.ceil(high - 0.5))
     if first < 0 or last >= rows:
         return False
@@ -106,18 +129,18 @@ def is_clear(
             continue
         if ax == bx:
             # All between the two ends are outermost.
-            y = min(max(y0, min(ay, by)), max(ay, by))
-            right = _right_of(min(max(y, y0), y1), ay, ax, by, bx, radius, length)
+            y = min(max(min(max(y0, ay), by), y0), y1)
+            right = _right_of(y, ay, ax, by, bx, side_y, side_x, slope, square)
             left = 2.0 * ax - right
         else:
             y = min(max(right_y, y0), y1)
-            right = _right_of(y, ay, ax, by, bx, radius, length)
+            right = _right_of(y, ay, ax, by, bx, side_y, side_x, slope, square)
             y = min(max(left_y, y0), y1)
-            left = -_right_of(y, ay, -ax, by, -bx, radius, length)
+            left = -_right_of(y, ay, -ax, by, -bx, -side_y, side_x, -slope, square)
         from_col, to_col = int(np.floor(left + 0.5)), int(np.ceil(right - 0.5))
         if from_col < 0 or to_col >= cols:
             return False
-        if blocked[i, to_col + 1] != blocked[i, from_col]:
+        if from_col <= to_col and any_between(blocked[i], from_col, to_col):
             return False
     return True
 
@@ -137,13 +160,7 @@ def prepare(
         ay, ax, by, bx = by, bx, ay, ax
     capsule = capsules[number]
     capsule[Y0], capsule[X0], capsule[Y1], capsule[X1] = ay, ax, by, bx
-    capsule[IS_SLANTED] = 0.0
-    dy, dx = by - ay, bx - ax
-    if dy > 1e-9:
-        length = np.sqrt(dy * dy + dx * dx)
-        capsule[SLOPE] = dx / dy
-        capsule[SIDE_Y], capsule[SIDE_X] = -dx / length * radius, dy / length * radius
-        capsule[IS_SLANTED] = 1.0
+    capsule[SIDE_Y], capsule[SIDE_X], capsule[SLOPE] = _right_side(ay, ax, by, bx, radius)
 
 
 @inlined
@@ -156,21 +173,10 @@ def _add_stretch(
 ) -> int:
     """Sort a capsule's pixels of row i in among ``count`` stretches; return how many there are."""
     ay, ax, by, bx = capsule[Y0], capsule[X0], capsule[Y1], capsule[X1]
-    right, left = -np.inf, np.inf
+    side_y, side_x, slope = capsule[SIDE_Y], capsule[SIDE_X], capsule[SLOPE]
     square = radius * radius
-    if (i - ay) * (i - ay) <= square:
-        half = np.sqrt(square - (i - ay) * (i - ay))
-        right, left = ax + half, ax - half
-    if (i - by) * (i - by) <= square:
-        half = np.sqrt(square - (i - by) * (i - by))
-        right, left = max(right, bx + half), min(left, bx - half)
-    if capsule[IS_SLANTED] > 0.0:
-        y = i - capsule[SIDE_Y]
-        if ay <= y <= by:
-            right = max(right, ax + capsule[SIDE_X] + (y - ay) * capsule[SLOPE])
-        y = i + capsule[SIDE_Y]
-        if ay <= y <= by:
-            left = min(left, ax - capsule[SIDE_X] + (y - ay) * capsule[SLOPE])
+    right = _right_of(i, ay, ax, by, bx, side_y, side_x, slope, square)
+    left = -_right_of(i, ay, -ax, by, -bx, -side_y, side_x, -slope, square)
     if not left <= right:
         return count
     begin, end = int(np.ceil(left - RIM)), int(np.floor(right + RIM))
@@ -184,34 +190,18 @@ def _add_stretch(
     return count + 1
 
 
-@lean_kernel
-def sweep(
-    sweeps: Sweeps,
-    ay: float,
-    ax: float,
-    by: float,
-    bx: float,
-    radius: float,
-    times: int,
-    scratch: Scratch,
+@inlined
+def _add(
+    row: NDArray[np.int16], blocks: NDArray[np.int32], begin: int, end: int, more: int
 ) -> None:
-    """Count a capsule in (``times`` 1) or out again (-1)."""
-    counts, left = sweeps.counts, sweeps.left
-    prepare(scratch.capsules, 0, ay, ax, by, bx, radius)
-    stretch = scratch.before
-    for i in range(
-        int(np.ceil(min(ay, by) - radius - RIM)), int(np.floor(max(ay, by) + radius + RIM)) + 1
-    ):
-        if not _add_stretch(scratch.capsules[0], i, radius, stretch, 0):
-            continue
-        row, blocks = counts[i], left[i >> BLOCK]
-        for j in range(stretch[0, 0], stretch[0, 1] + 1):
-            before = row[j]
-            row[j] = before + times
-            if before == 0:
-                blocks[j >> BLOCK] -= 1
-            elif before + times == 0:
-                blocks[j >> BLOCK] += 1
+    """Count pixels of a row, the last one among them, ``more`` times; 0 times counts as left."""
+    for j in range(begin, end + 1):
+        before = row[j]
+        row[j] = before + more
+        if before == 0:
+            blocks[j >> BLOCK] -= 1
+        elif before + more == 0:
+            blocks[j >> BLOCK] += 1
 
 
 @inlined
@@ -249,9 +239,55 @@ def _lost(
     return lost
 
 
+@inlined
+def rows_of(scratch: Scratch, count: int, radius: float) -> tuple[int, int]:
+    """Return the first and the last row that some capsules may meet."""
+    capsules = scratch.capsules
+    low, high = capsules[0, Y0], capsules[0, Y1]
+    for number in range(1, count):
+        low, high = min(low, capsules[number, Y0]), max(high, capsules[number, Y1])
+    return int(np.ceil(low - radius - RIM)), int(np.floor(high + radius + RIM))
+
+
+@inlined
+def stretches_of(
+    scratch: Scratch, i: int, taken: int, given: int, radius: float
+) -> tuple[int, int]:
+    """Fill in the stretches of row i before and after; return how many there are of each."""
+    capsules, before, after = scratch.capsules, scratch.before, scratch.after
+    olds = news = 0
+    for number in range(taken + given):
+        if capsules[number, Y0] - radius <= i <= capsules[number, Y1] + radius:
+            if number < taken:
+                olds = _add_stretch(capsules[number], i, radius, before, olds)
+            else:
+                news = _add_stretch(capsules[number], i, radius, after, news)
+    return olds, news
+
+
+@inlined
+def _over(stretches: NDArray[np.int64], count: int, col: int, end: int) -> tuple[int, int]:
+    """Return how many stretches lie over a column, and before which column, at most ``end``,
+    another number of them does."""
+    times = 0
+    for number in range(count):
+        begin, behind = stretches[number, 0], stretches[number, 1] + 1
+        if col < begin:
+            end = min(end, begin)
+        elif col < behind:
+            times += 1
+            end = min(end, behind)
+    return times, end
+
+
 @lean_kernel
 def swept_more(
-    counts: NDArray[np.int16], scratch: Scratch, taken: int, given: int, radius: float
+    counts: NDArray[np.int16],
+    scratch: Scratch,
+    taken: int,
+    given: int,
+    radius: float,
+    most_lost: float,
 ) -> int:
     """Return how many pixels more are swept once some capsules have taken the place of others.
 
@@ -262,29 +298,24 @@ def swept_more(
         scratch: whose first ``taken`` capsules are taken away, and the next ``given`` put in.
         taken, given: how many.
         radius: of the tool [pixels].
+        most_lost: once more pixels than these are swept no longer, the rest is not looked at.
     """
-    capsules, before, after = scratch.capsules, scratch.before, scratch.after
-    low, high = capsules[0, Y0], capsules[0, Y1]
-    for number in range(1, taken + given):
-        low, high = min(low, capsules[number, Y0]), max(high, capsules[number, Y1])
-    more = 0
-    for i in range(int(np.ceil(low - radius - RIM)), int(np.floor(high + radius + RIM)) + 1):
-        olds = news = 0
-        for number in range(taken + given):
-            if capsules[number, Y0] - radius <= i <= capsules[number, Y1] + radius:
-                if number < taken:
-                    olds = _add_stretch(capsules[number], i, radius, before, olds)
-                else:
-                    news = _add_stretch(capsules[number], i, radius, after, news)
+    before, after = scratch.before, scratch.after
+    first, last = rows_of(scratch, taken + given, radius)
+    more = lost = 0
+    for i in range(first, last + 1):
+        olds, news = stretches_of(scratch, i, taken, given, radius)
         row = counts[i]
         done = -1
         for number in range(olds):
             begin, at = max(before[number, 0], done + 1), 0
             while begin <= before[number, 1]:
                 begin, end, at = _next_outside(after, news, at, begin, before[number, 1])
-                more -= _lost(row, before, olds, begin, end)
+                lost += _lost(row, before, olds, begin, end)
                 begin = end + 1
             done = max(done, before[number, 1])
+        if lost > most_lost:
+            return -lost
         done = -1
         for number in range(news):
             begin, at = max(after[number, 0], done + 1), 0
@@ -294,4 +325,68 @@ def swept_more(
                     more += row[j] == 0
                 begin = end + 1
             done = max(done, after[number, 1])
-    return more
+    return more - lost
+
+
+@lean_kernel
+def exchange(sweeps: Sweeps, scratch: Scratch, taken: int, given: int, radius: float) -> None:
+    """Count the first ``taken`` capsules out and the next ``given`` in, where they differ."""
+    before, after = scratch.before, scratch.after
+    counts = sweeps.counts
+    first, last = rows_of(scratch, taken + given, radius)
+    for i in range(first, last + 1):
+        olds, news = stretches_of(scratch, i, taken, given, radius)
+        row, blocks = counts[i], sweeps.left[i >> BLOCK]
+        col = counts.shape[1]
+        if olds:
+            col = min(col, before[0, 0])
+        if news:
+            col = min(col, after[0, 0])
+        while col < counts.shape[1]:
+            less, end = _over(before, olds, col, counts.shape[1])
+            times, end = _over(after, news, col, end)
+            if times != less:
+                _add(row, blocks, col, end - 1, times - less)
+            col = end
+
+
+@lean_kernel
+def sweep(
+    sweeps: Sweeps,
+    ay: float,
+    ax: float,
+    by: float,
+    bx: float,
+    radius: float,
+    times: int,
+    scratch: Scratch,
+) -> None:
+    """Count a capsule in (``times`` 1) or out again (-1)."""
+    prepare(scratch.capsules, 0, ay, ax, by, bx, radius)
+    taken = 1 if times < 0 else 0
+    exchange(sweeps, scratch, taken, 1 - taken, radius)
+
+
+@lean_kernel
+def sweep_edges(
+    sweeps: Sweeps, edges: NDArray[np.float64], radius: float, times: int, scratch: Scratch
+) -> None:
+    """Count edges, float64 (n, 4): y, x and y, x of their ends, in (``times`` 1) or out (-1)."""
+    for number in range(len(edges)):
+        edge = edges[number]
+        sweep(sweeps, edge[0], edge[1], edge[2], edge[3], radius, times, scratch)
+
+
+@lean_kernel
+def count_left(sweeps: Sweeps, row0: int, col0: int, row1: int, col1: int) -> None:
+    """Count what is left in the blocks of a part of the pixels again."""
+    counts, left = sweeps.counts, sweeps.left
+    rows, cols = counts.shape
+    side = 1 << BLOCK
+    for i in range(row0 >> BLOCK, (row1 + side - 1) >> BLOCK):
+        for j in range(col0 >> BLOCK, (col1 + side - 1) >> BLOCK):
+            found = 0
+            for y in range(i << BLOCK, min((i + 1) << BLOCK, rows)):
+                for x in range(j << BLOCK, min((j + 1) << BLOCK, cols)):
+                    found += counts[y, x] == 0
+            left[i, j] = found

@@ -14,11 +14,13 @@ from fasaco_edge.kernels.floor.capsule import (
     BLOCK,
     Scratch,
     Sweeps,
+    exchange,
     is_clear,
     prepare,
     sweep,
     swept_more,
 )
+from fasaco_edge.kernels.floor.seconds import chain_s
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 # A move that gains less is not made [s]: sums of floats must not go in circles.
@@ -29,6 +31,8 @@ LEAST_EDGE = 0.3
 MOST_NEW = 4
 # The most points of a chain: those replaced, and two on either side.
 MOST_CHAIN = MOST_NEW + 4
+# So many capsules are compared at most: edges of the chains before and after.
+MOST_CAPSULES = 2 * (MOST_CHAIN - 1)
 NONE = -1
 
 
@@ -41,7 +45,8 @@ class Line(NamedTuple):
             NONE at the ends.
         seen: int64 (capacity,): when all moves at a point were last tried.
         changed: int64, a block each: when the line was last changed there.
-        state: int64 (3,): points used, the time, moves tried.
+        state: int64 (4,): points used, the time, moves tried, and the first of the numbers that
+            points have left free, each of which has the one after it as its ``next``; or NONE.
         is_end_fixed: whether the line has to end where it does.
     """
 
@@ -54,21 +59,21 @@ class Line(NamedTuple):
     is_end_fixed: bool
 
 
-USED, TIME, TRIED = range(3)
+USED, TIME, TRIED, FREE = range(4)
 
 
 class Floor(NamedTuple):
     """What the line lies on.
 
     Attributes:
-        blocked: int32 (rows, cols + 1), see ``capsule.is_clear``.
-        places: bool (rows, cols): where the robot may be, and can come to.
+        blocked: uint64 (rows, words), see ``bits``: what the robot must not touch.
+        places: the same: where the robot may be, and can come to.
         sweeps: what the line sweeps.
         robot, tool: their radii [pixels].
     """
 
-    blocked: NDArray[np.int32]
-    places: NDArray[np.bool_]
+    blocked: NDArray[np.uint64]
+    places: NDArray[np.uint64]
     sweeps: Sweeps
     robot: float
     tool: float
@@ -95,59 +100,9 @@ class Memory(NamedTuple):
 
 
 @inlined
-def _arctangent(ratio: float) -> float:
-    """Return the arctangent of a ratio in [0, 1], to 1e-5 rad, the same on every machine.
-
-    M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions, 4.4.49.
-    """
-    square = ratio * ratio
-    series = 0.0208351 * square - 0.085133
-    series = series * square + 0.180141
-    series = series * square - 0.3302995
-    return ratio * (series * square + 0.999866)
-
-
-@inlined
-def turn_between(uy: float, ux: float, vy: float, vx: float) -> float:
-    """Return the angle from one direction to another [rad], in [0, pi]."""
-    sine, cosine = abs(ux * vy - uy * vx), ux * vx + uy * vy
-    if sine <= 1e-9 * abs(cosine):
-        return 0.0 if cosine >= 0.0 else np.pi
-    if cosine >= 0.0:
-        angle = (
-            _arctangent(sine / cosine)
-            if sine <= cosine
-            else 0.5 * np.pi - _arctangent(cosine / sine)
-        )
-    elif sine <= -cosine:
-        angle = np.pi - _arctangent(sine / -cosine)
-    else:
-        angle = 0.5 * np.pi + _arctangent(-cosine / sine)
-    return angle
-
-
-@inlined
 def copy_point(source: NDArray[np.float64], at: int, target: NDArray[np.float64], to: int) -> None:
     """Copy a point; numba would allocate for an assignment of rows."""
     target[to, 0], target[to, 1] = source[at, 0], source[at, 1]
-
-
-@lean_kernel
-def chain_s(points: NDArray[np.float64], first: int, last: int, count: int, price: Price) -> float:
-    """Return the seconds of a chain: its edges from ``first`` to ``last``, all its turns."""
-    seconds = 0.0
-    for number in range(first, last):
-        dy = points[number + 1, 0] - points[number, 0]
-        dx = points[number + 1, 1] - points[number, 1]
-        seconds += price.drive_s * np.sqrt(dy * dy + dx * dx)
-    for number in range(1, count - 1):
-        seconds += price.turn_s * turn_between(
-            points[number, 0] - points[number - 1, 0],
-            points[number, 1] - points[number - 1, 1],
-            points[number + 1, 0] - points[number, 0],
-            points[number + 1, 1] - points[number, 1],
-        )
-    return seconds
 
 
 @lean_kernel
@@ -247,40 +202,56 @@ def _prepare_edges(
 
 
 @lean_kernel
-def gain_of(
-    line: Line, floor: Floor, price: Price, memory: Memory, begin: int, end: int, count: int
+def gain_above(
+    line: Line,
+    floor: Floor,
+    price: Price,
+    memory: Memory,
+    begin: int,
+    end: int,
+    count: int,
+    least_s: float,
 ) -> float:
     """Return what is gained if ``memory.new[:count]`` replace the points between two others [s].
 
-    0.0 where that is less than LEAST_GAIN_S, or where the way would not be clear.
+    -inf where that is less than ``least_s``, which may be below 0, or where the way would not be
+    clear.
 
     Args:
         line, floor, price, memory: see above.
         begin: number of the point before.
         end: of the point behind; NONE where the line shall end with the new ones.
         count: new points.
+        least_s: see above.
     """
     line.state[TRIED] += 1
     if end == NONE and line.is_end_fixed:
-        return 0.0
+        return -np.inf
     lead, olds, news, last_old, last_new = _chains(line, memory, begin, end, count)
     if not olds:
-        return 0.0
+        return -np.inf
     old, new, tool = memory.before, memory.after, floor.tool
-    longer_s = chain_s(new, lead, last_new, news, price)
-    longer_s -= chain_s(old, lead, last_old, olds, price)
-    if longer_s >= -LEAST_GAIN_S:
-        most = _left_around(floor.sweeps.left, new, lead, last_new, tool)
-        if price.left_s * most <= longer_s + LEAST_GAIN_S:
-            return 0.0
-    if not _is_way(floor, new, lead, last_new):
-        return 0.0
+    longer_s = chain_s(new, lead, last_new, news, price.drive_s, price.turn_s)
+    longer_s -= chain_s(old, lead, last_old, olds, price.drive_s, price.turn_s)
+    least_more = (longer_s + least_s) / price.left_s
+    most_more = _left_around(floor.sweeps.left, new, lead, last_new, tool)
+    if most_more < least_more or not _is_way(floor, new, lead, last_new):
+        return -np.inf
     scratch = memory.capsules
     taken = _prepare_edges(scratch, 0, old, lead, last_old, tool)
     given = _prepare_edges(scratch, taken, new, lead, last_new, tool)
-    more = swept_more(floor.sweeps.counts, scratch, taken, given, tool)
+    most_lost = most_more - least_more
+    more = swept_more(floor.sweeps.counts, scratch, taken, given, tool, most_lost)
     gain = price.left_s * more - longer_s
-    return gain if gain > LEAST_GAIN_S else 0.0
+    return gain if gain >= least_s else -np.inf
+
+
+@lean_kernel
+def gain_of(
+    line: Line, floor: Floor, price: Price, memory: Memory, begin: int, end: int, count: int
+) -> float:
+    """Return the same [s]; 0.0 where it is less than LEAST_GAIN_S."""
+    return max(gain_above(line, floor, price, memory, begin, end, count, LEAST_GAIN_S), 0.0)
 
 
 @lean_kernel
@@ -316,6 +287,25 @@ def note_change(line: Line, begin: int, tool: float, hops: int, now: int) -> int
 HOPS = 6
 
 
+@inlined
+def has_room(line: Line) -> bool:
+    """Tell whether there are numbers for the points of a move."""
+    return bool(line.state[USED] <= len(line.points) - MOST_NEW)
+
+
+@lean_kernel
+def _sweep_between(
+    line: Line, floor: Floor, memory: Memory, begin: int, end: int, times: int
+) -> None:
+    """Count the edges between two points in (``times`` 1) or out again (-1)."""
+    points, following = line.points, line.next
+    number = begin
+    while number != end and following[number] != NONE:
+        a, b = points[number], points[following[number]]
+        sweep(floor.sweeps, a[0], a[1], b[0], b[1], floor.tool, times, memory.capsules)
+        number = following[number]
+
+
 @lean_kernel
 def replace_points(
     line: Line, floor: Floor, memory: Memory, begin: int, end: int, count: int
@@ -324,16 +314,23 @@ def replace_points(
     points, following, preceding, tool = line.points, line.next, line.previous, floor.tool
     line.state[TIME] += 1
     note_change(line, begin, tool, HOPS, line.state[TIME])
-    number = begin
-    while number != end and following[number] != NONE:
-        a, b = points[number], points[following[number]]
-        sweep(floor.sweeps, a[0], a[1], b[0], b[1], tool, -1, memory.capsules)
-        number = following[number]
-    # The points that go lend their numbers to those that come.
+    lead, olds, _, last_old, last_new = _chains(line, memory, begin, end, count)
+    if olds:
+        scratch = memory.capsules
+        taken = _prepare_edges(scratch, 0, memory.before, lead, last_old, tool)
+        given = _prepare_edges(scratch, taken, memory.after, lead, last_new, tool)
+        exchange(floor.sweeps, scratch, taken, given, tool)
+    else:
+        _sweep_between(line, floor, memory, begin, end, -1)
+    # The points that go lend their numbers to those that come. Numbers of points that are gone are
+    # taken only once all others are: who knows a point by its number sees it again, or a new one.
     free, last = following[begin], begin
     for number in range(count):
         if free != end and free != NONE:  # noqa: PLR1714 - numba has no `in` for tuples
             place, free = free, following[free]
+        elif line.state[FREE] != NONE and line.state[USED] >= len(points) - 2 * MOST_NEW:
+            place = np.int32(line.state[FREE])
+            line.state[FREE] = following[place]
         else:
             place = np.int32(line.state[USED])
             line.state[USED] += 1
@@ -341,13 +338,14 @@ def replace_points(
         line.seen[place] = 0
         following[last], preceding[place] = place, last
         last = place
+    while free != end and free != NONE:  # noqa: PLR1714
+        gone, free = free, following[free]
+        following[gone] = line.state[FREE]
+        line.state[FREE] = gone
     following[last] = end
     if end != NONE:
         preceding[end] = last
-    number = begin
-    while number != end and following[number] != NONE:
-        a, b = points[number], points[following[number]]
-        sweep(floor.sweeps, a[0], a[1], b[0], b[1], tool, 1, memory.capsules)
-        number = following[number]
+    if not olds:
+        _sweep_between(line, floor, memory, begin, end, 1)
     line.state[TIME] += 1
     note_change(line, begin, tool, HOPS, line.state[TIME])

@@ -8,36 +8,55 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
-from fasaco_edge.kernels.floor.capsule import is_clear
-from fasaco_edge.kernels.jit import kernel, lean_kernel
-from fasaco_edge.kernels.lattice.footprint import Placement
+from fasaco_edge.kernels.floor.bits import NONE, ONE, WORD, Bits, is_marked, spread
+from fasaco_edge.kernels.floor.capsule import TOUCH, is_clear
+from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
+from fasaco_edge.kernels.lattice.footprint import Box, Placement
 
 # Bends are looked for at every so many-th pixel.
 BEND_STEP = 2
 # A way round a corner is at most so many times as long as a cell is wide.
 LONGEST_BEND = 3.0
+# Points on the border of cells or pixels, and distances, are told apart from here on: what is found
+# must not depend on where the raster begins.
+TIE = 1e-6
 
 
-@lean_kernel
-def find_places(blocked: NDArray[np.int32], radius: float, places: NDArray[np.bool_]) -> None:
-    """Mark the pixels at whose centre the robot's disc touches nothing blocked.
+def disc_rows(radius: float) -> NDArray[np.int64]:
+    """Return how far a disc around a pixel's centre reaches in the rows from its own one on.
+
+    int64 (n,): how many pixels it touches to either side of the middle one, in the row that many
+    rows above, or below. A pixel is a square, as for ``capsule.is_clear``.
+    """
+    radius -= TOUCH
+    rows = np.arange(int(np.ceil(radius - 0.5)) + 1)
+    nearest = np.maximum(rows - 0.5, 0.0)
+    reach: NDArray[np.int64] = np.ceil(np.sqrt(radius * radius - nearest * nearest) - 0.5).astype(
+        np.int64
+    )
+    return reach
+
+
+def places_of(blocked: Bits, disc: NDArray[np.int64]) -> Bits:
+    """Return the pixels at whose centre a disc touches nothing blocked.
 
     Args:
-        blocked: int32 (rows, cols + 1), see ``capsule.is_clear``.
-        radius: of the robot [pixels].
-        places: bool (rows, cols), filled in.
+        blocked: uint64 (rows, words), see ``bits``. Its rim, as wide as the disc, and what lies
+            beyond are blocked.
+        disc: see ``disc_rows``.
     """
-    rows, cols = places.shape
-    reach = int(radius)
-    for i in range(rows):
-        for j in range(cols):
-            # Most pixels of a wall, and of what is unknown, are told by their own row.
-            from_col, to_col = max(j - reach, 0), min(j + reach, cols - 1)
-            if blocked[i, to_col + 1] != blocked[i, from_col]:
-                places[i, j] = False
-            else:
-                y, x = float(i), float(j)
-                places[i, j] = is_clear(blocked, y, x, y, x, radius)
+    return ~spread(blocked, disc)
+
+
+def within(marked: Bits, radius: float) -> Bits:
+    """Return the pixels whose centre is within ``radius`` of a marked one's.
+
+    Args:
+        marked: uint64 (rows, words), see ``bits``.
+        radius: [pixels].
+    """
+    away = np.arange(int(radius + 1e-9) + 1)
+    return spread(marked, np.sqrt(radius * radius - away * away + 1e-6).astype(np.int64))
 
 
 @kernel
@@ -61,93 +80,142 @@ def connected(places: NDArray[np.bool_], row: int, col: int) -> NDArray[np.bool_
     return found
 
 
-@kernel
-def within(marked: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
-    """Return the pixels whose centre is within ``radius`` of a marked one's, bool (rows, cols)."""
-    rows, cols = marked.shape
-    far = np.int32(1 << 20)
-    beside = np.empty((rows, cols), np.int32)
-    for i in range(rows):
-        distance = far
-        for j in range(cols):
-            distance = np.int32(0) if marked[i, j] else np.int32(min(distance + 1, far))
-            beside[i, j] = distance
-        distance = far
-        for j in range(cols - 1, -1, -1):
-            distance = np.int32(0) if marked[i, j] else np.int32(min(distance + 1, far))
-            beside[i, j] = min(beside[i, j], distance)
-    found = np.zeros((rows, cols), np.bool_)
-    most = int(radius + 1e-9)
-    for di in range(-most, most + 1):
-        half = int(np.sqrt(radius * radius - di * di + 1e-6))
-        for i in range(max(0, -di), min(rows, rows - di)):
-            here, there = found[i], beside[i + di]
-            for j in range(cols):
-                here[j] |= there[j] <= half
-    return found
+@inlined
+def _cell_of(placement: Placement, i: int, j: int) -> tuple[int, int]:
+    """Return the cell (row, col) in which a pixel's centre lies."""
+    ux, uy = placement.ux, placement.uy
+    per_cell = ux * ux + uy * uy
+    dx, dy = j - placement.x0, i - placement.y0
+    across, up = (ux * dx + uy * dy) / per_cell, (ux * dy - uy * dx) / per_cell
+    return int(np.floor(up + TIE)), int(np.floor(across + TIE))
+
+
+@lean_kernel
+def keep_in_cells(
+    found: NDArray[np.uint64],
+    placement: Placement,
+    chosen: NDArray[np.bool_],
+    cell: tuple[int, int],
+    corner: tuple[int, int],
+) -> None:
+    """Keep of a part of the raster only the pixels that lie in chosen cells.
+
+    Args:
+        found: uint64 (rows, words), the part, see ``bits``; changed.
+        placement: where the lattice's cells lie on the raster.
+        chosen: bool (rows, cols) of the lattice.
+        cell: its first cell (row, col).
+        corner: first pixel (row, col) of the part.
+    """
+    is_level = placement.uy == 0.0
+    for i in range(found.shape[0]):
+        # On a level lattice a row of pixels lies in one of cells, as the one before, mostly.
+        row = _cell_of(placement, corner[0] + i, corner[1])[0] - cell[0]
+        if is_level and not 0 <= row < chosen.shape[0]:
+            for word in range(found.shape[1]):
+                found[i, word] = NONE
+            continue
+        for word in range(found.shape[1]):
+            bits = found[i, word]
+            if bits == NONE:
+                continue
+            first = corner[1] + WORD * word
+            kept = NONE
+            for bit in range(WORD):
+                if (bits >> np.uint64(bit)) & ONE:
+                    at = _cell_of(placement, corner[0] + i, first + bit)
+                    row, col = at[0] - cell[0], at[1] - cell[1]
+                    inside = 0 <= row < chosen.shape[0] and 0 <= col < chosen.shape[1]
+                    if inside and chosen[row, col]:
+                        kept |= ONE << np.uint64(bit)
+            found[i, word] = kept
+
+
+@inlined
+def _pixels_of(placement: Placement, row: int, col: int, shape: tuple[int, int]) -> Box:
+    """Return the smallest box of pixels, of those there are, that holds a cell."""
+    ux, uy = placement.ux, placement.uy
+    x = placement.x0 + ux * (col + 0.5) - uy * (row + 0.5)
+    y = placement.y0 + uy * (col + 0.5) + ux * (row + 0.5)
+    half = 0.5 * (abs(ux) + abs(uy))
+    return Box(
+        max(int(np.ceil(y - half - TIE)), 0),
+        max(int(np.ceil(x - half - TIE)), 0),
+        min(int(np.floor(y + half + TIE)) + 1, shape[0]),
+        min(int(np.floor(x + half + TIE)) + 1, shape[1]),
+    )
 
 
 @lean_kernel
 def choose_stands(
-    blocked: NDArray[np.int32],
-    places: NDArray[np.bool_],
+    blocked: NDArray[np.uint64],
+    places: NDArray[np.uint64],
     placement: Placement,
+    stale: NDArray[np.bool_],
     row0: int,
     col0: int,
     stands: NDArray[np.float64],
-    distances: NDArray[np.float64],
 ) -> None:
-    """Find for each cell the place nearest to its middle; the middle itself if that is clear.
+    """Find for stale cells the place nearest to its middle; the middle itself if that is clear.
 
     Args:
-        blocked, places: of the raster, whose pixel (0, 0) is around the point (0, 0).
+        blocked, places: uint64 (rows, words), see ``bits``, of the raster, whose pixel (0, 0) is
+            around the point (0, 0).
         placement: where the lattice's cells lie on it; its radius is the robot's.
+        stale: bool (rows, cols): the cells to look at.
         row0, col0: the first cell (row, col) of the arrays.
         stands: float64 (rows, cols, 2): y, x [pixels], filled in; NaN where there is no place.
-        distances: float64 (rows, cols), scratch.
     """
-    rows, cols = distances.shape
     ux, uy = placement.ux, placement.uy
-    per_cell = ux * ux + uy * uy
     is_level = uy == 0.0
-    distances.fill(np.inf)
-    stands.fill(np.nan)
-    for i in range(places.shape[0]):
-        for j in range(places.shape[1]):
-            if not places[i, j]:
-                continue
-            dx, dy = j - placement.x0, i - placement.y0
-            across, up = (ux * dx + uy * dy) / per_cell, (ux * dy - uy * dx) / per_cell
-            row, col = int(np.floor(up)), int(np.floor(across))
-            # Middles on a level lattice are rounded to pixels alike in a row: lanes stay straight.
-            x = placement.x0 + ux * (col + 0.5) - uy * (row + 0.5)
-            y = placement.y0 + uy * (col + 0.5) + ux * (row + 0.5)
-            if is_level:
-                x, y = np.floor(x + 0.5), np.floor(y + 0.5)
-            square = (j - x) * (j - x) + (i - y) * (i - y)
-            row -= row0
-            col -= col0
-            if 0 <= row < rows and 0 <= col < cols and square < distances[row, col]:
-                distances[row, col] = square
-                stands[row, col, 0], stands[row, col, 1] = i, j
-                if square <= 0.5 and is_clear(blocked, y, x, y, x, placement.radius):
-                    stands[row, col, 0], stands[row, col, 1] = y, x
-                    distances[row, col] = -1.0
+    rows, cols = places.shape[0], places.shape[1] << 6
+    for row, col in np.ndindex(stale.shape):
+        if not stale[row, col]:
+            continue
+        stands[row, col, 0] = stands[row, col, 1] = np.nan
+        # Middles on a level lattice are rounded to pixels alike in a row: lanes stay straight.
+        x = placement.x0 + ux * (col + col0 + 0.5) - uy * (row + row0 + 0.5)
+        y = placement.y0 + uy * (col + col0 + 0.5) + ux * (row + row0 + 0.5)
+        if is_level:
+            x, y = np.floor(x + 0.5 + TIE), np.floor(y + 0.5 + TIE)
+        i, j = int(np.floor(y + 0.5)), int(np.floor(x + 0.5))
+        is_near = 0 <= i < rows and 0 <= j < cols and is_marked(places, i, j)
+        if (
+            is_near
+            and _cell_of(placement, i, j) == (row + row0, col + col0)
+            and is_clear(blocked, y, x, y, x, placement.radius)
+        ):
+            stands[row, col, 0], stands[row, col, 1] = y, x
+            continue
+        nearest = np.inf
+        box = _pixels_of(placement, row + row0, col + col0, (rows, cols))
+        for i in range(box.row0, box.row1):
+            for j in range(box.col0, box.col1):
+                square = (j - x) * (j - x) + (i - y) * (i - y)
+                if (
+                    square < nearest - TIE
+                    and is_marked(places, i, j)
+                    and _cell_of(placement, i, j) == (row + row0, col + col0)
+                ):
+                    nearest = square
+                    stands[row, col, 0], stands[row, col, 1] = i, j
+        if nearest <= 0.5 + TIE and is_clear(blocked, y, x, y, x, placement.radius):
+            stands[row, col, 0], stands[row, col, 1] = y, x
 
 
 @lean_kernel
 def _bend(
-    blocked: NDArray[np.int32],
-    places: NDArray[np.bool_],
+    blocked: NDArray[np.uint64],
+    places: NDArray[np.uint64],
     a: NDArray[np.float64],
     b: NDArray[np.float64],
     margin: int,
     longest: float,
     radius: float,
-    bend: NDArray[np.float64],
+    bend: NDArray[np.float32],
 ) -> bool:
     """Find the place over which the way from a to b is shortest; False where there is none."""
-    rows, cols = places.shape
+    rows, cols = places.shape[0], places.shape[1] << 6
     best = longest
     for i in range(
         max(int(min(a[0], b[0])) - margin, 0),
@@ -159,13 +227,13 @@ def _bend(
             min(int(max(a[1], b[1])) + margin + 1, cols),
             BEND_STEP,
         ):
-            if not places[i, j]:
+            if not is_marked(places, i, j):
                 continue
             length = np.sqrt((i - a[0]) ** 2 + (j - a[1]) ** 2)
             length += np.sqrt((i - b[0]) ** 2 + (j - b[1]) ** 2)
             y, x = float(i), float(j)
             if (
-                length < best
+                length < best - TIE
                 and is_clear(blocked, a[0], a[1], y, x, radius)
                 and is_clear(blocked, y, x, b[0], b[1], radius)
             ):
@@ -176,42 +244,52 @@ def _bend(
 
 @lean_kernel
 def link_stands(
-    blocked: NDArray[np.int32],
-    places: NDArray[np.bool_],
+    blocked: NDArray[np.uint64],
+    places: NDArray[np.uint64],
+    placement: Placement,
+    stale: NDArray[np.bool_],
     stands: NDArray[np.float64],
-    cell: float,
-    radius: float,
     steps: NDArray[np.uint8],
-    bends: NDArray[np.float64],
+    bends: NDArray[np.float32],
 ) -> None:
-    """Find the steps between the stands of neighbours.
+    """Find the steps of stale cells to the neighbours in the east and in the north.
 
     Args:
         blocked, places: of the raster.
+        placement: of the lattice's cells on it.
+        stale: bool (rows, cols): the cells to look at.
         stands: float64 (rows, cols, 2), see ``choose_stands``.
-        cell: edge of a cell [pixels].
-        radius: of the robot [pixels].
-        steps: uint8 (rows, cols), filled in: bit ``1 << direction`` for each legal step.
-        bends: float64 (rows, cols, 2, 2), filled in: where the step east, and the step north, has
+        steps: uint8 (rows, cols), changed: bit ``1 << direction`` for each legal step.
+        bends: float32 (rows, cols, 2, 2), changed: where the step east, and the step north, has
             a bend, y, x [pixels]; NaN for a straight one.
     """
     rows, cols = steps.shape
-    steps.fill(0)
-    bends.fill(np.nan)
-    for row in range(rows):
-        for col in range(cols):
-            a = stands[row, col]
-            if np.isnan(a[0]):
+    radius = placement.radius
+    cell = np.sqrt(placement.ux * placement.ux + placement.uy * placement.uy)
+    for row, col in np.ndindex(stale.shape):
+        if not stale[row, col]:
+            continue
+        # No step leads out of the arrays.
+        if col == 0:
+            steps[row, col] &= 15 - (1 << WEST)
+        if row == 0:
+            steps[row, col] &= 15 - (1 << SOUTH)
+        a = stands[row, col]
+        for axis in range(2):
+            there, back = (EAST, WEST) if axis == 0 else (NORTH, SOUTH)
+            far_row, far_col = row + axis, col + 1 - axis
+            bend = bends[row, col, axis]
+            bend[0] = bend[1] = np.nan
+            steps[row, col] &= 15 - (1 << there)
+            if far_row >= rows or far_col >= cols:
                 continue
-            for axis in range(2):
-                far_row, far_col = row + axis, col + 1 - axis
-                if far_row >= rows or far_col >= cols or np.isnan(stands[far_row, far_col, 0]):
+            steps[far_row, far_col] &= 15 - (1 << back)
+            b = stands[far_row, far_col]
+            if np.isnan(a[0]) or np.isnan(b[0]):
+                continue
+            if not is_clear(blocked, a[0], a[1], b[0], b[1], radius):
+                longest = LONGEST_BEND * cell
+                if not _bend(blocked, places, a, b, int(cell), longest, radius, bend):
                     continue
-                b = stands[far_row, far_col]
-                if not is_clear(blocked, a[0], a[1], b[0], b[1], radius):
-                    longest, bend = LONGEST_BEND * cell, bends[row, col, axis]
-                    if not _bend(blocked, places, a, b, int(cell), longest, radius, bend):
-                        continue
-                there, back = (EAST, WEST) if axis == 0 else (NORTH, SOUTH)
-                steps[row, col] |= 1 << there
-                steps[far_row, far_col] |= 1 << back
+            steps[row, col] |= 1 << there
+            steps[far_row, far_col] |= 1 << back

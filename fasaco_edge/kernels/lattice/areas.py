@@ -177,7 +177,9 @@ def cells_beside(areas: Areas, allowed: NDArray[np.bool_]) -> NDArray[np.int32]:
             if allowed[row, col]:
                 for index in range(_beside(labels, row, col, around)):
                     cells[around[index]] += 1
-    left = cells // 2
+    left = np.empty_like(cells)
+    for label in range(cells.size):
+        left[label] = cells[label] // 2
     for row in range(rows):
         for col in range(cols):
             if not allowed[row, col]:

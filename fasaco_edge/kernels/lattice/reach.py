@@ -72,8 +72,10 @@ def reachable_from(steps: NDArray[np.uint8], row: int, col: int) -> NDArray[np.u
     offsets = np.array([1, cols, -1, -cols], np.int64)
     came_from = np.full(steps.size, UNSEEN, np.uint8)
     search(steps.ravel(), offsets, row * cols + col, -1, came_from, np.empty(steps.size, np.int32))
-    reached: NDArray[np.uint8] = (came_from != UNSEEN).astype(np.uint8)
-    return reached.reshape(steps.shape)
+    reached = np.empty(steps.shape, np.uint8)
+    for cell in range(steps.size):
+        reached[cell // cols, cell % cols] = came_from[cell] != UNSEEN
+    return reached
 
 
 @kernel

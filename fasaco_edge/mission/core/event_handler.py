@@ -22,7 +22,9 @@ from fasaco_edge.mission.core.events import (
     in_runs,
 )
 from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order_state import OrderState
@@ -38,6 +40,8 @@ class EventHandler:
     monitor: InputMonitor
     orders: Sequencer
     route: Route
+    line: LineLayer
+    trail: TrailLayer
     _now: float = field(default=0.0, init=False)
     # What the events of a step lead to.
     _path: PathUpdate | None = field(default=None, init=False)
@@ -69,6 +73,7 @@ class EventHandler:
         """Begin with another order, or with none; ``update_area`` has to follow."""
         self.route.abandon()
         self.map.keep_out(order.order.keep_out if order.order else ())
+        self.line.note_map()
         self.orders.start(order)
 
     def update_area(self) -> None:
@@ -113,9 +118,11 @@ class EventHandler:
         assert self.map.free is not None
         assert self.map.grid is not None
         self.monitor.note_map(self._now)
+        self.line.note_map()
         self.route.forget_failure()
         if self.map.has_moved and self.map.pose is not None:
             self.ledger.note_map_motion(self.map.pose.pose)
+            self.trail.note_map_motion()
         else:
             self._record()  # the pose may have come before the map
         self._go_on(self.ledger.check(self.map.free, self.map.grid.frame))
@@ -123,6 +130,7 @@ class EventHandler:
     def _go_on(self, misfit: LedgerMismatchError | None) -> None:
         """Update what can be reached; begin anew where the ledger is of another place."""
         if misfit is not None:
+            self.trail.begin_anew()
             self.begin_order(self.orders.order_state.in_other_building(str(misfit)))
         self.update_area()
         if misfit is not None:
@@ -141,6 +149,7 @@ class EventHandler:
             return
         self._leave_map(f"map and poses are in frame {frame!r} now")
         self.monitor.note_map(self._now)
+        self.line.note_map()
         if misfit is not None:
             self._record()
         self._go_on(misfit)
@@ -150,6 +159,7 @@ class EventHandler:
         self._path = self.route.stop(why, self._now) or self._path
         self.route.abandon()
         self.monitor.forget_pose()
+        self.trail.begin_anew()
 
     def _take_pose(self, stamped: StampedPose) -> None:
         if self.map.frames.note_pose(stamped, self._now):
@@ -158,8 +168,10 @@ class EventHandler:
         has_jumped = self.monitor.note_pose(stamped.pose, self._now)
         if has_jumped:
             self.ledger.break_track()
+        self.trail.note_motion(self.ledger.map_motion(stamped.pose))
         uncertain = self.ledger.forget_uncertain(stamped.pose)
         self._record()
+        self.line.note_pose(stamped.pose)
         cell = self.map.robot_cell()
         if cell is None:
             return
@@ -169,6 +181,7 @@ class EventHandler:
             self.route.want(f"map and pose moved: {uncertain} cells to be covered again")
         self.orders.note_cell(cell)
         self.route.follow(cell, self.ledger.current.has_visited)
+        self.trail.note_drive()
 
     def _record(self) -> None:
         """Count what lies under the tool; a pose far outside the map is no drive."""
@@ -177,7 +190,7 @@ class EventHandler:
             return
         pose = stamped.pose
         if lattice.contains(lattice.cell_at(pose.x, pose.y)):
-            full = self.ledger.record(pose)
+            full = self.ledger.record(pose, self.map.place_of)
             if full is not None:
                 self._faults.append(full)
 
@@ -217,7 +230,9 @@ class EventHandler:
         if self.map.switch_frame():
             self._leave_map("reset")
             self.monitor.note_map(self._now)
+            self.line.note_map()
         self.ledger.reset(self.map.frames.active)
+        self.trail.begin_anew()
         self.route.forget_failure()
         self._record()
 
@@ -231,4 +246,4 @@ class EventHandler:
             raise CommandError(f"nothing to plan: {self.map.why_misplaced()}")
         if not self.orders.can_plan:
             raise CommandError("nothing to plan: no reachable cell is left to cover")
-        return self.route.want_from_scratch("asked for")
+        return self.route.want_full("asked for")

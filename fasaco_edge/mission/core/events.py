@@ -141,6 +141,7 @@ class PathUpdate:
         plan: the plan it comes from; None where none was needed.
         plan_s: how long planning took [s].
         changed: window of the cells whose change is the reason; None where that is not the reason.
+        xy: float64 (m, 2), x, y [m]: the line to drive; None for the centres of the cells.
     """
 
     revision: int
@@ -149,6 +150,7 @@ class PathUpdate:
     plan: CoveragePath | None = None
     plan_s: float = 0.0
     changed: Window | None = None
+    xy: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
@@ -33,6 +34,7 @@ class Executive:
     monitor: InputMonitor
     orders: Sequencer
     route: Route
+    trail: TrailLayer
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
     _now: float = field(default=0.0, init=False)
@@ -173,7 +175,7 @@ class Executive:
                 if reason := orders.begin(cell, self._now):
                     route.want(reason)
                 continue
-            request = route.request_plan(problem)
+            request = route.request_plan(self.trail.posed(problem))
             self.monitor.note_request(request.number)
             self._state = State.COVERING if len(route.path.cells) else State.PLANNING
             self._reason = request.reason

@@ -17,14 +17,18 @@ from fasaco_edge.mission.core.event_handler import EventHandler
 from fasaco_edge.mission.core.events import Decision, Event
 from fasaco_edge.mission.core.executive import Executive
 from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import Coverage, ZoneProgress, zone_progress
+from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from fasaco_edge.mission.coverage.unreached import Unreached
+from fasaco_edge.mission.line.layer import FloorToSweep, LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.planners.living_trail import LivingTrail
 
 __all__ = ["Mission", "MissionConfig"]
 
@@ -40,12 +44,16 @@ class Mission:
     def __init__(self, config: MissionConfig, order: OrderState | None = None) -> None:
         """Begin with an order; by default with one for everything that can be reached."""
         self._map = MapState(config)
-        self._ledger = MissionLedger(config.footprint.cell_m)
+        cell_m, sweeping = config.footprint.cell_m, config.sweeping
+        self._ledger = MissionLedger(cell_m, sweeping.tool_m if sweeping else cell_m)
         monitor = InputMonitor(config)
         self._orders = Sequencer(config, self._map, self._ledger)
         self.route = Route(config.spare_share, self._map, self._orders)
         owners = self._map, self._ledger, monitor, self._orders, self.route
-        self._handler, self._executive = EventHandler(*owners), Executive(*owners)
+        self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
+        self._trail = TrailLayer(config, self._map, self.route)
+        self._handler = EventHandler(*owners, self._line, self._trail)
+        self._executive = Executive(*owners, self._trail)
         self.restore_order(order or OrderState.autostart())
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:
@@ -56,6 +64,7 @@ class Mission:
         since the restart still counts then.
         """
         self._ledger.resume(before)
+        self._trail.resume(before.trail)
         self._map.frames.activate(before.frame)
 
     def restore_order(self, order: OrderState) -> None:
@@ -74,11 +83,18 @@ class Mission:
         happened = self._handler.handle(events, now)
         decided = self._executive.decide(now)
         self.state, self.reason = self._executive.status()
-        return replace(happened, plan=decided.plan, path=decided.path or happened.path)
+        path = decided.path or happened.path
+        self._trail.finish(path)
+        path = self._line.finish(path, now)
+        return replace(happened, plan=decided.plan, path=path)
 
     def coverage(self) -> Coverage | None:
         """Return how much is covered; None before there is a map."""
         return self._map.coverage(self.ledger)
+
+    def floor_to_sweep(self) -> FloorToSweep | None:
+        """Return how much floor is to be swept; None where cells are counted."""
+        return self._line.to_sweep
 
     def unreached(self) -> Unreached:
         """Return what of the order stays uncovered as things are."""
@@ -90,7 +106,8 @@ class Mission:
 
     def snapshot(self) -> LedgerSnapshot:
         """Return all that is to outlive a restart: what is covered, and how far the order is."""
-        return replace(self.ledger.snapshot(), note=self.order_state.to_json())
+        trail, note = self._trail.snapshot(), self.order_state.to_json()
+        return replace(self._ledger.snapshot(), trail=trail, note=note)
 
     @property
     def order_state(self) -> OrderState:
@@ -119,5 +136,15 @@ class Mission:
 
     @property
     def ledger(self) -> CoverageLedger:
-        """What is covered."""
+        """Which cells are covered."""
         return self._ledger.current
+
+    @property
+    def trail(self) -> LivingTrail:
+        """The pheromone on the lattice."""
+        return self._trail.trail
+
+    @property
+    def floor(self) -> SweptFloor:
+        """Which floor is swept."""
+        return self._ledger.floor

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,8 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.effort import HELD_CELLS
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.repair import HELD_CELLS
 
 # A path is replaced by a better one only if that saves this many steps, and this share of
 # what is left.
@@ -128,6 +128,8 @@ class Route:
 
     def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
         self.path = PathProgress(NO_CELLS)
+        # What lay beyond where a map blocked the path.
+        self._cut_off = NO_CELLS
         self.revision = 0
         self.plans = self.attempts = 0
         self.unchanged = self.outdated = 0
@@ -140,8 +142,8 @@ class Route:
         self._attempt: Attempt | None = None
         # Whether the plan under way is for an order that no longer counts.
         self._is_abandoned = False
-        # Why a plan is wanted that keeps nothing of the path; "" where none is.
-        self._anew = ""
+        # Why a full plan is wanted; "" where none is.
+        self._full = ""
         # What has changed since the last request, and whether that is why a plan is wanted.
         self._changed: Window | None = None
         self._is_by_map = False
@@ -161,8 +163,11 @@ class Route:
 
     @property
     def path_to_keep(self) -> NDArray[np.int32]:
-        """What of the path the next plan is to keep where it can, int32 (n, 2)."""
-        return self.path.ahead[:0] if self._anew else self.path.ahead
+        """What of the path the next plan is to keep where it can, int32 (n, 2).
+
+        Also what a map cut off: most of that still holds.
+        """
+        return np.concatenate((self.path.ahead, self._cut_off))
 
     def want(self, reason: str, changed: Window | None = None) -> None:
         """Want a plan: because the cells in a window have changed, or for another reason."""
@@ -170,15 +175,15 @@ class Route:
         self._changed = Window.around(self._changed, changed)
         self._is_by_map = changed is not None
 
-    def want_from_scratch(self, reason: str) -> int:
-        """Want a plan that keeps nothing of the path; return its number among the plans."""
-        self.wanted = self._anew = reason
+    def want_full(self, reason: str) -> int:
+        """Want a plan for which all is searched; return its number among the plans."""
+        self.wanted = self._full = reason
         self.forget_failure()
         return self.plans + (1 if self.pending is None or self.is_improving else 2)
 
     def drop(self) -> None:
         """Want no plan any more."""
-        self.wanted = self._anew = ""
+        self.wanted = self._full = ""
         self._changed = None
 
     def abandon(self) -> None:
@@ -189,8 +194,9 @@ class Route:
 
     def request_plan(self, problem: CoverageProblem) -> PlanRequest:
         """Request the plan that is wanted."""
-        changed = self._changed if self._is_by_map and not self._anew else None
-        request = self._request(problem, self._anew or self.wanted, changed)
+        changed = self._changed if self._is_by_map and not self._full else None
+        problem = replace(problem, is_full=bool(self._full))
+        request = self._request(problem, self._full or self.wanted, changed)
         self.drop()
         return request
 
@@ -304,13 +310,18 @@ class Route:
         """Publish a path in place of the one before."""
         self.revision += 1
         self.published_at = now
-        self.path = PathProgress(cells)
+        self.path, self._cut_off = PathProgress(cells), NO_CELLS
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
         return PathUpdate(self.revision, cells, reason, plan, seconds, changed)
 
     def follow(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> None:
         """Note that the robot is in ``cell``, see ``PathProgress.driven_to``."""
         self.path = self.path.driven_to(cell, has_visited)
+
+    def follow_line(self, index: int) -> None:
+        """Note that the robot is, by its line, at a cell of the path."""
+        if self.path.index < index < len(self.path.cells):
+            self.path = replace(self.path, index=index)
 
     def stop(self, reason: str, now: float) -> PathUpdate | None:
         """Publish an empty path; None where the robot has none to drive."""
@@ -333,4 +344,7 @@ class Route:
             return None
         row, col = ahead[drivable]
         self.want(f"path blocked at cell ({row}, {col})", self._changed)
-        return self.publish(ahead[:drivable], self.wanted, now, changed=self._changed)
+        beyond = np.concatenate((ahead[drivable:], self._cut_off))
+        update = self.publish(ahead[:drivable], self.wanted, now, changed=self._changed)
+        self._cut_off = beyond
+        return update

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.geometry import Point, Pose2D, Window
+from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR, FloorSnapshot
+from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot
 
 if TYPE_CHECKING:
     # For types only: a daemon reads its ledger before it has loaded the kernels.
@@ -36,6 +38,8 @@ Tiles = Mapping["Cell", NDArray[np.uint16]]
 class LedgerSnapshot:
     """What a ledger held at a moment; shares nothing that will change.
 
+    With all of a mission that outlives a restart: the swept floor, the order, and the trail.
+
     Attributes:
         cell_m: edge of a cell [m].
         frame: name of the frame the cells lie in; "" as long as none is known.
@@ -43,7 +47,9 @@ class LedgerSnapshot:
         tiles: the visits, uint16 (TILE, TILE), read-only; tile (i, j) has the cells from
             (TILE * i, TILE * j) on.
         under_tool: the cells that lay under the tool: still there, it does not visit them anew.
+        floor: what of the floor was swept, pixel by pixel.
         note: the order and how far it is, as JSON, see ``orders.order_state``; "" for none.
+        trail: the pheromone.
     """
 
     cell_m: float
@@ -51,12 +57,19 @@ class LedgerSnapshot:
     total: int
     tiles: Tiles
     under_tool: frozenset[Cell] = frozenset()
+    floor: FloorSnapshot = NO_FLOOR
     note: str = ""
+    trail: TrailSnapshot = NO_TRAIL
 
     @property
     def cells(self) -> int:
         """How many cells were visited."""
         return sum(int(np.count_nonzero(tile)) for tile in self.tiles.values())
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing was covered or swept."""
+        return not self.cells and not self.floor.tiles
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
         """Return the number of visits, uint16 (rows, cols), of the cells of ``window``."""
@@ -110,16 +123,25 @@ class CoverageLedger:
         """Take the cells to lie in ``frame`` from now on."""
         self.frame = frame
 
-    def record(self, pose: Pose2D) -> frozenset[Cell]:
-        """Note that the robot drove on to ``pose``; return the cells newly visited."""
+    def record(
+        self, pose: Pose2D, place_of: Callable[[Cell], Point | None] | None = None
+    ) -> frozenset[Cell]:
+        """Note that the robot drove on to ``pose``; return the cells newly visited.
+
+        Args:
+            pose: where it is.
+            place_of: returns the place of a cell, x, y [m], that the tool has to pass over; None
+                where there is none. By default that is the cell's centre.
+        """
         last = self._last or pose
         if math.hypot(pose.x - last.x, pose.y - last.y) > JUMP_CELLS * self._cell_m:
             last = pose
-        swept = self._swept(last, pose)
+        place_of = place_of or self._centre
+        swept = self._swept(last, pose, place_of)
         entered = swept - self._under_tool
         for cell in entered:
             self._visit(cell)
-        self._under_tool = self._swept(pose, pose)
+        self._under_tool = self._swept(pose, pose, place_of)
         self._last = pose
         return entered
 
@@ -158,6 +180,10 @@ class CoverageLedger:
         tile = self._tiles.get((row // TILE, col // TILE))
         return tile is not None and bool(tile[row % TILE, col % TILE])
 
+    def credit(self, cell: Cell) -> None:
+        """Count a visit to a cell whose floor is swept, though the robot did not come to it."""
+        self._visit(cell)
+
     def _visit(self, cell: Cell) -> None:
         row, col = cell
         self.total += 1
@@ -183,8 +209,13 @@ class CoverageLedger:
             self._changed.discard(far)
         self.dropped += DROPPED_TILES
 
-    def _swept(self, start: Pose2D, end: Pose2D) -> frozenset[Cell]:
-        """Return the cells whose centre is within half a cell of the segment."""
+    def _centre(self, cell: Cell) -> Point | None:
+        return (cell[1] + 0.5) * self._cell_m, (cell[0] + 0.5) * self._cell_m
+
+    def _swept(
+        self, start: Pose2D, end: Pose2D, place_of: Callable[[Cell], Point | None]
+    ) -> frozenset[Cell]:
+        """Return the cells whose place is within half a cell of the segment."""
         cell_m, half = self._cell_m, 0.5 * self._cell_m
         rows = _span(min(start.y, end.y) - half, max(start.y, end.y) + half, cell_m)
         cols = _span(min(start.x, end.x) - half, max(start.x, end.x) + half, cell_m)
@@ -193,7 +224,10 @@ class CoverageLedger:
         cells = []
         for row in rows:
             for col in cols:
-                px, py = (col + 0.5) * cell_m - start.x, (row + 0.5) * cell_m - start.y
+                place = place_of((row, col))
+                if place is None:
+                    continue
+                px, py = place[0] - start.x, place[1] - start.y
                 along = min(max((px * dx + py * dy) / length2, 0.0), 1.0) if length2 else 0.0
                 if math.hypot(px - along * dx, py - along * dy) < half:
                     cells.append((row, col))

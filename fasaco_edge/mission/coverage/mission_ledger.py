@@ -1,4 +1,4 @@
-"""Mission ledger: the coverage ledger of a mission, as long as no map contradicts it.
+"""Mission ledger: the covered cells and the swept floor, as long as no map contradicts them.
 
 A ledger from before a restart may be of another building than the map now shows. A map of
 another building knows nothing of the ledger: its obstacles lie on covered cells as often as
@@ -24,15 +24,16 @@ more than a cell, the ledger is as wrong as in another building, and may be judg
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import LedgerFullError, LedgerMismatchError
-from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
+from fasaco_edge.grid.geometry import Point, Pose2D, Window
+from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell, CoverageLattice
+from fasaco_edge.mission.coverage.floor_tiles import FLOOR_TILE, PIXEL_M
 from fasaco_edge.mission.coverage.ledger import (
     DROPPED_TILES,
     MOST_TILES,
@@ -40,7 +41,14 @@ from fasaco_edge.mission.coverage.ledger import (
     CoverageLedger,
     LedgerSnapshot,
 )
-from fasaco_edge.mission.map.loop_closure import Motion, uncertain_cells
+from fasaco_edge.mission.coverage.swept_floor import (
+    DROPPED_FLOOR_TILES,
+    MOST_FLOOR_TILES,
+    SweptFloor,
+)
+from fasaco_edge.mission.map.loop_closure import Motion, uncertain_cells, uncertain_floor
+
+PlaceOf = Callable[[Cell], Point | None]
 
 # Unless this many covered cells are blocked, or would be by chance, nothing is decided.
 LEAST_CELLS = 10
@@ -114,70 +122,137 @@ def _near(indices: NDArray[np.intp]) -> slice:
     return slice(max(int(indices.min()) - AROUND_CELLS, 0), int(indices.max()) + 1 + AROUND_CELLS)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Covered:
+    """What one drive has covered: cells and floor."""
+
+    cells: CoverageLedger
+    floor: SweptFloor
+
+    def record(self, pose: Pose2D, place_of: PlaceOf | None) -> LedgerFullError | None:
+        """Note that the robot drove on to ``pose``; return a fault where tiles were dropped."""
+        cells, floor = self.cells, self.floor
+        before = cells.dropped, floor.dropped
+        cells.record(pose, place_of)
+        floor.record(pose)
+        if cells.dropped != before[0]:
+            return _full(MOST_TILES, f"{TILE} x {TILE} cells", DROPPED_TILES)
+        if floor.dropped != before[1]:
+            pixels = f"{FLOOR_TILE} x {FLOOR_TILE} pixels of floor"
+            return _full(MOST_FLOOR_TILES, pixels, DROPPED_FLOOR_TILES)
+        return None
+
+    def snapshot(self) -> LedgerSnapshot:
+        return replace(self.cells.snapshot(), floor=self.floor.snapshot())
+
+
+def _full(most: int, size: str, dropped: int) -> LedgerFullError:
+    return LedgerFullError(
+        f"the ledger holds {most} tiles of {size} at most: the {dropped} farthest from the robot "
+        "were dropped"
+    )
+
+
 class MissionLedger:
     """Keeps the ledger; one from before a restart only as long as no map contradicts it.
 
     Attributes:
-        current: what is covered.
         first_plan_reason: why the first plan is wanted.
     """
 
-    def __init__(self, cell_m: float) -> None:
-        self._cell_m = cell_m
-        self.current = CoverageLedger(cell_m)
+    def __init__(self, cell_m: float, tool_m: float) -> None:
+        """Begin with nothing; ``cell_m``: edge of a cell, ``tool_m``: width of the tool [m]."""
+        self._cell_m, self._tool_m = cell_m, tool_m
+        self._covered = self._nothing("")
         self.first_plan_reason = "first plan"
         # A ledger from before a restart that no map has confirmed yet, and what was covered since:
         # that is true in any building.
-        self._resumed: tuple[LedgerSnapshot, CoverageLedger] | None = None
+        self._resumed: tuple[LedgerSnapshot, _Covered] | None = None
         # The robot's last pose on a map that has moved since.
         self._pose_before_motion: Pose2D | None = None
 
     @property
-    def _all(self) -> tuple[CoverageLedger, ...]:
-        return (self.current,) if self._resumed is None else (self.current, self._resumed[1])
+    def current(self) -> CoverageLedger:
+        """Which cells are covered."""
+        return self._covered.cells
+
+    @property
+    def floor(self) -> SweptFloor:
+        """Which floor is swept."""
+        return self._covered.floor
+
+    def snapshot(self) -> LedgerSnapshot:
+        """Return what is covered now."""
+        return self._covered.snapshot()
+
+    @property
+    def _all(self) -> tuple[_Covered, ...]:
+        return (self._covered,) if self._resumed is None else (self._covered, self._resumed[1])
+
+    def _nothing(self, frame: str) -> _Covered:
+        return _Covered(CoverageLedger(self._cell_m, frame), SweptFloor(self._tool_m))
 
     def resume(self, before: LedgerSnapshot) -> None:
         """Go on with the ledger from before a restart."""
-        self._resumed = before, CoverageLedger(before.cell_m)
-        self.current = CoverageLedger.restored(before)
-        self.first_plan_reason = f"first plan, {before.cells} cells were covered before"
+        self._resumed = before, self._nothing("")
+        floor = SweptFloor.restored(before.floor, self._tool_m)
+        self._covered = _Covered(CoverageLedger.restored(before), floor)
+        if cells := before.cells:
+            self.first_plan_reason = f"first plan, {cells} cells were covered before"
 
-    def record(self, pose: Pose2D) -> LedgerFullError | None:
-        """Note that the robot drove on to ``pose``; return a fault where tiles were dropped."""
-        before = self.current.dropped
-        for ledger in self._all:
-            ledger.record(pose)
-        if self.current.dropped == before:
-            return None
-        return LedgerFullError(
-            f"the ledger holds {MOST_TILES} tiles of {TILE} x {TILE} cells at most: the "
-            f"{DROPPED_TILES} farthest from the robot were dropped"
-        )
+    def record(self, pose: Pose2D, place_of: PlaceOf | None = None) -> LedgerFullError | None:
+        """Note that the robot drove on to ``pose``; return a fault where tiles were dropped.
+
+        ``place_of``: see ``CoverageLedger.record``.
+        """
+        faults = [covered.record(pose, place_of) for covered in self._all]
+        return faults[0]
+
+    def credit(self, cell: Cell) -> None:
+        """Count a visit to a cell whose floor is swept, though the robot did not come to it."""
+        for covered in self._all:
+            covered.cells.credit(cell)
 
     def break_track(self) -> None:
         """Note that the way of the robot to its next pose is unknown."""
-        for ledger in self._all:
-            ledger.break_track()
+        for covered in self._all:
+            covered.cells.break_track()
+            covered.floor.break_track()
 
     def note_map_motion(self, pose: Pose2D) -> None:
         """Note that the map has moved under a robot at ``pose``; the next pose tells where to."""
         self._pose_before_motion = pose
-        for ledger in self._all:
-            ledger.lift_tool()
+        for covered in self._all:
+            covered.cells.lift_tool()
+            covered.floor.break_track()
+
+    def map_motion(self, pose: Pose2D) -> Motion | None:
+        """Return how the map moved, as the first pose after that tells; None where it did not."""
+        start = self._pose_before_motion
+        return None if start is None else Motion(start, pose)
 
     def forget_uncertain(self, pose: Pose2D) -> int:
         """Forget what is uncertain after a motion of the map; return how many cells that are."""
-        start, self._pose_before_motion = self._pose_before_motion, None
-        if start is None or (motion := Motion(start, pose)).is_still:
+        motion, self._pose_before_motion = self.map_motion(pose), None
+        if motion is None or motion.is_still:
             return 0
-        before = self.current.snapshot()
-        self.forget(uncertain_cells(before, motion))
+        before = self.snapshot()
+        cells, floor = uncertain_cells(before, motion), uncertain_floor(before.floor, motion)
+        for covered in self._all:
+            covered.cells.forget(cells)
+            covered.floor.forget(floor)
         return before.cells - self.current.snapshot().cells
 
-    def forget(self, inside: Callable[[Window], NDArray[np.bool_]]) -> None:
-        """Forget all visits to cells ``inside``, see ``CoverageLedger.forget``."""
-        for ledger in self._all:
-            ledger.forget(inside)
+    def forget(self, inside: Callable[[Window, float], NDArray[np.bool_]]) -> None:
+        """Forget some cells and the floor there, but what lies under the tool now.
+
+        Args:
+            inside: returns for a window, and the edge [m] of the squares it is of, which of these
+                have their centre inside, bool (rows, cols).
+        """
+        for covered in self._all:
+            covered.cells.forget(lambda window: inside(window, self._cell_m))
+            covered.floor.forget(lambda window: inside(window, PIXEL_M))
 
     def move_to(self, frame: str) -> LedgerMismatchError | None:
         """Lie in ``frame`` from now on; begin anew, and say so, if another holds covered cells."""
@@ -186,7 +261,7 @@ class MissionLedger:
             self.current.move_to(frame)
             return None
         cells = self.current.snapshot().cells
-        self._replace(CoverageLedger(self._cell_m, frame))
+        self._replace(self._nothing(frame))
         if not cells:
             return None
         return self._begun_anew(
@@ -195,7 +270,7 @@ class MissionLedger:
 
     def reset(self, frame: str) -> None:
         """Forget everything; ``frame`` is that of the poses, "" where none is active."""
-        self._replace(CoverageLedger(self._cell_m, frame))
+        self._replace(self._nothing(frame))
         self.first_plan_reason = "first plan"
 
     def check(self, lattice: CoverageLattice, frame: str) -> LedgerMismatchError | None:
@@ -209,14 +284,14 @@ class MissionLedger:
         self._resumed = None
         if verdict is Verdict.SAME:
             return None
-        self.current = since
+        self._covered = since
         self.current.move_to(frame)
         return self._begun_anew(
             f"the ledger of {before.cells} covered cells is of another building than the map"
         )
 
-    def _replace(self, ledger: CoverageLedger) -> None:
-        self.current, self._resumed, self._pose_before_motion = ledger, None, None
+    def _replace(self, covered: _Covered) -> None:
+        self._covered, self._resumed, self._pose_before_motion = covered, None, None
 
     def _begun_anew(self, why: str) -> LedgerMismatchError:
         misfit = LedgerMismatchError(why)

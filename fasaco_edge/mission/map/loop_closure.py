@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import UNKNOWN
+from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, FloorSnapshot, Similarity
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 
 # This many cells change between free and blocked in one map, and this share of those that were
@@ -28,6 +29,9 @@ STILL_M, STILL_RAD = 0.02, math.radians(0.2)
 NEAR = 0.1
 # Where the map may have lain, as shares of its motion.
 BETWEEN = (0.25, 0.5, 0.75, 1.0)
+# Of pixels, at every pixel on their way, up to so many places: what is left of motions of more than
+# 0.4 m, which are rare, is looked at more coarsely.
+MOST_BETWEEN = 16
 
 
 def has_moved(change: LatticeChange) -> bool:
@@ -51,6 +55,14 @@ class Motion:
 
     start: Pose2D
     end: Pose2D
+
+    def undone(self, share: float) -> Similarity:
+        """Return where pixels of the swept floor were before such a share of the motion."""
+        x, y = self.back(share, np.zeros(1), np.zeros(1))
+        turn = -share * math.remainder(self.end.yaw - self.start.yaw, math.tau)
+        return Similarity(
+            float(y[0]) / PIXEL_M, float(x[0]) / PIXEL_M, math.cos(turn), math.sin(turn)
+        )
 
     @property
     def is_still(self) -> bool:
@@ -88,6 +100,21 @@ def uncertain_cells(
         row, col = y / before.cell_m - 0.5, x / before.cell_m - 0.5
         between: NDArray[np.bool_] = np.hypot(row - np.rint(row), col - np.rint(col)) >= 0.5
         return doubt | between
+
+    return inside
+
+
+def uncertain_floor(before: FloorSnapshot, motion: Motion) -> Callable[[Window], NDArray[np.bool_]]:
+    """Return a function of a window: which pixels, bool (rows, cols), may not have been swept."""
+
+    def inside(window: Window) -> NDArray[np.bool_]:
+        rows, cols = (window.row0, window.row1), (window.col0, window.col1)
+        x, y = (np.array(each, float) * PIXEL_M for each in (cols * 2, rows + rows[::-1]))
+        was_x, was_y = motion.back(1.0, x, y)
+        farthest = float(np.hypot(was_x - x, was_y - y).max())
+        count = min(max(math.ceil(farthest / PIXEL_M), 1), MOST_BETWEEN)
+        places = [motion.undone(number / count) for number in range(1, count + 1)]
+        return ~before.swept_wherever(places, window)
 
     return inside
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fasaco_edge.errors import (
     FasacoError,
     MapTooFar,
@@ -13,17 +16,18 @@ from fasaco_edge.errors import (
     WrongFrame,
 )
 from fasaco_edge.grid.changes import LatticeChange
-from fasaco_edge.grid.geometry import Polygon, StampedPose, Window, polygon_bounds
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import Point, Polygon, StampedPose, Window, polygon_bounds
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, without_base
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.coverage.progress import Coverage, FreeArea
+from fasaco_edge.mission.map.ground import Ground
 from fasaco_edge.mission.map.inputs import FrameSelector
 from fasaco_edge.mission.map.loop_closure import has_moved
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.orders.order import MissionOrder
-from fasaco_edge.mission.orders.zones import kept_out, without
 
 
 class MapState:
@@ -33,27 +37,24 @@ class MapState:
         grid: the newest map, with all updates; None before there is one.
         map_revision: goes up by one with each new state of the map: a whole map, updates taken in
             together, the map of another frame; 0 before there is one.
-        free: the lattice over it.
-        lattice: the same without the cells the robot must keep out of.
         pose: the newest pose in the map's frame; before there is a map in any frame.
         has_moved: whether the newest map shows the walls elsewhere: a loop closure.
         area: what can be reached, as of the last ``update_area``; None where the robot's pose is
             on no coverable cell.
         frames: which frame is active, and what came in another.
+        path_cell: the cell of the path that the robot is at, where it is on its line; else None.
     """
 
     def __init__(self, config: MissionConfig) -> None:
         self.grid: OccupancyGrid | None = None
         self.map_revision = 0
-        self.free: CoverageLattice | None = None
-        self.lattice: CoverageLattice | None = None
         self.pose: StampedPose | None = None
         self.area: ReachableArea | None = None
         self.has_moved = False
         self.frames = FrameSelector()
         self._config = config
-        self._change: LatticeChange | None = None
-        self._keep_out: tuple[Polygon, ...] = ()
+        self.path_cell: Cell | None = None
+        self._ground = Ground(config)
         self._patches_lost = False
         # Why the newest map was refused; "" where it was not.
         self._refused = ""
@@ -116,36 +117,48 @@ class MapState:
         raise PatchWithoutBase(f"{count} map updates were lost")
 
     def _take_map(self, grid: OccupancyGrid, within: Window | None = None) -> None:
-        footprint, most = self._config.footprint, self._config.max_lattice_cells
-        is_first = self.grid is None or self.grid.frame != grid.frame
-        if self.grid is None or self.free is None or is_first:
-            change = LatticeChange.first(grid, footprint, most)
+        if self.grid is None or self.grid.frame != grid.frame:
+            change = self._ground.begin(grid)
+            self.area = None
         else:
-            maps = self.grid, grid
-            change = LatticeChange.between(maps, self.free, footprint, most, within)
+            change = self._ground.follow((self.grid, grid), within)
         self.has_moved = has_moved(change)
-        before, self.grid = self.lattice, grid
-        if is_first:
-            before = self.area = None
-        if change.after is not self.free:
-            self.free, self.lattice = change.after, self._without_kept_out(change.after)
-            # Without the same cells as before: no others have changed.
-            self._change = LatticeChange(before, self.lattice, change.cells)
+        self.grid = grid
         self.map_revision += 1
         if self.pose is not None and self.pose.frame != grid.frame:
             self.pose = self.frames.pose_in(grid.frame)
 
     def keep_out(self, polygons: tuple[Polygon, ...]) -> None:
         """Keep out of these polygons (x, y) [m] from now on, and of no others."""
-        self._keep_out = polygons
-        if self.free is not None:
-            self.lattice = self._without_kept_out(self.free)
+        self._ground.keep_out(polygons, self.grid)
 
-    def _without_kept_out(self, free: CoverageLattice) -> CoverageLattice:
-        if not self._keep_out:
-            return free
-        radius_m = self._config.footprint.robot_radius_m
-        return without(free, kept_out(self._keep_out, free.window, free.cell_m, radius_m))
+    @property
+    def free(self) -> CoverageLattice | None:
+        """The lattice over the newest map; None before there is one."""
+        return self._ground.free
+
+    @property
+    def lattice(self) -> CoverageLattice | None:
+        """The same without the cells the robot must keep out of."""
+        return self._ground.lattice
+
+    @property
+    def change(self) -> LatticeChange | None:
+        """How ``lattice`` came from one before it; None where that is not known."""
+        return self._ground.change
+
+    @property
+    def floor(self) -> FloorMap | None:
+        """The floor under the lattice; None before there is one, and where cells are counted."""
+        return self._ground.floor
+
+    def is_decided(self, window: Window) -> NDArray[np.bool_] | None:
+        """Return for which cells the map shows whether the robot fits, see ``Ground``."""
+        return self._ground.is_decided(window)
+
+    def place_of(self, cell: Cell) -> Point | None:
+        """Return where the robot is to come to in a cell, x, y [m]; None for nowhere."""
+        return self._ground.place_of(cell)
 
     def take_pose(self, pose: StampedPose) -> None:
         """Take a pose in.
@@ -164,10 +177,11 @@ class MapState:
         cell, before, self.area = self.robot_cell(), self.area, None
         if cell is None or self.lattice is None:
             return
-        if before is None or self._change is None or self._change.after is not self.lattice:
+        change = self._ground.change
+        if before is None or change is None or change.after is not self.lattice:
             self.area = ReachableArea.around(self.lattice, cell)
         else:
-            self.area = before.updated(self._change, cell)
+            self.area = before.updated(change, cell)
 
     def forget_area(self) -> None:
         """Forget what can be reached, until the robot is on coverable ground again."""
@@ -175,9 +189,21 @@ class MapState:
 
     def robot_cell(self) -> Cell | None:
         """Return the coverable cell the robot is in, or next to."""
-        if self.lattice is None or self.pose is None:
+        lattice, cell = self.lattice, self.path_cell
+        if lattice is None or self.pose is None:
             return None
-        return anchor_cell(self.lattice, self.pose.pose)
+        # A line that was polished leads beside its cells.
+        if (
+            cell is not None
+            and lattice.contains(cell)
+            and lattice.states[lattice.local(cell)] == COVERABLE
+        ):
+            return cell
+        return anchor_cell(lattice, self.pose.pose)
+
+    def follow_path(self, cell: Cell | None) -> None:
+        """Note at which cell of its path the robot is; None where it is not on its line."""
+        self.path_cell = cell
 
     def why_no_map(self) -> str:
         """Return why there is no map."""

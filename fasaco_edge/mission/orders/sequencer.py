@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -193,8 +194,7 @@ class Sequencer:
             return ""
         zone = state.current_zone
         if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
-            cell_m = self._config.footprint.cell_m
-            self._ledger.forget(lambda window: in_zones((zone,), window, cell_m))
+            self._ledger.forget(partial(in_zones, (zone,)))
         self.order_state = replace(state, begun=True, home=state.home or cell)
         run.left_over, run.same_again = -1, 0
         if state.pass_number == 1:
@@ -237,14 +237,27 @@ class Sequencer:
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
-        order, zone = self.order_state.order, self.order_state.current_zone
-        if order is None:
+        if self.order_state.order is None:
             return np.zeros((window.rows, window.cols), bool)
-        zones = order.zones if zone is None else (zone,)
-        wanted = in_zones(zones, window, self._config.footprint.cell_m)
+        wanted = self.asked_for(window)
         open_cells: NDArray[np.bool_] = wanted & (self._ledger.current.visits(window) == 0)
         self._run.exploration.mark(open_cells, window)
         return open_cells
+
+    @property
+    def is_exploring(self) -> bool:
+        """Whether the map does not show of all cells in reach yet where the robot fits."""
+        area = self._map.area
+        decided = None if area is None else self._map.is_decided(area.lattice.window)
+        if area is None or decided is None:
+            return False
+        return bool((area.reachable & ~decided).any())
+
+    def asked_for(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of ``window`` are to be covered now, or were."""
+        order, zone = self.order_state.order, self.order_state.current_zone
+        zones = () if order is None else order.zones if zone is None else (zone,)
+        return in_zones(zones, window, self._config.footprint.cell_m)
 
     def note_path_end(self) -> bool:
         """Note that a path came to its end; return whether what it left over has to wait."""

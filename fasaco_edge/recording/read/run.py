@@ -19,6 +19,7 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
+from fasaco_edge.recording.read.fields import DrawnField, FieldSampler
 from fasaco_edge.recording.read.frames import HINT, Chunk, chunks, column, open_part
 from fasaco_edge.samples import Place, SampleDecoder, place_of
 
@@ -151,6 +152,8 @@ class RunRecord:
         plots: float64 (n, 2) of each plotted entity: when, since ``began_ns`` [s], and its value.
         states: of each state entity when it was entered, and what it was.
         log: of each log entity when, and the text.
+        field_count: how often the pheromone field was drawn.
+        fields: some of these, spread over all of the time, the last among them.
         batches: samples, for ``RecordedSamples.of``.
     """
 
@@ -161,6 +164,8 @@ class RunRecord:
     plots: Mapping[str, NDArray[np.float64]]
     states: Mapping[str, tuple[TimedText, ...]]
     log: Mapping[str, tuple[TimedText, ...]]
+    field_count: int
+    fields: tuple[DrawnField, ...]
     batches: tuple[Batch, ...]
 
 
@@ -204,6 +209,7 @@ class _RunReader:
     span: list[int] = field(default_factory=list)
     rows: dict[str, list[Row]] = field(default_factory=lambda: defaultdict(list))
     batches: list[Batch] = field(default_factory=list)
+    fields: FieldSampler = field(default_factory=FieldSampler)
 
     def read(self, path: Path) -> None:
         with open_part(path) as (recording, scan):
@@ -232,6 +238,8 @@ class _RunReader:
                 if value and value[0] is not None
             ]
         else:
+            if entity == entities.PHEROMONE and not chunk.is_static and batch.num_rows:
+                self.fields.take(batch, _wall_ns(batch))
             return 0
         return chunk.bytes
 
@@ -255,6 +263,8 @@ class _RunReader:
             plots=dict(self._plots(began)),
             states=self._texts("state/"),
             log=self._texts("log/"),
+            field_count=self.fields.count,
+            fields=self.fields.spread(),
             batches=tuple(self.batches),
         )
 

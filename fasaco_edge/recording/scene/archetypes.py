@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
+from fasaco_edge.recording.scene.flows import Flows
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.maps import CoverageValue
+from fasaco_edge.wire.path_documents import TrailAttachment
 from fasaco_edge.wire.pheromone import PheromoneMessage
 
 Colour = tuple[int, int, int]
@@ -28,12 +30,18 @@ ROBOT_COLOUR: Colour = (220, 38, 38)
 HEADING_COLOUR: Colour = (250, 204, 21)
 COVERED_COLOUR: Colour = (56, 152, 222)
 RECOVERED_COLOUR: Colour = (245, 140, 40)
+SWEPT_COLOUR: Colour = (45, 212, 191)
 BLOCKED_COLOUR: Colour = (120, 120, 130)
 LABEL_COLOUR: Colour = (255, 255, 255)
+# Arrows along the trail stand out from its field, which goes from black over red to yellow.
+UNDECIDED_COLOUR: Colour = (70, 80, 130)
+DECIDED_COLOUR: Colour = (94, 234, 255)
 
 # Heights [m] only order the layers: the eye looks down from far above.
-ROBOT_Z, LABEL_Z = 0.06, 0.1
-MAP_ORDER, COVERAGE_ORDER = 0.0, 1.0
+ARROW_Z, ROBOT_Z, LABEL_Z = 0.03, 0.06, 0.1
+# On the screen [points].
+ARROW_WIDTH = 1.0
+MAP_ORDER, FLOOR_ORDER, COVERAGE_ORDER = 0.0, 0.5, 1.0
 # How far above a field its label is, as a share of the field's height.
 LABEL_ABOVE = 0.1
 
@@ -54,7 +62,6 @@ CHANGE = LineStyle((8, 145, 178), z=0.02, width=1.6)
 WINDOW = LineStyle((219, 39, 119), z=0.055, width=2.0)
 OLD_PATH = LineStyle((196, 181, 253), z=0.03, width=0.8)
 PATH = LineStyle((124, 58, 237), z=0.04, width=1.2)
-DIRECTION = LineStyle((226, 232, 240), z=0.03, width=1.2)
 DRIVEN = LineStyle((5, 150, 105), z=0.05, width=1.6)
 
 
@@ -74,6 +81,14 @@ def coverage_archetype(grid: OccupancyGrid) -> rr.GridMap:
     return _grid(grid.geometry, tints[grid.cells.view(np.uint8)], None, COVERAGE_ORDER)
 
 
+def floor_archetype(grid: OccupancyGrid) -> rr.GridMap:
+    """Return swept floor to lie over the map, the denser the more of a square is swept."""
+    tints = np.zeros((256, 4), np.uint8)
+    tints[:101, :3] = SWEPT_COLOUR
+    tints[:101, 3] = np.linspace(0, 150, 101)
+    return _grid(grid.geometry, tints[grid.cells.view(np.uint8)], None, FLOOR_ORDER)
+
+
 def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
     """Return a pheromone field as it came: one byte per cell, log scale, 0 black."""
     return _grid(message.geometry, message.levels, rr.components.Colormap.Inferno, MAP_ORDER)
@@ -86,6 +101,15 @@ def cohort_archetype(message: PheromoneMessage) -> rr.Points3D:
     text = (
         f"cohort {message.cohort + 1}, {message.velocity} {cells} a move\n"
         f"{message.ants} {ants} in all, best walk {message.best_steps} steps"
+    )
+    return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
+
+
+def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3D:
+    """Return the label over the living trail: the path it stands at, and how decided it is."""
+    text = (
+        f"living trail at path {about.revision}, {message.best_steps} steps to drive\n"
+        f"{about.cells} cells, {about.branching:.2f} directions in reach of the best"
     )
     return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
 
@@ -105,10 +129,16 @@ def strip_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3
     return rr.LineStrips3D.from_fields(strips=[points])
 
 
-def lines_archetype(lines: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:
-    """Return lines of two points each [m], float64 (n, 2, 2)."""
-    strips = np.concatenate((lines, np.full((len(lines), 2, 1), style.z)), axis=2)
-    return rr.LineStrips3D(strips, colors=style.colour, radii=-style.width)
+def arrows_archetype(flows: Flows) -> rr.Arrows3D:
+    """Return arrows along the trail, the brighter the more decided it is there."""
+    count = len(flows.origins)
+    origins = np.column_stack((flows.origins, np.full(count, ARROW_Z))).astype(np.float32)
+    vectors = np.column_stack((flows.vectors, np.zeros(count))).astype(np.float32)
+    # A cell of four equal directions has a quarter, one that is sure of itself all.
+    sure = np.clip((flows.share - 0.25) / 0.75, 0.0, 1.0)[:, np.newaxis]
+    low, high = np.array(UNDECIDED_COLOUR), np.array(DECIDED_COLOUR)
+    colours = np.rint(low + sure * (high - low)).astype(np.uint8)
+    return rr.Arrows3D(origins=origins, vectors=vectors, colors=colours, radii=-ARROW_WIDTH)
 
 
 def label_archetype(bounds: Bounds, text: str, above: float = 0.0) -> rr.Points3D:
@@ -118,6 +148,12 @@ def label_archetype(bounds: Bounds, text: str, above: float = 0.0) -> rr.Points3
     """
     x0, y0, x1, y1 = bounds
     place = ((x0 + x1) / 2, y1 + above * (y1 - y0), LABEL_Z)
+    return rr.Points3D([place], radii=0.0, labels=[text], colors=LABEL_COLOUR, show_labels=True)
+
+
+def words_archetype(pose: Pose2D, text: str, above_m: float) -> rr.Points3D:
+    """Return text so far above a place."""
+    place = (pose.x, pose.y + above_m, LABEL_Z)
     return rr.Points3D([place], radii=0.0, labels=[text], colors=LABEL_COLOUR, show_labels=True)
 
 

@@ -29,8 +29,10 @@ def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
     bounds = bounds or NO_MAP
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(_map_view(bounds), _states(), row_shares=[5, 2]),
-            rrb.Vertical(_pheromone_view(bounds), _plan(), _log(), row_shares=[9, 5, 7]),
+            rrb.Vertical(_map_view(bounds), rrb.Horizontal(_states(), _log()), row_shares=[5, 2]),
+            rrb.Vertical(
+                _pheromone_view(bounds), _branching(), _saved(), _plan(), row_shares=[10, 3, 3, 3]
+            ),
             rrb.Vertical(_figures(), _card(), row_shares=[5, 2]),
             column_shares=COLUMNS,
         ),
@@ -58,7 +60,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
 def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin=f"/{entities.WORLD}",
-        name="Pheromone, main directions",
+        name="Pheromone, where it points to",
         contents=[
             f"/{entities.PHEROMONE}/**",
             f"/{entities.DIRECTIONS}/**",
@@ -94,7 +96,17 @@ def _figures() -> rrb.Vertical:
 
 def _plan() -> rrb.TimeSeriesView:
     none = rrb.PlotLegend(visible=False)
-    return _plot("Plan: gap to the lower bound [share]", entities.GAP, none)
+    return _plot("Plan: time above the bound [share]", entities.GAP, none)
+
+
+def _saved() -> rrb.TimeSeriesView:
+    legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
+    return _plot("Saved by search, all plans [s]", entities.SAVED, legend)
+
+
+def _branching() -> rrb.TimeSeriesView:
+    none = rrb.PlotLegend(visible=False)
+    return _plot("Trail: directions in reach of the best", entities.BRANCHING, none)
 
 
 def _states() -> rrb.StateTimelineView:

@@ -15,7 +15,8 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.archetypes import COVERED_COLOUR, RECOVERED_COLOUR, Colour
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.wire.status import PathAttachment, Status
+from fasaco_edge.wire.path_documents import PathAttachment
+from fasaco_edge.wire.status import Status
 
 # Curves are drawn as staircases (``CURVES``). Each value is repeated at least this often, so
 # that a new part, or the time after a gap, shows every curve within a minute.
@@ -31,7 +32,10 @@ CURVES: tuple[tuple[str, str, Colour], ...] = (
     (f"{entities.LATENCY}/plan", "plan", (167, 139, 250)),
     (f"{entities.LATENCY}/map_to_path", "map to path", (245, 140, 40)),
     (entities.BEST_STEPS, "best walk", (250, 204, 21)),
+    (entities.BRANCHING, "directions in reach of the strongest", (244, 114, 182)),
     (entities.GAP, "gap of the plan", (250, 204, 21)),
+    (entities.SAVED_BY_ANTS, "ants", (244, 114, 182)),
+    (entities.SAVED_BY_LOCAL_SEARCH, "local search", (56, 152, 222)),
     (f"{entities.MEMORY}/planner", "planner MB", (167, 139, 250)),
     (f"{entities.MEMORY}/recorder", "recorder MB", (156, 163, 175)),
     (entities.PROCESSOR, "planner %", (245, 140, 40)),
@@ -96,6 +100,7 @@ LEAST_SHARE_S = 30.0
 MOST_CODES = 50
 _CODE = re.compile(r"[a-z_]{1,40}")
 
+SAVED = (entities.SAVED_BY_ANTS, entities.SAVED_BY_LOCAL_SEARCH)
 CELLS = ("coverable", "covered", "recovered", "unreachable")
 PLANS = ("plans", "unchanged", "outdated", "attempts")
 
@@ -107,6 +112,8 @@ class StatusFigures:
         self._curves = curves
         # Uptime and processor time [s] at the beginning of the current average.
         self._since: tuple[float, float] | None = None
+        # By ants and by local search, over all plans [s].
+        self._saved = [0.0, 0.0]
 
     def add(self, status: Status) -> None:
         """Draw the numbers of a status."""
@@ -123,6 +130,8 @@ class StatusFigures:
         if status.coverage is not None:
             for name in CELLS:
                 self._draw(f"{entities.CELLS}/{name}", getattr(status.coverage, name))
+        if status.floor is not None:
+            self._curves.draw(entities.SWEPT, status.floor.swept_m2, spacing_ns=COUNT_SPACING_NS)
         if status.path is not None:
             self._draw(entities.REMAINING_STEPS, status.path.remaining_steps)
         for name in PLANS:
@@ -135,6 +144,11 @@ class StatusFigures:
         """Draw how good a planned path is; steps, bound and cost are in the log and the inputs."""
         if about.gap is not None:
             self._curves.draw(entities.GAP, about.gap)
+        if about.saved_by_ants_s is not None and about.saved_by_local_search_s is not None:
+            self._saved[0] += about.saved_by_ants_s
+            self._saved[1] += about.saved_by_local_search_s
+            for entity, seconds in zip(SAVED, self._saved, strict=True):
+                self._curves.draw(entity, seconds)
 
     def _add_processor(self, uptime_s: float, cpu_s: float) -> None:
         since = self._since

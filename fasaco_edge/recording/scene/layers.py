@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Bounds, Pose2D
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid, marked_window
 from fasaco_edge.recording import entities
+from fasaco_edge.wire.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
-from fasaco_edge.wire.status import PathAttachment, Rectangle
 
 # Nearer to 0 than this float32 resolves a millimetre, and nothing is moved [m].
 NEAR_M = 10_000.0
@@ -109,8 +109,10 @@ BURST_S = 60.0
 # In the file [bytes/s].
 RATES = {
     entities.MAP: 3_000,
+    entities.FLOOR: 1_000,
     entities.COVERAGE: 1_000,
-    entities.PHEROMONE: 1_500,
+    entities.PHEROMONE: 4_000,
+    entities.DIRECTIONS: 2_500,
     entities.PATH: 2_000,
 }
 # A grid's size in the file is judged by every so many-th row.

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.status import Settings
+from fasaco_edge.wire.settings import Settings
 
 # The most important settings come first, the others by name.
 FIRST = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
@@ -31,7 +31,7 @@ LEGEND = """\
 - **Pink** what of the map led to this path, and how
 - **Cyan** an obstacle came or went
 - **Pheromone** dark little, bright much, black none
-- **White bars** which way the lanes of the path run"""
+- **Arrows** where it points to, bright where that is decided; at the robot, its share there"""
 
 # Each field has its own range, so that it is never flat.
 LEVELS = (

@@ -16,18 +16,24 @@ from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.curves import NOISE, Curves, StatusFigures
 from fasaco_edge.recording.scene.drawings import DrivenPathDrawing, PathDrawing
+from fasaco_edge.recording.scene.flows import flows_of, fork_at
 from fasaco_edge.recording.scene.layers import Anchor, Layers, changed_bounds, size_in_file
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
+from fasaco_edge.wire.maps import directions_of
+from fasaco_edge.wire.path_documents import PathAttachment, TrailAttachment
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
-from fasaco_edge.wire.status import ErrorCounts, PathAttachment, Recorder, Status, known_settings
+from fasaco_edge.wire.settings import known_settings
+from fasaco_edge.wire.status import ErrorCounts, Recorder, Status
 
 DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
 # takes 120 kB.
 REFRAME_FRACTION = 0.15
+# So far above the robot it is told where the trail leads on.
+FORK_CELLS = 3.0
 
 
 class Scene:
@@ -42,6 +48,7 @@ class Scene:
         self._known: Bounds | None = None
         self._framed: Bounds | None = None
         self._errors = self._restored = self._cohorts = 0
+        self._robot: Pose2D | None = None
         self._states: dict[str, str] = {}
         self._layers = Layers()
         self._curves = Curves(writer)
@@ -87,6 +94,7 @@ class Scene:
         """Move the robot, and draw its path."""
         pose = self._anchored(stamped.pose).pose(stamped.pose)
         self._writer.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
+        self._robot = pose
         self._driven.add(pose.x, pose.y)
 
     def add_command(self, command: str) -> None:
@@ -120,23 +128,45 @@ class Scene:
         self._curves.draw(entities.COVERED_FRACTION, covered)
         self._curves.draw(entities.RECOVERED_FRACTION, recovered)
 
-    def add_pheromone(self, message: PheromoneMessage) -> None:
-        """Draw the pheromone after a cohort, and plot the best walk so far.
+    def add_floor(self, grid: OccupancyGrid) -> None:
+        """Tint what of the floor is swept."""
+        grid = self._anchored(grid.geometry.origin).grid(grid)
 
-        All cohorts walk on one field. What one has done is what the field is then otherwise than
-        after the one before it: the timeline ``iter`` goes from cohort to cohort.
+        def draw_floor() -> None:
+            self._writer.log(
+                entities.FLOOR, draw.floor_archetype(grid), latched=True, size=4 * grid.cells.size
+            )
+
+        # As the coverage.
+        self._draw(entities.FLOOR, 2 * size_in_file(grid.cells), draw_floor)
+
+    def add_pheromone(
+        self, message: PheromoneMessage, about: TrailAttachment | None = None
+    ) -> None:
+        """Draw the living trail, or the pheromone after a cohort; plot how decided it is.
+
+        All cohorts of a plan walk on one field. What one has done is what the field is then
+        otherwise than after the one before it: the timeline ``iter`` goes from cohort to cohort.
         """
         message = self._anchored(message.geometry.origin).grid(message)
-        self._cohorts += 1
-        self._writer.sequence(entities.ITER, self._cohorts)
+        if about is None:
+            self._cohorts += 1
+            self._writer.sequence(entities.ITER, self._cohorts)
+            self._curves.draw(entities.BEST_STEPS, message.best_steps)
+        else:
+            self._curves.draw(entities.BRANCHING, about.branching)
+            self._curves.draw(entities.TRAIL_CELLS, about.cells)
 
         def draw_pheromone() -> None:
             field = draw.pheromone_archetype(message)
             self._writer.log(entities.PHEROMONE, field, latched=True, size=message.levels.size)
-            self._writer.log(entities.COHORT, draw.cohort_archetype(message), latched=True)
+            if about is None:
+                label = draw.cohort_archetype(message)
+            else:
+                label = draw.trail_label(message, about)
+            self._writer.log(entities.COHORT, label, latched=True)
 
         self._draw(entities.PHEROMONE, size_in_file(message.levels), draw_pheromone)
-        self._curves.draw(entities.BEST_STEPS, message.best_steps)
         # The levels' scale: with it they can be turned back into trails.
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
@@ -144,6 +174,24 @@ class Scene:
         if known is not self._run:
             self._run = known
             self._describe()
+
+    def add_directions(self, grid: OccupancyGrid) -> None:
+        """Draw where the living trail points to, and tell how decided it is at the robot."""
+        grid = self._anchored(grid.geometry.origin).grid(grid)
+        pointed, share = directions_of(grid)
+        flows = flows_of(grid.geometry, pointed, share)
+        fork = fork_at(grid.geometry, pointed, share, self._robot)
+        robot = self._robot if fork else None
+        above_m = FORK_CELLS * grid.geometry.resolution
+        here = draw.words_archetype(robot, fork, above_m) if robot else draw.no_label_archetype()
+
+        def draw_directions() -> None:
+            arrows = draw.arrows_archetype(flows)
+            self._writer.log(entities.DIRECTIONS, arrows, latched=True, size=flows.size_bytes)
+
+        # Small, and of where the robot is now: it does not wait as the arrows do.
+        self._writer.log(entities.HERE, here, latched=True)
+        self._draw(entities.DIRECTIONS, flows.size_bytes, draw_directions)
 
     def add_status(self, status: Status) -> None:
         """Plot the planner's figures, show its states, log its errors."""

@@ -33,11 +33,12 @@ from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant, encode_json
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.path_documents import PathAttachment, TrailAttachment
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.poses import DEFAULT_FRAMES, PoseDecoder
-from fasaco_edge.wire.status import PathAttachment, Status
 from fasaco_edge.wire.status import Recorder as RecorderReport
+from fasaco_edge.wire.status import Status
 
 TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000
@@ -127,7 +128,11 @@ class Recorder:
             "coverage": lambda sample: self._scene.add_coverage(
                 decode_occupancy_grid(sample.payload)
             ),
-            "pheromone": lambda sample: self._scene.add_pheromone(decode_pheromone(sample.payload)),
+            "floor": lambda sample: self._scene.add_floor(decode_occupancy_grid(sample.payload)),
+            "pheromone": self._draw_pheromone,
+            "directions": lambda sample: self._scene.add_directions(
+                decode_occupancy_grid(sample.payload)
+            ),
             "status": self._draw_status,
         }
         frames = (ros.frames.map, ros.frames.robot) if (ros := config.ros2) else DEFAULT_FRAMES
@@ -230,6 +235,11 @@ class Recorder:
     def _draw_path(self, sample: Sample) -> None:
         about = decode_tolerant(sample.attachment, PathAttachment)
         self._scene.add_path(decode_path(sample.payload), about)
+
+    def _draw_pheromone(self, sample: Sample) -> None:
+        message, beside = decode_pheromone(sample.payload), sample.attachment
+        about = decode_tolerant(beside, TrailAttachment) if beside else None
+        self._scene.add_pheromone(message, about)
 
     def _draw_status(self, sample: Sample) -> None:
         self._last_status_ns = time.monotonic_ns()

@@ -15,6 +15,7 @@ from fasaco_edge.bench.benchmark import (
 )
 from tests.benchmarks.online.buildings import BuildingChoice
 from tests.benchmarks.online.cases import CASES
+from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
 from tests.benchmarks.online.judge import MissionRun
 from tests.benchmarks.online.report import report
 from tests.benchmarks.online.robot import Pace
@@ -26,7 +27,7 @@ FEWEST_CELLS, MOST_CELLS = 1_000, 1_000_000
 # Options that figures say of themselves.
 CONDITIONS = (
     "starts", "ranges", "seeds", "misread", "cost", "turn_s", "speed_m_s", "proposals",
-    "planning_takes_time",
+    "planning_takes_time", "planners",
 )  # fmt: skip
 
 
@@ -79,6 +80,15 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         metavar="CASE",
         help=f"beside, missions in which something happens: {', '.join(CASES)} (default: "
         "all; no name for none)",
+    )
+    parser.add_argument(
+        "--planners",
+        nargs="+",
+        choices=CONTENDERS,
+        default=[DAEMON],
+        metavar="NAME",
+        help="; ".join(f"{name}: {one.about}" for name, one in CONTENDERS.items())
+        + "; figures and goals are of the first, a table has all (default: %(default)s)",
     )
     _add_robot_options(parser)
     parser.add_argument(
@@ -162,6 +172,7 @@ def _plan(args: argparse.Namespace) -> OnlinePlan:
         with_turns=args.cost == "turns",
         proposals=args.proposals,
         planning_takes_time=args.planning_takes_time,
+        planners=tuple(dict.fromkeys(args.planners)),
     )
 
 
@@ -191,5 +202,6 @@ examples:
   python -m tests.benchmarks online --grids *.npy --starts 3 --seeds 10 --misread 0.05 --json
   python -m tests.benchmarks online --generated 3 --cells 10000 --cost turns
   python -m tests.benchmarks online --maps office --cases person --planning-takes-time
+  python -m tests.benchmarks online --planners fasaco fasaco-anew aco aco-anew spiral-stc zigzag
 """,
 )

@@ -166,6 +166,7 @@ class MissionRun:
         held_up: how often the robot stood before an obstacle that its path led into.
         stale_m: way driven on a path that the newest map had blocked further on [m].
         replans, ingests, kept, updates: see ``Watch``.
+        planner: one of ``contenders.CONTENDERS``.
     """
 
     building: str
@@ -194,6 +195,7 @@ class MissionRun:
     ingests: tuple[Elapsed, ...]
     kept: tuple[float, ...]
     updates: tuple[bool, ...]
+    planner: str
 
     @property
     def covered_all(self) -> bool:

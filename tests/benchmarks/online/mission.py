@@ -35,11 +35,12 @@ from fasaco_edge.mission.core.events import (
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import SearchWork, WorkLimit
+from fasaco_edge.planners.planner import SearchWork, WorkLimit, ignore
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.benchmarks.harness import planner_for
 from tests.benchmarks.judge import MOVES
 from tests.benchmarks.online.buildings import Building
+from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
 from tests.benchmarks.online.robot import Pace, Robot
 from tests.benchmarks.online.sight import Senses, Sight
 
@@ -151,15 +152,17 @@ REFERENCE_PER_CELL, REFERENCE_LEAST = 10_000, 5_000_000
 
 @dataclass(frozen=True, slots=True)
 class CountedPlanning:
-    """The daemon's planner, with work for a budget.
+    """A planner, by default the daemon's, with work for a budget.
 
     Attributes:
         seed: of all random streams.
-        proposals: moves that a search may try; a repair ends long before.
+        proposals: moves that a search may try; a repair ends long before, ants try none.
+        planner: one of ``CONTENDERS``.
     """
 
     seed: int
     proposals: int
+    planner: str = DAEMON
 
     def __call__(self, request: PlanRequest) -> PlanReady:
         """Answer a request."""
@@ -170,7 +173,7 @@ class CountedPlanning:
         """Return a plan and how long it took."""
         limit = WorkLimit(SearchWork(proposals=self.proposals))
         stopwatch = Stopwatch()
-        path = planner_for(self.seed).plan(problem, limit)
+        path = CONTENDERS[self.planner].make(self.seed).plan(problem, limit, ignore)
         return path, stopwatch.read()
 
 
@@ -198,6 +201,7 @@ class Conditions:
         cost: what its walks are to have little of.
         seat: who plans.
         planning_takes_time: whether the robot drives on, or stands, while a plan is made.
+        plans_on_trail: see ``MissionConfig``.
     """
 
     senses: Senses
@@ -205,6 +209,7 @@ class Conditions:
     cost: CoverageCost
     seat: PlannerSeat
     planning_takes_time: bool = False
+    plans_on_trail: bool = False
 
 
 class OnlineMission:
@@ -228,7 +233,10 @@ class OnlineMission:
         self.watch = Watch(max(round(NEXT_M / cell_m), 1))
         self.now = 0.0
         self._conditions = conditions
-        self._mission = Mission(MissionConfig(building.footprint, cost=conditions.cost))
+        config = MissionConfig(
+            building.footprint, cost=conditions.cost, plans_on_trail=conditions.plans_on_trail
+        )
+        self._mission = Mission(config)
         # A plan that takes its time, and when it will be there.
         self._on_its_way: tuple[PlanReady, float] | None = None
         self._stale = False

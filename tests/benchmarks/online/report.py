@@ -17,6 +17,7 @@ HEADER = (
 LATENCY_HEADER = (
     "", "replan\np50", "\np99", "\nmax", "p99 to\nfull", "full\nplan", "ingest\np50", "\np99",
 )  # fmt: skip
+PLANNER_HEADER = (*HEADER[:-1], "replan\np50, p99\n[ms]")
 UNTIL_HEADER = ("", *(f"{percent} %:\nsteps,\n[s]" for percent in MILESTONES))
 CASE_HEADER = (
     "", "missions,\ndone", "missed,\nof cells", "steps,\ntime [s]", "plans,\npaths",
@@ -42,7 +43,12 @@ REMARKS = (
 def report(
     misread: float, *, with_turns: bool, about: dict[str, object], runs: Sequence[MissionRun]
 ) -> Report:
-    """Sum up any number of missions, even none; ``about`` says under what conditions."""
+    """Sum up any number of missions, even none; ``about`` says under what conditions.
+
+    Figures and goals are of the planner that comes first; the last table has all of them.
+    """
+    all_runs, of_planner = runs, _by_planner(runs)
+    runs = next(iter(of_planner.values()), [])
     of_kind = {kind: [run for run in runs if run.kind == kind] for kind in KINDS}
     buildings = Summary(of_kind[BUILDING])
     groups = list(_groups(of_kind[BUILDING], of_kind[MAZE]))
@@ -63,6 +69,9 @@ def report(
             "beside: something happens", CASE_HEADER, tuple(_case_row(case) for case in cases)
         ),
     ]
+    if len(of_planner) > 1:
+        rows = [_planner_row(name, group) for name, group in of_planner.items()]
+        further.append(ResultTable("planners, in buildings", PLANNER_HEADER, tuple(rows)))
     return Report(
         title=f"{len(buildings.runs)} missions in unknown buildings",
         header=HEADER,
@@ -74,12 +83,30 @@ def report(
                 group[0].building: {"kind": group[0].kind, **Summary(group).document()}
                 for group in beside
             },
-            "runs": [run.document() for run in runs],
+            "planners": {
+                name: Summary(_in_buildings(group)).document() for name, group in of_planner.items()
+            },
+            "runs": [run.document() for run in all_runs],
         },
         goals=tuple(goals(buildings, misread, with_turns=with_turns)),
-        remarks=(*REMARKS, *_complaints(runs), f"peak memory of this process {peak_mb()} MB"),
+        remarks=(*REMARKS, *_complaints(all_runs), f"peak memory of this process {peak_mb()} MB"),
         further=tuple(table for table in further if table.rows),
     )
+
+
+def _by_planner(runs: Sequence[MissionRun]) -> dict[str, list[MissionRun]]:
+    names = dict.fromkeys(run.planner for run in runs)
+    return {name: [run for run in runs if run.planner == name] for name in names}
+
+
+def _in_buildings(runs: Sequence[MissionRun]) -> list[MissionRun]:
+    return [run for run in runs if run.kind == BUILDING]
+
+
+def _planner_row(name: str, runs: Sequence[MissionRun]) -> tuple[str, ...]:
+    summary = Summary(_in_buildings(runs))
+    name, missions, *figures, _ = _row(name, summary) if summary.runs else (name, "0", *"----", "")
+    return name, missions, *figures, _lines(".1f", summary.replan_ms(50), summary.replan_ms(99))
 
 
 def _by_building(runs: Sequence[MissionRun]) -> list[list[MissionRun]]:

@@ -17,6 +17,7 @@ from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.harness import judged as judged_plan
 from tests.benchmarks.online.buildings import Building, BuildingChoice, of_grid
 from tests.benchmarks.online.cases import CASES, Act
+from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
 from tests.benchmarks.online.judge import MissionRun, Reference, judged
 from tests.benchmarks.online.mission import Conditions, CountedPlanning, OnlineMission, near_optimal
 from tests.benchmarks.online.robot import Pace
@@ -41,6 +42,7 @@ class OnlinePlan:
         with_turns: whether its walks are to take little time, or few steps alone.
         proposals: budget of a plan.
         planning_takes_time: as in ``Conditions``.
+        planners: names of CONTENDERS.
     """
 
     choice: BuildingChoice
@@ -53,13 +55,15 @@ class OnlinePlan:
     with_turns: bool
     proposals: int
     planning_takes_time: bool
+    planners: tuple[str, ...] = (DAEMON,)
 
 
 def count(plan: OnlinePlan) -> int:
     """Return how many missions ``measure`` will yield."""
     choice = plan.choice
     buildings = len(choice.grids) + choice.generated + choice.mazes
-    return plan.seeds * (buildings * plan.starts * len(plan.ranges_m) + len(plan.cases))
+    missions = buildings * plan.starts * len(plan.ranges_m) + len(plan.cases)
+    return plan.seeds * len(plan.planners) * missions
 
 
 def measure(plan: OnlinePlan, say: Say) -> Generator[MissionRun, None, None]:
@@ -76,9 +80,12 @@ def measure(plan: OnlinePlan, say: Say) -> Generator[MissionRun, None, None]:
     say("loading kernels")
     warm_up()
     room = NamedGrid("room", CoverageLattice.from_free(np.ones((4, 5), bool)), (0, 0))
-    _run(replace(plan, proposals=1), of_grid(room, MAP_FOOTPRINT.cell_m), 1.0, 0, None)
+    for planner in plan.planners:
+        warming = replace(plan, proposals=1, planners=(planner,))
+        _run(warming, of_grid(room, MAP_FOOTPRINT.cell_m), 1.0, 0, None)
     references: dict[tuple[str, Cell], Reference] = {}
-    for seed in range(plan.seeds):
+    for planner, seed in itertools.product(plan.planners, range(plan.seeds)):
+        one = replace(plan, planners=(planner,))
         for building, number in itertools.product(buildings, range(plan.starts)):
             started = building.started_at(number)
             key = started.name, started.start
@@ -86,12 +93,12 @@ def measure(plan: OnlinePlan, say: Say) -> Generator[MissionRun, None, None]:
                 say(f"{started.name}: reference")
                 references[key] = _reference(plan, started)
             for range_m in plan.ranges_m:
-                say(f"seed {seed}: {started.name}, start {number}, {range_m:g} m")
-                yield _run(plan, started, range_m, seed, references[key])
+                say(f"{planner}, seed {seed}: {started.name}, start {number}, {range_m:g} m")
+                yield _run(one, started, range_m, seed, references[key])
         for name in plan.cases:
-            say(f"seed {seed}: {name}")
+            say(f"{planner}, seed {seed}: {name}")
             case = CASES[name]
-            yield _run(plan, case.building(), plan.ranges_m[0], seed, None, case.acts())
+            yield _run(one, case.building(), plan.ranges_m[0], seed, None, case.acts())
 
 
 def _reference(plan: OnlinePlan, building: Building) -> Reference:
@@ -121,13 +128,15 @@ def _run(
         nonlocal happened
         happened = act(mission) or happened
 
+    (planner,) = plan.planners
     misread = plan.misread if reference is not None else 0.0
     conditions = Conditions(
         senses=Senses(range_m, misread, seed),
         pace=plan.pace,
         cost=plan.pace.cost(building.footprint.cell_m, with_turns=plan.with_turns),
-        seat=CountedPlanning(seed, plan.proposals),
+        seat=CountedPlanning(seed, plan.proposals, planner),
         planning_takes_time=plan.planning_takes_time,
+        plans_on_trail=CONTENDERS[planner].on_trail,
     )
     mission = OnlineMission(building, conditions)
     mission.run(acting)
@@ -159,4 +168,5 @@ def _run(
         ingests=tuple(watch.ingests),
         kept=tuple(watch.kept),
         updates=tuple(watch.updates),
+        planner=planner,
     )

@@ -1,0 +1,93 @@
+"""The last samples: what was published last on some topics, for whoever asks for it later."""
+
+from __future__ import annotations
+
+import re
+import threading
+from functools import partial
+
+from fasaco_edge.bus.queries import Reply, Request
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.daemon.loop.answers import Said, answering, check
+from fasaco_edge.daemon.loop.trail_publisher import ShownTrail
+from fasaco_edge.errors import BadQuery, NotYet
+from fasaco_edge.wire import schemas, topics
+from fasaco_edge.wire.keys import Keys
+
+# The cohort that stands for the last one.
+NEWEST = "newest"
+
+
+class LastSamples:
+    """Keeps what was said last on some topics, and answers with it.
+
+    The answer is the same on the topic itself, as a storage would give it.
+    """
+
+    def __init__(self, bus: Bus, keys: Keys) -> None:
+        self._lock = threading.Lock()
+        self._last: dict[str, Said] = {}
+        # Of the newest full plan: by cohort, and the newest; and the number of its request.
+        self._trails: dict[str, Said] = {}
+        self._plan = 0
+        self._living: ShownTrail | None = None
+        for topic in (topics.PATH, topics.STATUS, topics.COVERAGE):
+            answer = answering(partial(self._answer, topic.name))
+            for key in (keys.rpc(topic.name), keys.of(topic)):
+                bus.serve(key, answer)
+        for key in (keys.rpc("pheromone"), keys.of(topics.PHEROMONE)):
+            bus.serve(key, answering(self._trail))
+
+    def keep(self, topic: str, reply: Said) -> None:
+        """Keep what was said on ``topic``."""
+        with self._lock:
+            self._last[topic] = reply
+
+    def keep_trail(self, plan: int, cohort: int, reply: Said) -> None:
+        """Keep the trail that ``cohort`` of plan ``plan`` has left."""
+        with self._lock:
+            if plan != self._plan:
+                self._plan, self._trails = plan, {}
+            self._trails[str(cohort)] = self._trails[NEWEST] = reply
+
+    def keep_living(self, shown: ShownTrail) -> None:
+        """Keep the living trail."""
+        with self._lock:
+            self._living = shown
+
+    def _answer(self, topic: str, request: Request) -> Said:
+        check(request)
+        with self._lock:
+            reply = self._last.get(topic)
+        if reply is None:
+            raise NotYet(f"there is no {topic} yet")
+        return reply
+
+    def _trail(self, request: Request) -> Said:
+        check(request, "cohort")
+        cohort = request.parameters.get("cohort")
+        if cohort is None:
+            return self._living_trail()
+        if cohort != NEWEST:
+            if not re.fullmatch("[0-9]{1,9}", cohort):
+                raise BadQuery(f"cohort must be a whole number from 0, got {cohort!r}")
+            cohort = str(int(cohort))
+        with self._lock:
+            reply = self._trails.get(cohort)
+            kept = [name for name in self._trails if name != NEWEST]
+        if reply is not None:
+            return reply
+        if not kept:
+            raise NotYet("no cohort has walked yet: no full plan was made")
+        raise NotYet(
+            f"the newest full plan has no trail of cohort {cohort}",
+            hint=f"ask for {NEWEST}, {', '.join(kept)}, or leave cohort out for the living trail",
+        )
+
+    def _living_trail(self) -> Said:
+        with self._lock:
+            living = self._living
+        if living is None:
+            raise NotYet("there is no pheromone yet: there is no map with cells")
+        payload, attachment = living.field()
+        return Reply(payload, schemas.PHEROMONE_GRID, attachment)

@@ -1,0 +1,286 @@
+"""The floor under a map that changes: places, stands and the lattice over them.
+
+Where the new map lies on the raster of the one before, only cells near changed pixels are looked
+at, see ``grid.changes``. Either way all is as if it had been found for the new map alone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.changes import LatticeChange, stale_cells
+from fasaco_edge.grid.fine_raster import (
+    RobotDiscs,
+    blocked_pixels,
+    fine_geometry,
+    raster_to_map,
+    stand_placement,
+)
+from fasaco_edge.grid.floor import StandLattice, states_of
+from fasaco_edge.grid.geometry import GridGeometry, Point, Polygon, Window
+from fasaco_edge.grid.lattice import (
+    UNKNOWN,
+    Cell,
+    CoverageLattice,
+    Footprint,
+    placement_of,
+)
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.floor.bits import WORD, Bits, unpacked
+from fasaco_edge.kernels.floor.places import (
+    disc_rows,
+    keep_in_cells,
+    places_of,
+    within,
+)
+from fasaco_edge.kernels.lattice.footprint import Placement
+from fasaco_edge.kernels.lattice.polygons import add_near, turn_inside
+
+# A step may bend over places this far from its two cells' middles; a pixel more for rounding.
+REACH_CELLS, REACH_PX = 2.5, 2.0
+
+
+class FloorMap:
+    """Where a robot may be on a map, and where it stands in the cells.
+
+    Attributes:
+        discs: robot and tool.
+        geometry: of the fine raster.
+        blocked: uint64 (rows, words), see ``kernels.floor.bits``: pixels that are not known free,
+            or are kept out of.
+        places: the same: pixels at whose centre the robot may be, wherever it comes from.
+        stands: the lattice, and where in its cells the robot stands.
+        revision: goes up with each map.
+        shift: by how many rows and columns pixels have moved on the raster with the newest map;
+            None where it is another raster.
+        touched: the part of the raster that the newest map may have changed; None for nothing.
+    """
+
+    geometry: GridGeometry
+    blocked: Bits
+    places: Bits
+    stands: StandLattice
+    revision: int = 0
+    shift: tuple[int, int] | None
+    touched: Window | None
+
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        plain: CoverageLattice,
+        footprint: Footprint,
+        discs: RobotDiscs,
+        most_pixels: int,
+        keep_out: tuple[Polygon, ...] = (),
+    ) -> None:
+        """Look at a first map.
+
+        Args:
+            grid: the map.
+            plain: the lattice of ``footprint`` over it, whose cells tell what is unknown.
+            footprint, discs: of the robot.
+            most_pixels: the most that the raster may have.
+            keep_out: polygons that the robot must not touch.
+
+        Raises:
+            MapTooLarge: the raster would have more pixels.
+        """
+        self.discs = discs
+        self._footprint, self._most_pixels, self._keep_out = footprint, most_pixels, keep_out
+        self._see(grid, plain)
+
+    def change(
+        self,
+        grids: tuple[OccupancyGrid, OccupancyGrid],
+        plain: CoverageLattice,
+        within: Window | None = None,
+    ) -> LatticeChange:
+        """Go on with another map; return what becomes of the lattice.
+
+        Args:
+            grids: the map before and the new one.
+            plain: the plain lattice over the new one.
+            within: which pixels may differ, see ``LatticeChange.between``.
+
+        Raises:
+            MapTooLarge: the raster would have too many pixels; nothing has changed.
+        """
+        before = self.stands.lattice
+        geometry, parts = fine_geometry(grids[1].geometry, self.discs, self._most_pixels)
+        (old_raster, old), (raster, new) = (grid.geometry.on_raster() for grid in grids)
+        if old_raster != raster or geometry.resolution != self.geometry.resolution:
+            self._see(grids[1], plain)
+            return self._compared(before)
+        wide = placement_of(grids[1].geometry, self._footprint)
+        scale = self._footprint.cell_m / grids[1].geometry.resolution
+        wide = wide._replace(radius=wide.radius + REACH_CELLS * scale + REACH_PX)
+        stale = stale_cells(grids, before, plain.window, wide, self._footprint.thresholds, within)
+        self.revision += 1
+        self.shift = (old.row0 - new.row0) * parts, (old.col0 - new.col0) * parts
+        self.touched = self._pixels_of(stale, plain.window, geometry)
+        if self.touched is None and old == new:
+            return LatticeChange.to(before, self._with_states(plain))
+        if old != new:
+            self.geometry = geometry
+            self._look(grids[1], parts, 0, geometry.rows)
+        elif self.touched is not None:
+            self._look(grids[1], parts, self.touched.row0, self.touched.row1)
+        self._settle(plain, stale)
+        return self._compared(before)
+
+    def stand_xy(self, cell: Cell) -> Point | None:
+        """Return where the robot stands in a cell, x, y [m]; None where it cannot."""
+        lattice = self.stands.lattice
+        if not lattice.contains(cell):
+            return None
+        at = self.stands.stands[lattice.local(cell)]
+        if np.isnan(at[0]):
+            return None
+        ((x, y),) = raster_to_map(self.geometry, at[None]).tolist()
+        return x, y
+
+    def box_of(self, cell: Cell) -> Window:
+        """Return the smallest box of the raster's pixels around a cell."""
+        window = Window(cell[0], cell[1], cell[0] + 1, cell[1] + 1)
+        return self._box_around(window, self.geometry, 0) or Window(0, 0, 0, 0)
+
+    def reached(self, cells: NDArray[np.bool_], part: Window) -> NDArray[np.bool_]:
+        """Return the pixels of a part of the raster that the tool reaches from places in cells.
+
+        Args:
+            cells: bool (rows, cols) of the lattice.
+            part: of the raster.
+
+        Returns:
+            bool, (rows, cols) of the part.
+        """
+        radius = self.discs.tool_m / 2 / self.geometry.resolution
+        margin = int(radius) + 1
+        whole = Window(0, 0, self.geometry.rows, self.geometry.cols)
+        around = Window(
+            part.row0 - margin, part.col0 - margin, part.row1 + margin, part.col1 + margin
+        ).intersection(whole)
+        assert around is not None
+        # Whole words: what lies further away does not matter.
+        first, end = around.col0 // WORD, -(-around.col1 // WORD)
+        found = self.places[around.row0 : around.row1, first:end].copy()
+        lattice = self.stands.lattice
+        window = lattice.window
+        if (lattice.coverable & ~cells).any():
+            cell, corner = (window.row0, window.col0), (around.row0, first * WORD)
+            keep_in_cells(found, self._placement(), cells, cell, corner)
+        words = Window(around.row0, first * WORD, around.row1, end * WORD)
+        reached = unpacked(within(found, radius), words.cols)
+        return reached[part.slices_in(words)]
+
+    def pixels_of(self, cells: NDArray[np.bool_]) -> Window | None:
+        """Return the pixels around some cells that the tool reaches from there; None without any.
+
+        Args:
+            cells: bool (rows, cols) of the lattice.
+        """
+        return self._pixels_of(cells, self.stands.lattice.window, self.geometry)
+
+    def _see(self, grid: OccupancyGrid, plain: CoverageLattice) -> None:
+        self.geometry, parts = fine_geometry(grid.geometry, self.discs, self._most_pixels)
+        rows, cols = self.geometry.rows, self.geometry.cols
+        self.revision += 1
+        self.shift, self.touched = None, Window(0, 0, rows, cols)
+        self._look(grid, parts, 0, rows)
+        self._settle(plain, np.ones(plain.states.shape, np.bool_))
+
+    def _look(self, grid: OccupancyGrid, parts: int, first: int, end: int) -> None:
+        """See what is blocked in rows of the raster, and where the robot's disc fits there."""
+        rows = self.geometry.rows
+        keep_out = self._kept_out if self._keep_out else None
+        free_at_most = self.discs.free_at_most
+        seen = blocked_pixels(grid, self.geometry, parts, free_at_most, (first, end), keep_out)
+        disc = disc_rows(self.discs.radius_m / self.geometry.resolution)
+        if end - first == rows:
+            self.blocked, self.places = seen, places_of(seen, disc)
+            return
+        self.blocked[first:end] = seen
+        low, high = max(first - len(disc), 0), min(end + len(disc), rows)
+        places = places_of(self.blocked[low:high], disc)
+        self.places[first:end] = places[first - low : end - low]
+
+    def _compared(self, before: CoverageLattice) -> LatticeChange:
+        """Keep the lattice before where no cell has changed, though a stand may have."""
+        change = LatticeChange.to(before, self.stands.lattice)
+        self.stands = replace(self.stands, lattice=change.after)
+        return change
+
+    def _placement(self) -> Placement:
+        return stand_placement(self.geometry, self._footprint.cell_m, self.discs.radius_m)
+
+    def _settle(self, plain: CoverageLattice, stale: NDArray[np.bool_]) -> None:
+        """Look at stale cells again; the others are those of the lattice before."""
+        self.stands = StandLattice.where(
+            self.blocked,
+            self.places,
+            self._placement(),
+            plain.window,
+            plain.cell_m,
+            plain.states == UNKNOWN,
+            None if self.shift is None else (self.stands, self.shift, stale),
+        )
+
+    def _with_states(self, plain: CoverageLattice) -> CoverageLattice:
+        before = self.stands.lattice
+        states = states_of(self.stands.stands, plain.states == UNKNOWN)
+        if (states == before.states).all():
+            return before
+        lattice = CoverageLattice(before.window, before.cell_m, states, before.steps)
+        self.stands = StandLattice(lattice, self.stands.stands, self.stands.bends)
+        return lattice
+
+    def _kept_out(self, part: Window) -> NDArray[np.bool_]:
+        """Return which pixels of a part of the raster any polygon touches, bool (rows, cols)."""
+        kept_out = np.zeros((part.rows, part.cols), np.bool_)
+        for polygon in self._keep_out:
+            kept_out |= self._touched_by(polygon, part)
+        return kept_out
+
+    def _touched_by(self, polygon: Polygon, part: Window) -> NDArray[np.bool_]:
+        """Return which pixels of a part of the raster a polygon touches, bool (rows, cols)."""
+        corners = np.array([self.geometry.to_pixels(x, y) for x, y in polygon])
+        starts = np.zeros((part.rows, part.cols + 1), np.int32)
+        inside = np.zeros((part.rows, part.cols), np.bool_)
+        add_near(corners, part.row0, part.col0, 1.0, 0.5, starts)
+        turn_inside(corners, part.row0, part.col0, 1.0, inside)
+        touched: NDArray[np.bool_] = (np.cumsum(starts, axis=1)[:, :-1] > 0) | inside
+        return touched
+
+    def _pixels_of(
+        self, stale: NDArray[np.bool_], window: Window, geometry: GridGeometry
+    ) -> Window | None:
+        """Return the pixels around cells, and as far as robot and tool reach; None without any."""
+        cells = Window.of(stale)
+        if cells is None:
+            return None
+        reach = max(self.discs.radius_m, self.discs.tool_m / 2)
+        margin = int(reach / geometry.resolution) + 2
+        return self._box_around(cells.moved(window.row0, window.col0), geometry, margin)
+
+    def _box_around(self, cells: Window, geometry: GridGeometry, margin: int) -> Window | None:
+        """Return the box of pixels around a window of cells; None where there are none."""
+        placement = stand_placement(geometry, self._footprint.cell_m, self.discs.radius_m)
+        corners = [
+            (
+                placement.x0 + placement.ux * col - placement.uy * row,
+                placement.y0 + placement.uy * col + placement.ux * row,
+            )
+            for row in (cells.row0, cells.row1)
+            for col in (cells.col0, cells.col1)
+        ]
+        xs, ys = zip(*corners, strict=True)
+        low, high = (
+            (math.ceil(min(ys)), math.ceil(min(xs))),
+            (math.ceil(max(ys)), math.ceil(max(xs))),
+        )
+        around = Window(low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin)
+        return around.intersection(Window(0, 0, geometry.rows, geometry.cols))

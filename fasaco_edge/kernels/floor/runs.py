@@ -1,0 +1,82 @@
+"""Runs: stretches that one walk over cells has in common with another, forward or backward."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.jit import inlined, kernel
+
+AFTER, BEFORE, STEPS, BACKWARD = range(4)
+
+
+@inlined
+def _same(one: NDArray[np.int32], a: int, other: NDArray[np.int32], b: int) -> bool:
+    return bool(one[a, 0] == other[b, 0] and one[a, 1] == other[b, 1])
+
+
+@kernel
+def common_runs(
+    before: NDArray[np.int32], after: NDArray[np.int32], least: int
+) -> NDArray[np.int64]:
+    """Return stretches of one walk that lead along the same cells as another.
+
+    No step of either walk is in two of them.
+
+    Args:
+        before, after: int32 (n, 2) and (m, 2), cells (row, col), both one cell or more.
+        least: the fewest steps of a stretch.
+
+    Returns:
+        int64 (k, 4), in the order of ``after``: where it begins there; where it begins in
+        ``before``; how many steps it has; 1 where ``before`` goes the other way, else 0.
+    """
+    size, most = len(before), len(after)
+    row0 = min(before[:, 0].min(), after[:, 0].min())
+    col0 = min(before[:, 1].min(), after[:, 1].min())
+    row1 = max(before[:, 0].max(), after[:, 0].max())
+    col1 = max(before[:, 1].max(), after[:, 1].max())
+    cols = col1 - col0 + 1
+    # The visits of each cell of the walk before, in order.
+    first = np.full((row1 - row0 + 1) * cols, -1, np.int32)
+    following = np.empty(size, np.int32)
+    for at in range(size - 1, -1, -1):
+        cell = (before[at, 0] - row0) * cols + before[at, 1] - col0
+        following[at] = first[cell]
+        first[cell] = at
+    is_taken = np.zeros(size, np.bool_)
+    runs = np.empty((most // max(least, 1) + 1, 4), np.int64)
+    count = begin = 0
+    while begin < most - 1:
+        longest, origin, backward = 0, 0, 0
+        visit = first[(after[begin, 0] - row0) * cols + after[begin, 1] - col0]
+        while visit >= 0:
+            steps = 0
+            while (
+                visit + steps < size - 1
+                and begin + steps < most - 1
+                and not is_taken[visit + steps]
+                and _same(before, visit + steps + 1, after, begin + steps + 1)
+            ):
+                steps += 1
+            if steps > longest:
+                longest, origin, backward = steps, visit, 0
+            steps = 0
+            while (
+                visit - steps > 0
+                and begin + steps < most - 1
+                and not is_taken[visit - steps - 1]
+                and _same(before, visit - steps - 1, after, begin + steps + 1)
+            ):
+                steps += 1
+            if steps > longest:
+                longest, origin, backward = steps, visit, 1
+            visit = following[visit]
+        if longest < least:
+            begin += 1
+            continue
+        low = origin - longest if backward else origin
+        is_taken[low : low + longest] = True
+        runs[count, AFTER], runs[count, BEFORE] = begin, origin
+        runs[count, STEPS], runs[count, BACKWARD] = longest, backward
+        count += 1
+        begin += longest
+    return runs[:count].copy()

@@ -1,0 +1,1 @@
+"""Kernels that solve windows of a walk anew, exactly or nearly so."""

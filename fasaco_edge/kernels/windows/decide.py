@@ -1,0 +1,104 @@
+"""One cell of a window decided: the states after it from those before."""
+
+from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.windows.choices import list_choices
+from fasaco_edge.kernels.windows.memory import (
+    EXPANDED,
+    KINDS,
+    LAYER_STAMP,
+    MUCH,
+    NO_END,
+    Ends,
+    Here,
+    Program,
+    at_rim,
+)
+from fasaco_edge.kernels.windows.parts import is_stuck
+from fasaco_edge.kernels.windows.states import apply, file_state, order_lanes, shrink, take_in
+
+
+@lean_kernel
+def decide(
+    program: Program, here: Here, ends: Ends, layer: int, states: int, beam: int, limit: int
+) -> int:
+    """Write the states after a cell into the other layer; return how many there are."""
+    program.clock[LAYER_STAMP] += 1
+    for kind in range(KINDS):
+        program.choice.listed[kind] = -1
+    # From what cost on a state before the cell, and one after it, cannot come below the limit.
+    most, threshold = limit - program.left[here.number], limit - program.left[here.number + 1]
+    cheapest = MUCH
+    for state in range(states):
+        cheapest = min(cheapest, program.cost[layer, state])
+    made = 0
+    for state in range(states):
+        if program.cost[layer, state] < min(most, threshold):
+            room = threshold - cheapest
+            made, threshold = _expand(
+                program, here, ends, layer, state, made, beam, threshold, room
+            )
+    if made > beam:
+        made, _ = shrink(program, 1 - layer, made, _words(here), beam)
+    for state in range(made):
+        program.kept_parent[here.number + 1, state] = program.parent[state]
+        program.kept_code[here.number + 1, state] = program.code[state]
+    return made
+
+
+@inlined
+def _words(here: Here) -> int:
+    """Return how many words of a state are in use: four identifiers each, four of them spare."""
+    return (here.spare_id + 7) >> 2
+
+
+@lean_kernel
+def _expand(
+    program: Program,
+    here: Here,
+    ends: Ends,
+    layer: int,
+    state: int,
+    made: int,
+    beam: int,
+    threshold: int,
+    room: int,
+) -> tuple[int, int]:
+    """File all states that a state leads to; return how many there are, and the new threshold."""
+    words, cost, base = _words(here), program.cost[layer, state], program.base
+    for word in range(words):
+        program.base_words[word] = program.words[layer, state, word]
+    if here.from_behind:
+        behind = take_in(base, here.ahead_id, here.spare_id)
+    else:
+        behind = at_rim(program, here.cell, here.behind)
+    if here.from_above:
+        above = take_in(base, here.below_id, here.spare_id + 2)
+    else:
+        above = at_rim(program, here.cell, here.above)
+    may_end = ends.end_id >= 0 and base[ends.end_id] != NO_END
+    kind, choice = (behind * 3 + above) * 2 + int(may_end), program.choice
+    if choice.listed[kind] < 0:
+        list_choices(program, here, ends, kind, behind, above, may_end, room)
+    was_closed = program.closed[layer, state]
+    brought = behind << 20 | above << 22 | int(ends.begin_id >= 0) << 26
+    for number in range(choice.listed[kind]):
+        total = cost + choice.cost[kind, number]
+        if total >= threshold:
+            break
+        program.clock[EXPANDED] += 1
+        code = choice.code[kind, number]
+        closed = apply(program, here, ends, code, behind, above, was_closed, words)
+        if closed < 0:
+            continue
+        is_open = ends.is_free and program.scratch[ends.end_id] != NO_END
+        if ends.is_checked and not closed and is_stuck(program, is_open):
+            continue
+        swaps = order_lanes(program.scratch, here.ahead_id) if here.to_ahead else 0
+        if here.to_below:
+            swaps += 2 * order_lanes(program.scratch, here.below_id)
+        code |= brought | swaps << 24
+        made = file_state(program, 1 - layer, made, words, total, closed, state, code)
+        if made == program.parent.size:
+            made, cut = shrink(program, 1 - layer, made, words, beam)
+            threshold = min(threshold, cut)
+    return made, threshold

@@ -1,0 +1,217 @@
+"""Memory of the dynamic program over a window, and what it is told of walk, window and cell."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.jit import inlined
+
+# No end of a piece; a cost that nothing has.
+NO_END = -1
+MUCH = 1 << 60
+
+# Identifiers in a state: two for each column of the frontier, two for the side ahead, the slots at
+# the window's rim, and four while a cell is decided. Windows that need more are left alone.
+MOST_IDS = 192
+# Most choices for a cell, and kinds of incoming sides that they are listed for.
+MOST_CHOICES, KINDS = 600, 18
+# Passages of one cell at most; ways to pair up 2, 4, 6, 8 slots, one after the other.
+MOST_PAIRS = 4
+PAIRINGS = 1 + 1 + 3 + 15 + 105
+FIRST_PAIRING = (0, 1, 2, 5, 20, 125)
+
+
+class Choice(NamedTuple):
+    """What a cell may have, by kind of what comes in: cheapest first.
+
+    Attributes:
+        listed: int32 (KINDS,), how many; -1 where they are not listed yet.
+        cost: int64 (KINDS, MOST_CHOICES).
+        code: int32 (KINDS, MOST_CHOICES): lanes ahead, lanes below, whether it ends, pairing.
+    """
+
+    listed: NDArray[np.int32]
+    cost: NDArray[np.int64]
+    code: NDArray[np.int32]
+
+
+class Parts(NamedTuple):
+    """The cells of a window that are not yet decided, and how they hang together.
+
+    Attributes:
+        label: int32 (n,), the part of each such cell.
+        root: int32 (n,), working memory; number int32 (n,), place of a cell in the order.
+        queue: int32 (most cells,), working memory.
+        splits: uint8 (most cells,), whether the part of a cell falls apart without it.
+        left: int32 (most cells,), cells left of each part; needed int32, how many need a visit.
+        leads: int16 (MOST_IDS, 2), identifiers that lead into a part, and the part.
+        sizes: int64 (2,), how many parts; how many identifiers.
+    """
+
+    label: NDArray[np.int32]
+    root: NDArray[np.int32]
+    number: NDArray[np.int32]
+    queue: NDArray[np.int32]
+    splits: NDArray[np.uint8]
+    left: NDArray[np.int32]
+    needed: NDArray[np.int32]
+    leads: NDArray[np.int16]
+    sizes: NDArray[np.int64]
+
+
+class Program(NamedTuple):
+    """Memory of the program.
+
+    Attributes:
+        pairs: int8 (PAIRINGS, 2 * MOST_PAIRS), the slots that each pairing joins.
+        choice: of the cell that is decided.
+        mates: int16 (2, states, MOST_IDS), of each state the other end of the piece that an
+            identifier is an end of; a layer before and one after the cell.
+        words: int64 (2, states, MOST_IDS / 4), the same memory.
+        cost: int64 (2, states).
+        closed: uint8 (2, states), whether the ring is closed.
+        parent, code: int32, int64 (states,): how the states of the layer after came about.
+        kept_parent, kept_code: int32, int64 (most cells + 1, beam), the same of all layers.
+        table: int32 (slots,), states by hash; stamp int32 (slots,), from which layer.
+        order: int64 (states,), costs while the dearest are dropped.
+        scratch, base: int16 (MOST_IDS,), the state that comes about, and without the cell's ends;
+            scratch_words, base_words int64 (MOST_IDS / 4,), the same memory.
+        ident: int16 (n, SLOTS), identifier of a slot at the rim.
+        inside: uint8 (n,), 1 in the window.
+        cells: int32 (most cells,), of the window, in order.
+        rim: int32 (MOST_IDS, 2), cell and slot of each identifier at the rim.
+        reduced: int64 (most cells, 6, 6), costs of passages by the directions of their sides.
+        left: int64 (most cells + 1,), what the cells from here on cost at least.
+        clock: int64 (2,): stamp of the layer; states expanded so far.
+        taken: int16 (12,), identifiers of the slots that a cell has; kinds int64 (12,), their
+            directions.
+        at: int64 (10,), how far it is: entries NUMBER to END_ID.
+        parts: what the cells not yet decided hang together in.
+    """
+
+    pairs: NDArray[np.int8]
+    choice: Choice
+    mates: NDArray[np.int16]
+    words: NDArray[np.int64]
+    cost: NDArray[np.int64]
+    closed: NDArray[np.uint8]
+    parent: NDArray[np.int32]
+    code: NDArray[np.int64]
+    kept_parent: NDArray[np.int32]
+    kept_code: NDArray[np.int64]
+    table: NDArray[np.int32]
+    stamp: NDArray[np.int32]
+    order: NDArray[np.int64]
+    scratch: NDArray[np.int16]
+    scratch_words: NDArray[np.int64]
+    base: NDArray[np.int16]
+    base_words: NDArray[np.int64]
+    ident: NDArray[np.int16]
+    inside: NDArray[np.uint8]
+    cells: NDArray[np.int32]
+    rim: NDArray[np.int32]
+    reduced: NDArray[np.int64]
+    left: NDArray[np.int64]
+    clock: NDArray[np.int64]
+    taken: NDArray[np.int16]
+    kinds: NDArray[np.int64]
+    at: NDArray[np.int64]
+    parts: Parts
+
+
+class Terms(NamedTuple):
+    """What the walk is to be.
+
+    Attributes:
+        step, turn: a step and a quarter-turn [half us].
+        prices: int64 (n, 4), what a side of a cell costs beside, by direction.
+        begin_price, end_price: what its first and its last visit cost beside.
+        free_end: whether it may end in any cell that is to be covered.
+    """
+
+    step: int
+    turn: int
+    prices: NDArray[np.int64]
+    begin_price: int
+    end_price: int
+    free_end: bool
+
+
+class Window(NamedTuple):
+    """A rectangle of framed cells.
+
+    Attributes:
+        row, col: its first ones.
+        rows, cols: its size.
+        width: of the framed ground.
+    """
+
+    row: int
+    col: int
+    rows: int
+    cols: int
+    width: int
+
+
+LAYER_STAMP, EXPANDED = 0, 1
+
+# Entries of ``Program.at``: the next cell's number and line, the layer before it and its states;
+# the cost to come below; cells of the window, and the last that needs a passage; how many
+# identifiers; those of the walk's begin and end, -1 where they are elsewhere.
+NUMBER, LINE, LAYER, STATES, LIMIT, COUNT, LAST, IDS, BEGIN_ID, END_ID = range(10)
+
+
+class Here(NamedTuple):
+    """A cell that is decided.
+
+    Attributes:
+        cell, number: the cell, and its number in the window.
+        behind, above, ahead, below: directions.
+        from_behind, from_above: whether these sides come from the frontier; else from the rim.
+        to_ahead, to_below: whether these lead on inside the window.
+        below_id, ahead_id: first identifiers at the frontier.
+        spare_id: the first of four free ones.
+    """
+
+    cell: int
+    number: int
+    behind: int
+    above: int
+    ahead: int
+    below: int
+    from_behind: bool
+    from_above: bool
+    to_ahead: bool
+    to_below: bool
+    below_id: int
+    ahead_id: int
+    spare_id: int
+
+
+class Ends(NamedTuple):
+    """What of the walk's ends concerns a cell.
+
+    Attributes:
+        begin_id: identifier of the walk's begin, where it is in this cell, else -1.
+        end_id: of its end, where that is in the window, else -1.
+        is_needed: whether the cell must have a passage.
+        may_close: whether no cell after it must have one.
+        is_free: whether the walk may still end in any cell that is left.
+        is_checked: whether the ends into each part that is left are to be counted.
+    """
+
+    begin_id: int
+    end_id: int
+    is_needed: bool
+    may_close: bool
+    is_free: bool
+    is_checked: bool
+
+
+@inlined
+def at_rim(program: Program, cell: int, direction: int) -> int:
+    """Return how many lanes of a side lead out of the window; they are used from the first on."""
+    if program.ident[cell, 2 * direction] == NO_END:
+        return 0
+    return 1 if program.ident[cell, 2 * direction + 1] == NO_END else 2

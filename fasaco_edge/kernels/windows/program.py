@@ -1,0 +1,350 @@
+"""A window of a walk, solved anew exactly or nearly so, by dynamic programming over its frontier.
+
+Cell by cell, row by row of the window's shorter side, the program decides which passages the cell
+has. A state is what the rest needs to know: which open ends the walk so far has at the frontier
+and at the window's rim, and which of them are two ends of the same piece; what lies outside the
+window joins the ends at its rim. States that agree are one, the cheapest (Simpath; Inoue and
+Minato 2016 name it the frontier method). A ring may close once, when all cells are covered: so
+the result is one walk, as before.
+
+Costs are reduced by the prices of steps (``kernels.bound.turns``): no passage costs less than
+nothing, so what is left to decide costs at least the sum of the cells' cheapest passages, and
+states that cannot come below the present walk are dropped. Where more states are left than the
+beam takes, the dearest ones are dropped, too. All amounts are half microseconds.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.local_search.walk_array import Ground
+from fasaco_edge.kernels.windows.choices import price_cells, real_cost
+from fasaco_edge.kernels.windows.decide import decide
+from fasaco_edge.kernels.windows.memory import (
+    BEGIN_ID,
+    COUNT,
+    END_ID,
+    IDS,
+    LAST,
+    LAYER,
+    LIMIT,
+    LINE,
+    MOST_IDS,
+    NO_END,
+    NUMBER,
+    STATES,
+    Ends,
+    Here,
+    Program,
+    Terms,
+    Window,
+)
+from fasaco_edge.kernels.windows.parts import (
+    FEW_CELLS,
+    LEADS,
+    label_parts,
+    leads_to,
+    list_rim,
+    prepare_parts,
+)
+from fasaco_edge.kernels.windows.passages import BEGIN, END, NONE, SLOTS, Passages, across
+
+
+@inlined
+def _cell_at(window: Window, line: int, place: int) -> int:
+    """Return a cell by the program's line and place in it: lines run along the shorter side."""
+    if window.cols > window.rows:
+        return (window.row + place) * window.width + window.col + line
+    return (window.row + line) * window.width + window.col + place
+
+
+@lean_kernel
+def solve_window(
+    ground: Ground,
+    passages: Passages,
+    terms: Terms,
+    window: Window,
+    program: Program,
+    beam: int,
+    noise: int,
+    random: NDArray[np.uint64],
+) -> int:
+    """Solve a window anew; return by how much the walk's cost changes [half us], 0 if not at all.
+
+    Args:
+        ground: framed.
+        passages: of the walk; changed in place where something better is found.
+        terms: what it is to be.
+        window: where.
+        program: memory.
+        beam: most states kept after a cell.
+        noise: up to so much is added to each passage's cost at random, so that the walk may
+            become a little dearer.
+        random: state of the stream, uint64 (1,).
+    """
+    begin_window(ground, passages, terms, window, program, noise, random)
+    while advance_window(ground, passages, terms, window, program, beam):
+        pass
+    return end_window(ground, passages, terms, window, program)
+
+
+@lean_kernel
+def begin_window(
+    ground: Ground,
+    passages: Passages,
+    terms: Terms,
+    window: Window,
+    program: Program,
+    noise: int,
+    random: NDArray[np.uint64],
+) -> None:
+    """Begin to solve a window; see ``solve_window``."""
+    lines, wide = max(window.rows, window.cols), min(window.rows, window.cols)
+    at, count = program.at, 0
+    for line in range(lines):
+        for place in range(wide):
+            cell = _cell_at(window, line, place)
+            if ground.steps[cell]:
+                program.cells[count] = cell
+                program.inside[cell] = 1
+                count += 1
+    first = 2 * wide + 2
+    ids = _name_rim(ground, passages, program, first, count)
+    at[LINE], at[NUMBER], at[LAYER], at[STATES] = 0, 0, 0, 0
+    at[COUNT], at[IDS], at[BEGIN_ID], at[END_ID] = count, ids, -1, -1
+    for index in range(first, ids):
+        if program.rim[index, 1] == BEGIN:
+            at[BEGIN_ID] = index
+        if program.rim[index, 1] == END:
+            at[END_ID] = index
+    if ids < 0:
+        return
+    may_end = at[END_ID] >= 0
+    now, last = price_cells(ground, passages, terms, program, count, noise, random, may_end)
+    at[LIMIT], at[LAST] = now - (0 if noise else 1), last
+    if at[LIMIT] <= program.left[0]:
+        return
+    _join_outside(ground, passages, program, first, ids)
+    program.cost[0, 0], program.closed[0, 0] = 0, 0
+    ahead, below = _directions(window)
+    prepare_parts(ground, program, count, ahead, below, _begin_of(passages, program))
+    at[STATES] = 1
+
+
+@inlined
+def _directions(window: Window) -> tuple[int, int]:
+    """Return the directions along a line, and from line to line."""
+    return (1, 0) if window.cols > window.rows else (0, 1)
+
+
+@inlined
+def _begin_of(passages: Passages, program: Program) -> int:
+    """Return the cell the walk begins in, if that is in the window, else -1."""
+    return int(passages.ends[0]) if program.at[BEGIN_ID] >= 0 else -1
+
+
+@lean_kernel
+def advance_window(
+    ground: Ground, passages: Passages, terms: Terms, window: Window, program: Program, beam: int
+) -> bool:
+    """Decide one line of cells more; return whether there are more to decide."""
+    lines, wide = max(window.rows, window.cols), min(window.rows, window.cols)
+    at = program.at
+    line = at[LINE]
+    if line == lines or not at[STATES]:
+        return False
+    ahead, below = _directions(window)
+    begin, end_id, count = _begin_of(passages, program), at[END_ID], at[COUNT]
+    is_free = end_id >= 0 and terms.free_end
+    for place in range(wide):
+        cell = _cell_at(window, line, place)
+        if not ground.steps[cell] or not at[STATES]:
+            continue
+        number = at[NUMBER]
+        here = _here(ground, program, cell, number, 2 * place, 2 * wide, ahead, below, at[IDS])
+        begins = at[BEGIN_ID] if cell == begin else -1
+        is_needed = ground.needed[cell] > 0 or begins >= 0
+        is_checked = _part_with(ground, program, cell, number, count, begin)
+        if is_checked:
+            program.parts.sizes[LEADS] = 0
+            _list_frontier(ground, program, window, line, place, here)
+            list_rim(program, number, 2 * wide + 2, at[IDS], is_free)
+        ends = Ends(begins, end_id, is_needed, number >= at[LAST], is_free, is_checked)
+        at[STATES] = decide(program, here, ends, at[LAYER], at[STATES], beam, at[LIMIT])
+        at[LAYER] = 1 - at[LAYER]
+        at[NUMBER] = number + 1
+    at[LINE] = line + 1
+    return bool(at[STATES] > 0 and line + 1 < lines)
+
+
+@lean_kernel
+def end_window(
+    ground: Ground, passages: Passages, terms: Terms, window: Window, program: Program
+) -> int:
+    """Put the best state's passages back, if it is better; return as ``solve_window`` does."""
+    at, wide = program.at, min(window.rows, window.cols)
+    layer, end_id, count = at[LAYER], at[END_ID], at[COUNT]
+    best, cost = -1, at[LIMIT]
+    for state in range(at[STATES]):
+        is_whole = program.closed[layer, state] == 1
+        if end_id >= 0 and program.mates[layer, state, end_id] != NO_END:
+            is_whole = False
+        if is_whole and program.cost[layer, state] < cost:
+            best, cost = state, program.cost[layer, state]
+    for index in range(2 * wide + 2, at[IDS]):
+        program.ident[program.rim[index, 0], program.rim[index, 1]] = NO_END
+    for index in range(count):
+        program.inside[program.cells[index]] = 0
+    if best < 0:
+        return 0
+    before = real_cost(passages, terms, program, count)
+    _put_back(passages, program, window, best, count)
+    return real_cost(passages, terms, program, count) - before
+
+
+@lean_kernel
+def _name_rim(ground: Ground, passages: Passages, program: Program, first: int, count: int) -> int:
+    """Give the slots that lead out of the window identifiers; return how many there are, or -1."""
+    ids = first
+    for index in range(count):
+        cell = program.cells[index]
+        for slot in range(SLOTS):
+            if passages.partner[cell, slot] == NONE:
+                continue
+            if slot < BEGIN and program.inside[cell + ground.offsets[slot >> 1]]:
+                continue
+            if ids >= MOST_IDS - 8:
+                for other in range(first, ids):
+                    program.ident[program.rim[other, 0], program.rim[other, 1]] = NO_END
+                return -1
+            program.ident[cell, slot] = ids
+            program.rim[ids, 0], program.rim[ids, 1] = cell, slot
+            ids += 1
+    return ids
+
+
+@lean_kernel
+def _join_outside(
+    ground: Ground, passages: Passages, program: Program, first: int, ids: int
+) -> None:
+    """Write the first state: how the walk outside joins the slots at the rim."""
+    mates = program.mates[0, 0]
+    for index in range(MOST_IDS):
+        mates[index] = NO_END
+    for index in range(first, ids):
+        if mates[index] != NO_END:
+            continue
+        cell, slot = across(passages, ground.offsets, program.rim[index, 0], program.rim[index, 1])
+        while not program.inside[cell] or program.ident[cell, slot] == NO_END:
+            slot = passages.partner[cell, slot]
+            cell, slot = across(passages, ground.offsets, cell, slot)
+        other = program.ident[cell, slot]
+        mates[index], mates[other] = other, index
+
+
+@lean_kernel
+def _part_with(
+    ground: Ground, program: Program, cell: int, index: int, count: int, begin: int
+) -> bool:
+    """Take a cell out of its part; return whether states are to be looked at for it."""
+    parts = program.parts
+    label = parts.label[cell]
+    parts.left[label] -= 1
+    parts.needed[label] -= int(ground.needed[cell] > 0 or cell == begin)
+    if parts.splits[index]:
+        label_parts(ground, program, index + 1, count, begin)
+        return True
+    return bool(0 < parts.left[label] <= FEW_CELLS)
+
+
+@lean_kernel
+def _list_frontier(
+    ground: Ground, program: Program, window: Window, line: int, place: int, here: Here
+) -> None:
+    """Note which part each identifier of the frontier leads into, once the cell is decided."""
+    lines, wide = max(window.rows, window.cols), min(window.rows, window.cols)
+    for column in range(wide):
+        after = line + 1 if column <= place else line
+        if after in (0, lines):
+            continue
+        cell = _cell_at(window, after, column)
+        if ground.steps[cell] >> here.above & 1:
+            for lane in range(2):
+                leads_to(program, 2 * column + lane, cell)
+    if here.to_ahead:
+        for lane in range(2):
+            leads_to(program, here.ahead_id + lane, here.cell + ground.offsets[here.ahead])
+
+
+@inlined
+def _here(
+    ground: Ground,
+    program: Program,
+    cell: int,
+    index: int,
+    below_id: int,
+    ahead_id: int,
+    ahead: int,
+    below: int,
+    spare_id: int,
+) -> Here:
+    behind, above, mask = (ahead + 2) & 3, (below + 2) & 3, ground.steps[cell]
+    inside, offsets = program.inside, ground.offsets
+    return Here(
+        cell,
+        index,
+        behind,
+        above,
+        ahead,
+        below,
+        bool(mask >> behind & 1 and inside[cell + offsets[behind]]),
+        bool(mask >> above & 1 and inside[cell + offsets[above]]),
+        bool(mask >> ahead & 1 and inside[cell + offsets[ahead]]),
+        bool(mask >> below & 1 and inside[cell + offsets[below]]),
+        below_id,
+        ahead_id,
+        spare_id,
+    )
+
+
+@lean_kernel
+def _put_back(
+    passages: Passages,
+    program: Program,
+    window: Window,
+    state: int,
+    count: int,
+) -> None:
+    """Write the passages that led to a last state."""
+    ahead, below = _directions(window)
+    behind, above = (ahead + 2) & 3, (below + 2) & 3
+    taken, partner = program.taken, passages.partner
+    for index in range(count, 0, -1):
+        cell, code = program.cells[index - 1], program.kept_code[index, state]
+        swaps, size = code >> 24, 0
+        for lane in range(code >> 20 & 3):
+            taken[size] = 2 * behind + lane
+            size += 1
+        for lane in range(code >> 22 & 3):
+            taken[size] = 2 * above + lane
+            size += 1
+        for lane in range(code >> 8 & 3):
+            taken[size] = 2 * ahead + (1 - lane if swaps & 1 else lane)
+            size += 1
+        for lane in range(code >> 10 & 3):
+            taken[size] = 2 * below + (1 - lane if swaps & 2 else lane)
+            size += 1
+        if swaps & 4:
+            taken[size] = BEGIN
+            size += 1
+        if code >> 12 & 1:
+            taken[size] = END
+            size += 1
+            passages.ends[1] = cell
+        for slot in range(SLOTS):
+            partner[cell, slot] = NONE
+        for pair in range(size >> 1):
+            one = taken[program.pairs[code & 255, 2 * pair]]
+            other = taken[program.pairs[code & 255, 2 * pair + 1]]
+            partner[cell, one], partner[cell, other] = other, one
+        state = program.kept_parent[index, state]

@@ -1,0 +1,129 @@
+"""Windows one after the other, anywhere along a walk: large neighbourhood search.
+
+Source: Shaw, "Using constraint programming and local search methods to solve vehicle routing
+problems", 1998, for the scheme: a part is freed, all else is held, and the part is solved anew.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.local_search.walk_array import Ground
+from fasaco_edge.kernels.random import draw, index_of
+from fasaco_edge.kernels.windows.memory import EXPANDED, Program, Terms, Window
+from fasaco_edge.kernels.windows.passages import SLOTS, Passages
+from fasaco_edge.kernels.windows.program import solve_window
+
+
+class Aim(NamedTuple):
+    """Where windows lie, and how large they are.
+
+    Attributes:
+        cells: int32 (k,), framed cells that windows are laid around.
+        rows, cols: of the framed ground.
+        frame: cells of its frame on each side.
+        least_side, most_side: of a window's shorter side.
+        least_area, most_area: of a window at first, and in the end.
+        beam: most states kept.
+    """
+
+    cells: NDArray[np.int32]
+    rows: int
+    cols: int
+    frame: int
+    least_side: int
+    most_side: int
+    least_area: int
+    most_area: int
+    beam: int
+
+
+# Entries of the tally: cost of the walk and of the best one [half us]; windows solved and cells
+# in them since the search began.
+COST, BEST, SOLVED, SWEPT = 0, 1, 2, 3
+# The noise falls over so many sweeps of all cells, then begins anew.
+SWEEPS = 200
+# States kept at first; half as many more with each sweep.
+FIRST_BEAM = 60
+# Areas grow by a tenth of the first one with each sweep.
+GROWTH = 10
+
+
+@lean_kernel
+def solve_windows(
+    ground: Ground,
+    passages: Passages,
+    best: Passages,
+    terms: Terms,
+    program: Program,
+    aim: Aim,
+    tally: NDArray[np.int64],
+    expansions: int,
+    random: NDArray[np.uint64],
+) -> None:
+    """Solve windows until so many states were expanded.
+
+    Args:
+        ground: framed.
+        passages: of the walk; changed in place.
+        best: out, those of the best walk, where a better one is found.
+        terms: what the walk is to be.
+        program: memory.
+        aim: where windows lie.
+        tally: int64 (4,), COST, BEST, SOLVED, SWEPT; changed in place.
+        expansions: states to expand at least.
+        random: state of the stream, uint64 (1,).
+    """
+    until = program.clock[EXPANDED] + expansions
+    # A window in which nothing can be gained expands none.
+    for _ in range(max(expansions // 64, 1)):
+        if program.clock[EXPANDED] >= until:
+            break
+        window = _draw_window(aim, tally[SWEPT], random)
+        noise = _noise(terms, tally[SWEPT] // aim.cells.size)
+        # At first nearly any change gains: few states find one.
+        beam = min(aim.beam, FIRST_BEAM + FIRST_BEAM * (tally[SWEPT] // aim.cells.size) // 2)
+        gain = solve_window(ground, passages, terms, window, program, beam, noise, random)
+        tally[SOLVED] += 1
+        tally[SWEPT] += window.rows * window.cols
+        tally[COST] += gain
+        if tally[COST] < tally[BEST]:
+            tally[BEST] = tally[COST]
+            _copy(passages, best)
+
+
+@inlined
+def _noise(terms: Terms, sweeps: int) -> int:
+    """Return the noise on a passage's cost: a tenth of a turn at first, a fiftieth at last."""
+    left = SWEEPS - sweeps % SWEEPS
+    return terms.turn // 50 + terms.turn * 2 * left // (25 * SWEEPS)
+
+
+@inlined
+def _copy(source: Passages, target: Passages) -> None:
+    for cell in range(source.partner.shape[0]):
+        for slot in range(SLOTS):
+            target.partner[cell, slot] = source.partner[cell, slot]
+    target.ends[0], target.ends[1] = source.ends[0], source.ends[1]
+
+
+@inlined
+def _draw_window(aim: Aim, swept: int, random: NDArray[np.uint64]) -> Window:
+    """Draw a window around some cell: 3 to 8 cells wide, the longer the more was swept before."""
+    grown = aim.least_area + aim.least_area * swept // (GROWTH * aim.cells.size)
+    area = min(grown, aim.most_area)
+    short = aim.least_side + index_of(draw(random), aim.most_side - aim.least_side + 1)
+    area = area // 2 + index_of(draw(random), area)
+    long = max(short, area // short)
+    rows, cols = short, long
+    if draw(random) >> 40 & 1:
+        rows, cols = long, short
+    rows, cols = min(rows, aim.rows - 2 * aim.frame), min(cols, aim.cols - 2 * aim.frame)
+    cell = aim.cells[index_of(draw(random), aim.cells.size)]
+    row = cell // aim.cols - index_of(draw(random), rows)
+    col = cell % aim.cols - index_of(draw(random), cols)
+    row = min(max(row, aim.frame), aim.rows - aim.frame - rows)
+    col = min(max(col, aim.frame), aim.cols - aim.frame - cols)
+    return Window(row, col, rows, cols, aim.cols)

@@ -1,0 +1,108 @@
+"""Trail layer: keeps the living trail up with map, paths and robot."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.core.events import PathUpdate
+from fasaco_edge.mission.core.route import NO_CELLS, Route
+from fasaco_edge.mission.map.loop_closure import Motion
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.planners.living_trail import LivingTrail, TrailSnapshot
+from fasaco_edge.planners.problem import CoverageProblem
+
+
+class TrailLayer:
+    """Owns the trail; all that happens to map and route is passed on to it."""
+
+    def __init__(self, config: MissionConfig, map_state: MapState, route: Route) -> None:
+        self._config = config
+        self._map, self._route = map_state, route
+        self._trail = LivingTrail(config.trail)
+        # The lattice that the trail follows.
+        self._lattice: CoverageLattice | None = None
+        # The path that the robot was last seen on, and where on it.
+        self._path, self._index = NO_CELLS, 0
+        # The trail on a map that has moved since, until a pose tells where to.
+        self._before_motion: TrailSnapshot | None = None
+
+    @property
+    def trail(self) -> LivingTrail:
+        """The trail."""
+        return self._trail
+
+    def snapshot(self) -> TrailSnapshot:
+        """Return the trail on the newest map."""
+        self._follow_map()
+        return self._trail.snapshot()
+
+    def posed(self, problem: CoverageProblem) -> CoverageProblem:
+        """Return a problem with the trail, where the planner's ants walk on it."""
+        return replace(problem, trail=self.snapshot()) if self._config.plans_on_trail else problem
+
+    def resume(self, before: TrailSnapshot) -> None:
+        """Go on with the trail from before a restart."""
+        self._trail, self._lattice = LivingTrail(self._config.trail, before), None
+
+    def begin_anew(self) -> None:
+        """Forget the trail: it is of another place."""
+        self._trail, self._lattice = LivingTrail(self._config.trail), None
+        self._before_motion = None
+
+    def note_map_motion(self) -> None:
+        """Note that the newest map has moved; ``note_motion`` tells where to."""
+        if self._before_motion is None:
+            self._before_motion = self._trail.snapshot()
+
+    def note_motion(self, motion: Motion | None) -> None:
+        """Take the trail to where the map has moved; None where it has not."""
+        before, self._before_motion = self._before_motion, None
+        if before is None or motion is None or motion.is_still:
+            return
+        self._follow_map()
+        turn = math.remainder(motion.end.yaw - motion.start.yaw, math.tau)
+        turns = round(turn / (0.5 * math.pi))
+        self._trail.move(
+            before, lambda x, y: motion.back(1.0, x, y), turns, self._config.footprint.cell_m
+        )
+
+    def note_drive(self) -> None:
+        """Let what the robot has driven of its path fade."""
+        self._follow_map()
+        path = self._route.path
+        begun = self._index if path.cells is self._path else 0
+        if path.index > begun:
+            self._trail.fade(path.cells[begun : path.index + 1])
+        self._path, self._index = path.cells, path.index
+
+    def finish(self, update: PathUpdate | None) -> None:
+        """Follow what a step has decided: a planned path strengthens the trail."""
+        self._follow_map()
+        if update is not None and update.plan is not None:
+            cells, cost = update.cells, self._config.cost
+            self._trail.strengthen(cells, cost.quality(_distinct(cells), cost.of_walk_us(cells)))
+
+    def _follow_map(self) -> None:
+        lattice, before = self._map.lattice, self._lattice
+        if lattice is None or lattice is before:
+            return
+        change = self._map.change
+        is_next = change is not None and change.before is before and change.after is lattice
+        changed = change.cells if change is not None and is_next and before is not None else None
+        self._trail.follow(lattice.window, lattice.steps, changed)
+        self._lattice = lattice
+
+
+def _distinct(cells: NDArray[np.int32]) -> int:
+    """Return how many distinct cells a path, int32 (n, 2), leads over."""
+    low = cells.min(axis=0)
+    rows, cols = (cells.max(axis=0) - low + 1).tolist()
+    seen = np.zeros((rows, cols), np.bool_)
+    seen[tuple((cells - low).T)] = True
+    return int(np.count_nonzero(seen))

@@ -1,0 +1,231 @@
+"""Tiles of floor: a bit for each pixel, and how other rasters look them up.
+
+The pixels lie fixed in the map frame, whatever a map's origin, yaw and resolution: pixel (row, col)
+begins at y = row * PIXEL_M, x = col * PIXEL_M.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.occupancy import OccupancyGrid
+
+# Edge of a pixel [m]: what a tool leaves at a wall is a few of them.
+PIXEL_M = 0.025
+# Edge of a tile [pixels]: 3.2 m; a multiple of 8.
+FLOOR_TILE = 128
+# Bytes in a row of a tile.
+ROW_BYTES = FLOOR_TILE // 8
+
+# Edges of the squares in which floor is shown [pixels]: whole bytes, and parts of a tile.
+SQUARES = (1, 8, 16, 32, 64, FLOOR_TILE)
+
+# So many pixels are looked up together at most.
+MOST_TOGETHER = 1 << 20
+
+_BITS = np.array([bin(byte).count("1") for byte in range(256)], np.uint8)
+
+Place = tuple[int, int]
+"""Of a tile: (i, j) has the pixels from (FLOOR_TILE * i, FLOOR_TILE * j) on."""
+Bits = NDArray[np.uint8]
+"""Eight pixels of a row each, the first in the highest bit; a tile is (FLOOR_TILE, ROW_BYTES)."""
+Tiles = Mapping[Place, Bits]
+Mask = NDArray[np.bool_]
+
+
+class Similarity(NamedTuple):
+    """Where the pixels of another raster lie on this one [pixels].
+
+    The centre of pixel (row, col) lies at column ``col0 + right * (col + 0.5) - up * (row + 0.5)``
+    and at row ``row0 + up * (col + 0.5) + right * (row + 0.5)``.
+    """
+
+    row0: float
+    col0: float
+    right: float
+    up: float
+
+    @classmethod
+    def of(cls, geometry: GridGeometry) -> Similarity:
+        """Return where the pixels of a grid lie."""
+        origin, scale = geometry.origin, geometry.resolution / PIXEL_M
+        right, up = scale * math.cos(origin.yaw), scale * math.sin(origin.yaw)
+        return cls(origin.y / PIXEL_M, origin.x / PIXEL_M, right, up)
+
+    def bounds(self, window: Window) -> Window:
+        """Return the pixels of this raster that those of ``window`` lie on."""
+        corners = [(r, c) for r in (window.row0, window.row1) for c in (window.col0, window.col1)]
+        rows = [self.row0 + self.up * col + self.right * row for row, col in corners]
+        cols = [self.col0 + self.right * col - self.up * row for row, col in corners]
+        # One beyond: where a centre comes to lie is rounded.
+        low, high = (min(rows), min(cols)), (max(rows), max(cols))
+        return Window(
+            *(math.floor(least) - 1 for least in low), *(math.floor(most) + 2 for most in high)
+        )
+
+
+def pixels_under(window: Window, geometry: GridGeometry) -> Window:
+    """Return the pixels of a grid whose centres may lie in a window of floor, also beyond it."""
+    rows, cols = (window.row0, window.row1), (window.col0, window.col1)
+    corners = [geometry.to_pixels(col * PIXEL_M, row * PIXEL_M) for row in rows for col in cols]
+    x, y = zip(*corners, strict=True)
+    return Window(
+        math.floor(min(y)) - 1, math.floor(min(x)) - 1, math.ceil(max(y)) + 1, math.ceil(max(x)) + 1
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FloorSnapshot:
+    """The swept floor at a moment; shares nothing that will change.
+
+    Attributes:
+        tiles: those with a swept pixel, read-only.
+        changes: goes up with each change of what is swept.
+    """
+
+    tiles: Tiles = field(default_factory=lambda: MappingProxyType({}))
+    changes: int = 0
+
+    @property
+    def pixels(self) -> int:
+        """How many pixels were swept."""
+        return sum(count_bits(tile) for tile in self.tiles.values())
+
+    @property
+    def swept_m2(self) -> float:
+        """How much floor was swept [m2]."""
+        return self.pixels * PIXEL_M * PIXEL_M
+
+    def swept_in(self, window: Window) -> Mask:
+        """Return which pixels of ``window`` were swept, bool (rows, cols)."""
+        return swept_in(self.tiles, window)
+
+    def swept_wherever(self, places: Sequence[Similarity], window: Window) -> Mask:
+        """Return which pixels of a raster have a centre that was swept, bool (rows, cols).
+
+        Args:
+            places: where that raster may lie; only what was swept at all of them is.
+            window: of its pixels.
+        """
+        return swept_wherever(self.swept_in, places, window)
+
+    def shown(self, most: int, frame: str, stamp_ns: int) -> OccupancyGrid | None:
+        """Return how much of each square is swept, in percent, rounded down, as a grid.
+
+        The squares are pixels, or as much larger as it takes to have no more than ``most`` of
+        them. None where the widest are still too many.
+        """
+        rows, cols = zip(*(self.tiles or ((0, 0),)), strict=True)
+        low, high = (min(rows), min(cols)), (max(rows) + 1, max(cols) + 1)
+        for side in SQUARES:
+            edge = FLOOR_TILE // side
+            shape = edge * (high[0] - low[0]), edge * (high[1] - low[1])
+            if shape[0] * shape[1] > most:
+                continue
+            percent = np.zeros(shape, np.int8)
+            for (row, col), part in _percent(self.tiles, side):
+                i, j = edge * (row - low[0]), edge * (col - low[1])
+                percent[i : i + edge, j : j + edge] = part
+            corner = Pose2D(low[1] * FLOOR_TILE * PIXEL_M, low[0] * FLOOR_TILE * PIXEL_M)
+            geometry = GridGeometry(*shape, side * PIXEL_M, corner)
+            return OccupancyGrid(geometry, percent, frame, stamp_ns)
+        return None
+
+
+NO_FLOOR = FloorSnapshot()
+
+
+def _percent(tiles: Tiles, side: int) -> Iterator[tuple[Place, NDArray[np.int8]]]:
+    """Yield how much of each square of a tile is marked [%], int8 (n, n)."""
+    edge = FLOOR_TILE // side
+    for place, tile in tiles.items():
+        if side == 1:
+            yield place, np.unpackbits(tile, axis=1).view(np.int8) * np.int8(100)
+        else:
+            counts = (
+                _BITS[tile].reshape(edge, side, edge, side // 8).sum(axis=(1, 3), dtype=np.int32)
+            )
+            yield place, (counts * 100 // (side * side)).astype(np.int8)
+
+
+def count_bits(bits: Bits) -> int:
+    """Return how many pixels are marked."""
+    return int(_BITS[bits].sum())
+
+
+def window_of(place: Place) -> Window:
+    """Return the pixels of a tile."""
+    row, col = FLOOR_TILE * place[0], FLOOR_TILE * place[1]
+    return Window(row, col, row + FLOOR_TILE, col + FLOOR_TILE)
+
+
+def places_of(window: Window) -> Iterator[Place]:
+    """Yield the places of the tiles that have pixels in ``window``."""
+    for row in range(window.row0 // FLOOR_TILE, -(-window.row1 // FLOOR_TILE)):
+        for col in range(window.col0 // FLOOR_TILE, -(-window.col1 // FLOOR_TILE)):
+            yield row, col
+
+
+def swept_in(tiles: Tiles, window: Window) -> Mask:
+    """Return which pixels of ``window`` are marked, bool (rows, cols)."""
+    swept = np.zeros((window.rows, window.cols), np.bool_)
+    many = window.rows * window.cols > FLOOR_TILE * FLOOR_TILE * len(tiles)
+    places: Iterable[Place] = tiles if many else places_of(window)
+    for place in places:
+        tile, part = tiles.get(place), window_of(place)
+        common = window.intersection(part)
+        if tile is not None and common is not None:
+            pixels = np.unpackbits(tile, axis=1).view(np.bool_)
+            swept[common.slices_in(window)] = pixels[common.slices_in(part)]
+    return swept
+
+
+def swept_wherever(
+    swept_in: Callable[[Window], Mask], places: Sequence[Similarity], window: Window
+) -> Mask:
+    """Return which pixels of a raster have a marked centre, see ``FloorSnapshot``.
+
+    Args:
+        swept_in: returns which pixels of a window are marked.
+        places: where that raster may lie.
+        window: of its pixels.
+    """
+    bounds = [place.bounds(window) for place in places]
+    around = Window.around(*bounds)
+    assert around is not None
+    # Places far apart, as of a map that jumped, are looked up one by one.
+    is_near = around.rows * around.cols <= MOST_TOGETHER
+    together = swept_in(around) if is_near else None
+    if together is not None and not together.any():
+        return np.zeros((window.rows, window.cols), np.bool_)
+    found = np.ones((window.rows, window.cols), np.bool_)
+    for place, alone in zip(places, bounds, strict=True):
+        if together is None:
+            found &= _looked_up(swept_in(alone), alone, place, window)
+        else:
+            found &= _looked_up(together, around, place, window)
+        if not found.any():
+            break
+    return found
+
+
+def _looked_up(swept: Mask, under: Window, place: Similarity, window: Window) -> Mask:
+    """Return the pixels of ``swept``, bool over ``under``, at the centres of those of a window."""
+    row0, col0, right, up = place
+    rows = (np.arange(window.row0, window.row1) + 0.5)[:, np.newaxis]
+    cols = np.arange(window.col0, window.col1) + 0.5
+    # From the corner of ``under`` on all is above 0, and cut off where it is rounded down.
+    i = ((right * rows + (row0 - under.row0)) + up * cols).astype(np.int32)
+    j = (((col0 - under.col0) - up * rows) + right * cols).astype(np.int32)
+    i *= under.cols
+    i += j
+    found: Mask = swept.ravel().take(i)
+    return found

@@ -1,0 +1,307 @@
+"""Swept floor: what the tool has passed over, pixel by pixel in the map frame.
+
+A pixel is swept where its centre came under the tool, a disc, on the straight way from one pose to
+the next.
+
+A pose is not where the robot is. Where poses scatter, the tool seems to reach now to this side and
+now to that of where it was, and all of that together is wider than what it swept. So the disc goes
+along a steady track, and is narrowed by what that may err: with exact poses not at all, and never
+to less than half of the tool. What was swept along the newest poses is seen at once; it is kept,
+and counted, as soon as the track is certain there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from types import MappingProxyType
+from typing import Self
+
+import numpy as np
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.mission.coverage.floor_tiles import (
+    FLOOR_TILE,
+    PIXEL_M,
+    ROW_BYTES,
+    Bits,
+    FloorSnapshot,
+    Mask,
+    Similarity,
+    count_bits,
+    places_of,
+    swept_in,
+    swept_wherever,
+    window_of,
+)
+from fasaco_edge.mission.coverage.floor_tiles import Place as TilePlace
+from fasaco_edge.mission.coverage.steady_track import Place, SteadyTrack
+
+# Two poses further apart than so many times the tool are a jump, not a drive.
+JUMP_TOOLS = 2.0
+# The most tiles of a floor, 100 million pixels, as many as a floor is planned on: each takes 2 kB,
+# and as much again where it has changed since the copy that is being written.
+# ``protocol/limits.yaml`` has the same number.
+MOST_FLOOR_TILES = 6144
+# Beyond that the farthest are dropped, this many at once.
+DROPPED_FLOOR_TILES = MOST_FLOOR_TILES // 16
+NOWHERE = Window(0, 0, 0, 0)
+# The most pixels around what is not kept yet.
+MOST_AHEAD = 1 << 22
+# So many of the last changes are remembered by where they were.
+REMEMBERED = 64
+ANYWHERE = Window(-(2**40), -(2**40), 2**40, 2**40)
+# Rounding must not decide whether a pixel just reached is swept [m].
+TOUCH_M = 1e-9
+# Grids are looked up in blocks of so many of these pixels by so many, of coarser ones in smaller.
+BLOCK = 256
+
+
+class SweptFloor:
+    """The floor that the tool has passed over.
+
+    Attributes:
+        changes: goes up with each change of what is swept; of this floor, another one has its own.
+        pixels: how many are swept.
+        dropped: tiles that were dropped to hold no more than ``MOST_FLOOR_TILES``: those farthest
+            from the robot at that moment.
+    """
+
+    def __init__(self, tool_m: float) -> None:
+        """Begin with nothing; ``tool_m``: width of the tool [m]."""
+        self.changes = 0
+        self.pixels = 0
+        self.dropped = 0
+        self._tool_m = tool_m
+        self._track = SteadyTrack(tool_m)
+        # The newest pose, and the place up to which all is kept.
+        self._last: Pose2D | None = None
+        self._kept_to: Place | None = None
+        # What was swept beyond that; not made yet after another pose.
+        self._ahead: tuple[Window, Mask] | None = None
+        self._tiles: dict[TilePlace, Bits] = {}
+        # The tiles that no snapshot shares.
+        self._own: set[TilePlace] = set()
+        # Up to which number the last changes went, and where they were.
+        self._news: deque[tuple[int, Window]] = deque(maxlen=REMEMBERED)
+
+    @classmethod
+    def restored(cls, snapshot: FloorSnapshot, tool_m: float) -> Self:
+        """Return the floor as it was, without the last pose: the way from it is unknown."""
+        floor = cls(tool_m)
+        floor.changes, floor.pixels = snapshot.changes, snapshot.pixels
+        floor._tiles = dict(snapshot.tiles)
+        return floor
+
+    def snapshot(self) -> FloorSnapshot:
+        """Return what it holds now; a tile is copied once it changes."""
+        for place in self._own:
+            self._tiles[place].flags.writeable = False
+        self._own.clear()
+        return FloorSnapshot(MappingProxyType(dict(self._tiles)), self.changes)
+
+    @property
+    def swept_m2(self) -> float:
+        """How much floor is swept [m2]."""
+        return self.pixels * PIXEL_M * PIXEL_M
+
+    def swept_in(self, window: Window) -> Mask:
+        """Return which pixels of ``window`` are swept, bool (rows, cols)."""
+        swept = swept_in(self._tiles, window)
+        place, ahead = self._swept_ahead()
+        if (common := window.intersection(place)) is not None:
+            swept[common.slices_in(window)] |= ahead[common.slices_in(place)]
+        return swept
+
+    def swept_on(self, geometry: GridGeometry, window: Window | None = None) -> Mask:
+        """Return which pixels of a grid have a centre that is swept, bool (rows, cols).
+
+        Args:
+            geometry: of the grid, which may lie askew.
+            window: of its pixels; None for all.
+        """
+        whole = window or Window(0, 0, geometry.rows, geometry.cols)
+        found = np.zeros((whole.rows, whole.cols), np.bool_)
+        places = (Similarity.of(geometry),)
+        side = max(min(int(BLOCK * PIXEL_M / geometry.resolution), BLOCK), 1)
+        for row in range(whole.row0, whole.row1, side):
+            for col in range(whole.col0, whole.col1, side):
+                block = Window(row, col, min(row + side, whole.row1), min(col + side, whole.col1))
+                found[block.slices_in(whole)] = swept_wherever(self.swept_in, places, block)
+        return found
+
+    def record(self, pose: Pose2D) -> None:
+        """Note that the robot drove on to ``pose``."""
+        last, self._last = self._last, pose
+        if last is not None and (apart := _apart(last, pose)) <= JUMP_TOOLS * self._tool_m:
+            if not apart:
+                return  # a pose told again, as with each map, says nothing of how poses scatter
+        else:
+            self._end_track()
+        before, _ = self._swept_ahead()
+        self._keep(self._track.add(pose))
+        self._ahead = None
+        if self._track.is_behind or before.rows:
+            # What is not kept yet has changed, too.
+            after, _ = self._swept_ahead()
+            self._note(Window.around(before, after))
+
+    def changed_since(self, changes: int) -> Window | None:
+        """Return where pixels may have changed since there were so many changes; None for none.
+
+        ``ANYWHERE`` where that is no longer known.
+        """
+        if changes == self.changes:
+            return None
+        news = [window for number, window in self._news if number > changes]
+        if len(news) != self.changes - changes:
+            return ANYWHERE
+        return Window.around(*news)
+
+    def break_track(self) -> None:
+        """Note that the way of the robot to its next pose is unknown."""
+        self._end_track()
+        self._last = None
+
+    def forget(self, inside: Callable[[Window], Mask]) -> None:
+        """Forget some pixels, but those that lie under the tool now.
+
+        Args:
+            inside: returns for a window which of its pixels, bool (rows, cols).
+        """
+        self._end_track()
+        before = self.pixels
+        for place in list(self._tiles):
+            tile = self._tiles[place]
+            left = tile & ~np.packbits(inside(window_of(place)), axis=1)
+            self.pixels -= count_bits(tile) - count_bits(left)
+            self._own.discard(place)
+            if left.any():
+                self._tiles[place] = left
+                self._own.add(place)
+            else:
+                del self._tiles[place]
+        if self.pixels != before:
+            self._note(ANYWHERE)
+        if self._last is not None:
+            self._keep(self._track.add(self._last))
+            self._ahead = None
+
+    def _end_track(self) -> None:
+        """Keep what was swept up to the newest pose."""
+        before, _ = self._swept_ahead()
+        self._keep(self._track.end())
+        self._kept_to, self._ahead = None, None
+        if before.rows:
+            self._note(before)
+
+    def _note(self, window: Window | None) -> None:
+        """Note that pixels of a window may have changed."""
+        if window is not None:
+            self.changes += 1
+            self._news.append((self.changes, window))
+
+    def _keep(self, places: list[Place]) -> None:
+        for place in places:
+            window, under = self._under(self._kept_to or place, place)
+            self._mark(window, np.packbits(under, axis=1))
+            self._kept_to = place
+
+    def _swept_ahead(self) -> tuple[Window, Mask]:
+        """Return what seems to be swept beyond what is kept, and where."""
+        if self._ahead is None:
+            start, parts = self._kept_to, list[tuple[Window, Mask]]()
+            for place in self._track.ahead():
+                parts.append(self._under(start or place, place))
+                start = place
+            whole = Window.around(*(window for window, _ in parts)) or NOWHERE
+            if whole.rows * whole.cols > MOST_AHEAD:
+                # Poses that scatter so widely tell of no drive, and a mask would take much memory.
+                whole, parts = NOWHERE, []
+            ahead = np.zeros((whole.rows, whole.cols), np.bool_)
+            for window, under in parts:
+                ahead[window.slices_in(whole)] |= under
+            self._ahead = whole, ahead
+        return self._ahead
+
+    def _under(self, start: Place, end: Place) -> tuple[Window, Mask]:
+        """Return the pixels whose centre came under the tool for sure, and where.
+
+        The columns of the window are whole bytes.
+        """
+        reach = max(0.5 * self._tool_m - end.error_m, 0.25 * self._tool_m)
+        row0, row1 = _span(start.y, end.y, reach, 1)
+        col0, col1 = _span(start.x, end.x, reach, 8)
+        # Relative to the start: far from 0 a difference would drown in rounding.
+        up = ((np.arange(row0, row1) + 0.5) * PIXEL_M - start.y)[:, np.newaxis]
+        right = (np.arange(col0, col1) + 0.5) * PIXEL_M - start.x
+        dx, dy = end.x - start.x, end.y - start.y
+        length2 = dx * dx + dy * dy
+        if length2:
+            along = np.clip((right * dx + up * dy) / length2, 0.0, 1.0)
+            right, up = right - along * dx, up - along * dy
+        under = right * right + up * up <= (reach + TOUCH_M) ** 2
+        return Window(row0, col0, row1, col1), under
+
+    def _mark(self, window: Window, bits: Bits) -> None:
+        """Mark pixels of a window whose columns begin and end with whole bytes."""
+        has_changed = False
+        for place in places_of(window):
+            part = window_of(place)
+            common = window.intersection(part)
+            assert common is not None
+            new = bits[_bytes_in(common, window)]
+            within = _bytes_in(common, part)
+            tile = self._tiles.get(place)
+            if tile is not None:
+                new = new & ~tile[within]
+            if count := count_bits(new):
+                self._writable(place)[within] |= new
+                self.pixels += count
+                has_changed = True
+        if has_changed:
+            self._note(window)
+
+    def _writable(self, place: TilePlace) -> Bits:
+        tile = self._tiles.get(place)
+        if tile is not None and place in self._own:
+            return tile
+        if tile is None:
+            self._limit_tiles(place)
+            tile = np.zeros((FLOOR_TILE, ROW_BYTES), np.uint8)
+        else:
+            tile = tile.copy()
+        self._tiles[place] = tile
+        self._own.add(place)
+        return tile
+
+    def _limit_tiles(self, place: TilePlace) -> None:
+        """Drop the tiles farthest from ``place`` where there is no room for another."""
+        if len(self._tiles) < MOST_FLOOR_TILES:
+            return
+
+        def distance(other: TilePlace) -> tuple[int, TilePlace]:
+            return max(abs(other[0] - place[0]), abs(other[1] - place[1])), other
+
+        for far in sorted(self._tiles, key=distance)[-DROPPED_FLOOR_TILES:]:
+            self.pixels -= count_bits(self._tiles.pop(far))
+            self._own.discard(far)
+        self.dropped += DROPPED_FLOOR_TILES
+        self._note(ANYWHERE)
+
+
+def _apart(one: Pose2D, other: Pose2D) -> float:
+    return math.hypot(one.x - other.x, one.y - other.y)
+
+
+def _span(one: float, other: float, reach: float, whole: int) -> tuple[int, int]:
+    """Return from where to where pixels lie within reach, rounded outward to ``whole`` ones."""
+    low = math.floor((min(one, other) - reach) / PIXEL_M)
+    high = math.floor((max(one, other) + reach) / PIXEL_M) + 1
+    return low // whole * whole, -(-high // whole) * whole
+
+
+def _bytes_in(part: Window, outer: Window) -> tuple[slice, slice]:
+    rows, cols = part.slices_in(outer)
+    return rows, slice(cols.start // 8, cols.stop // 8)

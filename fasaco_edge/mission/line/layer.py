@@ -1,0 +1,203 @@
+"""Line layer: turns each path over cells into the line that the robot is given.
+
+It follows map, poses and paths, and says when the line is another one although the path is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.changes import carried
+from fasaco_edge.grid.fine_raster import strips
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.mission.config import Sweeping
+from fasaco_edge.mission.core.events import PathUpdate
+from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.coverage.floor_tiles import pixels_under
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, SweptFloor
+from fasaco_edge.mission.line.line_ahead import LineAhead
+from fasaco_edge.mission.line.polisher import Polisher
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.orders.sequencer import Sequencer
+
+# A cell of which less floor is left is not driven to again [m2].
+LEAST_LEFT_M2 = 0.04
+
+
+class FloorToSweep(NamedTuple):
+    """How much floor is to be swept, as of the newest map and order.
+
+    Attributes:
+        asked_m2: floor in reach that is asked for, swept or not [m2].
+        ahead_m2: what of it is not swept, and the line ahead sweeps [m2].
+        left_m2: what of it the line ahead does not sweep, either [m2].
+    """
+
+    asked_m2: float
+    ahead_m2: float
+    left_m2: float
+
+
+class LineLayer:
+    """Owns the line; does nothing where cells are counted."""
+
+    def __init__(
+        self,
+        sweeping: Sweeping | None,
+        map_state: MapState,
+        ledger: MissionLedger,
+        orders: Sequencer,
+        route: Route,
+    ) -> None:
+        self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
+        self._polisher = Polisher(sweeping.line) if sweeping else None
+        self._ahead: LineAhead | None = None
+        # What may have changed of map and floor since the last look, and which cells were asked
+        # for then, on which window.
+        self._touched: Window | None = None
+        self._is_dropped = False
+        self._asked: tuple[Window, NDArray[np.bool_]] | None = None
+        # Whether the map is known; None before the first look.
+        self._is_settled: bool | None = None
+        # The swept floor that was seen last, and how many changes it had.
+        self._swept: tuple[SweptFloor | None, int] = None, 0
+        self._pixels = 0
+        # The floor that was seen last, and its revision.
+        self._seen: tuple[FloorMap | None, int] = None, 0
+
+    def note_map(self) -> None:
+        """Follow the newest map; to be called for each."""
+        floor = self._map.floor
+        if floor is None or (floor is self._seen[0] and floor.revision == self._seen[1]):
+            return
+        self._seen = floor, floor.revision
+        if self._ahead is None:
+            self._ahead = LineAhead(floor)
+            self._asked, self._touched = None, None
+            return
+        if self._ahead.follow_floor(floor):
+            self._is_dropped = True
+        if floor.shift is None or self._touched is None:
+            self._touched = floor.touched
+        else:
+            self._touched = Window.around(self._touched.moved(*floor.shift), floor.touched)
+        if floor.shift is None:
+            self._asked = None
+
+    def note_pose(self, pose: Pose2D) -> None:
+        """Note where the robot is now: on its line, maybe."""
+        ahead = self._ahead
+        if ahead is None:
+            return
+        self._take_floor()
+        before = self._route.path.index
+        ahead.drive(pose)
+        self._route.follow_line(ahead.cell)
+        path = self._route.path
+        self._credit(path.cells[before : path.index])
+        is_on_it = ahead.is_followed and len(path.cells) > 0
+        row, col = path.cells[path.index].tolist() if is_on_it else (0, 0)
+        self._map.follow_path((row, col) if is_on_it else None)
+
+    def finish(self, update: PathUpdate | None, now: float) -> PathUpdate | None:
+        """Return what is to be published after a step that decided on a path, or on none."""
+        ahead, stamped = self._ahead, self._map.pose
+        if ahead is None or stamped is None or self._polisher is None or self._map.floor is None:
+            return update
+        touched, self._touched = self._touched, None
+        self._take_floor(touched)
+        reason = ""
+        if update is not None:
+            ahead.lay(update.cells, stamped.pose)
+        elif self._is_dropped:
+            ahead.lay(self._route.path.ahead, stamped.pose)
+            reason = "map on another raster"
+        self._is_dropped = False
+        if touched is not None and ahead.check(touched):
+            reason = "line blocked"
+        if touched is not None or self._is_settled is None:
+            self._is_settled = not self._orders.is_exploring
+        # What the robot waits for is told first, and polished with the next pose.
+        is_waited_for = update is not None or reason
+        if not is_waited_for and self._polisher.polish(
+            ahead, self._map.floor, may_anneal=self._is_settled
+        ):
+            reason = "line polished"
+        if update is None and reason and len(self._route.path.ahead):
+            ahead.rebase()
+            update = self._route.publish(self._route.path.ahead, reason, now)
+        if update is None:
+            return None
+        ahead.note_told()
+        return replace(update, xy=ahead.xy())
+
+    @property
+    def to_sweep(self) -> FloorToSweep | None:
+        """How much floor is to be swept; None where cells are counted, or no floor is known."""
+        if self._ahead is None or self._map.area is None:
+            return None
+        tally = self._ahead.tally
+        open_m2, left_m2 = tally.open_m2, tally.left_m2
+        return FloorToSweep(tally.wanted_m2, open_m2 - left_m2, left_m2)
+
+    def _credit(self, passed: NDArray[np.int32]) -> None:
+        """Take cells that the robot passed for covered, where hardly any floor is left of them.
+
+        A polished line need not lead over the place where the robot would stand.
+        """
+        ahead, floor, covered = self._ahead, self._map.floor, self._ledger.current
+        assert ahead is not None
+        assert floor is not None
+        for row, col in passed.tolist():
+            cell = (row, col)
+            if not covered.has_visited(cell) and (
+                ahead.tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2
+            ):
+                self._ledger.credit(cell)
+
+    def _take_floor(self, touched: Window | None = None) -> None:
+        """Tell the tally what is still to be swept where that may have changed."""
+        ahead, floor = self._ahead, self._map.floor
+        assert ahead is not None
+        assert floor is not None
+        swept = self._ledger.floor
+        whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
+        # Another floor, as after a reset, is another anywhere; so may be one that was forgotten.
+        known, since = self._swept
+        news = swept.changed_since(since) if known is swept else ANYWHERE
+        if known is not swept or swept.pixels < self._pixels:
+            ahead.tally.forget_driven()
+            news = ANYWHERE
+        self._pixels = swept.pixels
+        parts = [self._asked_part(floor), touched]
+        if (part := Window.around(*parts)) and (part := part.intersection(whole)):
+            assert self._asked is not None
+            for strip in strips(part):
+                wanted = floor.reached(self._asked[1], strip)
+                ahead.tally.set_open(strip, wanted, swept.swept_on(floor.geometry, strip))
+        driven = pixels_under(news, floor.geometry).intersection(whole) if news else None
+        if driven is not None and driven != part and self._asked is not None:
+            for strip in strips(driven):
+                ahead.tally.set_open(strip, None, swept.swept_on(floor.geometry, strip))
+        self._swept = swept, swept.changes
+
+    def _asked_part(self, floor: FloorMap) -> Window | None:
+        """Find which cells are asked for now; return the pixels where that has changed."""
+        area = self._map.area
+        if area is None:
+            return None
+        window = area.lattice.window
+        asked = area.reachable & self._orders.asked_for(window)
+        before, self._asked = self._asked, (window, asked)
+        if before is None:
+            return Window(0, 0, floor.geometry.rows, floor.geometry.cols)
+        if window != floor.stands.lattice.window:
+            return None
+        changed = asked != carried(before[1], before[0], window)
+        return floor.pixels_of(changed) if changed.any() else None

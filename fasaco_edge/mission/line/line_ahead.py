@@ -1,0 +1,334 @@
+"""The line ahead: what the robot drives along a walk, as points on the fine raster of its floor.
+
+A walk is laid as a line over stands; of the line before, what leads along the same cells stays as
+it was polished. Points keep the number of the cell of the walk that
+they stand for, so that the robot's place on the line tells its place on the walk.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.kernels.floor.capsule import is_clear
+from fasaco_edge.mission.line.pieces import (
+    MOVED,
+    POLISHED,
+    RAW,
+    Joiner,
+    Line,
+    Piece,
+    Points,
+    Walk,
+    kept_pieces,
+)
+from fasaco_edge.mission.line.tally import SweepTally
+from fasaco_edge.planners.path import common_beginning
+
+# The robot is looked for so far ahead on its line [m]: further on, the next lane may lie as near.
+LOOK_AHEAD_M = 0.8
+# So near to the end of its line a robot has arrived [m]; or where it comes no nearer for so many
+# poses, and the tool is over the end: it drives beside its line, maybe.
+ARRIVED_M, STANDING_POSES = 0.05, 10
+# The robot knows all of the line.
+TOLD = 1 << 60
+
+
+class LineAhead:
+    """Owns the line from the last point behind the robot on, and its sweeps.
+
+    Attributes:
+        line: what is left of it.
+        tally: what it sweeps.
+        cell: number of the cell of the walk that the robot is at.
+        untold_from: the first point from which on the robot knows another line.
+    """
+
+    def __init__(self, floor: FloorMap) -> None:
+        self.line = Line()
+        self.tally = SweepTally(floor)
+        self.cell = 0
+        self.untold_from = TOLD
+        self._floor = floor
+        # How near the robot came to the end of its line [pixels], and for how many poses no nearer.
+        self._nearest, self._poses_there = math.inf, 0
+        self._walk: Walk = np.empty((0, 2), np.int32)
+        # Where the walk was cut off, of how many cells the robot is told; the rest is kept until
+        # the next walk comes. None for all.
+        self._cut: int | None = None
+        # What of maps that came meanwhile was not looked at beyond the cut.
+        self._unchecked: Window | None = None
+        # How far the robot is on the way from the first point to the next, a share.
+        self._along = 0.0
+        # Where the robot is.
+        self._here = np.zeros(2)
+
+    def follow_floor(self, floor: FloorMap) -> bool:
+        """Follow the floor to another raster; return whether the line had to be dropped."""
+        is_same = floor is self._floor
+        self._floor = floor
+        if is_same and floor.shift is not None:
+            shape = floor.geometry.rows, floor.geometry.cols
+            if floor.shift != (0, 0) or shape != self.tally.shape:
+                self.tally.move(shape, floor.shift)
+                self.line = self.line.moved(floor.shift)
+                self._here = self._here + np.array(floor.shift)
+                self._unchecked = self._unchecked and self._unchecked.moved(*floor.shift)
+            return False
+        self.tally = SweepTally(floor)
+        dropped, self.line = bool(len(self.line)), Line()
+        self._cut = self._unchecked = None
+        return dropped
+
+    def lay(self, walk: NDArray[np.int32], pose: Pose2D) -> None:
+        """Lay the line along a walk; what leads along the same cells stays.
+
+        Args:
+            walk: int32 (n, 2), cells (row, col), each a legal step from the one before.
+            pose: of the robot, in or near its first cell.
+        """
+        self._see(pose)
+        ahead, line = self._walk[self.cell :], self.line.renumbered(-self.cell)
+        is_beginning = common_beginning(walk, ahead) == len(walk)
+        if 0 < len(walk) < len(ahead) and len(line) and is_beginning:
+            self._walk, self.line, self.cell, self._cut = ahead, line, 0, len(walk)
+            return
+        pieces = kept_pieces(line, ahead, walk) if len(line) and len(walk) else []
+        self._walk, self.cell, self._cut = walk, 0, None
+        self._join(pieces)
+        unchecked, self._unchecked = self._unchecked, None
+        if unchecked is not None:
+            self.check(unchecked)
+
+    def _join(self, pieces: list[Piece]) -> None:
+        """Take the line that is put together of pieces of the one before."""
+        here = Line(self._here[None], np.array([self.cell]), np.array([POLISHED], np.uint8))
+        if not len(self._walk):
+            self._take([])
+            return
+        stands, tally = self._floor.stands, self.tally
+        joiner = Joiner(
+            here,
+            self._walk,
+            self.cell,
+            stand=stands.stand,
+            raw=stands.line,
+            is_clear=self._is_clear,
+            is_swept=lambda cell: not tally.is_open(stands.stand(cell)),
+        )
+        self._take(joiner.joined(pieces))
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the walk was cut off, and the next one is waited for."""
+        return self._cut is not None
+
+    def check(self, touched: Window) -> bool:
+        """Lay again over stands what a new map blocks; return whether it blocks anything.
+
+        Args:
+            touched: the part of the raster that may have changed.
+        """
+        line = self.line
+        if self._cut is not None:
+            self._unchecked = Window.around(self._unchecked, touched)
+            line = line.part(0, line.before(self._cut - 1))
+        blocked = [
+            number
+            for number in self._edges_near(line.points, touched)
+            if not self._is_clear(line.points[number], line.points[number + 1])
+        ]
+        if not blocked:
+            return False
+        first, last = blocked[0], blocked[-1] + 1
+        head = [Piece(line.part(0, first + 1), 0)] if first else []
+        self._join([*head, Piece(self.line.part(last), last)])
+        return True
+
+    def drive(self, pose: Pose2D) -> None:
+        """Note where the robot is; what it has driven is dropped."""
+        self._see(pose)
+        at = self._place()
+        if at is None:
+            return
+        number, self._along = at
+        if number > 0:
+            self.tally.drive(self.line.points[: number + 1])
+            edges = _edges(self.line.points[: number + 1])
+            self.tally.exchange(edges, edges[:0])
+            self.line = self.line.part(number)
+            self.untold_from = max(self.untold_from - number, 0)
+        # The nearest cell, or the next plan would begin behind the robot. At the last one the robot
+        # has arrived, and that is told below.
+        first, second = self.line.cells[:2].tolist()
+        nearest = first + int(self._along * (second - first) + 0.5)
+        self.cell = max(self.cell, min(nearest, len(self._walk) - 2))
+        if self._has_arrived():
+            self.cell = len(self._walk) - 1
+
+    def _has_arrived(self) -> bool:
+        """Tell whether the robot is at the end of its line; to be asked once for each pose."""
+        apart = math.hypot(*(self.line.points[-1] - self._here))
+        if len(self.line) == 2 and apart * self.tally.unit_m <= ARRIVED_M:
+            return True
+        if apart > self._tool or self.lengths()[-1] > self._tool * self.tally.unit_m:
+            self._nearest, self._poses_there = math.inf, 0
+        elif apart < self._nearest - 1e-6:
+            self._nearest, self._poses_there = apart, 0
+        else:
+            self._poses_there += 1
+        return self._poses_there >= STANDING_POSES
+
+    def _place(self) -> tuple[int, float] | None:
+        """Return the edge that the robot is nearest to, and how far along; None where on none."""
+        points = self.line.points
+        nearest, at = self._tool, None
+        look = LOOK_AHEAD_M / self.tally.unit_m
+        for number in range(len(points) - 1):
+            edge = points[number + 1] - points[number]
+            length = max(math.hypot(*edge), 1e-9)
+            low = self._along if number == 0 else 0.0
+            high = min(1.0, low + look / length)
+            share = float(np.dot(self._here - points[number], edge)) / length**2
+            share = min(max(share, low), high)
+            apart = math.hypot(*(points[number] + share * edge - self._here))
+            if apart < nearest - 1e-6:
+                nearest, at = apart, (number, share)
+            look -= (high - low) * length
+            if look <= 0.0:
+                break
+        return at
+
+    def rebase(self) -> None:
+        """Number the walk's cells from where the robot is."""
+        self._walk = self._walk[self.cell :]
+        self.line = self.line.renumbered(-self.cell)
+        self.cell = 0
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether the robot is on the line, within half the tool."""
+        if len(self.line) < 2:
+            return False
+        a, b = self.line.points[:2]
+        return math.hypot(*(a + self._along * (b - a) - self._here)) <= self._tool
+
+    @property
+    def _tool(self) -> float:
+        return self._floor.discs.tool_m / 2 / self.tally.unit_m
+
+    def _see(self, pose: Pose2D) -> None:
+        self._here = np.array(map_to_raster(self._floor.geometry, pose.x, pose.y))
+
+    def xy(self) -> Points:
+        """Return the line from the robot on, float64 (n, 2): x, y in the map frame [m]."""
+        points = self._told()
+        if len(points) > 1:
+            points = points.copy()
+            points[0] += self._along * (points[1] - points[0])
+        return raster_to_map(self._floor.geometry, points)
+
+    def _told(self) -> Points:
+        """Return the points that the robot is told; where the walk is cut off it stops."""
+        points = self.line.points
+        if self._cut is None:
+            return points
+        end = self._floor.stands.stand(self._walk[self._cut - 1])
+        count = self.line.before(self._cut - 1)
+        while count > 1 and not self._is_clear(points[count - 1], end):
+            count -= 1
+        if count == 1 and not self._is_clear(points[0], end):
+            return points[:1]
+        return np.concatenate([points[:count], end[None]])
+
+    def put(self, first: int, end: int, points: Points, cells: NDArray[np.int64]) -> None:
+        """Put polished points in the place of those from ``first`` to ``end``; they are counted."""
+        line = self.line
+        state = line.state[first:end].min(initial=POLISHED)
+        part = Line(points, cells, np.full(len(points), state, np.uint8))
+        self.line = line.part(0, first).joined(part, line.part(end))
+        self.untold_from = min(self.untold_from, first)
+
+    def first_below(self, state: int) -> int:
+        """Return the first point that is not as far yet as MOVED, or POLISHED, or their number."""
+        below = self.line.state < state
+        return int(np.argmax(below)) if below.any() else len(below)
+
+    def raw_until(self, first: int) -> int:
+        """Return the first point from one on that was moved, or their number."""
+        moved = self.line.state[first:] >= MOVED
+        return first + int(np.argmax(moved)) if moved.any() else len(self.line)
+
+    def note(self, first: int, end: int, state: int) -> None:
+        """Note that points are as far as MOVED or POLISHED."""
+        line, states = self.line, self.line.state.copy()
+        states[first:end] = np.maximum(states[first:end], state)
+        self.line = Line(line.points, line.cells, states)
+
+    def note_told(self) -> None:
+        """Note that the robot knows all of the line."""
+        self.untold_from = TOLD
+
+    def lengths(self) -> NDArray[np.float64]:
+        """Return how far it is from the robot to each point, float64 (n,) [m]; the first is 0."""
+        edges = np.hypot(*np.diff(self.line.points, axis=0).T)
+        edges[:1] *= 1.0 - self._along
+        return np.concatenate([[0.0], np.cumsum(edges)]) * self.tally.unit_m
+
+    def _take(self, pieces: list[Piece]) -> None:
+        """Take another line; count, and polish again, what differs.
+
+        Args:
+            pieces: of the line before where their ``begin`` is 0 or more.
+        """
+        old = self.line
+        new = pieces[0].line.joined(*(piece.line for piece in pieces[1:])) if pieces else Line()
+        if len(old) > 1 and not np.array_equal(old.points[:2], new.points[:2]):
+            a, b = old.points[:2]
+            self.tally.drive(np.stack([a, a + self._along * (b - a)]))
+            self._along = 0.0
+        goes, comes = np.ones(max(len(old) - 1, 0), bool), np.ones(max(len(new) - 1, 0), bool)
+        at = 0
+        for piece in pieces:
+            inner = len(piece.line) - 1
+            if piece.begin >= 0:
+                goes[piece.begin : piece.begin + inner] = False
+                comes[at : at + inner] = False
+                # What lies at a joint may find a better place.
+                new.state[at : at + 1 if at else 0] = RAW
+                new.state[at + inner : at + inner + 1 if at + inner + 1 < len(new) else 0] = RAW
+            at += inner + 1
+        self.tally.exchange(_edges(old.points)[goes], _edges(new.points)[comes])
+        self.line = new
+
+    def _is_clear(self, a: Points, b: Points) -> bool:
+        if math.isnan(b[0]):
+            return False
+        radius = self._floor.discs.radius_m / self._floor.geometry.resolution
+        return bool(is_clear(self._floor.blocked, a[0], a[1], b[0], b[1], radius))
+
+    def _edges_near(self, points: Points, part: Window) -> list[int]:
+        """Return the edges between points that a robot comes near a part of the raster on."""
+        if len(points) < 2:
+            return []
+        margin = self._floor.discs.radius_m / self._floor.geometry.resolution + 1.0
+        low = np.minimum(points[:-1], points[1:]) - margin
+        high = np.maximum(points[:-1], points[1:]) + margin
+        near = (
+            (low[:, 0] < part.row1)
+            & (high[:, 0] > part.row0)
+            & (low[:, 1] < part.col1)
+            & (high[:, 1] > part.col0)
+        )
+        numbers: list[int] = np.flatnonzero(near).tolist()
+        return numbers
+
+
+def _edges(points: Points) -> NDArray[np.float64]:
+    """Return the edges between points, float64 (n - 1, 4)."""
+    return np.concatenate([points[:-1], points[1:]], axis=1)

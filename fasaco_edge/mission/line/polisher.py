@@ -1,0 +1,163 @@
+"""Polisher: polishes the line ahead of the robot, a piece at a time.
+
+What lies just ahead of the robot holds still, and what lies far ahead may still change.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.kernels.floor import line as kernel
+from fasaco_edge.kernels.floor.anneal import anneal
+from fasaco_edge.kernels.floor.polish import polish
+from fasaco_edge.mission.line.line_ahead import LineAhead
+from fasaco_edge.mission.line.pieces import MOVED, POLISHED, Line
+from fasaco_edge.planners.line import (
+    FARTHEST_M,
+    SEED,
+    LineConfig,
+    linked,
+    memory_for_moves,
+    numbers_along,
+)
+from fasaco_edge.planners.path import common_beginning
+
+# So much of the line ahead of the robot stays as it is [m].
+HELD_M = 1.0
+# Points are moved along all of the line, so much of it at a time [m].
+MOVED_M = 6.0
+# Detours over what is left come once all points have found their place, or the robot is so near;
+# they are looked for so far ahead, and along so much of the line at a time [m]. Further ahead the
+# map of a robot that explores may still grow.
+NEAR_M, AHEAD_M, PIECE_M = 5.0, 8.0, 4.0
+# Pieces are annealed from here on ahead of the robot, so long and so many, in turn [m].
+ANNEALED_M, ANNEALED_PIECE_M, ANNEALED_PIECES = 2.0, 4.0, 2
+# Moves for each of them, and the share of the temperature that the farthest is annealed at.
+ANNEAL_MOVES, HOTTEST = 300, 0.3
+# The robot is told of what is annealed no sooner than this [m].
+TOLD_M = 1.5
+# So many moves at most before the loop goes on.
+MOST_MOVES = 3000
+# Moves of points alone: no detour leads so far.
+NO_DETOURS = -1e6
+
+
+class Polisher:
+    """Polishes at prices; counts its work in moves, not in seconds."""
+
+    def __init__(self, config: LineConfig) -> None:
+        self._config = config
+        self._memory = memory_for_moves()
+        self._random = np.array([SEED], np.uint64)
+        # Which piece is annealed next.
+        self._at = 0
+
+    def polish(self, ahead: LineAhead, floor: FloorMap, *, may_anneal: bool) -> bool:
+        """Polish what is due of the line; return whether the robot is to be told.
+
+        It is told of what is near, and once all points are moved. On a map that still grows nothing
+        is annealed: what fits its rim best is in the way of what comes behind.
+        """
+        if self._config.price_s_m2 == 0.0 or len(ahead.line) < 3 or ahead.is_cut:
+            return False
+        lengths = ahead.lengths()
+        begin = ahead.first_below(MOVED)
+        if begin < len(lengths):
+            begins_m = lengths[begin]
+            first, last = _piece(lengths, begin, MOVED_M)
+            last = max(min(last, ahead.raw_until(begin) + 1, len(lengths) - 1), first)
+            end = self._polish(ahead, floor, first, last, lengths, NO_DETOURS)
+            # The last point of the line stays where it is.
+            end += end >= len(ahead.line) - 1
+            ahead.note(min(begin, first), max(end, begin + 1), MOVED)
+            is_all = ahead.first_below(MOVED) == len(ahead.line)
+            if is_all or begins_m > NEAR_M:
+                return is_all
+            lengths = ahead.lengths()
+        begin = ahead.first_below(POLISHED)
+        if begin >= len(ahead.line) - 1 or lengths[begin] > AHEAD_M:
+            if may_anneal:
+                self._anneal(ahead, floor, lengths)
+            return self._is_due(ahead)
+        first, last = _piece(lengths, begin, PIECE_M)
+        farthest = FARTHEST_M / ahead.tally.unit_m
+        before = ahead.line.points
+        end = self._polish(ahead, floor, first, last, lengths, farthest)
+        is_other = ahead.line.points is not before
+        ahead.note(min(begin, first), max(end, begin + 1), POLISHED)
+        return is_other
+
+    def _is_due(self, ahead: LineAhead) -> bool:
+        """Tell whether the robot is so near to what it does not know that it is to be told."""
+        lengths, untold = ahead.lengths(), ahead.untold_from
+        return untold < len(lengths) and bool(lengths[untold] < TOLD_M)
+
+    def _anneal(self, ahead: LineAhead, floor: FloorMap, lengths: NDArray[np.float64]) -> None:
+        """Anneal the next piece; the farther from the robot, the hotter."""
+        # Where pieces begin is drawn, too: no joint stays.
+        drawn = int(self._random[0] >> np.uint64(40)) / (1 << 24)
+        begins_m = ANNEALED_M + (self._at + drawn) * ANNEALED_PIECE_M
+        self._at = (self._at + 1) % ANNEALED_PIECES
+        first = max(int(np.searchsorted(lengths, begins_m)), 2)
+        last = int(np.searchsorted(lengths, begins_m + ANNEALED_PIECE_M))
+        last = min(max(last, first + 4), len(lengths) - 1)
+        if last - first < 4:
+            return
+        heat = HOTTEST * begins_m / (ANNEALED_M + (ANNEALED_PIECES + 1) * ANNEALED_PIECE_M)
+        first -= 1  # turns at the first point count
+        piece = ahead.line.part(first, last + 1)
+        line = linked(piece.points, ahead.tally.sweeps.left.shape, is_end_fixed=True)
+        on, prices = self._on(ahead, floor)
+        memory, random = self._memory, self._random
+        anneal(line, on, prices, memory, random, 1, (heat, heat), ANNEAL_MOVES)
+        self._put(ahead, first, last, piece, line)
+
+    def _on(self, ahead: LineAhead, floor: FloorMap) -> tuple[kernel.Floor, kernel.Price]:
+        """Return floor and prices for the kernels."""
+        unit = ahead.tally.unit_m
+        radius, tool = floor.discs.radius_m / unit, floor.discs.tool_m / 2 / unit
+        on = kernel.Floor(floor.blocked, floor.places, ahead.tally.sweeps, radius, tool)
+        return on, self._config.prices(unit)
+
+    def _put(self, ahead: LineAhead, first: int, last: int, piece: Line, line: kernel.Line) -> int:
+        """Put a polished piece in the place of what it was; return where its last point is then."""
+        numbers = np.array(numbers_along(line))
+        # Points that were put in are of the cell of the one before.
+        cells = np.where(numbers < len(piece), piece.cells[np.minimum(numbers, len(piece) - 1)], -1)
+        points, cells = line.points[numbers], np.maximum.accumulate(cells)
+        if np.array_equal(points, piece.points):
+            return last
+        begin = max(common_beginning(points, piece.points) - 1, 0)
+        ahead.put(first + begin, last + 1, points[begin:], cells[begin:])
+        return first + len(points) - 1
+
+    def _polish(
+        self,
+        ahead: LineAhead,
+        floor: FloorMap,
+        first: int,
+        last: int,
+        lengths: NDArray[np.float64],
+        farthest: float,
+    ) -> int:
+        """Polish from one point to another; return where the last one is then."""
+        if last - first < 2:
+            return last
+        piece = ahead.line.part(first, last + 1)
+        line = linked(piece.points, ahead.tally.sweeps.left.shape, is_end_fixed=True)
+        on, prices = self._on(ahead, floor)
+        area_m2 = float(lengths[last] - lengths[first]) * floor.discs.tool_m
+        most = min(int(self._config.moves_m2 * area_m2), MOST_MOVES)
+        if polish(line, on, prices, self._memory, farthest, most) <= 0.0:
+            return last
+        return self._put(ahead, first, last, piece, line)
+
+
+def _piece(lengths: NDArray[np.float64], begin: int, piece_m: float) -> tuple[int, int]:
+    """Return the points from which and to which a piece of a line is polished."""
+    begin = min(begin, len(lengths) - 1)
+    first = max(int(np.searchsorted(lengths, HELD_M)), begin - 2)
+    last = int(np.searchsorted(lengths, lengths[begin] + piece_m))
+    return first, min(max(last, first + 2), len(lengths) - 1)

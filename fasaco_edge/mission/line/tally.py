@@ -1,0 +1,124 @@
+"""Sweep tally: how often the line ahead sweeps each pixel of the floor that is still to be swept.
+
+What the robot has swept, what it is not asked to sweep, and what its tool cannot come to count as
+swept ``NEVER`` times more: no line gains anything there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.changes import carried
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.kernels.floor.capsule import NEVER, Scratch, Sweeps, sweep_edges
+from fasaco_edge.kernels.floor.driven import DRIVEN, OPEN, WANTED, note_driven
+from fasaco_edge.planners.line import blocks_of, count_blocks, memory_for_moves
+
+
+class SweepTally:
+    """Counts over the fine raster of a floor.
+
+    Attributes:
+        sweeps: the counts, for the kernels.
+        unit_m: edge of a pixel [m].
+    """
+
+    def __init__(self, floor: FloorMap) -> None:
+        shape = floor.geometry.rows, floor.geometry.cols
+        self.unit_m = floor.geometry.resolution
+        # Of each pixel whether it is WANTED, OPEN and DRIVEN.
+        self._state = np.zeros(shape, np.uint8)
+        self.sweeps = Sweeps(np.full(shape, NEVER, np.int16), np.zeros(blocks_of(shape), np.int32))
+        # How many pixels are wanted, and open.
+        self._wanted_pixels = self._open_pixels = 0
+        self._tool = floor.discs.tool_m / 2 / self.unit_m
+        self._scratch: Scratch = memory_for_moves().capsules
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the raster."""
+        rows, cols = self._state.shape
+        return rows, cols
+
+    def move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
+        """Lie on a raster of another shape, (rows, cols), on which pixels have moved."""
+        rows, cols = self.shape
+        old, new = Window(*by, by[0] + rows, by[1] + cols), Window(0, 0, *shape)
+        self._state = carried(self._state, old, new)
+        counts = carried(self.sweeps.counts, old, new, NEVER)
+        self.sweeps = Sweeps(counts, np.zeros(blocks_of(shape), np.int32))
+        count_blocks(self.sweeps, new)
+        self._wanted_pixels = int(np.count_nonzero(self._state & WANTED))
+        self._open_pixels = int(np.count_nonzero(self._state & OPEN))
+
+    def exchange(self, goes: NDArray[np.float64], comes: NDArray[np.float64]) -> None:
+        """Count edges out and others in, float64 (n, 4): y, x and y, x of their ends [pixels]."""
+        for edges, times in ((goes, -1), (comes, 1)):
+            sweep_edges(self.sweeps, edges, self._tool, times, self._scratch)
+
+    def set_open(
+        self, part: Window, wanted: NDArray[np.bool_] | None, swept: NDArray[np.bool_]
+    ) -> None:
+        """Set what of a part of the raster is still to be swept.
+
+        Args:
+            part: of the raster.
+            wanted: bool (rows, cols) of it, what is asked for; None for what was.
+            swept: bool (rows, cols) of it, what the robot has swept.
+        """
+        state = self._state[part.row0 : part.row1, part.col0 : part.col1]
+        if wanted is not None:
+            self._wanted_pixels += int(np.count_nonzero(wanted))
+            self._wanted_pixels -= int(np.count_nonzero(state & WANTED))
+            state &= ~np.uint8(WANTED)
+            state |= wanted
+        before = (state & OPEN) > 0
+        now = ((state & (WANTED | DRIVEN)) == WANTED) & ~swept
+        counts = self.sweeps.counts[part.row0 : part.row1, part.col0 : part.col1]
+        counts[before & ~now] += NEVER
+        counts[now & ~before] -= NEVER
+        self._open_pixels += int(np.count_nonzero(now)) - int(np.count_nonzero(before))
+        state &= ~np.uint8(OPEN)
+        state |= now * np.uint8(OPEN)
+        count_blocks(self.sweeps, part)
+
+    def drive(self, points: NDArray[np.float64]) -> None:
+        """Note that the robot has driven a line, float64 (n, 2), y, x [pixels].
+
+        The ledger learns that from poses, a little later, on pixels of its own, and more strictly:
+        ribbons that only the two rasters differ in, or that are still to come, would seem left.
+        """
+        self._open_pixels -= note_driven(
+            self.sweeps, self._state, points, self._tool, self._scratch
+        )
+
+    def forget_driven(self) -> None:
+        """Take what the ledger holds for all that was swept, from the next ``set_open`` on."""
+        self._state &= ~np.uint8(DRIVEN)
+
+    def missed_m2(self, part: Window) -> float:
+        """Return how much of a part of the raster nothing sweeps that should be swept [m2]."""
+        counts = self.sweeps.counts[part.row0 : part.row1, part.col0 : part.col1]
+        return int(np.count_nonzero(counts == 0)) * self.unit_m**2
+
+    @property
+    def wanted_m2(self) -> float:
+        """How much floor is asked for [m2]."""
+        return self._wanted_pixels * self.unit_m**2
+
+    @property
+    def open_m2(self) -> float:
+        """How much of that is still to be swept [m2]."""
+        return self._open_pixels * self.unit_m**2
+
+    @property
+    def left_m2(self) -> float:
+        """How much of that the line ahead does not sweep [m2]."""
+        return int(self.sweeps.left.sum()) * self.unit_m**2
+
+    def is_open(self, point: NDArray[np.float64]) -> bool:
+        """Tell whether a point, y, x [pixels], is still to be swept."""
+        row, col = np.rint(point).astype(int).tolist()
+        return bool(self._state[row, col] & OPEN)

@@ -1,0 +1,119 @@
+"""Lower bounds of a problem: steps, and seconds, that no walk can do without.
+
+The proofs are in ``kernels.bound``: ``covering`` counts steps alone, ``turns`` prices turns, too.
+The bound with turns is a search of its own: the longer it works, the closer it comes to what its
+relaxation can give. Work is counted, so the same calls give the same bounds.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
+from fasaco_edge.kernels.bound.covering import covering_bound
+from fasaco_edge.kernels.bound.turns import (
+    ALONG_COLS,
+    ALONG_ROWS,
+    ascend,
+    first_prices,
+    lines_of,
+)
+from fasaco_edge.kernels.lattice.reach import reachable_from
+from fasaco_edge.planners.cost import MICROSECONDS
+from fasaco_edge.planners.problem import CoverageProblem
+
+# Work is counted in cells times iterations: a million takes about 50 ms. A glance for repairs
+# and first walks, a thorough look for what is searched on.
+GLANCE, THOROUGH = 80_000, 400_000
+FEWEST, MOST = 8, 300
+
+# On larger lattices turns are left out: their prices take about 100 bytes a cell.
+MOST_CELLS = 250_000
+
+# How far a price moves at first, in shares of a quarter-turn's cost; by a later call; and by which
+# power of e that falls.
+FIRST_PACE, LATER_PACE, FALLS = 1.0, 0.5, 4
+
+
+def lower_bound_steps(problem: CoverageProblem) -> int:
+    """Return a number of steps that no walk which solves ``problem`` can beat, turns aside."""
+    required = problem.to_cover.astype(np.uint8)
+    return covering_bound(problem.lattice.steps, required, problem.flat_start, problem.flat_end)
+
+
+class LowerBound:
+    """What no walk that solves a problem can beat.
+
+    Attributes:
+        steps: no walk has fewer steps.
+        cost_us: none costs less [us].
+    """
+
+    def __init__(self, problem: CoverageProblem) -> None:
+        self._cost = problem.cost
+        self.steps = lower_bound_steps(problem)
+        self.cost_us = self.steps * self._cost.step_us
+        # Without a step there is no turn.
+        is_small = problem.lattice.states.size <= MOST_CELLS
+        self._turns = is_small and self.steps > 0 and self._cost.quarter_turn_us > 0
+        if not self._turns:
+            return
+        lattice = problem.lattice
+        reached = reachable_from(lattice.steps, *lattice.local(problem.start))
+        required = problem.to_cover.astype(np.uint8)
+        start, end = problem.flat_start, problem.flat_end
+        self._lines = lines_of(lattice.steps, required, reached, start, end)
+        self._flat = np.flatnonzero(reached).astype(np.int32)
+        self._prices = first_prices(self._lines, 2 * self._cost.quarter_turn_us)
+        self._is_first = True
+
+    @property
+    def knows_turns(self) -> bool:
+        """Whether turns are priced: they cost, and the lattice is not too large."""
+        return self._turns
+
+    @property
+    def cost_s(self) -> float:
+        """What no walk costs less than [s]."""
+        return self.cost_us / MICROSECONDS
+
+    def tighten(self, work: int) -> None:
+        """Raise ``cost_us`` if so much work can: in cells times iterations."""
+        if not self._turns or not work:
+            return
+        step, turn = 2 * self._cost.step_us, 2 * self._cost.quarter_turn_us
+        times = min(max(work // self._lines.sides.size, FEWEST), MOST)
+        pace = round(turn * (FIRST_PACE if self._is_first else LATER_PACE))
+        self._is_first = False
+        doubled = ascend(self._lines, self._prices, step, turn, pace, FALLS, times)
+        # A walk's cost is a whole number of microseconds, and of what divides both prices.
+        unit = math.gcd(self._cost.step_us, self._cost.quarter_turn_us)
+        self.cost_us = max(self.cost_us, -(-doubled // (2 * unit)) * unit)
+
+    def side_prices(self) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.bool_]]:
+        """Return the prices of the best bound of cost, where turns cost.
+
+        Returns:
+            The cells that can be reached, int32 (m,) flat; what each pays for its sides by
+            direction, int64 (m, 4) [half us], 0 where there is none; bool (m,), whether its
+            passage is to be paid.
+        """
+        lines, best = self._lines, self._prices.best
+        prices = np.zeros((lines.sides.size, 4), np.int64)
+        has = [(lines.sides >> direction & 1).astype(bool) for direction in range(4)]
+        number, rank = np.arange(lines.sides.size), lines.rank
+        prices[has[EAST], EAST] = best[ALONG_ROWS, number[has[EAST]]]
+        prices[has[NORTH], NORTH] = best[ALONG_COLS, rank[has[NORTH]]]
+        prices[has[WEST], WEST] = -best[ALONG_ROWS, number[has[WEST]] - 1]
+        prices[has[SOUTH], SOUTH] = -best[ALONG_COLS, rank[has[SOUTH]] - 1]
+        return self._flat, prices, lines.wanted > 0
+
+
+def lower_bound_of(problem: CoverageProblem, work: int = THOROUGH) -> LowerBound:
+    """Return the bounds of a problem after so much work."""
+    bound = LowerBound(problem)
+    bound.tighten(work)
+    return bound

@@ -1,0 +1,274 @@
+"""Windows of a walk solved anew: the search that is strong where turns cost.
+
+Moves of local search change a walk where it touches itself. Where turns are dear, better lanes
+come of changing many cells at once: ``kernels.windows`` solves a window of some 100 cells anew,
+with all that lies outside as it is, guided by the prices that the lower bound found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.local_search.walk_array import FRAME
+from fasaco_edge.kernels.windows.memory import (
+    KINDS,
+    MOST_CHOICES,
+    MOST_IDS,
+    MOST_PAIRS,
+    NO_END,
+    PAIRINGS,
+    Choice,
+    Parts,
+    Program,
+    Terms,
+    Window,
+)
+from fasaco_edge.kernels.windows.passages import BEGIN, NONE, SLOTS, Passages, passages_of, walk_of
+from fasaco_edge.kernels.windows.program import advance_window, begin_window, end_window
+from fasaco_edge.kernels.windows.search import BEST, COST, SOLVED, Aim, solve_windows
+from fasaco_edge.planners.bound import LowerBound
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.problem import CoverageProblem, FramedGround
+
+# Cells of the largest window, and states kept: memory of 2 MB.
+WINDOW_CELLS, MOST_BEAM = 256, 300
+# From so many steps a quarter-turn on windows are large; below a small one is as good, and quicker.
+DEAR_STEPS = 10
+# Grounds on lattices of more cells take too much memory: about 75 bytes a cell.
+MOST_LATTICE = 250_000
+NO_SIDE = 1 << 60
+
+
+def suits(problem: CoverageProblem) -> bool:
+    """Return whether windows can be solved: turns cost, and the lattice is not too large."""
+    size = problem.lattice.states.size
+    return problem.cost.quarter_turn_us > 0 and size <= MOST_LATTICE and problem.cells > 1
+
+
+def is_dear(cost: CoverageCost) -> bool:
+    """Return whether turns cost so much that little else counts."""
+    return cost.quarter_turn_us >= DEAR_STEPS * cost.step_us
+
+
+class WindowSearch:
+    """Windows of a problem's walk, solved one after the other.
+
+    Args:
+        problem: with turns at a price.
+        framed: its ground.
+        bound: whose prices guide the search.
+    """
+
+    def __init__(self, problem: CoverageProblem, framed: FramedGround, bound: LowerBound) -> None:
+        self._problem, self._framed, self._size = problem, framed, framed.ground.bound
+        self._terms, reached = _terms(problem, framed, bound)
+        # Other cells are not there: windows hold none that the walk cannot come to.
+        steps = np.zeros_like(framed.ground.steps)
+        steps[reached] = framed.ground.steps[reached]
+        self._ground = framed.ground._replace(steps=steps)
+        dear = is_dear(problem.cost)
+        self._aim = Aim(
+            cells=reached,
+            rows=framed.rows + 2 * FRAME,
+            cols=framed.width,
+            frame=FRAME,
+            least_side=3,
+            most_side=8 if dear else 6,
+            least_area=30,
+            most_area=150 if dear else 40,
+            beam=MOST_BEAM if dear else 60,
+        )
+        self._program = _program(self._size, self._aim.beam, WINDOW_CELLS)
+        self._passages, self._best = self._no_passages(), self._no_passages()
+        self._tally = np.zeros(4, np.int64)
+        # Steps of the best walk, counted when its cost was that.
+        self._counted_us, self._steps = -1, 0
+        # What the state goes on from.
+        self._walk: NDArray[np.int32] | None = None
+
+    def _no_passages(self) -> Passages:
+        return Passages(np.empty((self._size, SLOTS), np.int8), np.zeros(2, np.int64))
+
+    def load(self, walk: NDArray[np.int32]) -> bool:
+        """Begin with a walk, framed cells int32 (n,); return False if that cannot be.
+
+        With the walk that was loaded or taken last it goes on where it was left.
+        """
+        if walk is self._walk:
+            return True
+        self._walk = None
+        given = walk
+        lanes = np.empty((self._size, 2), np.uint8)
+        walk = thinned(walk)
+        if walk.size < 2 or not passages_of(self._ground, walk, lanes, self._passages):
+            return False
+        self._best.partner[:], self._best.ends[:] = self._passages
+        self._tally[COST] = self._tally[BEST] = 2 * self._problem.cost_us(walk)
+        self._counted_us = -1
+        self._walk = given
+        return True
+
+    def solve(self, expansions: int, random: NDArray[np.uint64]) -> None:
+        """Solve windows until so many states were expanded."""
+        ground, passages, best = self._ground, self._passages, self._best
+        terms, program, aim = self._terms, self._program, self._aim
+        solve_windows(ground, passages, best, terms, program, aim, self._tally, expansions, random)
+
+    def solve_whole(self, beam: int, random: NDArray[np.uint64]) -> Iterator[None]:
+        """Solve the whole ground as one window, with so many states; pause after each line."""
+        framed, ground, passages, terms = (
+            self._framed,
+            self._ground,
+            self._passages,
+            self._terms,
+        )
+        window = Window(FRAME, FRAME, framed.rows, framed.cols, framed.width)
+        program = _program(self._size, beam, self._aim.cells.size)
+        begin_window(ground, passages, terms, window, program, 0, random)
+        while advance_window(ground, passages, terms, window, program, beam):
+            # At each pause more is done than at the last.
+            self._tally[SOLVED] += 1
+            yield
+        self._tally[COST] += end_window(ground, passages, terms, window, program)
+        self._tally[SOLVED] += 1
+        if self._tally[COST] < self._tally[BEST]:
+            self._tally[BEST] = self._tally[COST]
+            self._best.partner[:], self._best.ends[:] = self._passages
+
+    @property
+    def best_us(self) -> int:
+        """Cost of the best walk [us]."""
+        return int(self._tally[BEST]) // 2
+
+    @property
+    def best_steps(self) -> int:
+        """Steps of the best walk."""
+        if self._counted_us != self.best_us:
+            self._counted_us = self.best_us
+            self._steps = int(np.count_nonzero(self._best.partner[:, :BEGIN] != NONE)) // 2
+        return self._steps
+
+    @property
+    def solved(self) -> int:
+        """How many windows were solved so far; each line of the whole ground counts as one."""
+        return int(self._tally[SOLVED])
+
+    def walk(self) -> NDArray[np.int32]:
+        """Return the best walk, framed cells int32 (n,)."""
+        # No step is walked more than twice.
+        out = np.empty(4 * self._aim.cells.size + 2, np.int32)
+        self._walk = out[: walk_of(self._ground, self._best, out)].copy()
+        return self._walk
+
+
+def thinned(walk: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return a walk over the same cells that takes no step three times, int32 (m,).
+
+    Of three times two are in the same direction: the part between them, walked backwards, leads
+    from the first one's begin to the last one's end without both.
+    """
+    while walk.size > 1:
+        low, high = np.minimum(walk[:-1], walk[1:]), np.maximum(walk[:-1], walk[1:])
+        steps = low.astype(np.int64) * 2 + (high - low > 1)
+        often, times = np.unique(steps, return_counts=True)
+        if times.max() <= 2:
+            break
+        taken = np.flatnonzero(steps == often[times.argmax()])[:3]
+        one, other = next((i, j) for i in taken for j in taken if i < j and walk[i] == walk[j])
+        walk = np.concatenate((walk[:one], walk[one + 1 : other + 1][::-1], walk[other + 2 :]))
+    return walk
+
+
+def _terms(
+    problem: CoverageProblem, framed: FramedGround, bound: LowerBound
+) -> tuple[Terms, NDArray[np.int32]]:
+    """Return the terms, and the cells that can be reached, framed, in the order of the rows."""
+    flat, priced, is_wanted = bound.side_prices()
+    cells = framed.framed(flat)
+    prices = np.zeros((framed.ground.bound, 4), np.int64)
+    prices[cells] = priced
+    step, turn = 2 * problem.cost.step_us, 2 * problem.cost.quarter_turn_us
+    masks = framed.ground.steps[cells]
+    sides = np.where(masks[:, np.newaxis] >> np.arange(4) & 1, priced, NO_SIDE).min(axis=1)
+    # With these no first or last visit costs less than nothing.
+    ends = is_wanted if problem.end is None else flat == problem.flat_end
+    begin_price = -(step // 2 + int(sides[flat == problem.flat_start].min()))
+    end_price = -(step // 2 + int(sides[ends].min()))
+    return Terms(step, turn, prices, begin_price, end_price, problem.end is None), cells
+
+
+def _program(size: int, beam: int, cells: int) -> Program:
+    """Return memory for windows of so many cells of a ground of ``size`` framed cells."""
+    states, slots = 4 * beam, 1 << (16 * beam - 1).bit_length()
+    mates = np.full((2, states, MOST_IDS), NO_END, np.int16)
+    scratch, base = (np.full(MOST_IDS, NO_END, np.int16) for _ in range(2))
+    choice = Choice(
+        np.zeros(KINDS, np.int32),
+        np.zeros((KINDS, MOST_CHOICES), np.int64),
+        np.zeros((KINDS, MOST_CHOICES), np.int32),
+    )
+    parts = Parts(
+        label=np.zeros(size, np.int32),
+        root=np.zeros(size, np.int32),
+        number=np.zeros(size, np.int32),
+        queue=np.zeros(cells, np.int32),
+        splits=np.zeros(cells, np.uint8),
+        left=np.zeros(cells, np.int32),
+        needed=np.zeros(cells, np.int32),
+        leads=np.zeros((MOST_IDS, 2), np.int16),
+        sizes=np.zeros(2, np.int64),
+    )
+    return Program(
+        pairs=PAIRS,
+        choice=choice,
+        mates=mates,
+        words=mates.view(np.int64),
+        cost=np.zeros((2, states), np.int64),
+        closed=np.zeros((2, states), np.uint8),
+        parent=np.zeros(states, np.int32),
+        code=np.zeros(states, np.int64),
+        kept_parent=np.zeros((cells + 1, beam), np.int32),
+        kept_code=np.zeros((cells + 1, beam), np.int64),
+        table=np.zeros(slots, np.int32),
+        stamp=np.zeros(slots, np.int32),
+        order=np.zeros(states, np.int64),
+        scratch=scratch,
+        scratch_words=scratch.view(np.int64),
+        base=base,
+        base_words=base.view(np.int64),
+        ident=np.full((size, SLOTS), NO_END, np.int16),
+        inside=np.zeros(size, np.uint8),
+        cells=np.zeros(cells, np.int32),
+        rim=np.zeros((MOST_IDS, 2), np.int32),
+        reduced=np.zeros((cells, 6, 6), np.int64),
+        left=np.zeros(cells + 1, np.int64),
+        clock=np.zeros(2, np.int64),
+        taken=np.zeros(12, np.int16),
+        kinds=np.zeros(12, np.int64),
+        at=np.zeros(10, np.int64),
+        parts=parts,
+    )
+
+
+def _pairings() -> NDArray[np.int8]:
+    """Return all ways to pair up 0, 2, 4, 6 and 8 slots, int8 (PAIRINGS, 8)."""
+    rows: list[list[int]] = []
+
+    def pair_up(left: list[int], paired: list[int]) -> None:
+        if not left:
+            rows.append(paired + [0] * (2 * MOST_PAIRS - len(paired)))
+            return
+        for other in left[1:]:
+            rest = [slot for slot in left[1:] if slot != other]
+            pair_up(rest, [*paired, left[0], other])
+
+    for size in range(0, 2 * MOST_PAIRS + 1, 2):
+        pair_up(list(range(size)), [])
+    assert len(rows) == PAIRINGS
+    return np.array(rows, np.int8)
+
+
+PAIRS = _pairings()

@@ -1,0 +1,96 @@
+"""Flows: runs of cells whose trail points the same way, as arrows of a drawing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.kernels import COL_STEP, EAST, NORTH, ROW_STEP
+
+# A run is cut where the trail is more decided or less than at its beginning by so much.
+DECIDED_APART = 0.2
+# An arrow in the file: where it begins, where it leads to, its colour.
+ARROW_BYTES = 2 * 12 + 4
+NAMES = ("east", "north", "west", "south")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flows:
+    """Arrows along a trail.
+
+    Attributes:
+        origins: float64 (n, 2), where they begin [m].
+        vectors: float64 (n, 2), how far they lead [m].
+        share: float64 (n,), the share of the cells' pheromone that lies along them.
+    """
+
+    origins: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+    share: NDArray[np.float64]
+
+    @property
+    def size_bytes(self) -> int:
+        """How much they take in a file."""
+        return ARROW_BYTES * len(self.origins)
+
+
+def flows_of(
+    geometry: GridGeometry, pointed: NDArray[np.int8], share: NDArray[np.float32]
+) -> Flows:
+    """Return an arrow for each straight run of cells that point the same way.
+
+    It leads from the middle of the first cell to that of the cell which the last one points to.
+    A cell that is as much for one direction as for any other has none.
+
+    Args:
+        geometry: of the cells, whose yaw is 0.
+        pointed: int8 (rows, cols), direction 0..3 of the trail, -1 for none.
+        share: float32 (rows, cols), its share of the cell's pheromone.
+    """
+    rows, cols = pointed.shape
+    begins: list[tuple[int, int, int, int, float]] = []
+    for direction in (EAST, NORTH, EAST + 2, NORTH + 2):
+        up, right = ROW_STEP[direction], COL_STEP[direction]
+        # The cell before each one on its way: on another run, if it points elsewhere.
+        marked = np.pad((pointed == direction) & (share > 0.25 + 1e-6), 1)
+        decided = np.pad(share, 1)
+        before = (slice(1 - up, rows + 1 - up), slice(1 - right, cols + 1 - right))
+        inner = slice(1, rows + 1), slice(1, cols + 1)
+        apart = np.abs(decided[inner] - decided[before]) > DECIDED_APART
+        first = marked[inner] & (~marked[before] | apart)
+        for row, col in np.argwhere(first).tolist():
+            length, at_row, at_col, total = 0, row, col, 0.0
+            while True:
+                total += float(share[at_row, at_col])
+                length, at_row, at_col = length + 1, at_row + up, at_col + right
+                inside = 0 <= at_row < rows and 0 <= at_col < cols
+                if not inside or not marked[at_row + 1, at_col + 1] or first[at_row, at_col]:
+                    break
+            begins.append((row, col, up * length, right * length, total / length))
+    found = np.array(begins, np.float64).reshape(-1, 5)
+    edge, origin = geometry.resolution, geometry.origin
+    centres = (found[:, 1::-1] + 0.5) * edge + (origin.x, origin.y)
+    return Flows(centres, found[:, 3:1:-1] * edge, found[:, 4])
+
+
+def fork_at(
+    geometry: GridGeometry,
+    pointed: NDArray[np.int8],
+    share: NDArray[np.float32],
+    pose: Pose2D | None,
+) -> str:
+    """Return where the trail leads on from the robot's cell, and the share of its pheromone.
+
+    "" where nobody can tell.
+    """
+    if pose is None:
+        return ""
+    x, y = geometry.to_pixels(pose.x, pose.y)
+    row, col = int(np.floor(y)), int(np.floor(x))
+    rows, cols = pointed.shape
+    if not (0 <= row < rows and 0 <= col < cols) or pointed[row, col] < 0:
+        return ""
+    return f"on {NAMES[pointed[row, col]]}: {100 * share[row, col]:.0f} %"

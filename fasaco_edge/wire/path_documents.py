@@ -1,0 +1,132 @@
+"""Path documents: what is told of a path beside its poses, and of the trail beside its field."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Self
+
+from fasaco_edge.wire.json_text import Amount, Count, Document, Name, Ordinal
+
+if TYPE_CHECKING:
+    from fasaco_edge.planners.path import CoveragePath
+
+
+class PlanFigures(Document, frozen=True):
+    """The plan that a path follows, as it was made; all null without one.
+
+    Attributes:
+        planner: name of the planner.
+        seed: of all random streams.
+        ants: ants that walked.
+        kicks: perturbations of the local search.
+        proposals: moves that the local search tried.
+        planned_steps: steps of the plan as it was made.
+        planned_cost_s: seconds the plan takes, by configured speed and turn time.
+        lower_bound_steps: no walk has fewer steps.
+        lower_bound_cost_s: no walk takes fewer seconds, steps and turns together.
+        gap: planned_cost_s / lower_bound_cost_s - 1.
+        saved_by_ants_s: what walks of ants, and local search on these, took off the first walk.
+        saved_by_local_search_s: what local search took off the first walk, or off the one that
+            was still to be driven.
+    """
+
+    planner: str | None = None
+    seed: Count | None = None
+    ants: Count | None = None
+    kicks: Count | None = None
+    proposals: Count | None = None
+    planned_steps: Count | None = None
+    planned_cost_s: Amount | None = None
+    lower_bound_steps: Ordinal | None = None
+    lower_bound_cost_s: Amount | None = None
+    gap: float | None = None
+    saved_by_ants_s: Amount | None = None
+    saved_by_local_search_s: Amount | None = None
+
+    @classmethod
+    def of(cls, plan: CoveragePath | None) -> Self:
+        """Return what is known of the plan a path follows."""
+        if plan is None:
+            return cls()
+        return cls(
+            planner=plan.planner,
+            seed=plan.seed,
+            ants=plan.work.ants,
+            kicks=plan.work.perturbations,
+            proposals=plan.work.proposals,
+            planned_steps=plan.steps,
+            planned_cost_s=round(plan.cost_s, 3),
+            lower_bound_steps=plan.lower_bound_steps or None,
+            lower_bound_cost_s=round(plan.lower_bound_cost_s, 3) or None,
+            gap=None if plan.gap is None else round(plan.gap, 6),
+            saved_by_ants_s=round(plan.saved.ants, 3),
+            saved_by_local_search_s=round(plan.saved.local_search, 3),
+        )
+
+
+class PathReport(PlanFigures, frozen=True):
+    """The path being driven.
+
+    Attributes:
+        revision: counts the published paths.
+        steps: as published.
+        remaining_steps: still to be driven.
+        reason: why it replaced the one before.
+    """
+
+    revision: Ordinal = 1
+    steps: Count = 0
+    remaining_steps: Count = 0
+    reason: str = ""
+
+
+class Rectangle(Document, frozen=True):
+    """A rectangle along the axes.
+
+    Attributes:
+        x_min, y_min, x_max, y_max: [m] in the frame of the map.
+    """
+
+    x_min: float
+    y_min: float
+    x_max: float
+    y_max: float
+
+
+class PathAttachment(PlanFigures, frozen=True):
+    """What comes with each path, as its Zenoh attachment.
+
+    Attributes:
+        revision: counts the published paths.
+        map_stamp_ns: stamp of the map it was planned on [ns].
+        map_revision: revision of that map, as in the status.
+        reason: why it replaces the one before.
+        steps: steps from pose to pose.
+        plan_ms: how long planning took; 0 where no plan was needed.
+        changed: rectangle of the map whose cells came, went or have other neighbours; null where
+            that is not the reason.
+    """
+
+    revision: Ordinal = 0
+    map_stamp_ns: int = 0
+    map_revision: Ordinal = 0
+    reason: Name = ""
+    steps: Count = 0
+    plan_ms: Amount = 0.0
+    changed: Rectangle | None = None
+
+
+class TrailAttachment(Document, frozen=True):
+    """What comes with each field of the living trail, as its Zenoh attachment.
+
+    A field without one is what a cohort of ants has left.
+
+    Attributes:
+        revision: of the path in force.
+        cells: how many cells the trail spans: those with a step to another one.
+        branching: mean number of directions of a cell that are within reach of its strongest: 1
+            where each cell is decided.
+    """
+
+    revision: Count = 0
+    cells: Count = 0
+    branching: Amount = 0.0

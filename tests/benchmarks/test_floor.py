@@ -1,0 +1,25 @@
+"""Lines over the floor of the smallest building, planned and driven, and what is said of them."""
+
+import json
+
+from tests.benchmarks.__main__ import main
+from tests.benchmarks.floor import CASES, CENTRES, ONLINE, THOROUGH
+
+
+def test_a_line_sweeps_more_than_the_centres_and_touches_nothing(capsys):
+    main(["floor", "--maps", "office", "--json"])
+    document = json.loads(capsys.readouterr().out)
+    runs = {run["case"]: run for run in document["floors"]}
+    assert tuple(runs) == CASES
+    assert all(run["illegal_share"] == 0.0 for run in runs.values())
+    assert runs[CENTRES]["swept_share"] < 0.8
+    assert runs[THOROUGH]["swept_share"] > 0.97
+    assert runs[ONLINE]["swept_share"] > 0.95
+    assert runs[CENTRES]["ratio"] == 1.0
+    assert runs[ONLINE]["replan_p99_ms"] >= runs[ONLINE]["step_p99_ms"] > 0.0
+    assert {goal["what"] for goal in document["goals"]} >= {"illegal share, worst"}
+
+
+def test_a_building_that_is_not_there_is_named(capsys):
+    assert main(["floor", "--maps", "nowhere"]) != 0
+    assert "nowhere" in capsys.readouterr().err

@@ -1,0 +1,20 @@
+"""Replans part by part, on a small building."""
+
+import json
+
+from tests.benchmarks.__main__ import main
+from tests.benchmarks.replan import CASES
+
+
+def test_replans_are_timed_part_by_part_and_lead_to_the_same_lines(capsys):
+    digests = []
+    for _ in range(2):
+        assert main(["replan", "--cells", "1000", "--replans", "4", "--json"]) == 0
+        document = json.loads(capsys.readouterr().out)
+        runs = document["replans"]
+        assert [run["case"] for run in runs] == [case for case in CASES for _ in range(4)]
+        for run in runs:
+            assert {"ingest", "reach", "repair", "rest"} <= set(run["ms"])
+            assert run["total_ms"] == sum(run["ms"].values())
+        digests.append([run["digest"] for run in runs])
+    assert digests[0] == digests[1]

@@ -1,0 +1,58 @@
+"""A daemon as it is by default: the robot is given a line over the floor."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fasaco_edge.bench.floor import SweepingRobot, judge_floor
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from tests.daemon.test_mission import START, planned
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import (
+    RADIUS_M,
+    RESOLUTION_M,
+    TOOL_M,
+    coverable_cells,
+    drive,
+    map_bytes,
+    pillared_room,
+    pose_bytes,
+)
+
+ROBOT = SweepingRobot(TOOL_M, RADIUS_M, 0.25, 1.5)
+
+
+def swept_by(pixels, points):
+    """Return the judge's figures of a line through points (n, 2), x, y [m]."""
+    rows, cols = pixels.shape
+    grid = OccupancyGrid(GridGeometry(rows, cols, RESOLUTION_M, Pose2D(0.0, 0.0)), pixels)
+    return judge_floor(grid, np.array([START, *points]), ROBOT).figures
+
+
+def test_by_default_the_path_is_a_line_that_sweeps_the_rims(tmp_path):
+    pixels = pillared_room()
+    by_default = DaemonConfig().planner.line
+    with (
+        daemon_process(tmp_path, planner={"line": by_default}) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        ear = outsider.listen("path")
+        outsider.put("map", map_bytes(pixels))
+        outsider.put("pose", pose_bytes(*START))
+        points, _ = planned(ear.wait(lambda heard: True))
+        figures = swept_by(pixels, points)
+        assert figures.illegal_share == 0.0
+        # Cells beside a wall have their centre within reach of it; a line goes nearer.
+        in_cells = len(coverable_cells(pixels)) * TOOL_M**2
+        assert figures.swept_m2 > 1.1 * in_cells
+        told = outsider.wait_status(lambda status: status["floor"]["reachable_m2"])["floor"]
+        assert told["reachable_m2"] == pytest.approx(figures.reachable_m2, rel=0.02)
+        ahead, beside = (left["m2"] for left in told["left"])
+        assert ahead > 10 * beside
+        way = [tuple(point) for point in points[:12].tolist()]
+        drive(outsider, way)
+        outsider.wait_status(lambda status: status["floor"]["swept_m2"] > 0.3)

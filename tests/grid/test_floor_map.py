@@ -1,0 +1,144 @@
+"""The floor under a map that changes is, after each change, that of the new map alone."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fasaco_edge.errors import MapTooLarge
+from fasaco_edge.grid.changes import LatticeChange
+from fasaco_edge.grid.fine_raster import RobotDiscs
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice, Footprint
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.floor.bits import unpacked
+from tests.grid.test_floor import room
+
+FOOTPRINT = Footprint(cell_m=0.276, robot_radius_m=0.18)
+DISCS = RobotDiscs(radius_m=0.18, tool_m=0.3)
+PLENTY = 10**6
+
+
+def over(grid, keep_out=()):
+    plain = CoverageLattice.from_map(grid, FOOTPRINT)
+    return FloorMap(grid, plain, FOOTPRINT, DISCS, PLENTY, keep_out)
+
+
+def part_of(grid, row0, col0, row1, col1):
+    x, y = grid.geometry.to_map(col0, row0)
+    origin = Pose2D(x, y, grid.geometry.origin.yaw)
+    geometry = GridGeometry(row1 - row0, col1 - col0, grid.geometry.resolution, origin)
+    return OccupancyGrid(geometry, grid.cells[row0:row1, col0:col1].copy())
+
+
+def assert_same(found, expected):
+    assert (found.geometry.rows, found.geometry.cols) == (
+        expected.geometry.rows,
+        expected.geometry.cols,
+    )
+    assert (found.blocked == expected.blocked).all()
+    assert (found.places == expected.places).all()
+    assert np.array_equal(found.stands.stands, expected.stands.stands, equal_nan=True)
+    assert np.array_equal(found.stands.bends, expected.stands.bends, equal_nan=True)
+    for name in ("window", "states", "steps"):
+        now, anew = (getattr(each.stands.lattice, name) for each in (found, expected))
+        assert np.array_equal(now, anew) if name != "window" else now == anew
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.3])
+def test_changes_lead_where_a_new_look_does(yaw):
+    rng = np.random.default_rng(7)
+    whole = room(6.0, 5.0, yaw)
+    known = part_of(whole, 3, 4, 90, 99)
+    floor, plain = over(known), CoverageLattice.from_map(known, FOOTPRINT)
+    seen = 0
+    for number in range(24):
+        if number % 6 == 5:
+            low, high = rng.integers(0, 8, 2), rng.integers(0, 8, 2)
+            cells = whole.cells.copy()
+            new = part_of(OccupancyGrid(whole.geometry, cells), *low, *(cells.shape - high))
+        else:
+            cells = known.cells.copy()
+            for row, col in rng.integers(0, 80, (int(rng.integers(1, 3)), 2)):
+                size = rng.integers(1, 9, 2)
+                cells[row : row + size[0], col : col + size[1]] = rng.choice([0, 50, 100, -1])
+            new = OccupancyGrid(known.geometry, cells)
+        before = floor.stands.lattice
+        plain = LatticeChange.between((known, new), plain, FOOTPRINT).after
+        change = floor.change((known, new), plain)
+        assert_same(floor, over(new))
+        assert change.before is before
+        assert change.after is floor.stands.lattice
+        expected = LatticeChange.to(before, over(new).stands.lattice)
+        assert (change.cells == expected.cells).all()
+        seen += len(change.cells)
+        known = new
+    assert seen > 100
+
+
+def test_a_map_on_another_raster_is_looked_at_as_a_whole():
+    first, other = room(3.0, 2.0), room(3.0, 2.0, yaw=0.01)
+    floor = over(first)
+    floor.change((first, other), CoverageLattice.from_map(other, FOOTPRINT))
+    assert floor.shift is None
+    assert_same(floor, over(other))
+
+
+def test_pixels_that_move_say_by_how_much():
+    whole = room(3.0, 2.0)
+    first, grown = part_of(whole, 2, 3, 30, 40), part_of(whole, 1, 0, 30, 40)
+    floor = over(first)
+    floor.change((first, grown), CoverageLattice.from_map(grown, FOOTPRINT))
+    assert floor.shift == (2, 6)  # pixels of 0.05 m have two parts
+
+
+def test_what_is_unknown_stays_so():
+    grid = room(3.0, 2.0)
+    cells = grid.cells.copy()
+    cells[10:] = -1
+    plain = CoverageLattice.from_map(OccupancyGrid(grid.geometry, cells), FOOTPRINT)
+    states = over(OccupancyGrid(grid.geometry, cells)).stands.lattice.states
+    assert (states[plain.states == UNKNOWN] != 1).any()
+    assert (states[-3:] == UNKNOWN).all()
+
+
+def test_a_robot_stands_clear_of_what_it_keeps_out_of():
+    corner = (3.0, 1.4)
+    zone = (corner, (4.0, 1.4), (4.0, 2.2), (3.0, 2.2))
+    floor = over(room(3.0, 2.0), (zone,))
+    rows, cols = np.nonzero(unpacked(floor.places, floor.geometry.cols))
+    x0, y0 = floor.geometry.origin.x, floor.geometry.origin.y
+    x, y = x0 + (cols + 0.5) * 0.025, y0 + (rows + 0.5) * 0.025
+    apart = np.hypot(
+        np.clip(3.0 - x, 0, None) + np.clip(x - 4.0, 0, None),
+        np.clip(1.4 - y, 0, None) + np.clip(y - 2.2, 0, None),
+    )
+    assert apart.min() >= 0.18 - 1e-9
+    assert apart.min() < 0.18 + 0.05
+
+
+def test_the_floor_in_reach_of_some_cells():
+    floor = over(room(3.0, 2.0))
+    whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
+    every = np.ones(floor.stands.lattice.states.shape, bool)
+    reached = floor.reached(every, whole)
+    inner = (3.0 - 0.35) * (2.0 - 0.35)
+    rim = 2 * 0.15 * (3.0 + 2.0 - 0.7) + math.pi * 0.15**2
+    assert np.count_nonzero(reached) * 0.025**2 == pytest.approx(inner + rim, abs=0.03)
+    part = Window(20, 30, 61, 77)
+    assert (floor.reached(every, part) == reached[20:61, 30:77]).all()
+    assert not floor.reached(~every, whole).any()
+
+
+def test_a_raster_too_large_changes_nothing():
+    grid = room(3.0, 2.0)
+    plain = CoverageLattice.from_map(grid, FOOTPRINT)
+    floor = FloorMap(grid, plain, FOOTPRINT, DISCS, 6_000)
+    larger = room(5.0, 4.0)
+    with pytest.raises(MapTooLarge, match="exceeds 6000 pixels"):
+        floor.change((grid, larger), CoverageLattice.from_map(larger, FOOTPRINT))
+    assert_same(floor, FloorMap(grid, plain, FOOTPRINT, DISCS, 6_000))
+    assert floor.geometry.resolution == 0.05  # the pixels of the map, whole

@@ -1,0 +1,143 @@
+"""Moves of the driven line: what they say to gain is what a slow count shows."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fasaco_edge.kernels.floor import line as kernel
+from fasaco_edge.kernels.floor.anneal import anneal
+from fasaco_edge.kernels.floor.bits import packed
+from fasaco_edge.kernels.floor.capsule import NEVER, Sweeps, sweep
+from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
+from fasaco_edge.kernels.floor.polish import polish
+from fasaco_edge.planners.line import linked, memory_for_moves, numbers_along
+
+ROWS, COLS = 72, 96
+ROBOT, TOOL = 7.2, 6.0
+PRICE = kernel.Price(drive_s=0.1, turn_s=1.5 / (0.5 * math.pi), left_s=0.11)
+# Three lanes, and one that leaves much beside it.
+WAY = [(10, 10), (10, 85), (20, 85), (20, 10), (30, 10), (30, 85), (37, 10), (62, 10)]
+
+
+class Room:
+    """A room with a pillar, and lanes through it."""
+
+    def __init__(self, *, is_end_fixed: bool = False) -> None:
+        free = np.zeros((ROWS, COLS), np.bool_)
+        free[2:-2, 2:-2] = True
+        free[50:54, 60:64] = False
+        blocked = packed(~free, beyond=True)
+        inner = np.zeros_like(free)
+        inner[10:62, 10:86] = True
+        places = packed(inner, beyond=False)
+        counts = np.where(free, 0, NEVER).astype(np.int16)
+        left = (counts == 0).reshape(ROWS // 8, 8, COLS // 8, 8).sum(axis=(1, 3)).astype(np.int32)
+        self.floor = kernel.Floor(blocked, places, Sweeps(counts, left), ROBOT, TOOL)
+        self.memory = memory_for_moves()
+        self.line = linked(np.array(WAY, float), left.shape, is_end_fixed=is_end_fixed)
+        for a, b in pairwise(WAY):
+            sweep(self.floor.sweeps, *map(float, (*a, *b)), TOOL, 1, self.memory.capsules)
+
+    @property
+    def points(self) -> np.ndarray:
+        return self.line.points[numbers_along(self.line)]
+
+    def cost_s(self) -> float:
+        """Return seconds and the price of what is left, counted slowly."""
+        way = np.diff(self.points, axis=0)
+        headings = np.arctan2(way[:, 0], way[:, 1])
+        turns = np.abs((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi)
+        left = int(np.count_nonzero(self.floor.sweeps.counts == 0))
+        driven_s = PRICE.drive_s * np.hypot(*way.T).sum() + PRICE.turn_s * turns.sum()
+        return float(driven_s + PRICE.left_s * left)
+
+    def recounted(self) -> Sweeps:
+        """Return what the line sweeps, counted anew."""
+        counts = np.where(self.floor.sweeps.counts >= NEVER // 2, NEVER, 0).astype(np.int16)
+        sweeps = Sweeps(counts, np.zeros_like(self.floor.sweeps.left))
+        for a, b in pairwise(self.points.tolist()):
+            sweep(sweeps, *a, *b, TOOL, 1, self.memory.capsules)
+        left = (counts == 0).reshape(ROWS // 8, 8, COLS // 8, 8).sum(axis=(1, 3))
+        return Sweeps(counts, left)
+
+    def run(self, stage: str, most: int = 4000) -> float:
+        args = self.line, self.floor, PRICE, self.memory
+        if stage == "polish":
+            return polish(*args, 40.0, most)
+        if stage == "anneal":
+            return anneal(*args, np.array([7], np.uint64), 0, (1.0, 0.0), most)
+        before = self.cost_s()
+        sweep_patches(*args, 40.0, find_patches(self.floor.sweeps, 10), most)
+        return before - self.cost_s()
+
+
+@pytest.mark.parametrize("stage", ["polish", "anneal", "patches"])
+def test_what_is_gained_is_what_a_slow_count_shows(stage):
+    room = Room()
+    before = room.cost_s()
+    gained = room.run(stage)
+    assert gained > 1.0
+    # A turn is told to 1e-5 rad; some thousand are added up.
+    assert gained == pytest.approx(before - room.cost_s(), abs=0.05)
+    counted = room.recounted()
+    below = counted.counts < NEVER // 2
+    assert (room.floor.sweeps.counts[below] == counted.counts[below]).all()
+    assert (room.floor.sweeps.left == counted.left).all()
+
+
+def test_numbers_of_points_that_go_are_used_again():
+    room = Room()
+    few = (array[:60].copy() for array in room.line[:4])
+    room.line = kernel.Line(*few, *room.line[4:])
+    assert room.run("anneal") > 1.0
+    assert room.line.state[kernel.TRIED] == 4000
+    used, most = int(room.line.state[kernel.USED]), len(room.points)
+    free, number = 0, int(room.line.state[kernel.FREE])
+    while number != kernel.NONE:
+        free, number = free + 1, int(room.line.next[number])
+    assert used == most + free
+    assert 40 < used <= 60
+
+
+def test_an_annealed_line_keeps_its_ends():
+    room = Room(is_end_fixed=True)
+    first, last = room.points[[0, -1]].tolist()
+    assert room.run("anneal") > 1.0
+    assert room.points[[0, -1]].tolist() == [first, last]
+
+
+def test_a_chain_longer_than_a_move_is_replaced_as_well():
+    room = Room()
+    numbers = numbers_along(room.line)
+    kernel.replace_points(room.line, room.floor, room.memory, numbers[0], numbers[-1], 0)
+    assert len(room.points) == 2
+    below = room.floor.sweeps.counts < NEVER // 2
+    assert (room.floor.sweeps.counts[below] == room.recounted().counts[below]).all()
+
+
+def test_what_is_tried_is_bounded():
+    for stage in ("polish", "anneal", "patches"):
+        room = Room()
+        room.run(stage, 300)
+        # All moves at one point, or to one patch, are tried.
+        assert 300 <= room.line.state[kernel.TRIED] <= 300 + 200
+
+
+def test_patches_are_pixels_left_that_hang_together():
+    room = Room()
+    counts = room.floor.sweeps.counts
+    counts[counts == 0] = 1
+    counts[20, 30:38] = counts[21, 37] = 0  # nine, across two blocks
+    counts[40, 50:58] = counts[41, 58] = 0  # eight and one beside a corner
+    assert np.argwhere(find_patches(room.floor.sweeps, 9)).tolist() == [[2, 3], [2, 4]]
+    assert np.argwhere(find_patches(room.floor.sweeps, 8)).tolist() == [
+        [2, 3],
+        [2, 4],
+        [5, 6],
+        [5, 7],
+    ]
+    assert not find_patches(room.floor.sweeps, 10).any()

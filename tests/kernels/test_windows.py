@@ -1,0 +1,107 @@
+"""Windows of a walk against least costs, and the walk's soundness after each of them."""
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.planners.baselines import first_walks
+from fasaco_edge.planners.bound import THOROUGH, LowerBound
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of
+from fasaco_edge.planners.regions import stream_of
+from fasaco_edge.planners.windows import WindowSearch, thinned
+from tests.benchmarks.judge import check_walk
+from tests.campaigns.turn_bound import drawn_problem, least_cost_us
+
+PLENTY = 5_000
+
+
+def search_of(problem):
+    """Windows on the first walk of a problem."""
+    framed, bound = FramedGround.of(problem), LowerBound(problem)
+    bound.tighten(THOROUGH)
+    search = WindowSearch(problem, framed, bound)
+    walk = framed.framed(next(iter(first_walks(problem, graph_of(problem)))))
+    return search, framed, walk
+
+
+def assert_sound(problem, framed, search):
+    """The best walk is a walk over all that is to be covered, and costs what is said."""
+    walk = framed.unframed(search.walk())
+    assert problem.cost_us(walk) == search.best_us
+    lattice, end = problem.lattice, problem.end
+    cells = problem.cells_of(walk) - (lattice.window.row0, lattice.window.col0)
+    at = None if end is None else lattice.local(end)
+    wanted = problem.to_cover
+    verdict = check_walk(lattice.steps, wanted, cells, lattice.local(problem.start), at)
+    assert verdict.problems == ()
+
+
+def test_a_window_of_the_whole_ground_is_solved_to_the_least_cost():
+    random = np.random.default_rng(11)
+    solved = 0
+    for _ in range(150):
+        problem = drawn_problem(random)
+        least_us = least_cost_us(problem)
+        if not least_us:
+            continue
+        search, framed, walk = search_of(problem)
+        if not search.load(walk):
+            continue
+        for _ in search.solve_whole(PLENTY, stream_of(1)):
+            pass
+        assert_sound(problem, framed, search)
+        # A walk is read as one that takes no step three times: so is a best one, nearly always.
+        assert search.best_us >= least_us
+        solved += search.best_us == least_us
+    assert solved >= 125
+
+
+@pytest.mark.parametrize("price", [0.5, 1.25, 5.0, 50.0])
+@pytest.mark.parametrize("kind", ["anywhere", "home", "elsewhere", "half covered"])
+def test_windows_leave_a_whole_walk_and_find_better_ones(kind, price):
+    random = np.random.default_rng(5)
+    floor = random.random((14, 17)) < 0.9
+    floor[0, 0] = floor[0, 1] = True
+    ground = CoverageLattice.from_free(floor)
+    reachable = CoverageProblem.of(ground, (0, 0)).to_cover
+    last = tuple(np.argwhere(reachable)[-1].tolist())
+    end = {"home": (0, 0), "elsewhere": last}.get(kind)
+    covered = np.zeros(floor.shape, bool)
+    covered[:7] = kind == "half covered"
+    cost = CoverageCost(1.0, price)
+    problem = CoverageProblem.of(ground, (0, 0), covered=covered, end=end, cost=cost)
+    search, framed, walk = search_of(problem)
+    assert search.load(walk)
+    begun_us, stream = search.best_us, stream_of(3)
+    costs = []
+    for _ in range(40):
+        search.solve(500, stream)
+        assert_sound(problem, framed, search)
+        costs.append(search.best_us)
+    assert costs == sorted(costs, reverse=True)
+    assert costs[-1] < begun_us
+
+
+def test_the_same_stream_finds_the_same_walk():
+    problem = CoverageProblem.of(
+        CoverageLattice.from_free(np.ones((9, 12), bool)), (4, 4), cost=CoverageCost(1.0, 5.0)
+    )
+    walks = []
+    for _ in range(2):
+        search, _, walk = search_of(problem)
+        search.load(walk)
+        search.solve(20_000, stream_of(8))
+        walks.append(search.walk())
+    assert np.array_equal(*walks)
+
+
+def test_a_walk_that_takes_a_step_three_times_is_thinned():
+    # Between 0 and 1 there and back, and there again.
+    walk = np.array([0, 1, 0, 1, 2, 1, 0, 10], np.int32)
+    found = thinned(walk)
+    assert (found[0], found[-1]) == (0, 10)
+    assert set(found.tolist()) == {0, 1, 2, 10}
+    moves = [tuple(sorted(pair)) for pair in zip(found.tolist(), found[1:].tolist(), strict=False)]
+    assert max(moves.count(move) for move in moves) <= 2
+    assert all(abs(one - other) in (1, 10) for one, other in moves)

@@ -1,0 +1,292 @@
+"""The line of a mission that sweeps floor: driven to its end, through maps that change."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fasaco_edge.bench.floor import SweepingRobot, judge_floor
+from fasaco_edge.daemon.loop.status import floor_report
+from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
+from fasaco_edge.grid.lattice import Footprint
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.floor.capsule import NEVER
+from fasaco_edge.kernels.floor.driven import DRIVEN, WANTED
+from fasaco_edge.mission.config import MissionConfig, Sweeping
+from fasaco_edge.mission.core.events import (
+    CommandReceived,
+    MapReceived,
+    PlanReady,
+    PoseReceived,
+    State,
+)
+from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.line.tally import SweepTally
+from fasaco_edge.mission.orders.order import read_order
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.line import LINES
+from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.planner import SearchWork, WorkLimit
+from fasaco_edge.wire.replies import FloorReport
+from tests.grid.test_floor import room
+from tests.grid.test_floor_map import part_of
+
+TOOL_M, RADIUS_M, CELL_M = 0.3, 0.18, 0.276
+ROBOT = SweepingRobot(TOOL_M, RADIUS_M, 0.25, 1.5)
+CONFIG = MissionConfig(
+    Footprint(CELL_M, RADIUS_M),
+    cost=CoverageCost.for_robot(CELL_M, 0.25, 1.5),
+    sweeping=Sweeping(TOOL_M, 1_000_000, LINES["thorough"]),
+)
+START = (2.6, 1.6)
+STEP_M = 0.08
+
+
+@dataclass
+class Robot:
+    """A robot that drives exactly along its line, a step at a time."""
+
+    mission: Mission
+    at: tuple[float, float] = START
+    now: float = 0.0
+    line: list[tuple[float, float]] = field(default_factory=list)
+    trail: list[tuple[float, float]] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)
+
+    def tell(self, *events):
+        pose = StampedPose(Pose2D(*self.at), "map")
+        decision = self.mission.step([*events, PoseReceived(pose)], self.now)
+        for _ in range(4):
+            assert not decision.faults
+            if decision.path is not None:
+                self.reasons.append(decision.path.reason)
+                assert decision.path.xy is not None
+                self.line = [tuple(point) for point in decision.path.xy.tolist()]
+            if decision.plan is None:
+                break
+            limit = WorkLimit(SearchWork(proposals=20_000))
+            path = NearOptimal().plan(decision.plan.problem, limit)
+            decision = self.mission.step([PlanReady(decision.plan.number, path, 0.0)], self.now)
+
+    def drive(self, steps=1):
+        for _ in range(steps):
+            left = STEP_M
+            self.trail.append(self.at)
+            while self.line and left > 0.0:
+                ahead = math.dist(self.at, self.line[0])
+                if ahead <= left:
+                    self.at, left = self.line.pop(0), left - ahead
+                    self.trail.append(self.at)
+                else:
+                    (x, y), (to_x, to_y), share = self.at, self.line[0], left / ahead
+                    self.at, left = (x + share * (to_x - x), y + share * (to_y - y)), 0.0
+            self.now += 0.3
+            self.tell()
+            check_tally(self.mission)
+
+    def finish(self, most=4000):
+        for _ in range(most):
+            if self.mission.state is State.DONE:
+                return
+            self.drive()
+        raise AssertionError(f"still {self.mission.state}: {self.mission.reason}")
+
+
+def check_tally(mission):
+    """What is counted is what a fresh count of the line ahead gives."""
+    ahead = mission._line._ahead
+    if ahead is None:
+        return
+    fresh = SweepTally(ahead._floor)
+    swept = mission.floor.swept_on(ahead._floor.geometry)
+    whole = Window(0, 0, *swept.shape)
+    state, points = ahead.tally._state, ahead.line.points
+    fresh.set_open(whole, (state & WANTED) > 0, swept | ((state & DRIVEN) > 0))
+    edges = np.concatenate([points[:-1], points[1:]], axis=1)
+    fresh.exchange(edges[:0], edges)
+    counts = ahead.tally.sweeps.counts
+    # Of what is done with, how often is of no interest.
+    assert ((counts >= NEVER // 2) == (fresh.sweeps.counts >= NEVER // 2)).all()
+    still_open = counts < NEVER // 2
+    assert (counts[still_open] == fresh.sweeps.counts[still_open]).all()
+    left = (counts == 0).astype(int)
+    padded = np.zeros([size * 8 for size in ahead.tally.sweeps.left.shape], int)
+    padded[: left.shape[0], : left.shape[1]] = left
+    high, wide = ahead.tally.sweeps.left.shape
+    blocks = padded.reshape(high, 8, wide, 8).sum(axis=(1, 3))
+    assert (blocks == ahead.tally.sweeps.left).all()
+
+
+def with_obstacle(grid, row, col, size=6, value=100):
+    cells = grid.cells.copy()
+    cells[row : row + size, col : col + size] = value
+    return OccupancyGrid(grid.geometry, cells)
+
+
+def test_a_room_is_swept_to_its_rim():
+    grid = room(3.0, 2.4)
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(grid))
+    robot.finish()
+    judged = judge_floor(grid, np.array(robot.trail), ROBOT)
+    centres = 1.0 - (2 * 0.15 * (3.0 + 2.4)) / (3.0 * 2.4)
+    assert judged.figures.swept_share > max(0.97, centres)
+    assert judged.figures.illegal_share == 0.0
+    assert robot.mission.floor.swept_m2 <= judged.swept.sum() * 0.025**2 * 1.005
+    told = floor_report(robot.mission)
+    assert told.reachable_m2 == pytest.approx(judged.figures.reachable_m2, rel=0.01)
+    assert told.reached_m2 == pytest.approx(judged.figures.swept_m2, rel=0.01)
+    assert [left.reason for left in told.left] == ["beside the path, and not worth the way"]
+
+
+def test_the_status_says_what_of_the_floor_is_left_and_why():
+    robot = Robot(Mission(CONFIG))
+    assert floor_report(robot.mission) == FloorReport(0.0)
+    robot.tell(MapReceived(room(3.0, 2.4)))
+    robot.drive(10)
+    told = floor_report(robot.mission)
+    ahead, beside = told.left
+    assert (ahead.reason, beside.reason) == (
+        "on the path",
+        "beside the path, and not worth the way",
+    )
+    assert ahead.m2 > 10 * beside.m2
+    assert told.reached_m2 == pytest.approx(told.swept_m2, abs=0.02)
+    assert told.reachable_m2 == pytest.approx(told.reached_m2 + ahead.m2 + beside.m2, abs=0.002)
+
+
+def test_the_same_events_give_the_same_line():
+    trails = []
+    for _ in range(2):
+        robot = Robot(Mission(CONFIG))
+        robot.tell(MapReceived(room(2.4, 1.8)))
+        robot.finish()
+        trails.append(robot.trail)
+    assert trails[0] == trails[1]
+
+
+def test_maps_that_grow_and_change_on_the_way():
+    whole = with_obstacle(room(3.6, 3.0), 24, 30)
+    rng = np.random.default_rng(3)
+    robot = Robot(Mission(CONFIG))
+    rows, cols = whole.cells.shape
+    known = part_of(whole, 0, 0, 36, 40)
+    robot.tell(MapReceived(known))
+    truth = whole
+    for number in range(14):
+        robot.drive(int(rng.integers(2, 9)))
+        if number % 3 == 2:
+            place = truth.geometry.to_pixels(*robot.at)
+            row, col = rng.integers(4, rows - 6), rng.integers(4, cols - 6)
+            if abs(row - place[1]) + abs(col - place[0]) > 16:
+                truth = with_obstacle(truth, row, col, 3, int(rng.choice([0, 100])))
+        low, high = rng.integers(0, 6, 2), (rows - rng.integers(0, 5), cols - rng.integers(0, 5))
+        robot.tell(MapReceived(part_of(truth, *low.tolist(), *(int(each) for each in high))))
+        check_tally(robot.mission)
+        assert_clear(robot, truth)
+    robot.tell(MapReceived(truth))
+    robot.finish()
+    assert judge_floor(truth, np.array(robot.trail), ROBOT).figures.swept_share > 0.95
+
+
+def assert_clear(robot, grid):
+    """No point of the line comes nearer to what is not free than the robot's radius."""
+    blocked = np.argwhere(grid.cells != 0) + 0.5
+    geometry = grid.geometry
+    points = np.array([robot.at, *robot.line])
+    for a, b in pairwise(points):
+        count = max(int(math.dist(a, b) / 0.02), 1)
+        for share in np.linspace(0.0, 1.0, count):
+            col, row = geometry.to_pixels(*(a + share * (b - a)))
+            off = np.abs(blocked - (row, col)) - 0.5
+            nearest = np.hypot(*np.clip(off, 0.0, None).T).min() * geometry.resolution
+            assert nearest > RADIUS_M - 1e-3
+
+
+def test_what_comes_into_the_way_is_driven_round_at_once():
+    grid = room(3.0, 2.4)
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(grid))
+    robot.drive(12)
+    x, y = robot.line[min(6, len(robot.line) - 1)]
+    col, row = (int(each) for each in grid.geometry.to_pixels(x, y))
+    if math.dist((x, y), robot.at) < 0.4:
+        row, col = (row + 14) % 36 + 6, (col + 14) % 48 + 6
+    blocked = with_obstacle(grid, row, col, 2)
+    robot.tell(MapReceived(blocked))
+    assert_clear(robot, blocked)
+    robot.finish()
+
+
+def test_a_line_keeps_clear_of_a_keep_out_zone():
+    grid = room(3.0, 2.4)
+    zone = [[3.6, 1.8], [4.4, 1.8], [4.4, 2.6], [3.6, 2.6]]
+    order = read_order({"keep_out": [zone]})
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(grid), CommandReceived(1, "start", order))
+    robot.finish()
+    trail = np.array(robot.trail)
+    off = np.maximum(np.maximum(3.6 - trail[:, 0], trail[:, 0] - 4.4), 0.0)
+    up = np.maximum(np.maximum(1.8 - trail[:, 1], trail[:, 1] - 2.6), 0.0)
+    assert np.hypot(off, up).min() >= RADIUS_M - 1e-3
+    assert judge_floor(grid, trail, ROBOT).figures.swept_share > 0.6
+
+
+def test_a_plan_goes_on_from_the_cell_that_the_robot_is_nearest_to():
+    # Behind the robot it would turn back.
+    line = replace(LINES["thorough"], price_s_m2=0.0)
+    sweeping = replace(CONFIG.sweeping, line=line)
+    robot = Robot(Mission(replace(CONFIG, sweeping=sweeping)))
+    robot.tell(MapReceived(room(3.6, 3.0)))
+    for _ in range(60):
+        robot.drive()
+        path = robot.mission.route.path
+        stand = robot.mission._map.place_of(tuple(path.cells[path.index].tolist()))
+        assert math.dist(stand, robot.at) < 0.65 * CELL_M
+
+
+def test_a_second_pass_sweeps_again():
+    grid = room(2.0, 1.6)
+    zone = [[1.9, 0.9], [4.1, 0.9], [4.1, 2.7], [1.9, 2.7]]
+    order = read_order({"zones": [{"name": "all", "polygon": zone, "passes": 2}]})
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(grid), CommandReceived(1, "start", order))
+    robot.finish()
+    once = Robot(Mission(CONFIG))
+    once.tell(MapReceived(grid))
+    once.finish()
+    assert len(robot.trail) > 1.6 * len(once.trail)
+
+
+def test_a_robot_that_was_carried_away_gets_a_line_from_there():
+    grid = room(3.6, 3.0)
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(grid))
+    robot.drive(10)
+    robot.at = (5.0, 3.5)
+    for _ in range(8):
+        robot.now += 0.3
+        robot.tell()
+    assert math.dist(robot.line[0], robot.at) < 0.3
+    robot.finish()
+    assert judge_floor(grid, np.array(robot.trail), ROBOT).figures.swept_share > 0.9
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.5])
+def test_a_map_on_another_raster_costs_the_polish_alone(yaw):
+    grid = room(3.0, 2.4, yaw)
+    robot = Robot(Mission(CONFIG))
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    robot.at = (2.6 * cos - 1.6 * sin, 2.6 * sin + 1.6 * cos)
+    robot.tell(MapReceived(grid))
+    robot.drive(20)
+    origin = grid.geometry.origin
+    moved = replace(grid.geometry, origin=replace(origin, x=origin.x + 0.012))
+    robot.tell(MapReceived(OccupancyGrid(moved, grid.cells)))
+    check_tally(robot.mission)
+    robot.finish()
+    assert judge_floor(grid, np.array(robot.trail), ROBOT).figures.swept_share > 0.95

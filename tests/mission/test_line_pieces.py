@@ -1,0 +1,105 @@
+"""A line put together of pieces of the one before, and of stands between them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fasaco_edge.mission.line.pieces import POLISHED, RAW, Joiner, Line, kept_pieces
+
+
+def cells(*places):
+    return np.array(places, np.int32)
+
+
+def lane(row, cols):
+    return [(row, col) for col in cols]
+
+
+BEFORE = cells(*lane(0, range(20)), *lane(1, range(19, -1, -1)))
+
+
+def stand(cell):
+    return 10.0 * np.asarray(cell, float)
+
+
+def over(walk):
+    return 10.0 * walk.astype(float), np.arange(len(walk))
+
+
+def polished(walk):
+    """Return a line a little beside the stands."""
+    points, numbers = over(walk)
+    return Line(points + np.array((0.5, 0.0)), numbers, np.full(len(walk), POLISHED, np.uint8))
+
+
+def join(walk, pieces, is_clear=lambda a, b: True):
+    here = Line(stand(walk[0])[None], np.array([0]), np.array([POLISHED], np.uint8))
+    joiner = Joiner(here, walk, 0, stand, over, is_clear, lambda cell: False)
+    return joiner.joined(pieces)
+
+
+def whole(pieces):
+    return pieces[0].line.joined(*(piece.line for piece in pieces[1:]))
+
+
+def test_the_same_walk_keeps_the_line():
+    line = polished(BEFORE)
+    pieces = join(BEFORE, kept_pieces(line, BEFORE, BEFORE))
+    assert (pieces[0].begin, len(pieces[0].line)) == (0, len(BEFORE) - 1)
+    found = whole(pieces)
+    assert (found.points[:-1] == line.points[:-1]).all()
+    assert (found.cells == np.arange(len(BEFORE))).all()
+
+
+def test_what_comes_between_goes_over_stands():
+    detour = cells(*lane(0, range(10)), (1, 9), (2, 9), (2, 10), (1, 10), *lane(0, range(10, 20)))
+    after = cells(*detour.tolist(), *lane(1, range(19, -1, -1)))
+    line = polished(BEFORE)
+    kept = kept_pieces(line, BEFORE, after)
+    found = whole(join(after, kept))
+    assert (np.diff(found.cells) >= 0).all()
+    raw = found.points[found.state == RAW]
+    assert {(20.0, 90.0), (20.0, 100.0)} <= set(map(tuple, raw.tolist()))
+    assert np.count_nonzero(found.state == POLISHED) > 30
+    for piece in kept:
+        assert (piece.line.points == line.points[piece.begin :][: len(piece.line)]).all()
+
+
+def test_a_part_driven_the_other_way_is_kept_backward():
+    after = cells(*lane(0, range(5)), *lane(1, range(4, 20)), *lane(0, range(19, 4, -1)))
+    line = polished(BEFORE)
+    pieces = join(after, kept_pieces(line, BEFORE, after))
+    found = whole(pieces)
+    turned = [piece for piece in pieces if piece.backward]
+    assert len(turned) == 1
+    for piece in turned:
+        there = line.points[piece.begin :][: len(piece.line)]
+        assert (piece.line.points == there[::-1]).all()
+    assert (np.diff(found.cells) >= 0).all()
+    at = np.rint(found.points / 10.0 - np.array((0.05, 0.0))).astype(int)
+    assert (at == after[found.cells]).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_joint_leads_where_it_is_not_clear(seed):
+    rng = np.random.default_rng(seed)
+    walls = rng.random((60, 210)) < 0.02
+
+    def is_clear(a, b):
+        ways = np.linspace(a, b, 40)
+        return not walls[tuple(np.rint(ways).astype(int).T)].any()
+
+    order = rng.permutation(2)
+    lanes = [lane(0, range(20)), lane(1, range(19, -1, -1))]
+    after = cells(*lanes[order[0]], *lanes[order[1]])
+    line = polished(BEFORE)
+    pieces = join(after, kept_pieces(line, BEFORE, after), is_clear)
+    for piece, behind in pairwise(pieces):
+        if behind.begin >= 0:
+            assert is_clear(piece.line.points[-1], behind.line.points[0])
+    found = whole(pieces)
+    assert (np.hypot(*np.diff(found.points, axis=0).T) >= 0.3).all()
+    assert (np.diff(found.cells) >= 0).all()

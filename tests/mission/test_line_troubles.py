@@ -1,0 +1,109 @@
+"""The line of a mission on maps and with robots that nobody would wish for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fasaco_edge.bench.floor import SweepingRobot, judge_floor
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.lattice import Footprint
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.config import Sweeping
+from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.core.mission import Mission
+from tests.grid.test_floor import room
+from tests.mission.test_line import CONFIG, RADIUS_M, ROBOT, Robot, assert_clear
+
+PIXEL_M = 0.05
+
+
+def grid_of(free, origin=(0.0, 0.0)):
+    """Return a map of pixels that are free or occupied."""
+    pixels = np.where(free, 0, 100).astype(np.int8)
+    return OccupancyGrid(GridGeometry(*pixels.shape, PIXEL_M, Pose2D(*origin)), pixels)
+
+
+def finish(grid, at, config=CONFIG):
+    """Let a robot carry a mission out; return its figures and the mission."""
+    robot = Robot(Mission(config), at)
+    robot.tell(MapReceived(grid))
+    assert_clear(robot, grid)
+    robot.finish()
+    return judge_floor(grid, np.array([*robot.trail, robot.at]), ROBOT).figures, robot.mission
+
+
+@pytest.mark.parametrize("tool_m", [0.17, 0.5])
+def test_a_tool_much_narrower_or_wider_than_the_robot(tool_m):
+    grid = room(2.4, 1.8)
+    cell_m = tool_m * 0.92
+    sweeping = Sweeping(tool_m, 1_000_000, CONFIG.sweeping.line)
+    config = replace(CONFIG, footprint=Footprint(cell_m, RADIUS_M), sweeping=sweeping)
+    robot = Robot(Mission(config))
+    robot.tell(MapReceived(grid))
+    robot.finish()
+    tool = SweepingRobot(tool_m, RADIUS_M, 0.25, 1.5)
+    figures = judge_floor(grid, np.array(robot.trail), tool).figures
+    assert figures.swept_share > 0.95
+    assert figures.illegal_share == 0.0
+
+
+def test_a_free_line_that_is_too_narrow_for_the_robot():
+    free = np.zeros((40, 80), np.bool_)
+    free[20, 4:76] = True
+    robot = Robot(Mission(CONFIG), (2.0, 1.025))
+    robot.tell(MapReceived(grid_of(free)))
+    assert robot.mission.state is State.BLOCKED
+    assert "too close" in robot.mission.reason
+    assert not robot.line
+
+
+def test_a_free_line_as_wide_as_the_robot():
+    free = np.zeros((40, 80), np.bool_)
+    free[16:24, 4:76] = True
+    figures, _ = finish(grid_of(free), (2.0, 1.0))
+    assert figures.swept_share > 0.9
+    assert figures.illegal_share == 0.0
+
+
+def test_a_building_with_no_straight_wall():
+    y, x = np.mgrid[:90, :110]
+    angle = np.arctan2(y - 45, x - 55)
+    free = np.hypot(y - 45, x - 55) < 32 + 6 * np.sin(3 * angle + 1)
+    free &= np.hypot(y - 50, x - 60) > 8
+    figures, _ = finish(grid_of(free), (1.9, 2.2))
+    assert figures.swept_share > 0.95
+    assert figures.illegal_share == 0.0
+
+
+def test_walls_of_single_pixels_are_not_driven_through():
+    free = np.zeros((66, 90), np.bool_)
+    free[1:-1, 1:-1] = True
+    free[1:50, 30] = free[20:-1, 60] = False
+    free[40, 70] = False
+    figures, mission = finish(grid_of(free), (0.8, 0.8))
+    assert figures.swept_share > 0.95
+    assert figures.illegal_share == 0.0
+    assert "every reachable cell" in mission.reason
+
+
+def test_a_map_that_turns_by_a_degree_with_each_message():
+    grid = room(3.0, 2.4)
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(grid))
+    origin, turned = grid.geometry.origin, grid
+    for degrees in range(1, 7):
+        robot.drive(8)
+        yaw = math.radians(degrees % 4)
+        geometry = replace(grid.geometry, origin=replace(origin, yaw=yaw))
+        turned = OccupancyGrid(geometry, grid.cells)
+        robot.tell(MapReceived(turned))
+        if robot.line:
+            assert_clear(robot, turned)
+    robot.tell(MapReceived(grid))
+    robot.finish()
+    assert_clear(robot, grid)
+    assert robot.mission.floor_to_sweep().left_m2 < 0.5

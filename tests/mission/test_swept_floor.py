@@ -1,0 +1,404 @@
+"""Swept floor is kept by pixel, as the tool passes over its centre."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.mission.coverage.floor_tiles import (
+    FLOOR_TILE,
+    NO_FLOOR,
+    PIXEL_M,
+    pixels_under,
+)
+from fasaco_edge.mission.coverage.pose_scatter import PoseScatter
+from fasaco_edge.mission.coverage.steady_track import SteadyTrack
+from fasaco_edge.mission.coverage.swept_floor import (
+    ANYWHERE,
+    DROPPED_FLOOR_TILES,
+    JUMP_TOOLS,
+    MOST_AHEAD,
+    MOST_FLOOR_TILES,
+    SweptFloor,
+)
+from fasaco_edge.mission.map.loop_closure import Motion, uncertain_floor
+from tests.mission.world import CELL, Drive, MapReceived, building, pose_at, rectangle
+
+TOOL = 0.3
+AROUND = Window(-80, -80, 80, 120)
+
+
+def drive(*points, tool_m=TOOL):
+    """The floor of a drive over points (x, y) [m]."""
+    floor = SweptFloor(tool_m)
+    for x, y in points:
+        floor.record(Pose2D(x, y))
+    return floor
+
+
+def centres(window):
+    """x, y [m] of the centres of a window's pixels."""
+    rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1] + 0.5
+    return cols * PIXEL_M, rows * PIXEL_M
+
+
+def distances(points, window):
+    """How far each pixel's centre lies from the line through points [m], (rows, cols)."""
+    x, y = centres(window)
+    nearest = np.full(x.shape, np.inf)
+    for (ax, ay), (bx, by) in zip(points, [*points[1:], points[-1]], strict=True):
+        for share in np.linspace(0.0, 1.0, 80):
+            at = ax + share * (bx - ax), ay + share * (by - ay)
+            nearest = np.minimum(nearest, np.hypot(x - at[0], y - at[1]))
+    return nearest
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2)), max_size=3),
+    st.sampled_from([0.17, 0.3, 0.5]),
+)
+def test_a_drive_sweeps_what_its_twin_finds_under_many_discs(moves, tool_m):
+    """The twin walks each way in tiny steps and asks at every one what lies under the tool."""
+    points = np.cumsum([(0.0, -0.1), *moves], axis=0).tolist()
+    swept = drive(*points, tool_m=tool_m).swept_in(AROUND)
+    nearest = distances(points, AROUND)
+    sure = abs(nearest - tool_m / 2) > 1e-3
+    assert np.array_equal(swept[sure], (nearest < tool_m / 2)[sure])
+
+
+def test_all_that_is_swept_is_counted_once():
+    floor = drive((0.0, 0.0), (0.5, 0.0), (0.0, 0.0), (0.5, 0.0))
+    assert floor.pixels == np.count_nonzero(floor.swept_in(AROUND)) > 0
+    assert floor.swept_m2 == pytest.approx(0.5 * TOOL + math.pi * TOOL**2 / 4, rel=0.05)
+    changes = floor.changes
+    floor.record(Pose2D(0.4, 0.0))
+    assert floor.changes == changes
+
+
+def test_a_jump_is_no_drive():
+    jumped = drive((0.0, 0.0), (JUMP_TOOLS * TOOL + 0.01, 0.0))
+    assert not jumped.swept_in(Window(-1, 10, 1, 14)).any()
+    assert drive((0.0, 0.0), (JUMP_TOOLS * TOOL, 0.0)).swept_in(Window(-1, 10, 1, 14)).all()
+
+
+def test_where_the_way_is_unknown_nothing_is_swept():
+    floor = drive((0.0, 0.0))
+    floor.break_track()
+    floor.record(Pose2D(0.5, 0.0))
+    assert not floor.swept_in(Window(-1, 8, 1, 12)).any()
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4, math.pi / 2, -2.0])
+@pytest.mark.parametrize("resolution", [0.011, 0.025, 0.3])
+def test_it_is_carried_onto_another_raster_by_the_centres_of_its_pixels(yaw, resolution):
+    floor = drive((0.0, 0.0), (0.5, 0.2), (0.1, 0.4))
+    geometry = GridGeometry(90, 300, resolution, Pose2D(-0.703, -0.311, yaw))
+    carried = floor.swept_on(geometry)
+    for row, col in np.argwhere(np.ones(carried.shape))[::37].tolist():
+        x, y = geometry.to_map(col + 0.5, row + 0.5)
+        i, j = math.floor(y / PIXEL_M), math.floor(x / PIXEL_M)
+        assert carried[row, col] == floor.swept_in(Window(i, j, i + 1, j + 1))[0, 0]
+    part = Window(20, 30, 61, 290)
+    assert np.array_equal(floor.swept_on(geometry, part), carried[20:61, 30:290])
+
+
+def test_far_from_0_it_is_the_same():
+    near = drive((0.1, 0.0), (0.4, 0.2)).swept_in(AROUND)
+    x, y = 9_000_000.0, -1_000_000.0
+    window = AROUND.moved(round(y / PIXEL_M), round(x / PIXEL_M))
+    assert np.array_equal(drive((x + 0.1, y), (x + 0.4, y + 0.2)).swept_in(window), near)
+
+
+def test_what_is_inside_is_forgotten_but_not_what_lies_under_the_tool():
+    floor = drive((0.0, 0.0), (0.4, 0.0), (0.8, 0.0))
+    here = drive((0.8, 0.0)).swept_in(AROUND)
+    before = floor.swept_in(AROUND)
+    floor.forget(lambda window: centres(window)[0] > 0.3)
+    assert np.array_equal(floor.swept_in(AROUND), (before & (centres(AROUND)[0] < 0.3)) | here)
+    assert floor.pixels == np.count_nonzero(floor.swept_in(AROUND))
+    changes = floor.changes
+    floor.break_track()
+    floor.forget(lambda window: np.ones((window.rows, window.cols), bool))
+    assert floor.pixels == 0
+    assert floor.changes > changes
+    assert not floor.snapshot().tiles
+
+
+def test_a_snapshot_stays_as_it_was_and_shares_what_has_not_changed():
+    floor = drive((0.1, 0.1), (5.0, 0.1))
+    first = floor.snapshot()
+    kept = first.swept_in(AROUND)
+    floor.record(Pose2D(5.1, 0.1))
+    second = floor.snapshot()
+    assert second.tiles[0, 0] is first.tiles[0, 0]
+    assert second.tiles[0, 1] is not first.tiles[0, 1]
+    assert second.pixels == floor.pixels > first.pixels
+    assert np.array_equal(first.swept_in(AROUND), kept)
+    with pytest.raises(ValueError, match="read-only"):
+        first.tiles[0, 0][0, 0] = 1
+    with pytest.raises(TypeError):
+        first.tiles[9, 9] = first.tiles[0, 0]
+
+
+def test_a_restored_floor_goes_on_as_if_nothing_had_been():
+    points = [(0.1 * step, 0.03 * step) for step in range(40)]
+    whole, begun = drive(*points, *points[::-1]), drive(*points)
+    restored = SweptFloor.restored(begun.snapshot(), TOOL)
+    assert (restored.pixels, restored.changes) == (begun.pixels, begun.changes)
+    for x, y in points[::-1]:
+        restored.record(Pose2D(x, y))
+    window = Window(-20, -20, 100, 200)
+    assert np.array_equal(restored.swept_in(window), whole.swept_in(window))
+    assert restored.pixels == whole.pixels
+    assert SweptFloor.restored(NO_FLOOR, TOOL).pixels == 0
+
+
+def test_poses_that_jump_all_over_the_world_take_a_bounded_floor():
+    floor = SweptFloor(TOOL)
+    tile_m = FLOOR_TILE * PIXEL_M
+    for number in range(MOST_FLOOR_TILES + 10):
+        row, col = divmod(number, 100)
+        floor.record(Pose2D((col + 0.5) * tile_m, (row + 0.5) * tile_m))
+    tiles = floor.snapshot().tiles
+    assert MOST_FLOOR_TILES - DROPPED_FLOOR_TILES < len(tiles) <= MOST_FLOOR_TILES
+    assert floor.dropped == DROPPED_FLOOR_TILES
+    assert floor.pixels == floor.snapshot().pixels
+    # Those far from where the robot is were dropped.
+    assert (0, 0) not in tiles
+    assert divmod(MOST_FLOOR_TILES + 9, 100) in tiles
+
+
+def wobbling(sigma_m, poses=400):
+    """Poses along a straight lane, every 2.5 cm, with errors."""
+    errors = np.random.default_rng(1).normal(0.0, sigma_m, (poses, 2))
+    return [(0.025 * step + dx, dy) for step, (dx, dy) in enumerate(errors.tolist())]
+
+
+@pytest.mark.parametrize("sigma_m", [0.0, 0.01, 0.03])
+def test_the_scatter_of_poses_is_what_they_err(sigma_m):
+    scatter = PoseScatter()
+    for x, y in wobbling(sigma_m):
+        scatter.note(Pose2D(x, y))
+    assert scatter.sigma_m == pytest.approx(sigma_m, rel=0.4)
+
+
+def test_few_poses_tell_no_scatter_and_corners_are_none():
+    scatter = PoseScatter()
+    for number, (x, y) in enumerate([(0.25 * min(n, 6), 0.25 * max(n - 6, 0)) for n in range(13)]):
+        scatter.note(Pose2D(x, y))
+        assert scatter.sigma_m == 0.0, number
+
+
+@pytest.mark.parametrize("sigma_m", [0.0, 0.01, 0.03])
+def test_what_is_said_to_be_swept_is_swept_however_poses_scatter(sigma_m):
+    """A straight lane: all that the poses add to either side is wrong."""
+    points = wobbling(sigma_m)
+    floor = drive(*points)
+    window = Window(-20, 40, 20, 360)
+    swept = floor.swept_in(window)
+    right = abs(centres(window)[1]) <= TOOL / 2
+    assert np.count_nonzero(swept & right) >= 0.995 * np.count_nonzero(swept)
+    assert np.count_nonzero(swept & right) >= 0.85 * np.count_nonzero(right)
+
+
+def test_exact_poses_are_kept_at_once_and_others_seen_at_once():
+    exact, scattered = drive(*wobbling(0.0)), drive(*wobbling(0.03))
+    everywhere = Window(-40, -40, 40, 440)
+    assert np.count_nonzero(exact.swept_in(everywhere)) == exact.pixels == exact.snapshot().pixels
+    kept = scattered.snapshot().swept_in(everywhere)
+    seen = scattered.swept_in(everywhere)
+    assert np.count_nonzero(kept) == scattered.pixels < np.count_nonzero(seen)
+    assert not (kept & ~seen).any()
+    # To where the robot is now, and no farther than the tool reaches.
+    assert seen[:, 40 + 399].any()
+    changes = scattered.changes
+    scattered.break_track()
+    assert scattered.pixels == np.count_nonzero(scattered.swept_in(everywhere))
+    assert scattered.changes > changes
+    assert np.array_equal(scattered.swept_in(everywhere), seen)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.5])
+def test_what_is_not_kept_yet_is_carried_onto_another_raster_too(yaw):
+    floor = drive(*wobbling(0.03, 60))
+    geometry = GridGeometry(60, 100, 0.025, Pose2D(-0.5, -0.5, yaw))
+    seen = floor.swept_on(geometry)
+    floor.break_track()
+    assert np.array_equal(seen, floor.swept_on(geometry))
+
+
+def test_a_pose_that_is_told_again_hides_no_scatter():
+    """As each map tells the mission to look at the newest pose again."""
+    once, twice = SweptFloor(TOOL), SweptFloor(TOOL)
+    for x, y in wobbling(0.03, 60):
+        for floor, times in ((once, 1), (twice, 2)):
+            for _ in range(times):
+                floor.record(Pose2D(x, y))
+    assert once.changes == twice.changes
+    assert np.array_equal(once.swept_in(AROUND), twice.swept_in(AROUND))
+
+
+@pytest.mark.parametrize("sigma_m", [0.0, 0.01, 0.03])
+def test_places_on_a_steady_track_are_as_right_as_they_say(sigma_m):
+    track = SteadyTrack(TOOL)
+    poses = wobbling(sigma_m)
+    places = [place for x, y in poses for place in track.add(Pose2D(x, y))] + track.end()
+    assert len(places) == len(poses)
+    off, said = (np.array(each) for each in zip(*((p.y, p.error_m) for p in places), strict=True))
+    assert (abs(off) <= said).mean() >= 0.9
+    # The first and the last have few poses to both sides.
+    assert said[40:-40].max(initial=0.0) <= max(0.6 * 2 * sigma_m, PIXEL_M / 2)
+    assert not track.ahead()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_after_a_loop_closure_only_what_was_swept_wherever_the_map_lay_counts(seed):
+    rng = np.random.default_rng(seed)
+    floor = drive(*[(0.1 * (n % 12), 0.12 * (n // 12)) for n in range(120)])
+    start = Pose2D(0.6, 0.6, 0.3)
+    jump = rng.uniform(-0.2, 0.2, 3)
+    motion = Motion(start, Pose2D(0.6 + jump[0], 0.6 + jump[1], 0.3 + 0.2 * jump[2]))
+    before = floor.snapshot()
+    floor.break_track()
+    floor.forget(uncertain_floor(before, motion))
+    left = floor.swept_in(AROUND)
+    x, y = (each[left] for each in centres(AROUND))
+    assert len(x) > 100
+    for share in np.linspace(0.0, 1.0, 33):
+        back_x, back_y = motion.back(float(share), x, y)
+        rows, cols = np.floor(back_y / PIXEL_M).astype(int), np.floor(back_x / PIXEL_M).astype(int)
+        was = before.swept_in(Window(-200, -200, 300, 300))[rows + 200, cols + 200]
+        assert was.mean() > 0.98
+    # What is farther from any border than it moved is sure.
+    reach = math.hypot(jump[0], jump[1]) + 0.1
+    inner = (centres(AROUND)[0] > reach) & (centres(AROUND)[0] < 1.1 - reach)
+    inner &= (centres(AROUND)[1] > reach) & (centres(AROUND)[1] < 1.08 - reach)
+    assert left[inner].all()
+
+
+def test_who_stood_still_forgets_nothing():
+    floor = drive(*[(0.1 * n, 0.0) for n in range(20)])
+    doubt = uncertain_floor(floor.snapshot(), Motion(Pose2D(0, 0), Pose2D(0, 0)))
+    assert not (doubt(AROUND) & floor.swept_in(AROUND)).any()
+
+
+def test_a_mission_sweeps_the_floor_it_drives_over():
+    drive = Drive((0, 0), MapReceived(building("....", "....")), pose_at(0, 0))
+    drive.plan()
+    drive.finish()
+    floor, snapshot = drive.mission.floor, drive.mission.snapshot()
+    # All but the corners, at a wall, that a round tool leaves.
+    assert floor.swept_m2 == pytest.approx(8 * CELL**2, rel=0.1)
+    assert snapshot.floor.pixels == floor.pixels
+    drive.command("reset")
+    assert floor.swept_m2 > drive.mission.floor.swept_m2 > 0, "where it stands"
+
+
+def test_a_second_pass_forgets_the_floor_of_its_zone():
+    drive = Drive((0, 0), MapReceived(building("........")), pose_at(0, 0))
+    drive.plan()
+    drive.finish()
+    whole = drive.mission.floor.pixels
+    zone = {"name": "east", "polygon": rectangle(0, 0, 1, 4), "passes": 1}
+    drive.command("start", {"zones": [zone]})
+    assert drive.mission.floor.pixels == pytest.approx(0.5 * whole, rel=0.15)
+    mid = round(4 * CELL / PIXEL_M)
+    swept = drive.mission.floor.swept_in(Window(0, mid - 10, 10, mid + 10))
+    assert not swept[:, :10].any()
+    assert swept[:, 10:].any()
+
+
+def test_the_floor_before_a_restart_counts_until_a_map_contradicts_it():
+    rooms = ["#" * 30, *("#" + "." * 28 + "#" for _ in range(8)), "#" * 30]
+    before = Drive((1, 1), MapReceived(building(*rooms)), pose_at(1, 1))
+    for col in range(2, 26):
+        before.tell(pose_at(1, col))
+    kept = before.mission.snapshot()
+
+    def resumed(*rows):
+        drive = Drive((1, 1))
+        drive.mission.restore_ledger(kept)
+        drive.tell(MapReceived(building(*rows)), pose_at(1, 1))
+        return drive.mission.floor
+
+    assert resumed(*rooms).pixels >= kept.floor.pixels
+    other = ["#" * 30, *("#." + "#." * 14 for _ in range(8)), "#" * 30]
+    assert resumed(*other).swept_m2 < CELL**2
+
+
+@pytest.mark.parametrize("sigma_m", [0.0, 0.03])
+def test_whoever_looks_again_where_it_says_knows_it_all(sigma_m):
+    """A raster that is kept up to date by the windows of changes alone."""
+    floor, geometry = SweptFloor(TOOL), GridGeometry(70, 460, 0.025, Pose2D(-0.5, -0.8, 0.1))
+    whole, known, changes = Window(0, 0, 70, 460), np.zeros((70, 460), bool), 0
+    for number, (x, y) in enumerate(wobbling(sigma_m)):
+        floor.record(Pose2D(x, y))
+        if number == 200:
+            floor.break_track()
+        if number == 300:
+            floor.forget(lambda window: centres(window)[0] < 4.0)
+        if number % 7:
+            continue
+        news = floor.changed_since(changes)
+        part = news and pixels_under(news, geometry).intersection(whole)
+        if part is not None:
+            known[part.slices_in(whole)] = floor.swept_on(geometry, part)
+        changes = floor.changes
+        assert np.array_equal(known, floor.swept_on(geometry)), number
+    assert floor.changed_since(floor.changes) is None
+    assert floor.changed_since(0) == ANYWHERE, "long ago"
+
+
+def test_it_is_shown_in_pixels_where_these_are_not_too_many():
+    floor = drive((0.1, 0.1), (0.5, 0.2))
+    shown = floor.snapshot().shown(10**6, "map", 7)
+    assert (shown.frame, shown.stamp_ns, shown.geometry.resolution) == ("map", 7, PIXEL_M)
+    assert set(np.unique(shown.cells).tolist()) == {0, 100}
+    assert np.array_equal(shown.cells > 0, floor.swept_on(shown.geometry))
+    assert np.count_nonzero(shown.cells) == floor.pixels
+
+
+@pytest.mark.parametrize("most", [60_000, 1_000, 300, 70, 20, 5])
+def test_where_pixels_are_too_many_it_is_shown_in_squares_by_the_share_swept(most):
+    floor = drive(*[(-1.0 + 0.05 * n, 0.3) for n in range(90)])
+    shown = floor.snapshot().shown(most, "map", 0)
+    rows, cols = shown.cells.shape
+    assert shown.cells.size <= most < 64_000
+    side = round(shown.geometry.resolution / PIXEL_M)
+    corner = shown.geometry.origin
+    row, col = round(corner.y / PIXEL_M), round(corner.x / PIXEL_M)
+    swept = floor.swept_in(Window(row, col, row + rows * side, col + cols * side))
+    shares = swept.reshape(rows, side, cols, side).mean(axis=(1, 3))
+    assert swept.sum() == floor.pixels
+    assert np.array_equal(shown.cells, np.floor(100 * shares + 1e-9))
+
+
+def test_what_does_not_fit_in_the_widest_squares_is_not_shown_and_nothing_is_a_blank():
+    astray = drive((0.0, 0.0), (9000.0, 9000.0))
+    assert astray.snapshot().shown(10**6, "map", 0) is None
+    blank = NO_FLOOR.shown(10**6, "map", 0)
+    assert blank.cells.size
+    assert not blank.cells.any()
+
+
+def test_a_map_that_jumps_by_thousands_of_kilometres_leaves_nothing_sure():
+    floor = drive(*[(0.1 * n, 0.0) for n in range(20)])
+    before = floor.snapshot()
+    floor.break_track()
+    floor.forget(uncertain_floor(before, Motion(Pose2D(0, 0), Pose2D(9e6, -1e7, -4.4))))
+    assert floor.pixels == 0
+
+
+def test_poses_that_scatter_over_a_hall_take_no_memory():
+    errors = np.random.default_rng(0).normal(0.0, 8.0, (60, 2)).tolist()
+    floor = drive(*[(2.0 * n + dx, dy) for n, (dx, dy) in enumerate(errors)], tool_m=10.0)
+    for n, (dx, dy) in enumerate(errors):
+        floor.record(Pose2D(120.0 + 9.0 * n + 0.1 * dx, 0.1 * dy))
+        place, ahead = floor._swept_ahead()
+        assert ahead.size <= MOST_AHEAD
+        assert ahead.shape == (place.rows, place.cols)
+    assert floor.pixels
