@@ -31,7 +31,13 @@ from fasaco_edge.host.durable import make_folder, sync_folder
 from fasaco_edge.host.files import why_not_trusted
 from fasaco_edge.kernels import release
 from fasaco_edge.kernels.release import COMPILERS, KERNEL_SUFFIX, sources_digest
-from fasaco_edge.kernels.sealed import UnsoundFileError, read_sealed, sweep, write_sealed
+from fasaco_edge.kernels.sealed import (
+    MissingFileError,
+    UnsoundFileError,
+    read_sealed,
+    sweep,
+    write_sealed,
+)
 
 LOG = logging.getLogger(__name__)
 
@@ -253,11 +259,10 @@ def missing_from(folder: Path, user: int | None = None) -> str:
         return release.why_unusable(user)
     if why := why_not_trusted(folder, user):
         return why
-    place = _note_of(folder, processor())
-    if not os.path.lexists(place):
-        return _never(folder, user)
     try:
-        note = json.loads(bytes(read_sealed(place, user)))
+        note = json.loads(bytes(read_sealed(_note_of(folder, processor()), user)))
+    except MissingFileError:
+        return _never(folder, user)
     except UnsoundFileError as why_not:
         return f"the list of them {why_not}"
     for name in note["files"]:

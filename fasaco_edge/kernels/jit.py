@@ -219,8 +219,10 @@ def lean_kernel(function: Kernel) -> Kernel:
 
 def inlined(function: Kernel) -> Kernel:
     """Compile a small function without allocations into each kernel that calls it."""
-    compiled: Kernel = _compile_into(function)
-    return compiled
+    compiled = _compile_into(function)
+    if not numba.config.DISABLE_JIT:
+        _take_constants_as_values(compiled)
+    return cast(Kernel, compiled)
 
 
 def note_all_compiled() -> None:

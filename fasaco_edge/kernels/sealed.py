@@ -32,6 +32,10 @@ class UnsoundFileError(Exception):
     """A file cannot be used; the text says why, without its name."""
 
 
+class MissingFileError(UnsoundFileError):
+    """There is no such file."""
+
+
 def _head_of(payload: bytes | memoryview) -> bytes:
     return _WORD + hashlib.sha256(payload).hexdigest().encode() + b"\n"
 
@@ -44,13 +48,13 @@ def read_sealed(file: Path, user: int | None = None) -> memoryview:
         user: whose it may be, beside root; without it this process's.
 
     Raises:
-        UnsoundFileError: it is missing, damaged or cannot be read, or others could have
-            written it.
+        MissingFileError: there is no such file.
+        UnsoundFileError: it is damaged or cannot be read, or others could have written it.
     """
     try:
         sealed = read_trusted(file, user)
     except FileNotFoundError:
-        raise UnsoundFileError("is gone") from None
+        raise MissingFileError("is gone") from None
     except OSError as error:
         raise UnsoundFileError(f"cannot be read: {error.strerror}") from error
     except UntrustedFileError as why:

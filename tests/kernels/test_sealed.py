@@ -70,12 +70,27 @@ def test_a_kernel_that_is_lost_while_it_runs_is_not_noted_as_there(installed):
 def test_a_kernel_that_cannot_be_read_once_more_stays_and_is_not_noted(installed):
     installed.tell("seven.tell(note=False)")
     files = kernel_files(installed.cache)
-    with Watch([installed.cache], Failure(Kind.OPEN, 6, "EMFILE")) as watch:
+    with Watch([installed.cache], Failure(Kind.OPEN, 8, "EMFILE")) as watch:
         told = installed.tell(env=watch.environment)
         assert watch.failed_on() == str(files[0])
     assert "could not be read again" in told.warnings[0]
     assert kernel_files(installed.cache) == files
     assert (installed.tell().compiled, installed.tell().missing) == (0, "")
+
+
+@pytest.mark.skipif(bool(why_not()), reason=why_not())
+@pytest.mark.parametrize("kind", [Kind.OPEN, Kind.LOOK])
+def test_a_list_that_the_disk_does_not_give_is_told_as_such(installed, kind):
+    installed.tell()
+    (note,) = installed.cache.rglob("complete-*")
+    told = set()
+    for number in range(1, 9):
+        with Watch([installed.cache], Failure(kind, number, "EIO")) as watch:
+            missing = installed.tell(env=watch.environment).missing
+            if watch.failed_on() == str(note):
+                told.add(missing)
+    assert told <= {"", "the list of them cannot be read: Input/output error"}
+    assert told or kind is Kind.LOOK
 
 
 @pytest.mark.parametrize("harm", ALL)
