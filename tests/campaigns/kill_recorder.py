@@ -24,7 +24,7 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.recording.read.run import RecordedSamples
-from tests.support.recordings import bus_on_free_port, read_column, recorder_process
+from tests.support.recordings import begun_parts, bus_on_free_port, read_column, recorder_process
 from tests.support.scripted_mission import Mission
 
 GOAL_LOST_S = 1.0
@@ -82,7 +82,7 @@ def kill_once(bus: Bus, endpoint: str, folder: Path, life_s: float) -> Kill:
         recorder.process.kill()
         recorder.process.wait()
     torn = len(repair_folder(folder))
-    parts = list(folder.glob("*.rrd"))
+    parts = begun_parts(folder)
     drawn_ns = [
         int(at_ns)
         for part in parts

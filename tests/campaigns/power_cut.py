@@ -33,7 +33,7 @@ import yaml
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.errors import LedgerFileError, UnreadableRecording
-from fasaco_edge.recording.read.repair import repair_folder, scan_recording
+from fasaco_edge.recording.read.repair import repair_folder
 from tests.campaigns.file_calls import Call, Kind, Watch, why_not
 from tests.campaigns.power_states import Cut, Disk, Spread, cuts_of
 from tests.campaigns.roaming import entries, roaming_robot
@@ -42,7 +42,7 @@ from tests.daemon.test_commands import command
 from tests.support.ledgers import CELL_M, Cell, contents
 from tests.support.outsider import Outsider
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
-from tests.support.recordings import read_summary
+from tests.support.recordings import begun_parts, read_summary
 
 # At so small a distance from the border of "under the tool", rounding may decide.
 DOUBT_M = 0.01
@@ -212,10 +212,7 @@ def _recordings(folder: Path) -> tuple[bool, str]:
     with tempfile.TemporaryDirectory() as scratch:
         copied = Path(shutil.copytree(folder, Path(scratch, RECORDINGS)))
         is_torn = bool(repair_folder(copied))
-        for part in sorted(copied.glob("*.rrd")):
-            with part.open("rb") as file:
-                if scan_recording(file) is None:
-                    continue  # nothing of it was ever on the disk
+        for part in begun_parts(copied):
             try:
                 read_summary(part)
             except UnreadableRecording as error:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from fasaco_edge.recording.read.repair import (
     HEADER_BYTES,
     MOST_ZEROS,
+    Scan,
     repair_folder,
     repair_recording,
     scan_recording,
@@ -68,9 +69,21 @@ def test_a_footer_that_is_followed_by_zeros_is_cut(tmp_path, kept):
     assert path.read_bytes() == WHOLE
 
 
-@pytest.mark.parametrize("content", [b"", b"RRF", b"hello, this is a text of some length"])
+@pytest.mark.parametrize("content", [b"", b"RR", b"RRF2", b"RRF2" + bytes(40), bytes(40)])
+def test_a_part_whose_writer_was_killed_before_its_header_is_one_without_frames(tmp_path, content):
+    path = written(tmp_path, content)
+    with path.open("rb") as recording:
+        scan = scan_recording(recording)
+    assert scan == Scan(0, 0, len(content), has_footer=False)
+    assert repair_recording(path) is None
+    assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize("content", [b"RX", b"hello", b"hello, this is a text of some length"])
 def test_what_is_no_recording_is_left_alone(tmp_path, content):
     path = written(tmp_path, content)
+    with path.open("rb") as recording:
+        assert scan_recording(recording) is None
     assert repair_recording(path) is None
     assert path.read_bytes() == content
 

@@ -11,6 +11,7 @@ import pytest
 
 pytest.importorskip("rerun")
 
+from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.review.drive import walk_figures
 from fasaco_edge.review.page import page_of
 from fasaco_edge.review.pictures import FIELDS, branching_panel, covered_share, draw_fields
@@ -291,6 +292,16 @@ def test_a_torn_file_is_read_as_far_as_it_is_whole(recording, review, tmp_path, 
     if told["coverage_from"] == "trail":
         assert told["covered_cells"] == len(set(cells))
     assert cut.duration_s <= review.duration_s
+
+
+def test_a_part_that_was_only_begun_says_nothing(recording, review, tmp_path):
+    begun = tmp_path / "begun.rrd"
+    begun.touch()
+    both = read_review([*recording.paths, begun])
+    assert both.duration_s == review.duration_s
+    begun.write_bytes(b"no recording")
+    with pytest.raises(UnreadableRecording, match="this is no recording"):
+        read_review([*recording.paths, begun])
 
 
 def test_the_command_prints_the_document(recording, told):

@@ -159,6 +159,17 @@ class RecordingSummary:
         return (self.ended_ns - self.began_ns) / 1e9
 
 
+def begun_parts(folder: Path) -> list[Path]:
+    """Return the parts in ``folder`` that hold a frame; of others nothing was on the disk yet."""
+    begun = []
+    for part in sorted(folder.glob("*.rrd")):
+        with part.open("rb") as file:
+            scan = scan_recording(file)
+        if scan is None or scan.frames:
+            begun.append(part)
+    return begun
+
+
 def read_column(path: Path, entity: str, component: str) -> Column:
     """Return what was logged over time as ``component``, "Scalars:scalars" say, of ``entity``.
 

@@ -74,13 +74,17 @@ class Repair:
 def scan_recording(recording: BinaryIO, known_bytes: int = HEADER_BYTES) -> Scan | None:
     """Walk the frames of ``recording``; None where it does not even begin as one.
 
+    A part whose writer was killed before it wrote its header is a recording without frames.
     Of ``known_bytes`` it is known that they are header and whole frames; those are not counted.
     """
     total = os.fstat(recording.fileno()).st_size
-    solid = min(_end_of_data(recording, total) + MOST_ZEROS, total)
+    data = _end_of_data(recording, total)
+    solid = min(data + MOST_ZEROS, total)
     recording.seek(0)
     header = recording.read(HEADER_BYTES)
-    if len(header) < HEADER_BYTES or not header.startswith(MAGIC) or solid < HEADER_BYTES:
+    if data < HEADER_BYTES - MOST_ZEROS and MAGIC.startswith(header[: min(data, len(MAGIC))]):
+        return Scan(0, 0, total, has_footer=False)
+    if len(header) < HEADER_BYTES or not header.startswith(MAGIC):
         return None
     end, frames, has_footer = max(known_bytes, HEADER_BYTES), 0, False
     while not has_footer:
@@ -114,7 +118,7 @@ def repair_recording(path: Path) -> Repair | None:
     """Cut ``path`` behind its last whole frame; None where nothing was torn.
 
     A recording whose writer lives is left alone: it holds a lock on the file. So is one
-    with a footer, and a file that is no recording.
+    with a footer, one without a header, and a file that is no recording.
     """
     with open(path, "r+b", opener=_open_no_link) as recording:
         try:
@@ -122,7 +126,7 @@ def repair_recording(path: Path) -> Repair | None:
         except BlockingIOError:
             return None
         scan = scan_recording(recording)
-        if scan is None or scan.has_footer or not scan.torn_bytes:
+        if scan is None or scan.has_footer or not scan.whole_bytes or not scan.torn_bytes:
             return None
         recording.truncate(scan.whole_bytes)
     return Repair(path, scan.torn_bytes)
@@ -167,8 +171,8 @@ def view(paths: Sequence[Path]) -> None:
     if importlib.util.find_spec("rerun") is None:
         raise MissingExtra("the viewer comes with rerun, which is not installed")
     with ExitStack() as copies:
-        whole = [str(copies.enter_context(_whole_part(path))) for path in paths]
-        ended = subprocess.run([*VIEWER, *whole], check=False)
+        whole = [copies.enter_context(_whole_part(path)) for path in paths]
+        ended = subprocess.run([*VIEWER, *filter(None, whole)], check=False)
     if ended.returncode:
         raise ProcessEnded(
             f"Rerun's viewer ended with {ended.returncode}",
@@ -177,8 +181,8 @@ def view(paths: Sequence[Path]) -> None:
 
 
 @contextmanager
-def _whole_part(path: Path) -> Iterator[Path]:
-    """Yield ``path``, or where its end is torn a copy of what is whole.
+def _whole_part(path: Path) -> Iterator[Path | None]:
+    """Yield ``path``, where its end is torn a copy of what is whole, None where nothing is.
 
     Raises:
         ValueError: it is no recording.
@@ -188,6 +192,9 @@ def _whole_part(path: Path) -> Iterator[Path]:
         scan = scan_recording(recording)
         if scan is None:
             raise ValueError("this is no recording")
+        if not scan.frames:
+            yield None
+            return
         if scan.has_footer or not scan.torn_bytes:
             yield path
             return
