@@ -8,7 +8,7 @@ from typing import Any
 import zenoh
 import zenoh.ext
 
-from fasaco_edge.wire.topics import Qos
+from fasaco_edge.wire.topic_types import Qos
 
 CDR = zenoh.Encoding.APPLICATION_CDR
 JSON = zenoh.Encoding.APPLICATION_JSON

@@ -39,7 +39,7 @@ from fasaco_edge.bus.queries import (
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
-from fasaco_edge.wire.topics import VOLATILE, Qos, Topic
+from fasaco_edge.wire.topic_types import VOLATILE, Qos, Topic
 
 ZENOH_VERSION = metadata.version("eclipse-zenoh")
 

@@ -21,8 +21,7 @@ from fasaco_edge.config.config import (
 )
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import from_here
-from fasaco_edge.wire.schemas import POSE_STAMPED
-from fasaco_edge.wire.topics import POSE_SCHEMAS
+from fasaco_edge.wire.schemas import POSE_SCHEMAS, POSE_STAMPED
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
 

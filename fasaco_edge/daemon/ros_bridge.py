@@ -20,7 +20,7 @@ from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.daemon.loop.inbox import poster
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, attachment, gid_of
-from fasaco_edge.wire.topics import VOLATILE, Topic
+from fasaco_edge.wire.topic_types import VOLATILE, Topic
 
 
 class RosBridge:

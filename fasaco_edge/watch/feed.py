@@ -13,7 +13,8 @@ from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.watch.robot_view import Token
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
-from fasaco_edge.wire.topics import NEWEST, PHEROMONE, TOPICS, Topic
+from fasaco_edge.wire.topic_types import NEWEST, Topic
+from fasaco_edge.wire.topics import PHEROMONE, TOPICS
 
 WATCHED = [topic for topic in TOPICS if topic.queues.watch is not None]
 # The daemon makes the field for who listens: that is asked for.

@@ -6,7 +6,8 @@ import re
 from dataclasses import dataclass
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.wire.topics import CLAIM, Topic
+from fasaco_edge.wire.topic_types import Topic
+from fasaco_edge.wire.topics import CLAIM
 
 VERSION = "@v1"
 

@@ -42,7 +42,7 @@ _AFTER_POSE = {
 
 
 def decode_pose(payload: bytes, schema: str) -> StampedPose:
-    """Return the robot's pose in a message of type ``schema``, one of ``topics.POSE_SCHEMAS``.
+    """Return the robot's pose in a message of type ``schema``, one of ``schemas.POSE_SCHEMAS``.
 
     Covariance and twist are stepped over, not looked at: publishers write NaN there for
     what they do not know.

@@ -12,3 +12,6 @@ ODOMETRY: Final = "nav_msgs/msg/Odometry"
 TF_MESSAGE: Final = "tf2_msgs/msg/TFMessage"
 PATH: Final = "nav_msgs/msg/Path"
 PHEROMONE_GRID: Final = "fasaco_msgs/msg/PheromoneGrid"
+
+POSE_SCHEMAS = (POSE_STAMPED, POSE_WITH_COVARIANCE_STAMPED, ODOMETRY)
+"""What a robot's pose may come in."""

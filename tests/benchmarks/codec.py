@@ -32,8 +32,7 @@ from fasaco_edge.wire.maps import (
 )
 from fasaco_edge.wire.paths import decode_path, encode_path
 from fasaco_edge.wire.poses import decode_pose, encode_pose_stamped
-from fasaco_edge.wire.schemas import OCCUPANCY_GRID_UPDATE, PHEROMONE_GRID
-from fasaco_edge.wire.topics import POSE_SCHEMAS
+from fasaco_edge.wire.schemas import OCCUPANCY_GRID_UPDATE, PHEROMONE_GRID, POSE_SCHEMAS
 from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 
 

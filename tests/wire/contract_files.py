@@ -16,7 +16,8 @@ import yaml
 
 from fasaco_edge.bus import access
 from fasaco_edge.host.resources import folder
-from fasaco_edge.wire.topics import QOS, QUERIES, TOPICS, Query, Topic
+from fasaco_edge.wire.topic_types import Query, Topic
+from fasaco_edge.wire.topics import QOS, QUERIES, TOPICS
 from tests.wire import make_schemas
 
 PROTOCOL = folder("protocol")

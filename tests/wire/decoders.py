@@ -10,7 +10,7 @@ from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.poses import Transform, decode_pose, decode_transforms
-from fasaco_edge.wire.topics import POSE_SCHEMAS
+from fasaco_edge.wire.schemas import POSE_SCHEMAS
 
 
 def decode_and_look(payload: bytes) -> tuple[Transform, ...]:

@@ -19,7 +19,7 @@ from fasaco_edge.wire import limits, schemas
 from fasaco_edge.wire.maps import encode_map_update
 from fasaco_edge.wire.paths import decode_path, encode_path
 from fasaco_edge.wire.poses import decode_transforms
-from fasaco_edge.wire.topics import POSE_SCHEMAS
+from fasaco_edge.wire.schemas import POSE_SCHEMAS
 from tests.wire.decoders import DECODERS
 from tests.wire.mutations import mutant, seeds_of
 from tests.wire.soundness import is_read, peak_bytes

@@ -16,7 +16,8 @@ from fasaco_edge.mission.coverage.swept_floor import MOST_FLOOR_TILES
 from fasaco_edge.mission.orders import order
 from fasaco_edge.wire import limits
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.topics import QOS, QUERIES, QUEUE_LENGTHS, TOPICS, VOLATILE
+from fasaco_edge.wire.topic_types import VOLATILE
+from fasaco_edge.wire.topics import QOS, QUERIES, QUEUE_LENGTHS, TOPICS
 from tests.wire import contract_files
 from tests.wire.contract_files import PROTOCOL, load
 

@@ -20,7 +20,8 @@ from collections import Counter, deque
 from collections.abc import Callable
 
 from fasaco_edge.bus.arrival import Arrival, Sample
-from fasaco_edge.wire.topics import NEWEST, TOPICS
+from fasaco_edge.wire.topic_types import NEWEST
+from fasaco_edge.wire.topics import TOPICS
 
 
 class RunClock:
