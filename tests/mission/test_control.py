@@ -240,6 +240,64 @@ def test_paused_it_stands_and_still_counts_what_it_passes_over():
     assert drive.visited == cells(0, 0, 6, 8) - {(5, 7)}
 
 
+def test_resumed_where_nothing_changed_it_goes_on_along_the_path_it_had():
+    drive = started(*ROOM)
+    for _ in range(5):
+        drive.go()
+    ahead, plans = drive.walk[:], drive.mission.route.plans
+    drive.command("pause")
+    drive.tell(pose_at(*drive.cell), MapReceived(building(*ROOM)), after=60.0)
+    decision = drive.command("resume")
+    assert (decision.plan, decision.path.reason) == (None, "resumed")
+    assert drive.mission.state is State.COVERING
+    assert (drive.walk, drive.mission.route.plans) == (ahead, plans)
+    drive.finish()
+
+
+def test_a_robot_that_rolls_on_when_it_is_paused_goes_on_from_there():
+    drive = started(*ROOM)
+    for _ in range(5):
+        drive.go()
+    ahead = drive.walk[:]
+    drive.command("pause")
+    drive.cell = ahead[0]
+    drive.tell(pose_at(*drive.cell))
+    assert drive.command("resume").plan is None
+    assert drive.walk == ahead[1:]
+
+
+def test_what_a_map_changed_during_a_pause_is_mended_in_the_path_it_had():
+    drive = started(*ROOM)
+    for _ in range(5):
+        drive.go()
+    ahead = drive.walk[:]
+    drive.command("pause")
+    drive.tell(patch("#", at=ahead[-1]))
+    plan = drive.command("resume").plan
+    assert [tuple(cell) for cell in plan.problem.before[1:].tolist()] == ahead
+    drive.plan()
+    drive.finish()
+
+
+def test_a_plan_that_a_pause_came_before_is_made_when_it_goes_on():
+    drive = started(*ROOM)
+    drive.tell(MapReceived(building("........", *ROOM)))
+    drive.command("pause")
+    assert drive.plan().path is None
+    drive.command("resume")
+    drive.plan()
+    drive.finish()
+    assert drive.visited == cells(0, 0, 7, 8)
+
+
+def test_another_order_after_a_pause_is_planned_from_nothing():
+    drive = started(*ROOM)
+    drive.command("pause")
+    drive.command("cancel")
+    plan = drive.command("start").plan
+    assert plan.problem.before is None or not len(plan.problem.before)
+
+
 def test_paused_while_planning_the_plan_comes_too_late():
     drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
     drive.command("pause")

@@ -249,6 +249,26 @@ def test_a_plan_goes_on_from_the_cell_that_the_robot_is_nearest_to():
         assert math.dist(stand, robot.at) < 0.65 * CELL_M
 
 
+def test_a_pause_leaves_the_line_as_it_was():
+    mission = Mission(CONFIG)
+    robot = Robot(mission)
+    robot.tell(MapReceived(room(4.5, 3.5)))
+    robot.drive(20)
+    # As it is polished by now: of what lies further on the robot was not told yet.
+    before = mission._line._ahead.xy()[1:]
+    robot.tell(CommandReceived(1, "pause"))
+    assert robot.line == []
+    # A robot that brakes comes a little further.
+    (x, y), (to_x, to_y) = robot.at, before[0]
+    share = STEP_M / math.dist(robot.at, before[0])
+    robot.at = x + share * (to_x - x), y + share * (to_y - y)
+    robot.tell()
+    robot.tell(CommandReceived(2, "resume"))
+    assert robot.reasons[-1] == "resumed"
+    np.testing.assert_allclose(robot.line[-len(before) :], before, atol=1e-9)
+    robot.finish()
+
+
 def test_a_second_pass_sweeps_again():
     grid = room(2.0, 1.6)
     zone = [[1.9, 0.9], [4.1, 0.9], [4.1, 2.7], [1.9, 2.7]]

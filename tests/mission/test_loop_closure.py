@@ -9,8 +9,11 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
-from fasaco_edge.mission.map.loop_closure import Motion, has_moved, uncertain_cells
+from fasaco_edge.mission.map.loop_closure import Motion, has_moved, moved_cells, uncertain_cells
+from fasaco_edge.planners.near_optimal import NearOptimal
+from tests.mission.world import Drive, pixels, placed, pose_at
 
 FOOTPRINT = Footprint(0.3, 0.15)
 HOME = Pose2D(0.0, 0.0)
@@ -109,3 +112,62 @@ def test_who_stood_still_forgets_nothing():
     before = ledger.snapshot()
     ledger.forget(uncertain_cells(before, Motion(HOME, HOME)))
     assert ledger.snapshot().cells == before.cells > 5
+
+
+WALLED = ("############", *["#..........#"] * 12, "############")
+
+
+def moved_hall(shift):
+    """A hall, half a cell wider than its columns, that has moved by some columns."""
+    drawn = np.insert(pixels(*WALLED), 3, 0, axis=1)
+    drawn[0:2] = drawn[-2:] = 100
+    return MapReceived(placed(drawn, (0, shift)))
+
+
+def closed(shift, *, together=True):
+    """A robot on its path when the map moves by so many columns; the path ahead before that."""
+    drive = Drive((1, 1), moved_hall(0), pose_at(1, 1))
+    drive.plan()
+    for _ in range(4):
+        drive.go()
+    ahead = [drive.cell, *drive.walk]
+    row, col = drive.cell
+    there = pose_at(row, col + shift)
+    drive.cell = row, round(col + shift + 0.1)
+    if together:
+        drive.tell(moved_hall(shift), there)
+    else:
+        drive.tell(moved_hall(shift))
+        drive.tell(there)
+    return drive, ahead
+
+
+@pytest.mark.parametrize("together", [True, False])
+@pytest.mark.parametrize("shift", [3, 2.5])
+def test_the_path_stays_with_the_building(shift, together):
+    """By half a cell, too: then each cell is another place, and the path leads over the nearest."""
+    drive, ahead = closed(shift, together=together)
+    moved = [(row, col + 3) for row, col in ahead]
+    assert drive.walk == moved[1:]
+    assert drive.updates[-1].reason == "map and pose moved"
+    if not together:
+        # A plan from where the robot seemed to be comes too late.
+        assert drive.plan().path is None
+    # The next one mends what was moved.
+    assert drive.request.reason.startswith("map and pose moved")
+    assert [tuple(cell) for cell in drive.request.problem.before.tolist()] == moved
+    planned = NearOptimal().plan(drive.request.problem).cells
+    assert [tuple(cell) for cell in planned.tolist()][:19] == moved[:19]
+    drive.finish()
+
+
+def test_cells_of_a_turned_map_are_moved_one_by_one():
+    walk = np.array([(0, col) for col in range(20)], np.int32)
+    motion = Motion(Pose2D(0.15, 0.15), Pose2D(0.45, 0.75, math.radians(6.0)))
+    moved = moved_cells(walk, motion, 0.3)
+    assert moved[0].tolist() == [2, 1]
+    x, y = 0.45 + 0.3 * 19 * math.cos(math.radians(6)), 0.75 + 0.3 * 19 * math.sin(math.radians(6))
+    assert moved[-1].tolist() == [math.floor(y / 0.3), math.floor(x / 0.3)]
+    apart = np.abs(np.diff(moved, axis=0))
+    assert apart.max() == 1
+    assert apart.any(axis=1).all()

@@ -81,7 +81,6 @@ def test_a_mission_that_rests_is_not_planned():
     drive.command("replan")
     assert "paused" in str(drive.refused)
     drive.command("resume")
-    drive.plan()
     drive.finish()
     assert drive.command("replan").plan is None
     assert "no reachable cell is left" in str(drive.refused)

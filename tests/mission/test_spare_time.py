@@ -7,7 +7,7 @@ import pytest
 
 from fasaco_edge.daemon.loop.outbox import path_attachment
 from fasaco_edge.mission.core.events import MapReceived, PlanReady
-from fasaco_edge.mission.core.route import SKIPPED_S, Attempt
+from fasaco_edge.mission.core.spare_time import SKIPPED_S, Attempt
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.near_optimal import NearOptimal

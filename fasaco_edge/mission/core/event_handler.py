@@ -27,7 +27,7 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
 
@@ -123,6 +123,7 @@ class EventHandler:
         if self.map.has_moved and self.map.pose is not None:
             self.ledger.note_map_motion(self.map.pose.pose)
             self.trail.note_map_motion()
+            self.route.note_map_motion()
         else:
             self._record()  # the pose may have come before the map
         self._go_on(self.ledger.check(self.map.free, self.map.grid.frame))
@@ -168,7 +169,8 @@ class EventHandler:
         has_jumped = self.monitor.note_pose(stamped.pose, self._now)
         if has_jumped:
             self.ledger.break_track()
-        self.trail.note_motion(self.ledger.map_motion(stamped.pose))
+        motion = self.ledger.map_motion(stamped.pose)
+        self.trail.note_motion(motion)
         uncertain = self.ledger.forget_uncertain(stamped.pose)
         self._record()
         self.line.note_pose(stamped.pose)
@@ -177,6 +179,7 @@ class EventHandler:
             return
         if has_jumped or self.map.area is None or not self.map.area.contains(cell):
             self.update_area()
+        self._path = self.route.note_motion(motion, self._now) or self._path
         if uncertain:
             self.route.want(f"map and pose moved: {uncertain} cells to be covered again")
         self.orders.note_cell(cell)
@@ -218,10 +221,16 @@ class EventHandler:
             self.begin_order(after)
             self.update_area()
         elif after.paused and not before.paused:
-            self.route.abandon()
+            self.route.pause()
         elif before.paused and not after.paused:
-            self.route.want("resumed")
+            self._path = self._resume(after) or self._path
         self.orders.set_state(after)
+
+    def _resume(self, order: OrderState) -> PathUpdate | None:
+        if order.begun and order.stage is not Stage.RETURNING:
+            return self.route.resume(self._now)
+        self.route.want("resumed")
+        return None
 
     def _reset(self) -> None:
         """Forget what is covered but where the tool is now, and which frame is active."""

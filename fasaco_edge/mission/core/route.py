@@ -1,115 +1,30 @@
-"""Route: the path the robot was given, the plan under way, and better paths in spare time."""
+"""Route: the path the robot was given, what is kept of it while the robot rests, and the plan under
+way.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.events import PathUpdate, PlanBroken, PlanReady, PlanRequest
+from fasaco_edge.mission.core.spare_time import Attempt, SpareTime
 from fasaco_edge.mission.coverage.progress import PathProgress
+from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.sequencer import Sequencer
-from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.effort import HELD_CELLS
 from fasaco_edge.planners.problem import CoverageProblem
 
-# A path is replaced by a better one only if that saves this many steps, and this share of
-# what is left.
-LEAST_STEPS, LEAST_SHARE = 2, 0.002
-# The share of time is halved at most this often.
-MOST_VAIN = 4
-# Where there is nothing to improve, the next look is this much later [s]: it takes a search of
-# the whole lattice, and the answer rarely changes from one pose to the next.
-SKIPPED_S = 1.0
 # After a plan that failed [s].
 BROKEN_S = 30.0
 
 NO_CELLS: NDArray[np.int32] = np.empty((0, 2), np.int32)
-
-
-class SpareTime:
-    """Limits attempts at better paths to a share of a processor core; a share of 0 is none.
-
-    While attempts at one path come to nothing, fewer and fewer are made.
-    """
-
-    def __init__(self, share: float) -> None:
-        self._share = share
-        self._resting_until = 0.0
-        # The path of the last attempt, and how many attempts at it came to nothing.
-        self._revision = self._vain = 0
-
-    def is_available(self, now: float) -> bool:
-        """Tell whether another attempt may begin at ``now`` [s]."""
-        return self._share > 0.0 and now >= self._resting_until
-
-    def spend(self, seconds: float, now: float, revision: int) -> None:
-        """Note that an attempt at path ``revision`` took ``seconds`` and ended at ``now`` [s]."""
-        self._vain = min(self._vain + 1, MOST_VAIN) if revision == self._revision else 0
-        self._revision = revision
-        share = self._share / 2**self._vain
-        self._resting_until = now + seconds * (1.0 / share - 1.0)
-
-    def rest_after_failure(self, now: float) -> None:
-        """Note that a plan failed at ``now`` [s]."""
-        self._resting_until = max(self._resting_until, now + BROKEN_S)
-
-    def skip(self, now: float) -> None:
-        """Note that there was nothing to improve at ``now`` [s]."""
-        self._resting_until = now + SKIPPED_S
-
-
-@dataclass(frozen=True, slots=True)
-class Attempt:
-    """An attempt at a better path from one of its cells on.
-
-    Attributes:
-        revision: of the path.
-        index: where on it the robot is.
-        joint: index of that cell.
-        problem: that the rest of the path solves, the end of the one that is left.
-    """
-
-    revision: int
-    index: int
-    joint: int
-    problem: CoverageProblem
-
-    @classmethod
-    def at(
-        cls, path: PathProgress, revision: int, orders: Sequencer, number: int
-    ) -> Attempt | None:
-        """Return attempt ``number`` at a path; None where too little of it is left."""
-        # The next cells ahead of the robot stay as they are; a shorter rest is not worth a search.
-        joint = path.index + HELD_CELLS
-        if joint + HELD_CELLS > len(path.cells):
-            return None
-        row, col = path.cells[path.index].tolist()
-        try:
-            problem = orders.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
-        except FasacoError:
-            return None  # the map has changed: a repair is due
-        return cls(revision, path.index, joint, problem)
-
-    def joined(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
-        """Return the cells ahead on a better path, int32 (n, 2); None if it saves too little."""
-        if path.index > self.joint:
-            return None
-        ahead = better[path.index - self.index :]
-        return ahead if _is_worth_it(self.problem.cost, path.ahead, ahead) else None
-
-
-def _is_worth_it(cost: CoverageCost, before: NDArray[np.int32], after: NDArray[np.int32]) -> bool:
-    cost_s = cost.of_walk(before)
-    least_s = max(LEAST_STEPS * cost.step_s, LEAST_SHARE * cost_s)
-    return cost_s - cost.of_walk(after) >= least_s
 
 
 class Route:
@@ -128,8 +43,11 @@ class Route:
 
     def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
         self.path = PathProgress(NO_CELLS)
-        # What lay beyond where a map blocked the path.
-        self._cut_off = NO_CELLS
+        # What is kept of a path that is not driven now: what lay beyond where a map blocked it, or,
+        # of a robot that was stopped, all that was left.
+        self._kept = PathProgress(NO_CELLS)
+        # The path over a map that has moved since, until a pose tells where to.
+        self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
         self.plans = self.attempts = 0
         self.unchanged = self.outdated = 0
@@ -165,9 +83,15 @@ class Route:
     def path_to_keep(self) -> NDArray[np.int32]:
         """What of the path the next plan is to keep where it can, int32 (n, 2).
 
-        Also what a map cut off: most of that still holds.
+        Also what a map cut off, or what a robot had before it that was stopped: most of that still
+        holds.
         """
-        return np.concatenate((self.path.ahead, self._cut_off))
+        return np.concatenate((self.path.ahead, self._kept.ahead))
+
+    @property
+    def held(self) -> PathProgress:
+        """The path, or, of a robot that was stopped, what is kept of the one before."""
+        return self.path if len(self.path.cells) else self._kept
 
     def want(self, reason: str, changed: Window | None = None) -> None:
         """Want a plan: because the cells in a window have changed, or for another reason."""
@@ -191,6 +115,58 @@ class Route:
         self.drop()
         self.forget_failure()
         self._is_abandoned = self.pending is not None
+        self._kept, self._before_motion = PathProgress(NO_CELLS), None
+
+    def pause(self) -> None:
+        """Discard the plan under way; what it was needed for is planned once the robot goes on."""
+        self.forget_failure()
+        if self.pending is not None and self.is_planning and not self._is_abandoned:
+            if self.pending.problem.is_full:
+                self._full = self.pending.reason
+            self.want(self.wanted or self.pending.reason, self.pending.changed)
+        self._is_abandoned = self.pending is not None
+
+    def resume(self, now: float) -> PathUpdate | None:
+        """Publish what is kept of the path before a pause; want a plan where that does not do."""
+        area, cell, cells = self._map.area, self._map.robot_cell(), self._kept.ahead
+        holds = (
+            not self.wanted
+            and area is not None
+            and len(cells) > 0
+            and cell == tuple(cells[0].tolist())
+            and area.drivable_prefix(cells) == len(cells)
+        )
+        if holds:
+            return self.publish(cells, "resumed", now)
+        self.want("resumed")
+        return None
+
+    def note_map_motion(self) -> None:
+        """Note that the newest map has moved; ``note_motion`` tells where to."""
+        if self._before_motion is None:
+            self._before_motion = self.path_to_keep
+
+    def note_motion(self, motion: Motion | None, now: float) -> PathUpdate | None:
+        """Take the path to where the map has moved, and want a plan that mends it.
+
+        What of it can be driven is published at once: the robot must not follow the old place.
+        """
+        before, self._before_motion = self._before_motion, None
+        if before is None or motion is None or motion.is_still or not len(before):
+            return None
+        self._is_abandoned = self.pending is not None
+        self.want("map and pose moved")
+        assert self._map.lattice is not None
+        cells = moved_cells(before, motion, self._map.lattice.cell_m)
+        cell, area, was_driving = self._map.robot_cell(), self._map.area, len(self.path.cells) > 0
+        drivable = 0
+        if cell is not None and area is not None and was_driving:
+            lead = area.shortest_path(cell, (int(cells[0, 0]), int(cells[0, 1])))
+            cells = np.concatenate((lead[:-1], cells))
+            drivable = area.drivable_prefix(cells)
+        update = self.publish(cells[:drivable], self.wanted, now) if was_driving else None
+        self._kept = PathProgress(cells[drivable:])
+        return update
 
     def request_plan(self, problem: CoverageProblem) -> PlanRequest:
         """Request the plan that is wanted."""
@@ -218,7 +194,7 @@ class Route:
 
     def fail(self, event: PlanBroken, now: float) -> None:
         """Note that the plan under way failed: the same problem would make it fail again."""
-        self._spare.rest_after_failure(now)
+        self._spare.rest(BROKEN_S, now)
         request, is_improving = self.pending, self.is_improving
         if request is None or request.number != event.number:
             return
@@ -310,24 +286,35 @@ class Route:
         """Publish a path in place of the one before."""
         self.revision += 1
         self.published_at = now
-        self.path, self._cut_off = PathProgress(cells), NO_CELLS
+        self.path, self._kept = PathProgress(cells), PathProgress(NO_CELLS)
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
         return PathUpdate(self.revision, cells, reason, plan, seconds, changed)
 
     def follow(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> None:
         """Note that the robot is in ``cell``, see ``PathProgress.driven_to``."""
-        self.path = self.path.driven_to(cell, has_visited)
+        self._hold(self.held.driven_to(cell, has_visited))
 
     def follow_line(self, index: int) -> None:
         """Note that the robot is, by its line, at a cell of the path."""
-        if self.path.index < index < len(self.path.cells):
-            self.path = replace(self.path, index=index)
+        held = self.held
+        if held.index < index < len(held.cells):
+            self._hold(replace(held, index=index))
+
+    def _hold(self, held: PathProgress) -> None:
+        if len(self.path.cells):
+            self.path = held
+        else:
+            self._kept = held
 
     def stop(self, reason: str, now: float) -> PathUpdate | None:
-        """Publish an empty path; None where the robot has none to drive."""
+        """Publish an empty path, keep the one before; None where the robot has none to drive."""
         if not len(self.path.cells):
             return None
-        return self.publish(NO_CELLS, reason, now)
+        kept = self.path_to_keep
+        update = self.publish(NO_CELLS, reason, now)
+        # At its end nothing is left to drive.
+        self._kept = PathProgress(kept if len(kept) > 1 else NO_CELLS)
+        return update
 
     def truncate(self, now: float) -> PathUpdate | None:
         """Cut a path that a new map blocks before the block, at once; a new plan follows.
@@ -344,7 +331,7 @@ class Route:
             return None
         row, col = ahead[drivable]
         self.want(f"path blocked at cell ({row}, {col})", self._changed)
-        beyond = np.concatenate((ahead[drivable:], self._cut_off))
+        beyond = PathProgress(np.concatenate((ahead[drivable:], self._kept.ahead)))
         update = self.publish(ahead[:drivable], self.wanted, now, changed=self._changed)
-        self._cut_off = beyond
+        self._kept = beyond
         return update

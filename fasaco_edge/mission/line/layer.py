@@ -96,10 +96,10 @@ class LineLayer:
         if ahead is None:
             return
         self._take_floor()
-        before = self._route.path.index
+        before = self._route.held.index
         ahead.drive(pose)
         self._route.follow_line(ahead.cell)
-        path = self._route.path
+        path = self._route.held
         self._credit(path.cells[before : path.index])
         is_on_it = ahead.is_followed and len(path.cells) > 0
         row, col = path.cells[path.index].tolist() if is_on_it else (0, 0)

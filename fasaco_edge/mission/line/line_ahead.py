@@ -58,8 +58,8 @@ class LineAhead:
         # How near the robot came to the end of its line [pixels], and for how many poses no nearer.
         self._nearest, self._poses_there = math.inf, 0
         self._walk: Walk = np.empty((0, 2), np.int32)
-        # Where the walk was cut off, of how many cells the robot is told; the rest is kept until
-        # the next walk comes. None for all.
+        # Where the walk was cut off: of how many cells the robot is told, 0 where it was stopped.
+        # The rest is kept until the next walk comes. None for all.
         self._cut: int | None = None
         # What of maps that came meanwhile was not looked at beyond the cut.
         self._unchecked: Window | None = None
@@ -95,12 +95,15 @@ class LineAhead:
         self._see(pose)
         ahead, line = self._walk[self.cell :], self.line.renumbered(-self.cell)
         is_beginning = common_beginning(walk, ahead) == len(walk)
-        if 0 < len(walk) < len(ahead) and len(line) and is_beginning:
+        if len(walk) < len(ahead) > 1 and len(line) and is_beginning:
             self._walk, self.line, self.cell, self._cut = ahead, line, 0, len(walk)
             return
-        pieces = kept_pieces(line, ahead, walk) if len(line) and len(walk) else []
-        self._walk, self.cell, self._cut = walk, 0, None
-        self._join(pieces)
+        if self.is_cut and self.is_followed and np.array_equal(walk, ahead):
+            self._walk, self.line, self.cell, self._cut = ahead, line, 0, None
+        else:
+            pieces = kept_pieces(line, ahead, walk) if len(line) and len(walk) else []
+            self._walk, self.cell, self._cut = walk, 0, None
+            self._join(pieces)
         unchecked, self._unchecked = self._unchecked, None
         if unchecked is not None:
             self.check(unchecked)
@@ -236,8 +239,8 @@ class LineAhead:
     def _told(self) -> Points:
         """Return the points that the robot is told; where the walk is cut off it stops."""
         points = self.line.points
-        if self._cut is None:
-            return points
+        if not self._cut:
+            return points if self._cut is None else points[:0]
         end = self._floor.stands.stand(self._walk[self._cut - 1])
         count = self.line.before(self._cut - 1)
         while count > 1 and not self._is_clear(points[count - 1], end):

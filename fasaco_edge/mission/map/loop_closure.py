@@ -72,6 +72,12 @@ class Motion:
         turn = math.remainder(end.yaw - start.yaw, math.tau)
         return distance < STILL_M and abs(turn) < STILL_RAD
 
+    def forward(
+        self, x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where points [m] are after the motion."""
+        return Motion(self.end, self.start).back(1.0, x, y)
+
     def back(
         self, share: float, x: NDArray[np.float64], y: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -82,6 +88,20 @@ class Motion:
         dy = y - start.y - share * (end.y - start.y)
         cos, sin = math.cos(turn), math.sin(turn)
         return cos * dx - sin * dy + start.x, sin * dx + cos * dy + start.y
+
+
+def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDArray[np.int32]:
+    """Return where the middles of a path's cells, int32 (n, 2), have moved to, int32 (m, 2).
+
+    What falls on the same cell one after the other is that cell once; where the map has turned,
+    the next cell may lie beside a corner.
+    """
+    y, x = ((cells.astype(np.float64) + 0.5) * cell_m).T
+    x, y = motion.forward(x, y)
+    moved = np.floor(np.stack((y, x), axis=1) / cell_m).astype(np.int32)
+    is_other = np.ones(len(moved), bool)
+    is_other[1:] = (moved[1:] != moved[:-1]).any(axis=1)
+    return moved[is_other]
 
 
 def uncertain_cells(

@@ -1,0 +1,102 @@
+"""Spare time: attempts at a better path while the one there is need not change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.mission.coverage.progress import PathProgress
+from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.effort import HELD_CELLS
+from fasaco_edge.planners.problem import CoverageProblem
+
+# A path is replaced by a better one only if that saves this many steps, and this share of
+# what is left.
+LEAST_STEPS, LEAST_SHARE = 2, 0.002
+# The share of time is halved at most this often.
+MOST_VAIN = 4
+# Where there is nothing to improve, the next look is this much later [s]: it takes a search of
+# the whole lattice, and the answer rarely changes from one pose to the next.
+SKIPPED_S = 1.0
+
+
+class SpareTime:
+    """Limits attempts at better paths to a share of a processor core; a share of 0 is none.
+
+    While attempts at one path come to nothing, fewer and fewer are made.
+    """
+
+    def __init__(self, share: float) -> None:
+        self._share = share
+        self._resting_until = 0.0
+        # The path of the last attempt, and how many attempts at it came to nothing.
+        self._revision = self._vain = 0
+
+    def is_available(self, now: float) -> bool:
+        """Tell whether another attempt may begin at ``now`` [s]."""
+        return self._share > 0.0 and now >= self._resting_until
+
+    def spend(self, seconds: float, now: float, revision: int) -> None:
+        """Note that an attempt at path ``revision`` took ``seconds`` and ended at ``now`` [s]."""
+        self._vain = min(self._vain + 1, MOST_VAIN) if revision == self._revision else 0
+        self._revision = revision
+        share = self._share / 2**self._vain
+        self._resting_until = now + seconds * (1.0 / share - 1.0)
+
+    def rest(self, seconds: float, now: float) -> None:
+        """Make no attempt for some seconds from ``now`` [s] on: a plan failed."""
+        self._resting_until = max(self._resting_until, now + seconds)
+
+    def skip(self, now: float) -> None:
+        """Note that there was nothing to improve at ``now`` [s]."""
+        self._resting_until = now + SKIPPED_S
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """An attempt at a better path from one of its cells on.
+
+    Attributes:
+        revision: of the path.
+        index: where on it the robot is.
+        joint: index of that cell.
+        problem: that the rest of the path solves, the end of the one that is left.
+    """
+
+    revision: int
+    index: int
+    joint: int
+    problem: CoverageProblem
+
+    @classmethod
+    def at(
+        cls, path: PathProgress, revision: int, orders: Sequencer, number: int
+    ) -> Attempt | None:
+        """Return attempt ``number`` at a path; None where too little of it is left."""
+        # The next cells ahead of the robot stay as they are; a shorter rest is not worth a search.
+        joint = path.index + HELD_CELLS
+        if joint + HELD_CELLS > len(path.cells):
+            return None
+        row, col = path.cells[path.index].tolist()
+        try:
+            problem = orders.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
+        except FasacoError:
+            return None  # the map has changed: a repair is due
+        return cls(revision, path.index, joint, problem)
+
+    def joined(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
+        """Return the cells ahead on a better path, int32 (n, 2); None if it saves too little."""
+        if path.index > self.joint:
+            return None
+        ahead = better[path.index - self.index :]
+        return ahead if _is_worth_it(self.problem.cost, path.ahead, ahead) else None
+
+
+def _is_worth_it(cost: CoverageCost, before: NDArray[np.int32], after: NDArray[np.int32]) -> bool:
+    cost_s = cost.of_walk(before)
+    least_s = max(LEAST_STEPS * cost.step_s, LEAST_SHARE * cost_s)
+    return cost_s - cost.of_walk(after) >= least_s
