@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
     from fasaco_edge.review.run_data import PublishedPath
     from fasaco_edge.wire.path_documents import Rectangle
+    from fasaco_edge.wire.replies import FloorLeft
 
 
 MILESTONES = (50, 90, 99, 100)
@@ -114,6 +115,9 @@ class ReviewDocument(msgspec.Struct):
             passed over along the recorded poses [m2].
         patches_over_4_dm2, largest_patch_m2: what of it was left, in one piece [m2].
         ledger_swept_m2: floor that the daemon had as swept at the end, in reach or not [m2].
+        left_by_reason: what the daemon said at the end of reachable floor that is not swept [m2].
+        out_of_reach_by_reason: and of free floor that the tool cannot come to [m2]; null
+            where the robot drives through the middles of cells.
         coverage_from: who counted: `status` (the daemon) or `trail` (from the recorded poses and
             the last map, where the daemon's last recorded count is outdated).
         reached_s: when 50, 90, 99 and 100 % of the cells coverable at the end were covered [s].
@@ -175,6 +179,8 @@ class ReviewDocument(msgspec.Struct):
     patches_over_4_dm2: int | None = None
     largest_patch_m2: float | None = None
     ledger_swept_m2: float | None = None
+    left_by_reason: dict[str, float] | None = None
+    out_of_reach_by_reason: dict[str, float] | None = None
     coverage_from: str | None = None
     reached_s: dict[str, float | None] | None = None
     steps: int | None = None
@@ -314,7 +320,10 @@ def _add_coverage(told: ReviewDocument, review: Review) -> None:
         told.swept_m2 = _rounded(figures.swept_m2)
         told.patches_over_4_dm2 = figures.patches_over_4_dm2
         told.largest_patch_m2 = _rounded(figures.largest_patch_m2)
-    told.ledger_swept_m2 = review.data.ledger_swept_m2
+    if (ledger := review.data.ledger_floor) is not None:
+        told.ledger_swept_m2 = ledger.swept_m2
+        told.left_by_reason = _by_reason(ledger.left)
+        told.out_of_reach_by_reason = _by_reason(ledger.out_of_reach)
     if (walk := review.walk) is not None:
         told.steps, told.revisits = walk.steps, walk.revisits
         told.turns_90, told.turns_180 = walk.turns_90, walk.turns_180
@@ -322,6 +331,10 @@ def _add_coverage(told: ReviewDocument, review: Review) -> None:
         told.driven_m = round(review.drive.driven_m, 2)
     if (reached := review.reached_s) is not None:
         told.reached_s = {str(percent): _rounded(at_s) for percent, at_s in reached.items()}
+
+
+def _by_reason(floor: tuple[FloorLeft, ...] | None) -> dict[str, float] | None:
+    return None if floor is None else {part.reason: part.m2 for part in floor}
 
 
 def _add_plans(told: ReviewDocument, review: Review) -> None:
@@ -384,8 +397,10 @@ def _not_recorded(review: Review) -> dict[str, str]:
         why["reached_s"] = why[FLOOR] = before
     elif review.floor is None:
         why[FLOOR] = "no pose lies on the map"
-    if data.ledger_swept_m2 is None:
-        why["ledger_swept_m2"] = "no recorded status tells of floor"
+    if data.ledger_floor is None:
+        why["ledger_swept_m2, left_by_reason, out_of_reach_by_reason"] = (
+            "no recorded status tells of floor"
+        )
     if review.counts is None:
         why["covered_cells, coverable_cells, recovered_cells"] = (
             "the daemon's last recorded count is outdated, and the trail does not tell all"

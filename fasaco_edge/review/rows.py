@@ -190,6 +190,8 @@ def figures(document: ReviewDocument) -> Iterator[Figure]:
     patches, largest_m2 = document.patches_over_4_dm2, document.largest_patch_m2
     yield Figure("patches left, over 4 dm2", _count(patches, ""), patches)
     yield Figure("largest patch left", _count(largest_m2, "m2"), largest_m2)
+    yield Figure("floor left", _by_reason(document.left_by_reason))
+    yield Figure("floor out of reach", _by_reason(document.out_of_reach_by_reason))
     for percent in MILESTONES:
         at_s = (document.reached_s or {}).get(str(percent))
         text = "never" if document.reached_s else NOT_KNOWN
@@ -199,6 +201,12 @@ def figures(document: ReviewDocument) -> Iterator[Figure]:
     for name, member, unit in NUMBERS:
         value: float | None = getattr(document, member)
         yield Figure(name, _count(value, unit), value)
+
+
+def _by_reason(floor: dict[str, float] | None) -> str:
+    if floor is None:
+        return NOT_KNOWN
+    return "; ".join(f"{m2:.2f} m2 {reason}" for reason, m2 in floor.items()) or "none"
 
 
 def clock(seconds: float) -> str:

@@ -19,6 +19,7 @@ from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.path_documents import PathAttachment
 from fasaco_edge.wire.poses import PoseDecoder
+from fasaco_edge.wire.replies import FloorReport
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from fasaco_edge.wire.settings import Settings, known_settings
 from fasaco_edge.wire.status import Status
@@ -143,10 +144,10 @@ class RunData:
         return max((each.status.ledger.restored_cells for each in self.statuses), default=0)
 
     @property
-    def ledger_swept_m2(self) -> float | None:
-        """Floor that the daemon had as swept last [m2]; None where it did not tell."""
+    def ledger_floor(self) -> FloorReport | None:
+        """What the daemon told of the floor last; None where it did not."""
         floors = (each.status.floor for each in reversed(self.statuses))
-        return next((floor.swept_m2 for floor in floors if floor is not None), None)
+        return next((floor for floor in floors if floor is not None), None)
 
     @property
     def footprint(self) -> Footprint | None:

@@ -82,8 +82,10 @@ def _coverage(coverage: CoverageReport, bar: Text) -> list[Row]:
 
 
 def _floor(floor: FloorReport) -> list[Row]:
-    left = [_text(f"{left.m2:.1f} m2 left: {left.reason}") for left in floor.left or ()]
-    return [("swept", _text(phrases.swept(floor))), *(("", each) for each in left)]
+    left = [f"{left.m2:.1f} m2 left: {left.reason}" for left in floor.left or ()]
+    beyond = [f"{part.m2:.1f} m2 out of reach: {part.reason}" for part in floor.out_of_reach or ()]
+    rows = [("", _text(each)) for each in (*left, *beyond)]
+    return [("swept", _text(phrases.swept(floor))), *rows]
 
 
 def _path(path: PathReport, width: int) -> list[Row]:

@@ -52,7 +52,7 @@ class CoverageReport(Document, frozen=True):
 
 
 class FloorLeft(Document, frozen=True):
-    """Reachable floor that is not swept, for one reason."""
+    """Floor that is not swept, for one reason."""
 
     m2: Amount = 0.0
     reason: str = ""
@@ -66,11 +66,14 @@ class FloorReport(Document, frozen=True):
         reachable_m2: floor that the tool can reach and is asked to sweep, as far as that is known;
             null where the robot drives through the middles of cells.
         left: what of that is not swept, and why, the largest first; null where that is not known.
+        out_of_reach: floor that the map shows free and the tool cannot come to, asked for or not,
+            and why, the largest first; null where that is not known.
     """
 
     swept_m2: Amount = 0.0
     reachable_m2: Amount | None = None
     left: Annotated[tuple[FloorLeft, ...], allowed(maxItems=20)] | None = None
+    out_of_reach: Annotated[tuple[FloorLeft, ...], allowed(maxItems=20)] | None = None
 
     @property
     def reached_m2(self) -> float | None:

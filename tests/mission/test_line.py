@@ -159,6 +159,61 @@ def test_the_status_says_what_of_the_floor_is_left_and_why():
     assert told.reachable_m2 == pytest.approx(told.reached_m2 + ahead.m2 + beside.m2, abs=0.002)
 
 
+def test_the_status_says_what_floor_is_out_of_reach_and_why():
+    # A closet without a door and a gap between two shelves, and a zone in the far corner.
+    grid = room(4.8, 2.4)
+    cells = grid.cells.copy()
+    cells[:, 80] = 100
+    cells[2:30, 20], cells[2:30, 25] = 100, 100
+    grid = OccupancyGrid(grid.geometry, cells)
+    robot = Robot(Mission(CONFIG), at=(4.6, 2.6))
+    zone = [[5.0, 1.0], [5.9, 1.0], [5.9, 1.9], [5.0, 1.9]]
+    robot.tell(MapReceived(grid))
+    robot.tell()
+    told = floor_report(robot.mission)
+    judged = judge_floor(grid, np.array([robot.at]), ROBOT)
+    free_m2 = float((cells == 0).sum()) * 0.05**2
+    beyond = {left.reason.split(",")[0].split(":")[0]: left.m2 for left in told.out_of_reach}
+    assert sum(beyond.values()) == pytest.approx(free_m2 - judged.figures.reachable_m2, rel=0.01)
+    closet = judge_floor(grid, np.array([(6.4, 2.2)]), ROBOT).figures.reachable_m2
+    assert beyond["closed off"] == pytest.approx(closet, rel=0.01)
+    assert beyond["too narrow for the robot"] > 28 * 4 * 0.05**2
+    robot.tell(CommandReceived(1, "start", read_order({"keep_out": [zone]})))
+    robot.tell()
+    kept = floor_report(robot.mission)
+    more = {left.reason.split(",")[0].split(":")[0]: left.m2 for left in kept.out_of_reach}
+    assert more["too narrow for the robot"] == beyond["too narrow for the robot"]
+    assert more["closed off"] == beyond["closed off"]
+    # The zone lies in the corner; what is too near to it counts, too.
+    assert 0.75 < more["in a keep-out zone"] < 1.05
+    assert kept.reachable_m2 == pytest.approx(told.reachable_m2 - more["in a keep-out zone"])
+
+
+def test_what_is_out_of_reach_follows_a_map_that_grows_and_an_order_for_a_zone():
+    whole = room(4.8, 2.4)
+    cells = whole.cells.copy()
+    cells[:, 80] = 100
+    cells[20:30, 80] = 0  # a door
+    shut = cells.copy()
+    shut[:, 80] = 100
+    hidden = shut.copy()
+    hidden[:, 60:] = -1
+    last = Robot(Mission(CONFIG), at=(3.0, 2.0))
+    last.tell(MapReceived(OccupancyGrid(whole.geometry, shut)))
+    last.tell()
+    robot = Robot(Mission(CONFIG), at=(3.0, 2.0))
+    zone = {"name": "left", "polygon": [[2.0, 1.0], [4.0, 1.0], [4.0, 3.4], [2.0, 3.4]]}
+    robot.tell(
+        MapReceived(OccupancyGrid(whole.geometry, hidden)),
+        CommandReceived(1, "start", read_order({"zones": [zone]})),
+    )
+    robot.drive(3)
+    for seen in (cells, shut):
+        robot.tell(MapReceived(OccupancyGrid(whole.geometry, seen)))
+        robot.drive(3)
+    assert floor_report(robot.mission).out_of_reach == floor_report(last.mission).out_of_reach
+
+
 def test_the_same_events_give_the_same_line():
     trails = []
     for _ in range(2):

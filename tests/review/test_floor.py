@@ -15,7 +15,7 @@ from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.floor import swept_floor
 from fasaco_edge.review.rows import Figure, figures
 from fasaco_edge.review.run_data import RunData, StatusSample
-from fasaco_edge.wire.replies import FloorReport
+from fasaco_edge.wire.replies import FloorLeft, FloorReport
 from fasaco_edge.wire.status import LedgerReport, Status
 from tests.support.rooms import RADIUS_M, RESOLUTION_M, TOOL_M, room
 
@@ -103,8 +103,21 @@ def test_floor_swept_before_is_not_guessed_at():
 def test_what_the_ledger_had_last_is_told_beside():
     told = [Status(floor=FloorReport(2.0)), Status(floor=FloorReport(3.5)), Status()]
     samples = [StatusSample(float(at), status) for at, status in enumerate(told)]
-    assert RunData(statuses=samples).ledger_swept_m2 == 3.5
-    assert RunData(statuses=samples[2:]).ledger_swept_m2 is None
+    assert RunData(statuses=samples).ledger_floor.swept_m2 == 3.5
+    assert RunData(statuses=samples[2:]).ledger_floor is None
     assert Figure("floor swept by the ledger", "3.5 m2", 3.5) in list(
         figures(ReviewDocument(ledger_swept_m2=3.5))
     )
+
+
+def test_what_is_left_and_out_of_reach_is_told_with_its_reasons():
+    left = (FloorLeft(0.5, "beside the path"), FloorLeft(0.25, "on the path"))
+    status = Status(floor=FloorReport(3.5, 4.25, left, (FloorLeft(1.5, "too narrow"),)))
+    data = RunData(statuses=[StatusSample(0.0, status)])
+    assert data.ledger_floor == status.floor
+    document = ReviewDocument(
+        left_by_reason={"beside the path": 0.5, "on the path": 0.25}, out_of_reach_by_reason={}
+    )
+    told = {figure.name: figure.text for figure in figures(document)}
+    assert told["floor left"] == "0.50 m2 beside the path; 0.25 m2 on the path"
+    assert told["floor out of reach"] == "none"

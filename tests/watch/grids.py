@@ -58,7 +58,7 @@ def status(**members: Any) -> bytes:
         "state": "covering",
         "reason": "path 7",
         "coverage": {**coverage, "fraction": 0.25, "covered_m2": 0.9, "to_cover_m2": 2.7},
-        "floor": {"swept_m2": 1.44, "reachable_m2": None, "left": None},
+        "floor": {"swept_m2": 1.44, "reachable_m2": None, "left": None, "out_of_reach": None},
         "path": {**path, "planned_steps": 30, "lower_bound_steps": 29, "gap": 0.0345},
         "ledger": {"age_s": 0.4},
         "mission": {"stage": "covering", "ordered": "itself", "pass": 1, "passes": 1},

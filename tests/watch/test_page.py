@@ -143,12 +143,15 @@ def test_it_says_how_far_an_order_is():
 def test_it_says_how_much_floor_is_swept_and_what_is_left_and_why():
     view = mid_mission()
     left = [{"m2": 1.5, "reason": "too narrow"}, {"m2": 0.5, "reason": "in a keep-out zone"}]
-    tell(view, "status", status(floor={"swept_m2": 9.0, "reachable_m2": 10.0, "left": left}))
+    floor = {"swept_m2": 9.0, "reachable_m2": 10.0, "left": left}
+    floor["out_of_reach"] = [{"m2": 2.5, "reason": "closed off"}]
+    tell(view, "status", status(floor=floor))
     page = page_of(view, 120, 40)
     for said in (
         "swept     80.0 %: 8.0 of 10.0 m2",
         "1.5 m2 left: too narrow",
         "0.5 m2 left: in a keep-out zone",
+        "2.5 m2 out of reach: closed off",
     ):
         assert said in page, page
 

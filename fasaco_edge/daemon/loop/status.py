@@ -15,6 +15,7 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.figures import CycleTimes, Faults
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.host.processes import resident_mb, thread_count
+from fasaco_edge.mission.line.out_of_reach import REASONS
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.wire.path_documents import PathReport
 from fasaco_edge.wire.replies import (
@@ -203,12 +204,18 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     swept_m2, to_sweep = round(mission.floor.swept_m2, 3), mission.floor_to_sweep()
     if to_sweep is None:
         return FloorReport(swept_m2)
-    parts = (
-        FloorLeft(round(to_sweep.ahead_m2, 3), "on the path"),
-        FloorLeft(round(to_sweep.left_m2, 3), "beside the path, and not worth the way"),
+    left = _largest_first(
+        (to_sweep.ahead_m2, "on the path"),
+        (to_sweep.left_m2, "beside the path, and not worth the way"),
     )
-    left = tuple(sorted((part for part in parts if part.m2), key=lambda part: -part.m2))
-    return FloorReport(swept_m2, round(to_sweep.asked_m2, 3), left)
+    beyond = _largest_first(*((m2, REASONS[cause]) for cause, m2 in to_sweep.beyond_m2.items()))
+    return FloorReport(swept_m2, round(to_sweep.asked_m2, 3), left, beyond)
+
+
+def _largest_first(*parts: tuple[float, str]) -> tuple[FloorLeft, ...]:
+    """Return floor left for some reasons [m2], without those that are of none."""
+    told = (FloorLeft(round(m2, 3), reason) for m2, reason in parts)
+    return tuple(sorted((part for part in told if part.m2), key=lambda part: -part.m2))
 
 
 def _plans(mission: Mission | None) -> PlanCounts:

@@ -20,8 +20,9 @@ from fasaco_edge.mission.core.events import PathUpdate
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.coverage.floor_tiles import pixels_under
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, SweptFloor
+from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFloor
 from fasaco_edge.mission.line.line_ahead import LineAhead
+from fasaco_edge.mission.line.out_of_reach import Cause, causes_of
 from fasaco_edge.mission.line.polisher import Polisher
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.sequencer import Sequencer
@@ -37,11 +38,13 @@ class FloorToSweep(NamedTuple):
         asked_m2: floor in reach that is asked for, swept or not [m2].
         ahead_m2: what of it is not swept, and the line ahead sweeps [m2].
         left_m2: what of it the line ahead does not sweep, either [m2].
+        beyond_m2: free floor that the tool cannot come to, asked for or not, by cause [m2].
     """
 
     asked_m2: float
     ahead_m2: float
     left_m2: float
+    beyond_m2: dict[Cause, float]
 
 
 class LineLayer:
@@ -59,10 +62,12 @@ class LineLayer:
         self._polisher = Polisher(sweeping.line) if sweeping else None
         self._ahead: LineAhead | None = None
         # What may have changed of map and floor since the last look, and which cells were asked
-        # for then, on which window.
+        # for then, and in reach, on which window.
         self._touched: Window | None = None
         self._is_dropped = False
-        self._asked: tuple[Window, NDArray[np.bool_]] | None = None
+        # Where what is out of reach may have changed, and was not looked at.
+        self._unexplained: Window | None = None
+        self._asked: tuple[Window, NDArray[np.bool_], NDArray[np.bool_]] | None = None
         # Whether the map is known; None before the first look.
         self._is_settled: bool | None = None
         # The swept floor that was seen last, and how many changes it had.
@@ -83,12 +88,13 @@ class LineLayer:
             return
         if self._ahead.follow_floor(floor):
             self._is_dropped = True
-        if floor.shift is None or self._touched is None:
-            self._touched = floor.touched
-        else:
-            self._touched = Window.around(self._touched.moved(*floor.shift), floor.touched)
         if floor.shift is None:
-            self._asked = None
+            self._touched, self._unexplained, self._asked = floor.touched, None, None
+            return
+        touched, self._unexplained = (
+            window and window.moved(*floor.shift) for window in (self._touched, self._unexplained)
+        )
+        self._touched = Window.around(touched, floor.touched)
 
     def note_pose(self, pose: Pose2D) -> None:
         """Note where the robot is now: on its line, maybe."""
@@ -123,12 +129,12 @@ class LineLayer:
             reason = "line blocked"
         if touched is not None or self._is_settled is None:
             self._is_settled = not self._orders.is_exploring
-        # What the robot waits for is told first, and polished with the next pose.
+        # What the robot waits for is told first; the rest comes with the next pose.
         is_waited_for = update is not None or reason
-        if not is_waited_for and self._polisher.polish(
-            ahead, self._map.floor, may_anneal=self._is_settled
-        ):
-            reason = "line polished"
+        if not is_waited_for:
+            self._explain()
+            if self._polisher.polish(ahead, self._map.floor, may_anneal=self._is_settled):
+                reason = "line polished"
         if update is None and reason and len(self._route.path.ahead):
             ahead.rebase()
             update = self._route.publish(self._route.path.ahead, reason, now)
@@ -144,7 +150,7 @@ class LineLayer:
             return None
         tally = self._ahead.tally
         open_m2, left_m2 = tally.open_m2, tally.left_m2
-        return FloorToSweep(tally.wanted_m2, open_m2 - left_m2, left_m2)
+        return FloorToSweep(tally.wanted_m2, open_m2 - left_m2, left_m2, tally.beyond_m2)
 
     def _credit(self, passed: NDArray[np.int32]) -> None:
         """Take cells that the robot passed for covered, where hardly any floor is left of them.
@@ -160,6 +166,19 @@ class LineLayer:
                 ahead.tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2
             ):
                 self._ledger.credit(cell)
+
+    def _explain(self) -> None:
+        """Find out what is out of reach, and why, where that may have changed."""
+        ahead, floor, part = self._ahead, self._map.floor, self._unexplained
+        assert ahead is not None
+        assert floor is not None
+        if part is None or self._asked is None or self._asked[0] != floor.stands.lattice.window:
+            return
+        self._unexplained = None
+        whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
+        for strip in strips(part.intersection(whole) or NOWHERE):
+            free = self._map.free_floor or floor
+            ahead.tally.set_causes(strip, causes_of(floor, free, self._asked[2], strip))
 
     def _take_floor(self, touched: Window | None = None) -> None:
         """Tell the tally what is still to be swept where that may have changed."""
@@ -178,6 +197,7 @@ class LineLayer:
         parts = [self._asked_part(floor), touched]
         if (part := Window.around(*parts)) and (part := part.intersection(whole)):
             assert self._asked is not None
+            self._unexplained = Window.around(self._unexplained, part)
             for strip in strips(part):
                 wanted = floor.reached(self._asked[1], strip)
                 ahead.tally.set_open(strip, wanted, swept.swept_on(floor.geometry, strip))
@@ -194,10 +214,11 @@ class LineLayer:
             return None
         window = area.lattice.window
         asked = area.reachable & self._orders.asked_for(window)
-        before, self._asked = self._asked, (window, asked)
+        before, self._asked = self._asked, (window, asked, area.reachable)
         if before is None:
             return Window(0, 0, floor.geometry.rows, floor.geometry.cols)
         if window != floor.stands.lattice.window:
             return None
         changed = asked != carried(before[1], before[0], window)
+        changed |= area.reachable != carried(before[2], before[0], window)
         return floor.pixels_of(changed) if changed.any() else None

@@ -14,7 +14,11 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.kernels.floor.capsule import NEVER, Scratch, Sweeps, sweep_edges
 from fasaco_edge.kernels.floor.driven import DRIVEN, OPEN, WANTED, note_driven
+from fasaco_edge.mission.line.out_of_reach import Cause
 from fasaco_edge.planners.line import blocks_of, count_blocks, memory_for_moves
+
+# Where the state of a pixel has its ``Cause``.
+CAUSE_SHIFT, CAUSE = 3, 24
 
 
 class SweepTally:
@@ -28,11 +32,13 @@ class SweepTally:
     def __init__(self, floor: FloorMap) -> None:
         shape = floor.geometry.rows, floor.geometry.cols
         self.unit_m = floor.geometry.resolution
-        # Of each pixel whether it is WANTED, OPEN and DRIVEN.
+        # Of each pixel whether it is WANTED, OPEN and DRIVEN, and why it is out of reach.
         self._state = np.zeros(shape, np.uint8)
         self.sweeps = Sweeps(np.full(shape, NEVER, np.int16), np.zeros(blocks_of(shape), np.int32))
         # How many pixels are wanted, and open.
         self._wanted_pixels = self._open_pixels = 0
+        # How many are out of reach for each cause.
+        self._beyond_pixels = dict.fromkeys(Cause, 0)
         self._tool = floor.discs.tool_m / 2 / self.unit_m
         self._scratch: Scratch = memory_for_moves().capsules
 
@@ -52,6 +58,7 @@ class SweepTally:
         count_blocks(self.sweeps, new)
         self._wanted_pixels = int(np.count_nonzero(self._state & WANTED))
         self._open_pixels = int(np.count_nonzero(self._state & OPEN))
+        self._beyond_pixels = _count_causes(self._state)
 
     def exchange(self, goes: NDArray[np.float64], comes: NDArray[np.float64]) -> None:
         """Count edges out and others in, float64 (n, 4): y, x and y, x of their ends [pixels]."""
@@ -83,6 +90,15 @@ class SweepTally:
         state &= ~np.uint8(OPEN)
         state |= now * np.uint8(OPEN)
         count_blocks(self.sweeps, part)
+
+    def set_causes(self, part: Window, causes: NDArray[np.uint8]) -> None:
+        """Set why the tool cannot come to pixels of a part, uint8 (rows, cols), see ``Cause``."""
+        state = self._state[part.row0 : part.row1, part.col0 : part.col1]
+        before = _count_causes(state)
+        state &= ~np.uint8(CAUSE)
+        state |= causes << CAUSE_SHIFT
+        for cause, after in _count_causes(state).items():
+            self._beyond_pixels[cause] += after - before[cause]
 
     def drive(self, points: NDArray[np.float64]) -> None:
         """Note that the robot has driven a line, float64 (n, 2), y, x [pixels].
@@ -118,7 +134,17 @@ class SweepTally:
         """How much of that the line ahead does not sweep [m2]."""
         return int(self.sweeps.left.sum()) * self.unit_m**2
 
+    @property
+    def beyond_m2(self) -> dict[Cause, float]:
+        """How much free floor the tool cannot come to, for each cause [m2]."""
+        return {cause: count * self.unit_m**2 for cause, count in self._beyond_pixels.items()}
+
     def is_open(self, point: NDArray[np.float64]) -> bool:
         """Tell whether a point, y, x [pixels], is still to be swept."""
         row, col = np.rint(point).astype(int).tolist()
         return bool(self._state[row, col] & OPEN)
+
+
+def _count_causes(state: NDArray[np.uint8]) -> dict[Cause, int]:
+    causes = state & np.uint8(CAUSE)
+    return {cause: int(np.count_nonzero(causes == cause << CAUSE_SHIFT)) for cause in Cause}

@@ -29,6 +29,7 @@ class Ground:
         lattice: the same without the cells the robot must keep out of.
         change: how ``lattice`` came from the one before; None before there is one.
         floor: the floor of ``lattice``; None for one of centres.
+        free_floor: that of ``free``.
     """
 
     def __init__(self, config: MissionConfig) -> None:
@@ -36,11 +37,11 @@ class Ground:
         self.lattice: CoverageLattice | None = None
         self.change: LatticeChange | None = None
         self.floor: FloorMap | None = None
+        self.free_floor: FloorMap | None = None
         self._config = config
         self._keep_out: tuple[Polygon, ...] = ()
-        # Over centres, and the floor with no zone kept out.
+        # Over centres.
         self._plain: CoverageLattice | None = None
-        self._free_floor: FloorMap | None = None
 
     def begin(self, grid: OccupancyGrid) -> LatticeChange:
         """Look at a first map; return what it shows, of centres.
@@ -50,7 +51,7 @@ class Ground:
         """
         change = LatticeChange.first(grid, self._config.footprint, self._config.max_lattice_cells)
         free_floor = self._floor_of(grid, change.after, ())
-        self._plain, self._free_floor = change.after, free_floor
+        self._plain, self.free_floor = change.after, free_floor
         self._set_free(change if free_floor is None else None, grid)
         return change
 
@@ -67,14 +68,14 @@ class Ground:
         assert self._plain is not None
         footprint, most = self._config.footprint, self._config.max_lattice_cells
         plain = LatticeChange.between(maps, self._plain, footprint, most, within)
-        if self._free_floor is None:
+        if self.free_floor is None:
             self._plain = plain.after
             if plain.after is not self.free:
                 self._set_free(plain, maps[1])
             return plain
-        change = self._free_floor.change(maps, plain.after, within)
+        change = self.free_floor.change(maps, plain.after, within)
         self._plain, self.free = plain.after, change.after
-        if self.floor is not self._free_floor and self.floor is not None:
+        if self.floor is not self.free_floor and self.floor is not None:
             change = self.floor.change(maps, plain.after, within)
         if change.after is not self.lattice:
             self.change, self.lattice = change, change.after
@@ -83,7 +84,7 @@ class Ground:
     def keep_out(self, polygons: tuple[Polygon, ...], grid: OccupancyGrid | None) -> None:
         """Keep out of these polygons (x, y) [m] from now on, and of no others."""
         is_other, self._keep_out = polygons != self._keep_out, polygons
-        if grid is not None and (is_other or self._free_floor is None):
+        if grid is not None and (is_other or self.free_floor is None):
             self._set_free(None, grid)
 
     def is_decided(self, window: Window) -> NDArray[np.bool_] | None:
@@ -114,7 +115,7 @@ class Ground:
 
         A lattice without the same cells as before has changed in no others.
         """
-        before, free = self.lattice, self._free_floor
+        before, free = self.lattice, self.free_floor
         if free is None:
             assert self._plain is not None
             self.free, self.lattice = self._plain, self._without_kept_out(self._plain)

@@ -152,6 +152,11 @@ class MapState:
         """The floor under the lattice; None before there is one, and where cells are counted."""
         return self._ground.floor
 
+    @property
+    def free_floor(self) -> FloorMap | None:
+        """The same with no zone kept out."""
+        return self._ground.free_floor
+
     def is_decided(self, window: Window) -> NDArray[np.bool_] | None:
         """Return for which cells the map shows whether the robot fits, see ``Ground``."""
         return self._ground.is_decided(window)

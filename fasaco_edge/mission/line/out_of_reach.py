@@ -1,0 +1,53 @@
+"""Floor out of reach: what the map shows free and the tool cannot come to, and why."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.kernels.floor.bits import WORD, unpacked
+
+
+class Cause(IntEnum):
+    """Why the tool cannot come to a pixel; 0 is one that it can come to, or that is not free."""
+
+    NARROW = 1
+    CLOSED = 2
+    KEPT_OUT = 3
+
+
+REASONS = {
+    Cause.NARROW: "too narrow for the robot, or too near to a wall or to furniture",
+    Cause.CLOSED: "closed off: no way leads there that the robot fits through",
+    Cause.KEPT_OUT: "in a keep-out zone, or too near to one",
+}
+
+
+def causes_of(
+    floor: FloorMap, free: FloorMap, reachable: NDArray[np.bool_], part: Window
+) -> NDArray[np.uint8]:
+    """Return the cause of each pixel of a part of the raster, uint8 (rows, cols) of it.
+
+    Args:
+        floor: with keep-out zones.
+        free: of the same map without; the same one where there are none.
+        reachable: bool (rows, cols) of the lattice, the cells that the robot can come to.
+        part: of the raster.
+    """
+    anywhere = floor.stands.lattice.coverable
+    fits = floor.reached(anywhere, part)
+    fits_free = fits if free is floor else free.reached(free.stands.lattice.coverable, part)
+    first, end = part.col0 // WORD, -(-part.col1 // WORD)
+    words = unpacked(free.blocked[part.row0 : part.row1, first:end], (end - first) * WORD)
+    is_free = ~words[:, part.col0 - first * WORD : part.col1 - first * WORD]
+    causes = np.full(fits.shape, Cause.NARROW, np.uint8)
+    causes[fits_free] = Cause.KEPT_OUT
+    causes[fits] = 0
+    if (anywhere & ~reachable).any():
+        causes[fits & ~floor.reached(reachable, part)] = Cause.CLOSED
+    causes[~is_free] = 0
+    return causes
