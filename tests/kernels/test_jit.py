@@ -83,6 +83,14 @@ def test_what_is_said_to_be_there_is_loaded(installed):
     assert (again.loaded, again.compiled, again.warnings) == ALL_LOADED
 
 
+def test_what_is_loaded_needs_nothing_of_what_compiles(compiled):
+    """It takes as long as all else of loading, and is read where something is compiled."""
+    which = "print('numba.np.linalg' in sys.modules, file=sys.stderr)"
+    for code, is_needed in (("seven.tell()", False), ("seven.tell(1.5, note=False)", True)):
+        _, err = compiled.start(f"{code}\nimport sys\n{which}").communicate(timeout=100)
+        assert err.split() == [str(is_needed)]
+
+
 def test_code_of_another_processor_is_not_run(compiled):
     """As in a folder that was copied from another robot."""
     told = compiled.tell(env={"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""})
