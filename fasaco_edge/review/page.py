@@ -30,6 +30,7 @@ from fasaco_edge.review.pictures import (
     draw_fields,
     draw_map,
     replan_panel,
+    saved_panel,
     state_panel,
 )
 from fasaco_edge.review.review import Review
@@ -264,8 +265,8 @@ def _charts(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> l
         panel = state_panel(review)
         name = f" ({label})" if len(reviews) > 1 else ""
         charts.append(_chart(panel, 66 + 30 * len(panel.y.ticks), name))
-        if (decided := branching_panel(review)) is not None:
-            charts.append(_chart(decided, 240, name))
+        found = branching_panel(review), saved_panel(review)
+        charts += [_chart(panel, 240, name) for panel in found if panel is not None]
     return [key, element("div", *charts, class_="charts")]
 
 

@@ -161,6 +161,35 @@ def branching_panel(review: Review) -> Panel | None:
     return Panel("How decided the trail was", caption, time.axis, y, (line,))
 
 
+def saved_panel(review: Review) -> Panel | None:
+    """Return what ants and local search saved, plan by plan; None where that is not recorded."""
+    plots = review.record.plots
+    saved = [
+        (colour, points)
+        for entity, colour in (
+            (entities.SAVED_BY_LOCAL_SEARCH, COLOURS[0]),
+            (entities.SAVED_BY_ANTS, COLOURS[1]),
+        )
+        if (points := plots.get(entity)) is not None
+    ]
+    if not saved:
+        return None
+    time = TimeAxis.over(review.duration_s)
+    lines = [
+        Line("", colour, time.points(*_held(points, review.duration_s)), dotted=False, width=2.2)
+        for colour, points in saved
+    ]
+    y = Axis.linear("s", [0.0, *(value for _, points in saved for value in points[:, 1].tolist())])
+    caption = "blue: local search, red: ants; off the time of the walks that they began with"
+    return Panel("Saved by search, all plans together", caption, time.axis, y, tuple(lines))
+
+
+def _held(points: NDArray[np.float64], end_s: float) -> Points:
+    """Return a plot, float64 (n, 2), as one that holds each value until the next one comes."""
+    at_s = np.concatenate((points[:, 0].repeat(2)[1:], [end_s]))
+    return at_s, points[:, 1].repeat(2)
+
+
 # Fields on a page; the edge of the square that each has to fit into [px].
 FIELDS, FIELD_PX = 4, 440
 

@@ -14,7 +14,14 @@ pytest.importorskip("rerun")
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.review.drive import walk_figures
 from fasaco_edge.review.page import page_of
-from fasaco_edge.review.pictures import FIELDS, branching_panel, covered_share, draw_fields
+from fasaco_edge.review.pictures import (
+    FIELDS,
+    TimeAxis,
+    branching_panel,
+    covered_share,
+    draw_fields,
+    saved_panel,
+)
 from fasaco_edge.review.review import read_review
 from tests.benchmarks.judge import check_walk
 from tests.review.naive import nearest_rank, passed_cells, quarter_turns
@@ -204,6 +211,21 @@ def test_the_trail_is_shown_at_some_moments_and_how_decided_it_was(review):
     page = page_of(review)
     assert page.count('alt="pheromone field"') == len(pictures)
     assert "How decided the trail was" in page
+
+
+def test_the_page_shows_what_ants_and_local_search_saved(review, recording):
+    panel = saved_panel(review)
+    local_search, ants = panel.lines
+    unit_s = TimeAxis.over(review.duration_s).unit_s
+    for line, member in ((local_search, "saved_by_local_search_s"), (ants, "saved_by_ants_s")):
+        saved = {note["revision"]: note.get(member) or 0.0 for _, note in recording.notes}
+        end, total = line.points[-1]
+        assert end * unit_s == pytest.approx(review.duration_s)
+        # The recorder may have missed the first path.
+        assert sum(saved.values()) - max(saved.values()) <= total + 0.01
+        assert total <= sum(saved.values()) + 0.01
+    assert local_search.points[-1][1] > 0
+    assert panel.title in page_of(review)
 
 
 def test_faults_are_those_of_the_status(told, recording):

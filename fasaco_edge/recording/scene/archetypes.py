@@ -63,6 +63,13 @@ WINDOW = LineStyle((219, 39, 119), z=0.055, width=2.0)
 OLD_PATH = LineStyle((196, 181, 253), z=0.03, width=0.8)
 PATH = LineStyle((124, 58, 237), z=0.04, width=1.2)
 DRIVEN = LineStyle((5, 150, 105), z=0.05, width=1.6)
+LINES = {
+    entities.MAP_CHANGE: CHANGE,
+    entities.REPLAN_WINDOW: WINDOW,
+    entities.OLD_PATH: OLD_PATH,
+    entities.PATH: PATH,
+    entities.DRIVEN_PATH: DRIVEN,
+}
 
 
 def map_archetype(grid: OccupancyGrid) -> rr.GridMap:
@@ -115,18 +122,12 @@ def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3
 
 
 def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:
-    """Return points [m] float64 (n, 2) as a line; nothing for fewer than two points."""
-    points = np.column_stack((xy, np.full(len(xy), style.z)))
-    strips = [points] if len(points) >= 2 else []
-    count = len(strips)
-    # Rerun takes a width on the screen as a negative radius.
-    return rr.LineStrips3D(strips, colors=[style.colour] * count, radii=[-style.width] * count)
+    """Return points [m] float64 (n, 2) as a line; nothing for fewer than two points.
 
-
-def strip_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:
-    """Return points [m] float64 (n, 2) as a line without its style: see ``style_archetype``."""
+    Its colour and width are logged once, see ``style_archetype``.
+    """
     points = np.column_stack((xy, np.full(len(xy), style.z)))
-    return rr.LineStrips3D.from_fields(strips=[points])
+    return rr.LineStrips3D.from_fields(strips=[points] if len(points) >= 2 else [])
 
 
 def arrows_archetype(flows: Flows) -> rr.Arrows3D:
@@ -163,7 +164,7 @@ def no_label_archetype() -> rr.Points3D:
 
 
 def style_archetype(style: LineStyle) -> rr.LineStrips3D:
-    """Return the style of lines that come without one."""
+    """Return the style of lines; Rerun takes a width on the screen as a negative radius."""
     return rr.LineStrips3D.from_fields(colors=[style.colour], radii=[-style.width])
 
 
@@ -183,9 +184,12 @@ def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def pose_archetype(pose: Pose2D) -> rr.Transform3D:
-    """Return the robot's place."""
-    rotation = rr.RotationAxisAngle([0.0, 0.0, 1.0], pose.yaw)
-    return rr.Transform3D(translation=[pose.x, pose.y, ROBOT_Z], rotation=rotation)
+    """Return the robot's place, to the millimetre: it comes with each pose."""
+    half = pose.yaw / 2
+    return rr.Transform3D.from_fields(
+        translation=[round(pose.x, 3), round(pose.y, 3), ROBOT_Z],
+        quaternion=[0.0, 0.0, round(math.sin(half), 4), round(math.cos(half), 4)],
+    )
 
 
 def body_archetypes(radius_m: float) -> tuple[rr.Ellipsoids3D, rr.LineStrips3D]:
@@ -274,9 +278,10 @@ STATES: dict[str, dict[str, int]] = {
 
 
 def log_styles(writer: RecordingWriter) -> None:
-    """Log the colours of all states, and which way is up."""
+    """Log the colours of all states and lines, and which way is up."""
     writer.log_static(entities.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-    writer.log_static(entities.DRIVEN_PATH, style_archetype(DRIVEN))
+    for entity, style in LINES.items():
+        writer.log_static(entity, style_archetype(style))
     for entity, colours in STATES.items():
         states = list(colours)
         palette = np.array(list(colours.values()), np.uint32)

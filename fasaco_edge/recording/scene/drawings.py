@@ -118,7 +118,7 @@ class DrivenPathDrawing:
         if len(self._piece) < 2:
             return
         self._drawn_ns = self._writer.wall_ns
-        piece = draw.strip_archetype(np.array(self._piece), draw.DRIVEN)
+        piece = draw.line_archetype(np.array(self._piece), draw.DRIVEN)
         self._writer.log(entities.DRIVEN_PATH, piece)
         # The next piece begins where this one ends.
         self._piece = self._piece[-1:]

@@ -111,7 +111,7 @@ RATES = {
     entities.MAP: 3_000,
     entities.FLOOR: 1_000,
     entities.COVERAGE: 1_000,
-    entities.PHEROMONE: 4_000,
+    entities.PHEROMONE: 3_500,
     entities.DIRECTIONS: 2_500,
     entities.PATH: 2_000,
 }

@@ -14,7 +14,7 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
-from fasaco_edge.recording.scene.curves import NOISE, Curves, StatusFigures
+from fasaco_edge.recording.scene.curves import NOISE, SHARE_SPACING_NS, Curves, StatusFigures
 from fasaco_edge.recording.scene.drawings import DrivenPathDrawing, PathDrawing
 from fasaco_edge.recording.scene.flows import flows_of, fork_at
 from fasaco_edge.recording.scene.layers import Anchor, Layers, changed_bounds, size_in_file
@@ -125,8 +125,8 @@ class Scene:
         # It is drawn in four bytes a cell, which makes it twice as large.
         self._draw(entities.COVERAGE, 2 * size_in_file(grid.cells), draw_coverage)
         covered, recovered = draw.coverage_fractions(grid)
-        self._curves.draw(entities.COVERED_FRACTION, covered)
-        self._curves.draw(entities.RECOVERED_FRACTION, recovered)
+        self._curves.draw(entities.COVERED_FRACTION, covered, spacing_ns=SHARE_SPACING_NS)
+        self._curves.draw(entities.RECOVERED_FRACTION, recovered, spacing_ns=SHARE_SPACING_NS)
 
     def add_floor(self, grid: OccupancyGrid) -> None:
         """Tint what of the floor is swept."""
