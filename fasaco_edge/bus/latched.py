@@ -18,6 +18,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import zenoh
 
@@ -50,8 +51,13 @@ class Subscription:
     def ask(self) -> None:
         """Query the samples kept for late joiners: none here."""
 
+    def end(self) -> None:
+        """Receive no more; it only has to be released then."""
+        subscriber: Any = self._subscriber  # undeclare() has no annotation
+        subscriber.undeclare()
+
     def release(self) -> None:
-        """Release the objects of Zenoh."""
+        """Release the objects of Zenoh: a subscriber with a callback receives all the same."""
         del self._subscriber
 
 
@@ -270,6 +276,11 @@ class Asker:
                 self._thread = threading.Thread(target=self._run, name="late-joiner", daemon=True)
                 self._thread.start()
         self.wake()
+
+    def remove(self, subscription: Subscription) -> None:
+        """Let a subscription ask no more; one that never did is left out."""
+        with self._changed:
+            self._subscriptions = [one for one in self._subscriptions if one is not subscription]
 
     def wake(self) -> None:
         """Look at once who is to be asked; safe from any thread."""

@@ -149,6 +149,13 @@ class Bus:
         self._lent.append(subscription)
         return subscription
 
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """End a subscription; what is on its way may still come."""
+        self._asker.remove(subscription)
+        self._lent.remove(subscription)
+        subscription.end()
+        subscription.release()
+
     def serve(
         self, key: str, answer: Callable[[Request], Reply | Shared | None], complete: bool = True
     ) -> None:

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Self
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Queue
 from fasaco_edge.bus.session import Bus, BusSettings, open_bus
 from fasaco_edge.errors import BusUnavailable
@@ -48,6 +49,7 @@ class Feed:
         self._ended = threading.Event()
         self._bus: Bus | None = None
         self._wants_field = False
+        self._field: Subscription | None = None
         self._lock = threading.Lock()
         # In a thread: a host that does not answer would block the caller.
         self._joining = threading.Thread(target=self._join, name="join-bus", daemon=True)
@@ -68,12 +70,19 @@ class Feed:
         """Return what came, as (topic, Sample or Token); wait up to ``timeout_s`` [s] for it."""
         return self._mailbox.take(timeout_s)
 
-    def want_field(self) -> None:
-        """Have the pheromone field sent, too, from now on."""
+    def want_field(self, wants: bool) -> None:
+        """Have the pheromone field sent, too, from now on, or no more."""
         with self._lock:
-            if self._bus is not None and not self._wants_field:
-                self._subscribe(self._bus, PHEROMONE)
-            self._wants_field = True
+            self._wants_field = wants
+            if self._bus is not None:
+                self._follow_field(self._bus)
+
+    def _follow_field(self, bus: Bus) -> None:
+        if self._wants_field and self._field is None:
+            self._field = self._subscribe(bus, PHEROMONE)
+        elif not self._wants_field and self._field is not None:
+            bus.unsubscribe(self._field)
+            self._field = None
 
     def _join(self) -> None:
         while not self._ended.is_set():
@@ -95,11 +104,12 @@ class Feed:
     def _listen(self, bus: Bus) -> None:
         prefix = f"{self._keys.base}/{VERSION}"
         bus.watch_tokens(f"{prefix}/*/alive", self._note_token)
-        for topic in (*SUBSCRIBED, PHEROMONE) if self._wants_field else SUBSCRIBED:
+        for topic in SUBSCRIBED:
             self._subscribe(bus, topic)
+        self._follow_field(bus)
 
-    def _subscribe(self, bus: Bus, topic: Topic) -> None:
-        bus.listen(self._keys, topic, partial(self._post, topic.name))
+    def _subscribe(self, bus: Bus, topic: Topic) -> Subscription:
+        return bus.listen(self._keys, topic, partial(self._post, topic.name))
 
     def _note_token(self, key: str, here: bool) -> None:
         self._mailbox.post("token", Token(key.split("/")[-2], here))

@@ -64,8 +64,7 @@ def watch_on_screen(feed: Feed, view: RobotView, console: Console) -> None:
                 return
             if typed.count("f") % 2:
                 shown_at = (0, (0, 0), "")
-                if page.toggle_field():
-                    feed.want_field()
+                feed.want_field(page.toggle_field())
 
 
 def watch_in_lines(feed: Feed, view: RobotView) -> None:
