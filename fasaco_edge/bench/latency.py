@@ -102,7 +102,8 @@ def _turns(args: argparse.Namespace) -> list[tuple[bool, int]]:
     if not args.recorder:
         return [(False, args.samples)]
     # By turns: what else goes on on the machine then meets both.
-    shares = [args.samples // ROUNDS + (turn < args.samples % ROUNDS) for turn in range(ROUNDS)]
+    rounds = min(ROUNDS, args.samples)
+    shares = [args.samples // rounds + (turn < args.samples % rounds) for turn in range(rounds)]
     return [(recorded, share) for share in shares for recorded in (False, True)]
 
 

@@ -160,9 +160,9 @@ def test_where_a_process_runs(monkeypatch, tmp_path):
 
 def test_latency_beside_a_recorder(capsys):
     pytest.importorskip("rerun")
-    words = ("--samples", "4", "--pause", "0", "--recorder")
+    words = ("--samples", "2", "--pause", "0", "--recorder")
     document = figures(capsys, "latency", *words)
-    assert document["samples"] == 4
+    assert document["samples"] == 2
     assert document["recorded_total_ms"]["p99"] > 0
     assert document["recorder_ratio"] > 0
 

@@ -89,14 +89,23 @@ class Installation:
         """Run both kernels, and tell what came of it."""
         return told_by(self.start(code, **process))
 
-    def start(self, code: str = "seven.tell()", *, before: str = "", words=(), env=None, **process):
-        """Begin a process that runs both kernels."""
+    def start(
+        self,
+        code: str = "seven.tell()",
+        *,
+        name: str = "seven",
+        before: str = "",
+        words=(),
+        env=None,
+        **process,
+    ):
+        """Begin a process that imports the module ``name`` of kernels, and runs ``code``."""
         ours = {"NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(self.cache)}
         program = [
             *words,
             sys.executable,
             "-c",
-            f"{before}\nfrom fasaco_edge.kernels import seven\n{code}",
+            f"{before}\nfrom fasaco_edge.kernels import {name}\n{code}",
         ]
         environment = os.environ | ours | (env or {})
         return subprocess.Popen(
@@ -108,6 +117,13 @@ class Installation:
             text=True,
             **process,
         )
+
+    def look(self, env: dict[str, str]) -> str:
+        """Return what a process that runs no kernel says is missing."""
+        code = "folder, _ = cache.usable_folder()\nprint(cache.missing_from(folder))"
+        out, err = self.start(code, name="cache", env=env).communicate(timeout=100)
+        assert err == ""
+        return out.strip()
 
     @property
     def folder(self) -> Path:

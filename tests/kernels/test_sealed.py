@@ -80,13 +80,12 @@ def test_a_kernel_that_cannot_be_read_once_more_stays_and_is_not_noted(installed
 
 @pytest.mark.skipif(bool(why_not()), reason=why_not())
 @pytest.mark.parametrize("kind", [Kind.OPEN, Kind.LOOK])
-def test_a_list_that_the_disk_does_not_give_is_told_as_such(installed, kind):
-    installed.tell()
-    (note,) = installed.cache.rglob("complete-*")
+def test_a_list_that_the_disk_does_not_give_is_told_as_such(compiled, kind):
+    (note,) = compiled.cache.rglob("complete-*")
     told = set()
     for number in range(1, 9):
-        with Watch([installed.cache], Failure(kind, number, "EIO")) as watch:
-            missing = installed.tell(env=watch.environment).missing
+        with Watch([compiled.cache], Failure(kind, number, "EIO")) as watch:
+            missing = compiled.look(env=watch.environment)
             if watch.failed_on() == str(note):
                 told.add(missing)
     assert told <= {"", "the list of them cannot be read: Input/output error"}
