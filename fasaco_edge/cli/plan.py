@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +15,7 @@ from fasaco_edge.cli.console.arguments import Command, Exit, check_output, writi
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.plan_line import Ground, Line, PlannedFloor, judged_floor, write_line
 from fasaco_edge.cli.plan_options import CELLS, EPILOG, add_options, check, settle
+from fasaco_edge.cli.plan_progress import watching
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
@@ -58,6 +57,10 @@ def run(args: argparse.Namespace) -> int:
     for output in (args.path_out, args.xy_out, args.png):
         check_output(output)
     compile_kernels()
+    if args.robots or args.robots_xy:
+        from fasaco_edge.cli.plan_fleet import plan_fleet
+
+        return plan_fleet(args, file)
     ground = _read(args, file)
     problem = _pose(args, ground)
     asked = Interrupt()
@@ -135,7 +138,8 @@ def _plan(
     bound = None if args.local_search else lower_bound_of(problem)
     criteria = _criteria(args, asked)
     ended_by = "the search"
-    with watching(args, colony) as show:
+    total = args.budget if args.local_search else colony.ants
+    with watching(total, counted=not args.local_search) as show:
 
         def stop(search: SearchProgress) -> bool:
             nonlocal ended_by
@@ -166,10 +170,6 @@ def _criteria(args: argparse.Namespace, asked: Interrupt) -> dict[str, StoppingC
     if args.budget is not None:
         criteria["budget"] = TimeBudget(args.budget)
     return criteria
-
-
-# A terminal shows no more pictures a second; drawing them costs the search time.
-LEAST_INTERVAL_S = 0.05
 
 
 def figures_of(
@@ -269,32 +269,6 @@ def print_figures(
     for file in (args.path_out, args.xy_out, args.png):
         if file is not None:
             terminal.out().print(f"wrote {file}")
-
-
-@contextmanager
-def watching(
-    args: argparse.Namespace, colony: ColonyConfig
-) -> Iterator[Callable[[SearchProgress], None]]:
-    """Yield what shows how far a search is: the budget used up, else the ants that walked."""
-    with terminal.progress(counted=not args.local_search) as bar:
-        total = args.budget if args.local_search else colony.ants
-        task = bar.add_task("ants", total=total)
-        began = shown = time.perf_counter()
-
-        def show(search: SearchProgress) -> None:
-            nonlocal shown
-            now = time.perf_counter()
-            if not bar.disable and now - shown >= LEAST_INTERVAL_S:
-                shown = now
-                done = now - began if args.local_search else search.work.ants
-                bar.update(task, completed=done, description=_words(search))
-
-        yield show
-
-
-def _words(search: SearchProgress) -> str:
-    words = f"{search.steps} steps"
-    return words if search.gap is None else f"{words}, {search.gap:.2%} above the bound"
 
 
 COMMAND = Command(

@@ -29,6 +29,7 @@ examples:
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
   fasaco-edge plan basement --no-local-search --seed 7
+  fasaco-edge plan office --robots 3,3 12,30 5,18 --end home --png fleet.png
 
 figures:
   revisits         steps + 1 - distinct cells
@@ -43,6 +44,13 @@ figures:
                    come to; the share of it that the line sweeps; seconds_per_m2 swept;
                    patches left of more than 4 dm2, the largest; illegal_share, the part
                    of the line where the robot would touch what is not known free
+
+figures of several robots:
+  makespan_steps   steps of the longest walk; makespan_s what the costliest takes
+  lower_bound_makespan_steps
+                   no division of the floor has a shorter longest walk
+  balance          mean steps of the walks / makespan_steps
+  swept_twice      cells that two or more robots pass
 
 fasaco searches until its budget ends, the walk is proven to be the best, or all ants
 have walked: a complete walk within milliseconds, then better ones by local search,
@@ -130,6 +138,23 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
     )
     start.add_argument(
         "--start-xy", type=pair_of_floats, metavar="X,Y", help="point to start at [m]"
+    )
+    start.add_argument(
+        "--robots",
+        type=pair_of_ints,
+        nargs="+",
+        action="extend",
+        metavar="R,C",
+        help="cells that several robots start in, which share the floor: one walk each, the "
+        "longest as short as can be found",
+    )
+    start.add_argument(
+        "--robots-xy",
+        type=pair_of_floats,
+        nargs="+",
+        action="extend",
+        metavar="X,Y",
+        help="the same as points [m]; of one with a minus sign first, --robots-xy=-1,2",
     )
     group.add_argument(
         "--cell",
@@ -266,14 +291,17 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
 
 def _add_output(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
-        "--path-out", type=Path, metavar="FILE.csv", help="write the walk: header row,col"
+        "--path-out",
+        type=Path,
+        metavar="FILE.csv",
+        help="write the walk: header row,col; robot,row,col of several",
     )
     group.add_argument(
         "--xy-out",
         type=Path,
         metavar="FILE.csv",
         help="write the line to be driven, in the map frame, straight from point to point [m]: "
-        "header x_m,y_m; of a YAML map, as a .npy grid has no frame",
+        "header x_m,y_m; robot,x_m,y_m of several; of a YAML map, as a .npy grid has no frame",
     )
     group.add_argument("--png", type=Path, metavar="FILE", help="draw the walk")
     add_json(group, "the figures")

@@ -201,7 +201,7 @@ def plot_walk(
         key = draw_visits(plot, lattice, _visits(lattice, cells), tuple(cells[0].tolist()))
     else:
         key = draw_swept(plot, swept)
-    _draw_line(plot, in_pieces(line, lattice.cell_m), lattice.cell_m)
+    draw_line(plot, in_pieces(line, lattice.cell_m), lattice.cell_m)
     if (line[0] != line[-1]).any():
         plot.end_mark(line[-1])
     plot.start_mark(line[0])
@@ -228,7 +228,8 @@ def _visits(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.in
     return visits
 
 
-def _draw_line(plot: Plot, line: Points, cell_m: float) -> None:
+def draw_line(plot: Plot, line: Points, cell_m: float) -> None:
+    """Draw a line, points (n, 2) with n >= 2 [m], beside its middle, and arrows along it."""
     moves = np.ones(len(line), np.bool_)
     moves[1:] = (np.diff(line, axis=0) != 0).any(axis=1)
     points = line[moves]

@@ -27,6 +27,7 @@ from fasaco_edge.kernels.lattice.reach import update_reach
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.division import Fleet, divide
 from fasaco_edge.planners.effort import effort_for
 from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
 from fasaco_edge.planners.near_optimal import NearOptimal
@@ -41,7 +42,7 @@ from fasaco_edge.planners.windows import WindowSearch
 LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
 WALKS, BOUND = "shortest walks", "lower bound"
 LOCAL_SEARCH, REPAIR, LINE = "local search", "repair", "driven line"
-WINDOWS = "windows of the walk"
+WINDOWS, SHARES = "windows of the walk", "shares of a fleet"
 
 
 def warm_up(report: Callable[[str], None] | None = None, *, backward: bool = False) -> None:
@@ -138,6 +139,11 @@ def _take_windows(room: _TinyRoom) -> None:
     windows.walk()
 
 
+def _take_shares(room: _TinyRoom) -> None:
+    fleet = Fleet([(0, 0), (3, 3)], room.costly.cost)
+    divide(room.lattice, fleet, lambda progress: progress.work.perturbations > 0)
+
+
 def _take_repair(room: _TinyRoom) -> None:
     problem = replace(room.costly, before=room.path.cells[2:])
     repaired(problem, room.path.planner, 0, _perturbed)
@@ -176,6 +182,7 @@ _STAGES: dict[str, Callable[[_TinyRoom], object]] = {
     BOUND: lambda room: lower_bound_of(room.costly),
     LOCAL_SEARCH: _take_local_search,
     WINDOWS: _take_windows,
+    SHARES: _take_shares,
     REPAIR: _take_repair,
     LINE: _take_line,
     **{name: partial(_plan_with, name) for name in PLANNER_NAMES},

@@ -1,0 +1,209 @@
+"""``fasaco-edge plan --robots``: one walk for each of several robots, which share the floor."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.cli.console import terminal
+from fasaco_edge.cli.console.arguments import Exit, writing
+from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.plan_line import line_through
+from fasaco_edge.cli.plan_options import ANYWHERE, CELLS, HOME
+from fasaco_edge.cli.plan_progress import watching
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
+from fasaco_edge.grid.map_files import read_coverage_grid, read_map
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.host.processes import ctrl_c_asks
+from fasaco_edge.planners.cost import CoverageCost, count_turns
+from fasaco_edge.planners.division import Division, Fleet, divide
+from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
+
+MOST_ROBOTS = 32
+
+
+def plan_fleet(args: argparse.Namespace, file: Path) -> int:
+    """Plan, print the figures, write what was asked for."""
+    _check(args)
+    if file.suffix == ".npy":
+        grid, lattice = None, CoverageLattice.from_free(read_coverage_grid(file), args.cell)
+    else:
+        grid = read_map(file)
+        lattice = CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius))
+    starts = args.robots or [lattice.cell_at(*xy) for xy in args.robots_xy]
+    _check_apart(starts)
+    cost = CoverageCost.for_robot(lattice.cell_m, args.speed_m_s, args.turn_s)
+    fleet = Fleet(starts, cost, args.end == HOME, args.seed, args.threads)
+    asked = Interrupt()
+    began, cpu = time.perf_counter(), time.process_time()
+    with ctrl_c_asks(asked.asked.set), watching(args.budget) as show:
+        is_over = TimeBudget(args.budget)
+
+        def stop(search: SearchProgress) -> bool:
+            show(search)
+            return asked(search) or is_over(search)
+
+        division = divide(lattice, fleet, stop)
+    figures = _figures(args, lattice, division) | {
+        "wall_s": round(time.perf_counter() - began, 6),
+        "cpu_s": round(time.process_time() - cpu, 6),
+    }
+    robots = [_robot(lattice, walk) for walk in division.walks]
+    for robot, cost_s in zip(robots, division.costs_s, strict=True):
+        robot["cost_s"] = cost_s
+    _write(args, lattice, grid, division, figures)
+    _print(args, figures, robots)
+    return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
+
+
+def _check(args: argparse.Namespace) -> None:
+    if args.end not in (ANYWHERE, HOME):
+        raise BadConfiguration(
+            f"--end {args.end[0]},{args.end[1]}: several robots cannot end in one cell",
+            hint="choose --end anywhere or --end home",
+        )
+    if not args.local_search or args.planner != "fasaco":
+        raise BadConfiguration(
+            "several robots are planned for by fasaco with local search",
+            hint="leave --planner and --no-local-search out",
+        )
+    if args.line != CELLS:
+        raise BadConfiguration(
+            f"--line {args.line}: a line over the floor is for one robot",
+            hint="leave --line out",
+        )
+    for option, is_given in (
+        ("--target-gap", args.target_gap is not None),
+        ("--xy-out", args.xy_out is not None and Path(args.map).suffix == ".npy"),
+    ):
+        if is_given:
+            raise BadConfiguration(f"{option} cannot be had of several robots on this map")
+    count = len(args.robots or args.robots_xy)
+    if count > MOST_ROBOTS:
+        raise BadConfiguration(f"at most {MOST_ROBOTS} robots share a floor, got {count}")
+
+
+def _check_apart(starts: Sequence[Cell]) -> None:
+    for (one, here), (other, there) in combinations(enumerate(starts, 1), 2):
+        if here == there:
+            raise BadConfiguration(
+                f"robots {one} and {other} both start in cell {here}",
+                hint="give each a cell of its own",
+            )
+
+
+def _figures(
+    args: argparse.Namespace, lattice: CoverageLattice, division: Division
+) -> dict[str, object]:
+    """Return the figures of all robots together, as JSON values."""
+    steps = [len(walk) - 1 for walk in division.walks]
+    least = division.lower_bound_steps
+    window = lattice.window
+    passed = np.zeros(lattice.states.shape, np.int64)
+    for walk in division.walks:
+        rows, cols = np.unique(walk - (window.row0, window.col0), axis=0).T
+        passed[rows, cols] += 1
+    return {
+        "planner": args.planner,
+        "seed": args.seed,
+        "map": str(args.map),
+        "tool_m": args.cell,
+        "cell_m": lattice.cell_m,
+        "end": args.end,
+        "cells": division.cells,
+        "makespan_steps": max(steps),
+        "makespan_s": max(division.costs_s),
+        "lower_bound_makespan_steps": least,
+        "gap": round(max(steps) / least - 1, 6) if least else None,
+        "steps": sum(steps),
+        "balance": round(sum(steps) / len(steps) / max(steps), 6) if max(steps) else None,
+        "swept_twice": int(np.count_nonzero(passed > 1)),
+        "revisits": sum(len(walk) for walk in division.walks) - int(np.count_nonzero(passed)),
+        "unreachable_cells": int(np.count_nonzero(lattice.coverable & (passed == 0))),
+        "rounds": division.rounds,
+        "speed_m_s": args.speed_m_s,
+        "turn_s": args.turn_s,
+        "budget_s": args.budget,
+        "threads": args.threads,
+    }
+
+
+def _robot(lattice: CoverageLattice, walk: NDArray[np.int32]) -> dict[str, object]:
+    """Return the figures of one robot, as JSON values."""
+    turns = count_turns(walk)
+    return {
+        "start": walk[0].tolist(),
+        "end": walk[-1].tolist(),
+        "cells": len(np.unique(walk, axis=0)),
+        "steps": len(walk) - 1,
+        "length_m": round((len(walk) - 1) * lattice.cell_m, 3),
+        "turns_90": turns.quarter,
+        "turns_180": turns.half,
+    }
+
+
+def _write(
+    args: argparse.Namespace,
+    lattice: CoverageLattice,
+    grid: OccupancyGrid | None,
+    division: Division,
+    figures: dict[str, object],
+) -> None:
+    if args.path_out is not None:
+        with writing(args.path_out):
+            _write_rows(args.path_out, "robot,row,col", "%d", division.walks)
+    if args.xy_out is not None:
+        lines = [line_through(lattice, walk) for walk in division.walks]
+        with writing(args.xy_out):
+            _write_rows(args.xy_out, "robot,x_m,y_m", ("%d", "%.6f", "%.6f"), lines)
+    if args.png is not None:
+        from fasaco_edge.drawing.fleet import draw_fleet
+
+        gap = f", at most {figures['gap']:.1%} above the least" if figures["gap"] else ""
+        lines_below = [
+            f"{Path(args.map).name}: {figures['cells']} cells of {lattice.cell_m:g} m, "
+            f"{len(division.walks)} robots; longest walk {figures['makespan_steps']} steps{gap}; "
+            f"{figures['swept_twice']} cells passed by two or more",
+        ]
+        title = f"{args.planner}, {len(division.walks)} robots, seed {args.seed}"
+        with writing(args.png):
+            draw_fleet(lattice, division.walks, grid=grid, title=title, lines=lines_below).save(
+                args.png, "PNG"
+            )
+
+
+def _write_rows(
+    file: Path, header: str, form: str | Sequence[str], tables: Sequence[NDArray[np.generic]]
+) -> None:
+    """Write tables (n, 2) as one CSV, each row with the number of its robot, from 1."""
+    numbered = [
+        np.column_stack((np.full(len(table), number), table))
+        for number, table in enumerate(tables, 1)
+    ]
+    np.savetxt(file, np.vstack(numbered), form, ",", header=header, comments="")
+
+
+def _print(
+    args: argparse.Namespace, figures: dict[str, object], robots: list[dict[str, object]]
+) -> None:
+    """Print the figures as JSON or as tables."""
+    if args.json:
+        print_json(figures | {"robots": robots})
+        return
+    rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
+    terminal.out().print(terminal.figures(rows))
+    for number, robot in enumerate(robots, 1):
+        terminal.out().print(
+            f"robot {number}: from {robot['start']} to {robot['end']}, {robot['steps']} steps, "
+            f"{robot['length_m']} m, {robot['cost_s']:.1f} s, {robot['turns_90']} quarter-turns"
+        )
+    for file in (args.path_out, args.xy_out, args.png):
+        if file is not None:
+            terminal.out().print(f"wrote {file}")

@@ -1,0 +1,1 @@
+"""Kernels that share one coverage walk out among several robots."""

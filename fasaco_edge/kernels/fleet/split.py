@@ -1,0 +1,279 @@
+"""Splitting a closed walk into two closed walks, for two groups of robots.
+
+A closed walk comes apart without an extra step where it passes a cell twice, and where it passes
+two neighbouring cells in one direction and the two beside them in the other: the two steps across
+take the place of the two along. Anywhere else one step more is needed on either side, between two
+neighbouring cells that it visits. All of these places are tried.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.jit import kernel, lean_kernel
+
+NONE = -1
+# From a start to a cell that cannot be reached from it [steps]; twice this is no overflow.
+FAR = 1 << 28
+# The worst share counts so much more than all shares together.
+WORST = 4
+
+
+@lean_kernel
+def _nearest(tables: NDArray[np.int32], robot: int, begin: int, count: int) -> int:
+    """Return the least way of a robot to ``count`` visits from ``begin`` on, read cyclically."""
+    level = 0
+    while 2 << level <= count:
+        level += 1
+    first = tables[robot, level, begin]
+    last = tables[robot, level, begin + count - (1 << level)]
+    return int(min(first, last))
+
+
+@lean_kernel
+def _worst_share(first_us: int, second_us: int, robots: int) -> int:
+    """Return the least that the worst of ``robots`` shares of two parts can be, ways left out."""
+    worst = first_us + second_us
+    for count in range(1, robots):
+        worst = min(worst, max(first_us // count, second_us // (robots - count)))
+    return worst
+
+
+class _Places(NamedTuple):
+    """The closed walk that is to be split.
+
+    Attributes:
+        steps: step masks, uint8 (size,).
+        offsets: int64 (4,), difference of flat index for a step in each direction.
+        walk: int32 (n,), flat cells.
+    """
+
+    steps: NDArray[np.uint8]
+    offsets: NDArray[np.int64]
+    walk: NDArray[np.int32]
+
+
+class _Parts(NamedTuple):
+    """Two parts of it: the first visit and the number of visits of each; no visits for none."""
+
+    first: int
+    firsts: int
+    second: int
+    seconds: int
+
+
+# Where it comes apart: a cell that is passed twice, two steps side by side in opposite directions,
+# two neighbouring cells.
+TWICE, ABREAST, BESIDE = 0, 1, 2
+
+
+@lean_kernel
+def _parts(places: _Places, kind: int, index: int, other: int, direction: int) -> _Parts:
+    """Return the parts if the walk is split at visits ``index`` and ``other``.
+
+    Where these are not of one cell, ``direction`` leads from one to the other.
+    """
+    steps, offsets, walk = places
+    visits = walk.size
+    if kind != ABREAST:
+        # Each of two neighbouring cells is visited by both parts.
+        more = 1 if kind == BESIDE else 0
+        if other <= index:
+            return _Parts(0, 0, 0, 0)
+        return _Parts(index, other - index + more, other, visits - (other - index) + more)
+    after = index + 1 if index + 1 < visits else 0
+    before = other - 1 if other else visits - 1
+    is_open = steps[walk[after]] >> direction & 1
+    if not is_open or walk[before] != walk[after] + offsets[direction]:
+        return _Parts(0, 0, 0, 0)
+    count, rest = (before - after) % visits + 1, (index - other) % visits + 1
+    if count + rest != visits:
+        return _Parts(0, 0, 0, 0)
+    return _Parts(after, count, other, rest)
+
+
+class _Shares(NamedTuple):
+    """What tells how good parts are, and working memory.
+
+    Attributes:
+        costs_us: int64 (2n + 1,), what the first visits cost, the walk gone through twice [us].
+        nearest: int32 (k, levels, 2n), the least ways to 1, 2, 4 ... visits from each on [steps].
+        step_us: of a step [us].
+        ways: int64 (2, k), each robot's way to either part [steps].
+        gains: int64 (k,), of the first part over the second.
+        order: int64 (k,), robots, those nearest to the first part first.
+    """
+
+    costs_us: NDArray[np.int64]
+    nearest: NDArray[np.int32]
+    step_us: int
+    ways: NDArray[np.int64]
+    gains: NDArray[np.int64]
+    order: NDArray[np.int64]
+
+
+@lean_kernel
+def _deal(shares: _Shares, first_us: int, second_us: int) -> tuple[int, int]:
+    """Deal robots out to two parts of a walk by their ways; return the score, and how many.
+
+    ``shares.order`` has the robots then, those of the first part first.
+    """
+    gains, order, ways = shares.gains, shares.order, shares.ways
+    robots, out_and_back_us = order.size, 2 * shares.step_us
+    second = 0
+    for robot in range(robots):
+        gain = ways[0, robot] - ways[1, robot]
+        at = robot
+        while at > 0 and gains[at - 1] > gain:
+            gains[at], order[at] = gains[at - 1], order[at - 1]
+            at -= 1
+        gains[at], order[at] = gain, robot
+        second += ways[1, robot]
+    first, best, share = 0, -1, 0
+    for count in range(1, robots):
+        robot = order[count - 1]
+        first += ways[0, robot]
+        second -= ways[1, robot]
+        one_us, other_us = first_us + first * out_and_back_us, second_us + second * out_and_back_us
+        worst = max(one_us // count, other_us // (robots - count))
+        score = WORST * worst + one_us + other_us
+        if best < 0 or score < best:
+            best, share = score, count
+    return best, share
+
+
+@lean_kernel
+def _score(shares: _Shares, parts: _Parts, best: int) -> tuple[int, int]:
+    """Return how bad parts are, and how many robots go to the first; -1 if no better than best."""
+    robots = shares.order.size
+    first_us = shares.costs_us[parts.first + parts.firsts] - shares.costs_us[parts.first]
+    second_us = shares.costs_us[parts.second + parts.seconds] - shares.costs_us[parts.second]
+    least = WORST * _worst_share(first_us, second_us, robots) + first_us + second_us
+    if 0 <= best <= least:
+        return -1, 0
+    for robot in range(robots):
+        shares.ways[0, robot] = _nearest(shares.nearest, robot, parts.first, parts.firsts)
+        shares.ways[1, robot] = _nearest(shares.nearest, robot, parts.second, parts.seconds)
+    score, share = _deal(shares, first_us, second_us)
+    if 0 <= best <= score:
+        return -1, 0
+    return score, share
+
+
+@kernel
+def best_split(
+    steps: NDArray[np.uint8],
+    offsets: NDArray[np.int64],
+    walk: NDArray[np.int32],
+    costs_us: NDArray[np.int64],
+    ways: NDArray[np.int32],
+    step_us: int,
+    found: NDArray[np.int64],
+    order: NDArray[np.int64],
+) -> bool:
+    """Find where a closed walk is best split in two, and which robots drive which part.
+
+    Best is what leaves the worst share, and then all of them, cheapest: a part is shared by its
+    robots alike, and each drives out to it and back.
+
+    Args:
+        steps: step masks, uint8 (size,).
+        offsets: int64 (4,), difference of flat index for a step in each direction.
+        walk: int32 (n,), n >= 2, flat cells; from the last one a step leads to the first.
+        costs_us: int64 (2n + 1,), what the first visits cost, the walk gone through twice [us].
+        ways: int32 (k, size), k >= 2, steps from each robot's start to each cell, FAR at most.
+        step_us: of a step [us].
+        found: int64 (5,), out: the first visit and the number of visits of the first part, of the
+            second part, and how many robots drive the first one.
+        order: int64 (k,), out: the robots, those of the first part first.
+
+    Returns:
+        whether there is any such place.
+    """
+    places, robots = _Places(steps, offsets, walk), ways.shape[0]
+    head = np.full(steps.size, NONE, np.int64)
+    following = np.empty(walk.size, np.int64)
+    for index in range(walk.size - 1, -1, -1):
+        following[index] = head[walk[index]]
+        head[walk[index]] = index
+    shares = _Shares(
+        costs_us,
+        _nearest_tables(walk, ways),
+        step_us,
+        np.empty((2, robots), np.int64),
+        np.empty(robots, np.int64),
+        np.empty(robots, np.int64),
+    )
+    best = -1
+    for index in range(walk.size):
+        here = walk[index]
+        # The cell itself, then its neighbours.
+        for direction in range(-1, 4):
+            if direction >= 0 and not steps[here] >> direction & 1:
+                continue
+            other = head[here if direction < 0 else here + offsets[direction]]
+            while other != NONE:
+                for kind in range(TWICE if direction < 0 else ABREAST, BESIDE + 1):
+                    if direction < 0 < kind:
+                        break
+                    parts = _parts(places, kind, index, other, direction)
+                    if not parts.firsts:
+                        continue
+                    score, share = _score(shares, parts, best)
+                    if score >= 0:
+                        best = score
+                        found[0], found[1] = parts.first, parts.firsts
+                        found[2], found[3] = parts.second, parts.seconds
+                        found[4] = share
+                        order[:] = shares.order
+                other = following[other]
+    return best >= 0
+
+
+@kernel
+def _nearest_tables(walk: NDArray[np.int32], ways: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the least ways to 1, 2, 4 ... visits from each on, int32 (k, levels, 2n)."""
+    visits, robots = walk.size, ways.shape[0]
+    levels = 1
+    while 2 << (levels - 1) <= visits:
+        levels += 1
+    tables = np.empty((robots, levels, 2 * visits), np.int32)
+    for robot in range(robots):
+        for index in range(2 * visits):
+            tables[robot, 0, index] = ways[robot, walk[index % visits]]
+        for level in range(1, levels):
+            half = 1 << (level - 1)
+            for index in range(2 * visits):
+                far = min(index + half, 2 * visits - 1)
+                near = tables[robot, level - 1, index]
+                tables[robot, level, index] = min(near, tables[robot, level - 1, far])
+    return tables
+
+
+@kernel
+def ways_from(steps: NDArray[np.uint8], start: int) -> NDArray[np.int32]:
+    """Return the steps from a flat cell to each cell, int32 (rows * cols,), FAR where none lead.
+
+    Args:
+        steps: step masks, uint8 (rows, cols).
+        start: flat cell.
+    """
+    size, cols = steps.size, steps.shape[1]
+    offsets = np.array([1, cols, -1, -cols], np.int64)
+    masks = steps.ravel()
+    ways, queue = np.full(size, FAR, np.int32), np.empty(size, np.int32)
+    queue[0], ways[start] = start, 0
+    head, tail = 0, 1
+    while head < tail:
+        here = queue[head]
+        head += 1
+        for direction in range(4):
+            if not masks[here] >> direction & 1:
+                continue
+            there = here + offsets[direction]
+            if ways[there] == FAR:
+                ways[there] = ways[here] + 1
+                queue[tail] = there
+                tail += 1
+    return ways

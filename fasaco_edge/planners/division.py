@@ -1,0 +1,327 @@
+"""Division of a ground among several robots: one walk each, balanced by cost.
+
+1. One closed walk over all that any of them can reach, by the project's search.
+2. It is split in two, for two groups of robots, and each part again, until every robot has one
+   (``kernels.fleet.split``): that costs hardly a step, and balances but for the ways from the
+   starts.
+3. Round by round, pairs of robots whose parts touch put their walks together, improve them by
+   local search, and split them anew.
+
+The longest walk decides when all is done: its cost is the makespan.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.kernels import EAST, NORTH
+from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.cost import MICROSECONDS, CoverageCost
+from fasaco_edge.planners.loops import Loop, LoopGround
+from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.planner import (
+    AnyOf,
+    SearchProgress,
+    SearchWork,
+    StoppingCriterion,
+    WorkLimit,
+)
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.regions import stream_of
+
+# Proposals for each cell of the walk over all; perturbations of a walk with a free end.
+TOUR_PROPOSALS = 1_000
+OPEN = SearchWork(perturbations=200)
+# After so many rounds without a gain the worst robot shares with one more.
+GAINLESS_PAIRS = 4
+# After so many it begins anew, with another walk over all.
+GAINLESS_ROUNDS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Fleet:
+    """Robots that share a ground.
+
+    Attributes:
+        starts: the cell (row, col) each begins in.
+        returns: whether each ends where it began.
+        cost: of its steps and turns, alike for all.
+        seed: of local search.
+        threads: that pairs are improved on; the walks are the same for any number.
+    """
+
+    starts: Sequence[Cell]
+    cost: CoverageCost
+    returns: bool = True
+    seed: int = 0
+    threads: int = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Division:
+    """A walk for each robot; together they cover all that any of them can reach.
+
+    Attributes:
+        walks: of each robot, int32 (n, 2), n >= 1: cells (row, col), its start first.
+        costs_s: what each costs [s].
+        cells: cells to cover.
+        lower_bound_steps: no division has a shorter longest walk.
+        rounds: rounds of pairs.
+    """
+
+    walks: tuple[NDArray[np.int32], ...]
+    costs_s: tuple[float, ...]
+    cells: int
+    lower_bound_steps: int
+    rounds: int
+
+
+def divide(lattice: CoverageLattice, fleet: Fleet, stop: StoppingCriterion) -> Division:
+    """Share all that can be reached out among robots.
+
+    Args:
+        lattice: where they can be; they do not mind each other's places.
+        fleet: the robots, at least one.
+        stop: when to end early; it sees cost and steps of the longest walk.
+
+    Raises:
+        StartOutsideMap, StartBlocked: a robot cannot stand where it begins; its number, from 1,
+            is in the text.
+        NothingToCover: no cell is coverable.
+    """
+    reached = [_reached(lattice, start, number) for number, start in enumerate(fleet.starts, 1)]
+    walks: list[NDArray[np.int32]] = [np.empty((0, 2), np.int32)] * len(fleet.starts)
+    cells = least = rounds = 0
+    left = list(range(len(fleet.starts)))
+    while left:
+        # Those in one part of the building share it.
+        here = lattice.local(fleet.starts[left[0]])
+        together = [robot for robot in left if reached[robot][here]]
+        group = replace(fleet, starts=[fleet.starts[robot] for robot in together])
+        sharing = _Sharing(lattice, group, reached[left[0]])
+        for _ in sharing.run(stop):
+            if stop(sharing.progress()):
+                break
+        for robot, walk in zip(together, sharing.walks(stop), strict=True):
+            walks[robot] = walk
+        cells += sharing.cells
+        least, rounds = max(least, sharing.lower_bound_steps), rounds + sharing.rounds
+        left = [robot for robot in left if robot not in together]
+    costs_s = tuple(fleet.cost.of_walk(walk) for walk in walks)
+    return Division(tuple(walks), costs_s, cells, least, rounds)
+
+
+def _reached(lattice: CoverageLattice, start: Cell, number: int) -> NDArray[np.bool_]:
+    try:
+        problem = CoverageProblem.of(lattice, start)
+    except FasacoError as error:
+        raise type(error)(f"robot {number}: {error}") from error
+    return problem.to_cover
+
+
+class _Best(NamedTuple):
+    """The best division so far: the robots' loops, who covers each cell, the worst cost [us]."""
+
+    loops: list[Loop]
+    owner: NDArray[np.int32]
+    worst_us: int
+
+
+class _Sharing:
+    """A running division of one connected part of a lattice; a generator of pauses."""
+
+    def __init__(self, lattice: CoverageLattice, fleet: Fleet, reached: NDArray[np.bool_]) -> None:
+        self._lattice, self._fleet, self._reached = lattice, fleet, reached
+        self._ground = LoopGround(lattice, fleet.cost, fleet.starts)
+        self._starts = self._ground.starts
+        self._loops: list[Loop] = []
+        self._costs_us: list[int] = []
+        # The robot that covers each cell, -1 for none; int32 (rows * cols,).
+        self._owner = np.full(lattice.steps.size, -1, np.int32)
+        self._best = _Best([], self._owner, 0)
+        self.cells = int(np.count_nonzero(reached))
+        self.rounds = 0
+        self._least_us = self.lower_bound_steps * fleet.cost.step_us
+
+    @property
+    def lower_bound_steps(self) -> int:
+        """No division has a shorter longest walk.
+
+        A walk that returns has as many steps as visits, and visits cells of both colours of a
+        chessboard alike often; and one robot has to come to the cell farthest from all starts.
+        """
+        robots, returns = len(self._starts), self._fleet.returns
+        rows, cols = np.nonzero(self._reached)
+        odd = int(np.count_nonzero((rows + cols) & 1))
+        visits = 2 * max(odd, self.cells - odd) if returns else self.cells
+        share = -(-visits // robots)
+        share = share + share % 2 if returns else share - 1
+        farthest = int(self._ground.ways.min(axis=0)[self._reached.ravel()].max())
+        return max(share if self.cells > robots else 0, farthest * (2 if returns else 1))
+
+    def progress(self) -> SearchProgress:
+        """Return how far it is: figures of the longest walk of the best division so far."""
+        steps = max(map(len, self._best.loops), default=0)
+        work = SearchWork(perturbations=self.rounds)
+        return SearchProgress(work, self._best.worst_us / MICROSECONDS, steps)
+
+    def run(self, stop: StoppingCriterion) -> Iterator[None]:
+        """Share out, balance and improve, again and again; pause after each piece of work."""
+        with ThreadPoolExecutor(self._fleet.threads) as pool:
+            for attempt in itertools.count():
+                self._begin(stop, attempt)
+                self._note_best()
+                yield
+                gainless, least_us = 0, max(self._costs_us)
+                while gainless < GAINLESS_ROUNDS:
+                    if len(self._starts) == 1 or self._is_proven():
+                        return
+                    # Larger groups take turns with pairs.
+                    self._balance(2 + self.rounds % 2 * (gainless // GAINLESS_PAIRS), pool)
+                    self.rounds += 1
+                    worst_us = max(self._costs_us)
+                    gainless = 0 if worst_us < least_us else gainless + 1
+                    least_us = min(least_us, worst_us)
+                    self._note_best()
+                    yield
+
+    def _note_best(self) -> None:
+        worst_us = max(self._costs_us)
+        if not self._best.loops or worst_us < self._best.worst_us:
+            self._best = _Best(list(self._loops), self._owner.copy(), worst_us)
+
+    def _is_proven(self) -> bool:
+        return self._best.worst_us <= self._least_us
+
+    def _begin(self, stop: StoppingCriterion, attempt: int) -> None:
+        """Plan one walk for all, another one at each attempt, and split it for the robots."""
+        start = self._fleet.starts[0]
+        problem = CoverageProblem.of(
+            self._lattice, start, end=start, cost=self._fleet.cost, reachable=self._reached
+        )
+        planner = NearOptimal(ColonyConfig(seed=self._fleet.seed + attempt))
+        tour = planner.plan(problem, partial(self._is_tour_over, stop))
+        robots = range(len(self._starts))
+        loops = self._ground.parted(self._ground.loop_of(tour.cells), robots)
+        self._costs_us = [self._ground.cost_us(loops[robot]) for robot in robots]
+        self._loops = [loops[robot] for robot in robots]
+        for robot in reversed(robots):
+            self._owner[loops[robot]] = robot
+
+    def _is_tour_over(self, stop: StoppingCriterion, progress: SearchProgress) -> bool:
+        """Ask ``stop`` of a walk over all, of which each robot will have a share."""
+        if progress.work.proposals >= TOUR_PROPOSALS * self.cells:
+            return True
+        robots = len(self._starts)
+        share = replace(progress, cost_s=progress.cost_s / robots, steps=progress.steps // robots)
+        return stop(replace(share, lower_bound_cost_s=0.0))
+
+    def _balance(self, size: int, pool: ThreadPoolExecutor) -> None:
+        """Let groups of robots whose parts touch share anew: the worst one's of ``size``, pairs."""
+        groups = self._groups(size)
+        # All of them before the first is taken, as they read what that changes.
+        found = list(pool.map(self._shared_anew, groups))
+        for robots, loops in zip(groups, found, strict=True):
+            self._accept(robots, loops)
+
+    def _touching(self) -> NDArray[np.bool_]:
+        """Return whose parts touch, bool (k, k), symmetric."""
+        robots = len(self._loops)
+        touch = np.zeros((robots, robots), np.bool_)
+        steps = self._lattice.steps
+        grid = self._owner.reshape(steps.shape)
+        for direction, here, there in (
+            (EAST, grid[:, :-1], grid[:, 1:]),
+            (NORTH, grid[:-1], grid[1:]),
+        ):
+            is_open = steps[: here.shape[0], : here.shape[1]] >> direction & 1 > 0
+            touch[here[is_open], there[is_open]] = True
+        for robot, loop in enumerate(self._loops):
+            touch[robot, self._owner[loop]] = True
+        touch |= touch.T
+        np.fill_diagonal(touch, False)
+        return touch
+
+    def _groups(self, size: int) -> list[tuple[int, ...]]:
+        """Return groups of robots: the worst one with those beside it, then pairs.
+
+        Those that differ most come first, by chance where they are alike.
+        """
+        robots = len(self._loops)
+        touch, costs_us = self._touching(), np.array(self._costs_us)
+        random = np.random.default_rng((self._fleet.seed, self.rounds))
+        # Every other round all who differ little are alike.
+        alike_us = 2 * self._fleet.cost.step_us * (1 + 8 * (self.rounds % 2))
+        apart = np.abs(costs_us[:, None] - costs_us) + alike_us * random.random((robots, robots))
+        apart = np.where(touch, apart + apart.T, -1.0)
+        free = np.ones(robots, np.bool_)
+        groups: list[tuple[int, ...]] = []
+        while (apart := np.where(free[:, None] & free, apart, -1.0)).max() >= 0.0:
+            one = (
+                int(np.argmax(costs_us)) if not groups and size > 2 else int(apart.max(1).argmax())
+            )
+            group = [one]
+            while len(group) < (2 if groups else size) and apart[group].max() >= 0.0:
+                group.append(int(apart[group].max(0).argmax()))
+                apart[:, group] = -1.0
+            free[group] = False
+            groups.append(tuple(sorted(group)))
+        return [group for group in groups if len(group) > 1]
+
+    def _shared_anew(self, robots: tuple[int, ...]) -> dict[int, Loop]:
+        """Return walks of these robots, over all that they cover."""
+        wanted = np.isin(self._owner, robots)
+        wanted[[self._starts[robot] for robot in robots]] = True
+        loop = self._loops[robots[0]]
+        for robot in robots[1:]:
+            loop = self._ground.merged(loop, self._loops[robot])
+        random = stream_of(self._fleet.seed, self.rounds, robots[0])
+        return self._ground.parted(self._ground.improved(loop, wanted, random), robots)
+
+    def _accept(self, robots: tuple[int, ...], loops: dict[int, Loop]) -> None:
+        """Take walks in place of those of the same robots, unless they are worse."""
+        before = [self._costs_us[robot] for robot in robots]
+        after = [self._ground.cost_us(loops[robot]) for robot in robots]
+        is_no_worse = (max(after), sum(after)) <= (max(before), sum(before))
+        is_shorter = sum(after) < sum(before) and max(after) < max(self._costs_us)
+        if not is_no_worse and not is_shorter:
+            return
+        theirs = np.isin(self._owner, robots)
+        theirs[[self._starts[robot] for robot in robots]] = True
+        for robot, cost_us in zip(robots, after, strict=True):
+            self._loops[robot], self._costs_us[robot] = loops[robot], cost_us
+        for robot in reversed(robots):
+            passed = np.zeros_like(theirs)
+            passed[loops[robot]] = True
+            self._owner[theirs & passed] = robot
+
+    def walks(self, stop: StoppingCriterion) -> list[NDArray[np.int32]]:
+        """Return the walks, cells (row, col) int32 (n, 2)."""
+        return [self._walk(robot, stop) for robot in range(len(self._best.loops))]
+
+    def _walk(self, robot: int, stop: StoppingCriterion) -> NDArray[np.int32]:
+        walk = self._ground.walk_of(self._best.loops[robot], self._starts[robot])
+        mine = (self._best.owner == robot).reshape(self._lattice.steps.shape)
+        if self._fleet.returns or len(walk) < 3 or not mine.any():
+            return walk
+        problem = CoverageProblem.of(
+            self._lattice,
+            self._fleet.starts[robot],
+            covered=~mine,
+            cost=self._fleet.cost,
+            before=walk,
+            reachable=self._reached,
+        )
+        planner = NearOptimal(ColonyConfig(seed=self._fleet.seed))
+        found = planner.plan(replace(problem, is_full=True), AnyOf(WorkLimit(OPEN), stop))
+        return found.cells

@@ -1,0 +1,196 @@
+"""Closed walks over one ground, and what sharing them out needs: merged, improved, split in parts.
+
+A loop is a closed walk, int32 (n,), n >= 1: flat cells ``row * cols + col`` of the lattice's
+arrays; from the last one a step leads to the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
+from fasaco_edge.kernels.fleet.split import best_split, ways_from
+from fasaco_edge.kernels.lattice.reach import shortest_walk
+from fasaco_edge.kernels.local_search.regions import Box
+from fasaco_edge.kernels.local_search.walk_array import FRAME
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.effort import effort_for
+from fasaco_edge.planners.problem import CoverageProblem, FramedGround
+from fasaco_edge.planners.regions import WalkRegion
+from fasaco_edge.planners.repair import completed
+
+# Proposals for each visit of a loop that is improved, and perturbations of it.
+PROPOSALS, PERTURBATIONS = 20, 4
+
+Loop = NDArray[np.int32]
+
+
+class LoopGround:
+    """A lattice, what loops on it cost, and where the robots begin that drive them.
+
+    Attributes:
+        lattice: where they can be.
+        cost: of steps and turns.
+        starts: flat cells.
+        ways: int32 (k, rows * cols): steps from each start to each cell.
+    """
+
+    def __init__(
+        self, lattice: CoverageLattice, cost: CoverageCost, starts: Sequence[Cell]
+    ) -> None:
+        self.lattice, self.cost = lattice, cost
+        self._steps, self._cols = lattice.steps, lattice.steps.shape[1]
+        self.starts = [row * self._cols + col for row, col in map(lattice.local, starts)]
+        self.ways = np.array([ways_from(self._steps, start) for start in self.starts])
+        self._offsets = np.array([1, self._cols, -1, -self._cols], np.int64)
+
+    def loop_of(self, cells: NDArray[np.int32]) -> Loop:
+        """Return the loop of a walk that ends where it began, cells (row, col) int32 (n, 2)."""
+        loop: Loop = self._flat(cells)
+        return loop[:-1] if len(loop) > 1 else loop
+
+    def walk_of(self, loop: Loop, start: int) -> NDArray[np.int32]:
+        """Return a loop as a walk from ``start`` and back, cells (row, col) int32 (n, 2)."""
+        loop = np.roll(loop, -int(np.argmax(loop == start)))
+        return self._cells(np.append(loop, loop[0]) if len(loop) > 1 else loop)
+
+    def cost_us(self, loop: Loop) -> int:
+        """Return what a loop costs, its first turn, too [us]."""
+        return 0 if len(loop) == 1 else int(self._visit_costs(loop).sum())
+
+    def merged(self, first: Loop, second: Loop) -> Loop:
+        """Return one loop from two, joined where they meet, or else are neighbours."""
+        place = np.full(self._steps.size, -1, np.int64)
+        place[second] = np.arange(len(second))
+        meets = np.flatnonzero(place[first] >= 0)
+        if meets.size:
+            at = int(meets[0])
+            inner = np.roll(second, -place[first[at]])
+            return np.concatenate((first[:at], inner, first[at:]))
+        for direction, offset in enumerate(self._offsets.tolist()):
+            is_open = self._steps.ravel()[first] >> direction & 1 > 0
+            beside = np.where(is_open, first + offset, first)
+            near = np.flatnonzero(place[beside] >= 0)
+            if near.size:
+                at = int(near[0])
+                inner = np.roll(second, -place[beside[at]])
+                return np.concatenate((first[: at + 1], inner, inner[:1], first[at:]))
+        way = self._way(int(first[0]), int(second[0]))
+        return np.concatenate((way[:-1], second, way[:0:-1], first))
+
+    def parted(self, loop: Loop, robots: Sequence[int]) -> dict[int, Loop]:
+        """Split a loop until each robot has a part of it, with the way to it and back."""
+        loops = {}
+        parts = [(loop, np.array(robots))]
+        while parts:
+            part, theirs = parts.pop()
+            if len(theirs) == 1:
+                loops[int(theirs[0])] = self._reached(int(theirs[0]), part)
+            else:
+                parts += self._split(part, theirs)
+        return loops
+
+    def improved(self, loop: Loop, wanted: NDArray[np.bool_], random: NDArray[np.uint64]) -> Loop:
+        """Return a loop over the same cells that costs no more.
+
+        Args:
+            loop: what it was.
+            wanted: bool (rows * cols,), the cells that it has to visit; it does.
+            random: stream, uint64 (1,); advanced.
+        """
+        problem = self._cut_out(loop, wanted)
+        framed = FramedGround.of(problem)
+        assert problem.before is not None
+        walk = completed(problem, framed, problem.before)
+        region = WalkRegion(framed.rows, framed.cols, 4 * walk.size, 1)
+        everywhere = np.zeros(framed.ground.bound, np.int32)
+        if region.load(framed, walk, Box(everywhere, 0, FRAME, FRAME, framed.rows, framed.cols)):
+            region.improve(0, PROPOSALS * walk.size, random)
+            region.go_back()
+            region.perturb(effort_for(problem.cost).rules, PERTURBATIONS, random)
+            walk = region.put_back()
+        return self.loop_of(problem.cells_of(framed.unframed(walk)))
+
+    def _flat(self, cells: NDArray[np.int32]) -> NDArray[np.int32]:
+        window = self.lattice.window
+        flat = (cells - (window.row0, window.col0)) @ (self._cols, 1)
+        return flat.astype(np.int32)
+
+    def _cells(self, flat: NDArray[np.int32]) -> NDArray[np.int32]:
+        rows, cols = np.divmod(flat, self._cols)
+        window = self.lattice.window
+        return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
+
+    def _way(self, begin: int, end: int) -> NDArray[np.int32]:
+        """Return a shortest way between two flat cells, both among it, int32 (n,)."""
+        way = shortest_walk(self._steps, divmod(begin, self._cols), divmod(end, self._cols))
+        return (way @ (self._cols, 1)).astype(np.int32)
+
+    def _visit_costs(self, loop: Loop) -> NDArray[np.int64]:
+        """Return what each visit costs: the step on from it, and the turn in it [us]."""
+        after = np.roll(loop, -1) - loop
+        before = np.roll(after, 1)
+        quarters = np.where(after == before, 0, np.where(after == -before, 2, 1)).astype(np.int64)
+        costs: NDArray[np.int64] = self.cost.step_us + self.cost.quarter_turn_us * quarters
+        return costs
+
+    def _split(self, loop: Loop, robots: NDArray[np.int64]) -> list[tuple[Loop, NDArray[np.int64]]]:
+        """Split a loop in two, each with some of the robots."""
+        found, order = np.zeros(5, np.int64), np.zeros(len(robots), np.int64)
+        costs_us = np.concatenate(([0], np.cumsum(np.tile(self._visit_costs(loop), 2))))
+        ways, step_us = self.ways[robots], self.cost.step_us
+        is_split = len(loop) > 1 and best_split(
+            self._steps.ravel(), self._offsets, loop, costs_us, ways, step_us, found, order
+        )
+        if not is_split:
+            return [(loop, robots[:1]), (loop[:1], robots[1:])]  # fewer cells than robots
+        first, count, second, rest, share = found.tolist()
+        twice = np.concatenate((loop, loop))
+        return [
+            (twice[first : first + count], robots[order[:share]]),
+            (twice[second : second + rest], robots[order[share:]]),
+        ]
+
+    def _reached(self, robot: int, part: Loop) -> Loop:
+        """Return a part of a loop with the shortest way to it from a robot's start, and back."""
+        part = np.roll(part, -int(np.argmin(self.ways[robot][part])))
+        if part[0] == self.starts[robot]:
+            return part
+        way = self._way(self.starts[robot], int(part[0]))
+        if len(part) == 1:
+            return np.concatenate((way, way[-2:0:-1]))
+        return np.concatenate((way[:-1], part, way[:0:-1]))
+
+    def _cut_out(self, loop: Loop, wanted: NDArray[np.bool_]) -> CoverageProblem:
+        """Return the problem of covering ``wanted`` around a loop, its ``before``."""
+        whole = self.lattice.window
+        rows, cols = np.divmod(loop, self._cols)
+        top, left = int(rows.min()), int(cols.min())
+        inside = slice(top, int(rows.max()) + 1), slice(left, int(cols.max()) + 1)
+        steps = self._steps[inside].copy()
+        # No step leads out.
+        steps[:, -1] &= ~np.uint8(1 << EAST)
+        steps[-1] &= ~np.uint8(1 << NORTH)
+        steps[:, 0] &= ~np.uint8(1 << WEST)
+        steps[0] &= ~np.uint8(1 << SOUTH)
+        row0, col0 = whole.row0 + top, whole.col0 + left
+        window = Window(row0, col0, row0 + steps.shape[0], col0 + steps.shape[1])
+        states = self.lattice.states[inside].copy()
+        lattice = CoverageLattice(window, self.lattice.cell_m, states, steps)
+        before = self._cells(np.append(loop, loop[0]))
+        row, col = before[0].tolist()
+        to_cover = wanted.reshape(self._steps.shape)[inside].copy()
+        return CoverageProblem(
+            lattice,
+            (row, col),
+            to_cover,
+            np.zeros_like(to_cover),
+            end=(row, col),
+            cost=self.cost,
+            before=before,
+        )
