@@ -14,6 +14,7 @@ from fasaco_edge.bench.benchmark import Benchmark
 from fasaco_edge.cli import run_command
 from fasaco_edge.cli.bench import EPILOG, add_benchmarks
 from tests.benchmarks.codec import CODEC
+from tests.benchmarks.fleet import FLEET
 from tests.benchmarks.floor import FLOOR
 from tests.benchmarks.full import FULL
 from tests.benchmarks.ingest import INGEST
@@ -26,7 +27,7 @@ from tests.benchmarks.turns.benchmark import TURNS
 from tests.benchmarks.twins import TWINS
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    TABLE1, QUALITY, TURNS, FLOOR, REPLAN, FULL, ONLINE, SCALE, CODEC, INGEST, TWINS,
+    TABLE1, QUALITY, TURNS, FLOOR, REPLAN, FULL, FLEET, ONLINE, SCALE, CODEC, INGEST, TWINS,
 )  # fmt: skip
 
 
