@@ -42,6 +42,8 @@ from fasaco_edge.planners.regions import stream_of
 # Proposals for each cell of the walk over all; perturbations of a walk with a free end.
 TOUR_PROPOSALS = 1_000
 OPEN = SearchWork(perturbations=200)
+# Of two robots so many times only some cells go from one to the other, at least so many in turn.
+SHIFTED, FEW = 0.5, 6
 # After so many rounds without a gain the worst robot shares with one more.
 GAINLESS_PAIRS = 4
 # After so many it begins anew, with another walk over all.
@@ -278,18 +280,63 @@ class _Sharing:
             groups.append(tuple(sorted(group)))
         return [group for group in groups if len(group) > 1]
 
-    def _shared_anew(self, robots: tuple[int, ...]) -> dict[int, Loop]:
-        """Return walks of these robots, over all that they cover."""
+    def _shared_anew(self, robots: tuple[int, ...]) -> dict[int, Loop] | None:
+        """Return other walks of these robots, over all that they cover; None for none."""
+        random = np.random.default_rng((self._fleet.seed, self.rounds, robots[0]))
+        if len(robots) == 2 and random.random() < SHIFTED:
+            return self._shifted(robots, random)
         wanted = np.isin(self._owner, robots)
         wanted[[self._starts[robot] for robot in robots]] = True
         loop = self._loops[robots[0]]
         for robot in robots[1:]:
             loop = self._ground.merged(loop, self._loops[robot])
-        random = stream_of(self._fleet.seed, self.rounds, robots[0])
-        return self._ground.parted(self._ground.improved(loop, wanted, random), robots)
+        stream = stream_of(self._fleet.seed, self.rounds, robots[0])
+        return self._ground.parted(self._ground.improved(loop, wanted, stream), robots)
 
-    def _accept(self, robots: tuple[int, ...], loops: dict[int, Loop]) -> None:
+    def _shifted(
+        self, robots: tuple[int, ...], random: np.random.Generator
+    ) -> dict[int, Loop] | None:
+        """Return walks of two robots, the dearer of which leaves some cells to the other."""
+        giver, taker = sorted(robots, key=lambda robot: -self._costs_us[robot])
+        apart_us = self._costs_us[giver] - self._costs_us[taker]
+        most = apart_us // self._fleet.cost.step_us // 2
+        cells = self._piece(giver, taker, int(random.integers(1, max(most, FEW) + 1)), random)
+        if not cells:
+            return None
+        loops = {}
+        for robot in robots:
+            wanted = self._owner == robot
+            wanted[cells] = robot == taker
+            wanted[self._starts[robot]] = True
+            stream = stream_of(self._fleet.seed, self.rounds, robot)
+            loops[robot] = self._ground.improved(self._loops[robot], wanted, stream)
+        return loops
+
+    def _piece(self, giver: int, taker: int, size: int, random: np.random.Generator) -> list[int]:
+        """Return connected cells of one robot that lie beside the other's, about ``size``."""
+        theirs = self._owner
+        rim = [
+            cell
+            for cell in np.flatnonzero(theirs == taker).tolist()
+            for beside in self._ground.beside(cell)
+            if theirs[beside] == giver
+        ]
+        if not rim:
+            return []
+        begin = rim[int(random.integers(len(rim)))]
+        found = [cell for cell in self._ground.beside(begin) if theirs[cell] == giver][:1]
+        seen = set(found)
+        for cell in found:
+            for beside in self._ground.beside(cell):
+                if len(found) < size and beside not in seen and theirs[beside] == giver:
+                    seen.add(beside)
+                    found.append(beside)
+        return found
+
+    def _accept(self, robots: tuple[int, ...], loops: dict[int, Loop] | None) -> None:
         """Take walks in place of those of the same robots, unless they are worse."""
+        if loops is None:
+            return
         before = [self._costs_us[robot] for robot in robots]
         after = [self._ground.cost_us(loops[robot]) for robot in robots]
         is_no_worse = (max(after), sum(after)) <= (max(before), sum(before))

@@ -96,11 +96,12 @@ class LoopGround:
         return loops
 
     def improved(self, loop: Loop, wanted: NDArray[np.bool_], random: NDArray[np.uint64]) -> Loop:
-        """Return a loop over the same cells that costs no more.
+        """Return a loop over ``wanted`` cells, improved by local search.
 
         Args:
             loop: what it was.
-            wanted: bool (rows * cols,), the cells that it has to visit; it does.
+            wanted: bool (rows * cols,), the cells that it has to visit from now on; those that
+                it does not visit are connected to it by others of them.
             random: stream, uint64 (1,); advanced.
         """
         problem = self._cut_out(loop, wanted)
@@ -115,6 +116,12 @@ class LoopGround:
             region.perturb(effort_for(problem.cost).rules, PERTURBATIONS, random)
             walk = region.put_back()
         return self.loop_of(problem.cells_of(framed.unframed(walk)))
+
+    def beside(self, cell: int) -> list[int]:
+        """Return the flat cells that a step leads to from one."""
+        mask = int(self._steps[divmod(cell, self._cols)])
+        offsets = enumerate(self._offsets.tolist())
+        return [cell + offset for direction, offset in offsets if mask >> direction & 1]
 
     def _flat(self, cells: NDArray[np.int32]) -> NDArray[np.int32]:
         window = self.lattice.window
@@ -169,7 +176,7 @@ class LoopGround:
     def _cut_out(self, loop: Loop, wanted: NDArray[np.bool_]) -> CoverageProblem:
         """Return the problem of covering ``wanted`` around a loop, its ``before``."""
         whole = self.lattice.window
-        rows, cols = np.divmod(loop, self._cols)
+        rows, cols = np.divmod(np.concatenate((loop, np.flatnonzero(wanted))), self._cols)
         top, left = int(rows.min()), int(cols.min())
         inside = slice(top, int(rows.max()) + 1), slice(left, int(cols.max()) + 1)
         steps = self._steps[inside].copy()
