@@ -15,7 +15,6 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.figures import CycleTimes, Faults
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.host.processes import resident_mb, thread_count
-from fasaco_edge.mission.line.out_of_reach import REASONS
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.wire.path_documents import PathReport
 from fasaco_edge.wire.replies import (
@@ -208,7 +207,7 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
         (to_sweep.ahead_m2, "on the path"),
         (to_sweep.left_m2, "beside the path, and not worth the way"),
     )
-    beyond = _largest_first(*((m2, REASONS[cause]) for cause, m2 in to_sweep.beyond_m2.items()))
+    beyond = _largest_first(*((m2, reason) for reason, m2 in to_sweep.beyond_m2.items()))
     return FloorReport(swept_m2, round(to_sweep.asked_m2, 3), left, beyond)
 
 

@@ -22,7 +22,7 @@ from fasaco_edge.mission.coverage.floor_tiles import pixels_under
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFloor
 from fasaco_edge.mission.line.line_ahead import LineAhead
-from fasaco_edge.mission.line.out_of_reach import Cause, causes_of
+from fasaco_edge.mission.line.out_of_reach import REASONS, causes_of
 from fasaco_edge.mission.line.polisher import Polisher
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.sequencer import Sequencer
@@ -38,13 +38,13 @@ class FloorToSweep(NamedTuple):
         asked_m2: floor in reach that is asked for, swept or not [m2].
         ahead_m2: what of it is not swept, and the line ahead sweeps [m2].
         left_m2: what of it the line ahead does not sweep, either [m2].
-        beyond_m2: free floor that the tool cannot come to, asked for or not, by cause [m2].
+        beyond_m2: free floor that the tool cannot come to, asked for or not, by reason [m2].
     """
 
     asked_m2: float
     ahead_m2: float
     left_m2: float
-    beyond_m2: dict[Cause, float]
+    beyond_m2: dict[str, float]
 
 
 class LineLayer:
@@ -150,7 +150,8 @@ class LineLayer:
             return None
         tally = self._ahead.tally
         open_m2, left_m2 = tally.open_m2, tally.left_m2
-        return FloorToSweep(tally.wanted_m2, open_m2 - left_m2, left_m2, tally.beyond_m2)
+        beyond_m2 = {REASONS[cause]: m2 for cause, m2 in tally.beyond_m2.items()}
+        return FloorToSweep(tally.wanted_m2, open_m2 - left_m2, left_m2, beyond_m2)
 
     def _credit(self, passed: NDArray[np.int32]) -> None:
         """Take cells that the robot passed for covered, where hardly any floor is left of them.
