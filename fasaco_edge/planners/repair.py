@@ -130,8 +130,8 @@ def _steady(
 
     A change that gains something is taken wherever it is, though another one further on may gain
     as much. So where a repair has changed the way ahead, but need not have, the rest of the walk
-    is repaired alone, with half the perturbations. What comes of that costs no more than the
-    completed walk.
+    is repaired alone, with few perturbations: more of them keep no more, and are what takes the
+    time. What comes of that costs no more than the completed walk.
     """
     assert problem.before is not None
     try:
@@ -139,8 +139,8 @@ def _steady(
     except NothingToCover:
         return path
     effort = repair_for(problem.cost)
-    half = replace(effort, perturbations=effort.perturbations // 2, held=0)
-    repair = _Repair(rest, path.seed, half, path.work)
+    few = replace(effort, perturbations=PERTURBATIONS_AT_ONCE, held=0)
+    repair = _Repair(rest, path.seed, few, path.work)
     _run(repair, stop)
     other = repair.path(path.planner, path.seed)
     cells = np.concatenate((problem.before[:held], other.cells))
