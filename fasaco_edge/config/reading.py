@@ -172,7 +172,7 @@ def read_text(path: Path) -> ConfigText:
     twice = []
     for key, line in _keys(node, ""):
         if key in lines:
-            text = f"{key}: stands twice, in line {lines[key]} and in line {line}"
+            text = f"{key}: is given twice, in line {lines[key]} and in line {line}"
             twice.append(Fault(key, BadConfiguration(text), line))
         lines[key] = line
     return ConfigText(document if document is not None else {}, lines, tuple(twice))

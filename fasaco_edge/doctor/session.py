@@ -120,7 +120,7 @@ def session(context: CheckContext) -> Finding:
             details.append(f"{endpoint}: {who} listens there")
         elif why := why_not_bound(endpoint):
             to_do = "correct bus.listen: that address is not this computer's, or not for this user"
-            return fail(f"{endpoint}: nobody can listen there: {why}", to_do)
+            return fail(f"{endpoint}: no daemon can listen there: {why}", to_do)
         else:
             details.append(f"{endpoint}: free")
     silent = [endpoint for endpoint in bus.connect if answers(endpoint) is False]
@@ -167,7 +167,7 @@ def _seen(context: CheckContext, bus: Bus) -> Finding:
     details += [f"daemon {own} {stand}" for own, stand in sorted(claims.items())]
     status = _status(bus, keys.rpc("status")) if keys.of(topics.ALIVE) in alive else None
     for kind, count in heard.items():
-        details.append(f"{kind}: {f'{count} in {LISTEN_S:g} s' if count else 'nothing heard'}")
+        details.append(f"{kind}: {f'{count} in {LISTEN_S:g} s' if count else 'nothing received'}")
     if keys.of(topics.ALIVE) not in alive:
         found = f"no daemon of robot {keys.robot!r}; {_in_words(heard)}"
         return ok(found, details)

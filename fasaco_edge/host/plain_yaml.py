@@ -81,7 +81,7 @@ class _Loader(yaml.SafeLoader):
         values, levels = 1, 1
         if isinstance(event, yaml.AliasEvent):
             if anchor not in self._sizes:
-                raise PlainYamlError(f"{where}: *{anchor} stands for nothing, or for itself")
+                raise PlainYamlError(f"{where}: *{anchor} refers to nothing, or to itself")
             values, levels = self._sizes[anchor]
         elif event.tag is not None:
             raise PlainYamlError(f"{where}: a tag, {event.tag}: write the value alone")

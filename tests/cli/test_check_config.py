@@ -41,7 +41,7 @@ TOLD = [
         "bus.security.tls.colour",
         "unknown key bus.security.tls.colour; there are root_ca, certificate, private_key",
     ),
-    (12, "planner.ants", "planner.ants: stands twice, in line 11 and in line 12"),
+    (12, "planner.ants", "planner.ants: is given twice, in line 11 and in line 12"),
     (13, "ros2", "ros2: object missing required field kind"),
     (13, "ros2.domain", "ros2.domain: expected int, got 'x'"),
 ]
@@ -93,7 +93,7 @@ def test_what_does_not_go_together_is_told_at_once(check):
     ("text", "line", "said"),
     [
         ("a: [", None, "not plain YAML"),
-        ("a: &a {b: *a}", None, "not plain YAML: line 1: *a stands for nothing, or for itself"),
+        ("a: &a {b: *a}", None, "not plain YAML: line 1: *a refers to nothing, or to itself"),
         ("x: &r {name: r2}\nrobot: *r", 1, "unknown key x; there are robot, bus"),
         ("[1, 2]", None, "the file: expected object, got [1, 2]"),
         ("robot: {name: " + "x" * 9999 + "/}", 1, "robot.name: robot must be chunks"),
@@ -158,5 +158,5 @@ def test_who_starts_a_daemon_with_it_is_told_the_first_and_where_the_others_are(
     with pytest.raises(BadConfiguration) as refused:
         load_config(file)
     # What stands twice comes first: what the rest says depends on which of the two is meant.
-    assert str(refused.value).startswith(f"{file}, line 12: planner.ants: stands twice")
+    assert str(refused.value).startswith(f"{file}, line 12: planner.ants: is given twice")
     assert refused.value.hint.endswith(f"check-config {file} shows the 9 others")

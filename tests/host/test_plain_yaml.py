@@ -41,8 +41,8 @@ def test_what_people_write_is_read(text, value):
     ("text", "said"),
     [
         (LAUGHS, "line 5: more than 50000 values, aliases written out"),
-        ("a: &a [*a]", "line 1: *a stands for nothing, or for itself"),
-        ("a: *b", "line 1: *b stands for nothing, or for itself"),
+        ("a: &a [*a]", "line 1: *a refers to nothing, or to itself"),
+        ("a: *b", "line 1: *b refers to nothing, or to itself"),
         ("\n" + "[" * (MOST_DEPTH + 1), "line 2: nested deeper than 32 levels"),
         ("a0: &a0 [1]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}]\n" for n in range(1, 40)), "nested"),
         ("[" + "1," * MOST_VALUES + "]", "more than 50000 values"),
