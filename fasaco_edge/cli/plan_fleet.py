@@ -79,12 +79,11 @@ def _check(args: argparse.Namespace) -> None:
             f"--line {args.line}: a line over the floor is for one robot",
             hint="leave --line out",
         )
-    for option, is_given in (
-        ("--target-gap", args.target_gap is not None),
-        ("--xy-out", args.xy_out is not None and Path(args.map).suffix == ".npy"),
-    ):
-        if is_given:
-            raise BadConfiguration(f"{option} cannot be had of several robots on this map")
+    if args.target_gap is not None:
+        raise BadConfiguration(
+            "--target-gap: how far several robots' walks are from the best is not known well",
+            hint="choose --budget",
+        )
     count = len(args.robots or args.robots_xy)
     if count > MOST_ROBOTS:
         raise BadConfiguration(f"at most {MOST_ROBOTS} robots share a floor, got {count}")
