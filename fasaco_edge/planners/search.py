@@ -59,8 +59,9 @@ EXPANSIONS_AT_ONCE = 30_000
 DEAR_PIECES, PIECES = 50, 5
 # So many windows without gain count as a perturbation.
 WINDOWS_A_PERTURBATION = 10
-# States that the whole ground is solved with at first, where turns are dear: more if none leads on.
-WHOLE_BEAMS = (60, 200)
+# States that the whole ground is solved with at first, where turns are dear: so many over its
+# cells, within a range; some times as many if none leads on.
+WHOLE_STATES, LEAST_BEAM, MOST_BEAM, WIDER = 16_000, 8, 100, 4
 
 # Visits of a walk that local search has memory for.
 VISITS_PER_CELL = 4
@@ -283,12 +284,14 @@ class Search:
         if windows is None:
             self._tighten(THOROUGH)
         elif is_dear(self._problem.cost) and not self._is_proven() and self._load_windows():
-            for beam in WHOLE_BEAMS:
+            beam = min(max(WHOLE_STATES // self._problem.cells, LEAST_BEAM), MOST_BEAM)
+            for states in (beam, WIDER * beam):
                 before_us = windows.best_us
-                yield from windows.solve_whole(beam, self._random)
+                yield from windows.solve_whole(states, self._random)
                 if windows.best_us < before_us:
                     break
             self._put_back_windows()
+            yield from self._solve_windows()
 
     def _improve(self) -> Iterator[None]:
         """Improve the whole walk, without perturbations; twice where there are several regions."""

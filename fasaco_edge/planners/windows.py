@@ -28,6 +28,7 @@ from fasaco_edge.kernels.windows.memory import (
 )
 from fasaco_edge.kernels.windows.passages import BEGIN, NONE, SLOTS, Passages, passages_of, walk_of
 from fasaco_edge.kernels.windows.program import advance_window, begin_window, end_window
+from fasaco_edge.kernels.windows.rings import ANY_PRICE, join_rings
 from fasaco_edge.kernels.windows.search import BEST, COST, SOLVED, Aim, solve_windows
 from fasaco_edge.planners.bound import LowerBound
 from fasaco_edge.planners.cost import CoverageCost
@@ -39,6 +40,10 @@ WINDOW_CELLS, MOST_BEAM = 256, 300
 DEAR_STEPS = 10
 # Grounds on lattices of more cells take too much memory: about 75 bytes a cell.
 MOST_LATTICE = 250_000
+# A ring beside the first one costs so many quarter-turns where a whole ground is solved: rather
+# any way on than that. Windows that join rings: so many in a piece, and pieces.
+RING_TURNS = 1000
+JOINS_AT_ONCE, JOIN_PIECES = 8, 40
 NO_SIDE = 1 << 60
 
 
@@ -105,7 +110,7 @@ class WindowSearch:
         walk = thinned(walk)
         if walk.size < 2 or not passages_of(self._ground, walk, lanes, self._passages):
             return False
-        self._best.partner[:], self._best.ends[:] = self._passages
+        _copy(self._passages, self._best)
         self._tally[COST] = self._tally[BEST] = 2 * self._problem.cost_us(walk)
         self._counted_us = -1
         self._walk = given
@@ -118,7 +123,10 @@ class WindowSearch:
         solve_windows(ground, passages, best, terms, program, aim, self._tally, expansions, random)
 
     def solve_whole(self, beam: int, random: NDArray[np.uint64]) -> Iterator[None]:
-        """Solve the whole ground as one window, with so many states; pause after each line."""
+        """Solve the whole ground as one window, with so many states; pause after each line.
+
+        Its rings are joined; what comes of it is kept where it is better.
+        """
         framed, ground, passages, terms = (
             self._framed,
             self._ground,
@@ -127,16 +135,29 @@ class WindowSearch:
         )
         window = Window(FRAME, FRAME, framed.rows, framed.cols, framed.width)
         program = _program(self._size, beam, self._aim.cells.size)
-        begin_window(ground, passages, terms, window, program, 0, random)
+        price = RING_TURNS * terms.turn
+        begin_window(ground, passages, terms, window, program, 0, ANY_PRICE, price, random)
         while advance_window(ground, passages, terms, window, program, beam):
             # At each pause more is done than at the last.
             self._tally[SOLVED] += 1
             yield
         self._tally[COST] += end_window(ground, passages, terms, window, program)
         self._tally[SOLVED] += 1
-        if self._tally[COST] < self._tally[BEST]:
+        rings, seams = np.empty((self._size, 2), np.int32), np.empty_like(self._aim.cells)
+        for _ in range(JOIN_PIECES):
+            left = join_rings(
+                *(ground, passages, terms, self._program, self._aim, rings, seams, self._tally),
+                *(JOINS_AT_ONCE, random),
+            )
+            yield
+            if left == 1:
+                break
+        if left == 1 and self._tally[COST] < self._tally[BEST]:
             self._tally[BEST] = self._tally[COST]
-            self._best.partner[:], self._best.ends[:] = self._passages
+            _copy(passages, self._best)
+        else:
+            self._tally[COST] = self._tally[BEST]
+            _copy(self._best, passages)
 
     @property
     def best_us(self) -> int:
@@ -162,6 +183,10 @@ class WindowSearch:
         out = np.empty(4 * self._aim.cells.size + 2, np.int32)
         self._walk = out[: walk_of(self._ground, self._best, out)].copy()
         return self._walk
+
+
+def _copy(source: Passages, target: Passages) -> None:
+    target.partner[:], target.ends[:] = source
 
 
 def thinned(walk: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -248,7 +273,7 @@ def _program(size: int, beam: int, cells: int) -> Program:
         clock=np.zeros(2, np.int64),
         taken=np.zeros(12, np.int16),
         kinds=np.zeros(12, np.int64),
-        at=np.zeros(10, np.int64),
+        at=np.zeros(11, np.int64),
         parts=parts,
     )
 

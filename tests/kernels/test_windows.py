@@ -57,6 +57,26 @@ def test_a_window_of_the_whole_ground_is_solved_to_the_least_cost():
     assert solved >= 125
 
 
+def test_a_whole_ground_with_few_states_becomes_one_walk_all_the_same():
+    # A beam of 8 over rooms with notches comes apart into rings, which windows join.
+    random = np.random.default_rng(2)
+    better = 0
+    for trial in range(6):
+        floor = np.kron(random.random((9, 11)) < 0.8, np.ones((3, 3), bool))
+        floor[:3, :3] = True
+        end = (0, 0) if trial % 2 else None
+        ground = CoverageLattice.from_free(floor)
+        problem = CoverageProblem.of(ground, (0, 0), end=end, cost=CoverageCost(1.0, 50.0))
+        search, framed, walk = search_of(problem)
+        assert search.load(walk)
+        begun_us = search.best_us
+        for _ in search.solve_whole(8, stream_of(trial)):
+            pass
+        assert_sound(problem, framed, search)
+        better += search.best_us < 0.9 * begun_us
+    assert better == 6
+
+
 @pytest.mark.parametrize("price", [0.5, 1.25, 5.0, 50.0])
 @pytest.mark.parametrize("kind", ["anywhere", "home", "elsewhere", "half covered"])
 def test_windows_leave_a_whole_walk_and_find_better_ones(kind, price):

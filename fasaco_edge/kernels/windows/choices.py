@@ -118,7 +118,9 @@ def list_choices(
         begins = int(ends.begin_id >= 0)
         size = behind + above + ahead + below + begins + ending
         is_empty = size == 0 and ends.is_needed
-        if ending > int(may_end) or size & 1 or size > 2 * MOST_PAIRS or is_empty:
+        if not int(ends.is_given) <= ending <= int(may_end):
+            continue
+        if size & 1 or size > 2 * MOST_PAIRS or is_empty:
             continue
         filled = _fill(kinds, 0, behind, here.behind)
         filled = _fill(kinds, filled, above, here.above)

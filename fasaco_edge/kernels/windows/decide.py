@@ -51,6 +51,16 @@ def _words(here: Here) -> int:
     return (here.spare_id + 7) >> 2
 
 
+@inlined
+def _leads_nowhere(program: Program, ends: Ends, closed: int) -> bool:
+    """Return whether the state in ``scratch`` is known to cover what is left no more."""
+    may_ring = ends.ring_price > 0
+    if not ends.is_checked or (closed > 0 and not may_ring):
+        return False
+    is_open = ends.is_free and program.scratch[ends.end_id] != NO_END
+    return is_stuck(program, is_open, may_ring)
+
+
 @lean_kernel
 def _expand(
     program: Program,
@@ -88,10 +98,9 @@ def _expand(
         program.clock[EXPANDED] += 1
         code = choice.code[kind, number]
         closed = apply(program, here, ends, code, behind, above, was_closed, words)
-        if closed < 0:
-            continue
-        is_open = ends.is_free and program.scratch[ends.end_id] != NO_END
-        if ends.is_checked and not closed and is_stuck(program, is_open):
+        if closed > 1:
+            total, closed = total + (closed - 1) * ends.ring_price, 1
+        if closed < 0 or total >= threshold or _leads_nowhere(program, ends, closed):
             continue
         swaps = order_lanes(program.scratch, here.ahead_id) if here.to_ahead else 0
         if here.to_below:

@@ -86,7 +86,7 @@ class Program(NamedTuple):
         clock: int64 (2,): stamp of the layer; states expanded so far.
         taken: int16 (12,), identifiers of the slots that a cell has; kinds int64 (12,), their
             directions.
-        at: int64 (10,), how far it is: entries NUMBER to END_ID.
+        at: int64 (11,), how far it is: entries NUMBER to RING_PRICE.
         parts: what the cells not yet decided hang together in.
     """
 
@@ -158,8 +158,9 @@ LAYER_STAMP, EXPANDED = 0, 1
 
 # Entries of ``Program.at``: the next cell's number and line, the layer before it and its states;
 # the cost to come below; cells of the window, and the last that needs a passage; how many
-# identifiers; those of the walk's begin and end, -1 where they are elsewhere.
-NUMBER, LINE, LAYER, STATES, LIMIT, COUNT, LAST, IDS, BEGIN_ID, END_ID = range(10)
+# identifiers; those of the walk's begin and end, -1 where they are elsewhere; what each ring but
+# the first one costs, 0 where there is to be one.
+NUMBER, LINE, LAYER, STATES, LIMIT, COUNT, LAST, IDS, BEGIN_ID, END_ID, RING_PRICE = range(11)
 
 
 class Here(NamedTuple):
@@ -196,7 +197,9 @@ class Ends(NamedTuple):
         begin_id: identifier of the walk's begin, where it is in this cell, else -1.
         end_id: of its end, where that is in the window, else -1.
         is_needed: whether the cell must have a passage.
-        may_close: whether no cell after it must have one.
+        may_close: whether a ring may close: no cell after it must have one, or several may.
+        ring_price: what each ring but the first one costs; 0 where there is to be one.
+        is_given: whether the walk must end in this cell.
         is_free: whether the walk may still end in any cell that is left.
         is_checked: whether the ends into each part that is left are to be counted.
     """
@@ -205,6 +208,8 @@ class Ends(NamedTuple):
     end_id: int
     is_needed: bool
     may_close: bool
+    ring_price: int
+    is_given: bool
     is_free: bool
     is_checked: bool
 

@@ -2,7 +2,8 @@
 
 A walk that enters a part leaves it again, but for its end. So the number of open ends that lead
 into a part is even, or odd in one part while the walk may end there; and no part with a cell to
-cover is without any. A state where that does not hold leads nowhere, however cheap it is.
+cover is without any, unless it may have a ring of its own. A state where that does not hold leads
+nowhere, however cheap it is.
 """
 
 from fasaco_edge.kernels.jit import inlined, lean_kernel
@@ -93,12 +94,13 @@ def list_rim(program: Program, number: int, first: int, ids: int, is_free: bool)
 
 
 @inlined
-def is_stuck(program: Program, is_open: bool) -> bool:
+def is_stuck(program: Program, is_open: bool, may_ring: bool) -> bool:
     """Return whether the state in ``scratch`` cannot cover what is left.
 
     Args:
         program: the memory.
         is_open: whether the walk may end in any cell that is left.
+        may_ring: whether a part of two cells or more may have a ring of its own.
     """
     parts = program.parts
     odd, met = 0, 0
@@ -110,6 +112,7 @@ def is_stuck(program: Program, is_open: bool) -> bool:
             met |= bit
     for label in range(min(parts.sizes[PARTS], MOST_PARTS)):
         bit = 1 << label
-        if parts.left[label] > 0 and parts.needed[label] > 0 and not met & bit:
+        is_bound = parts.left[label] == 1 or not may_ring
+        if is_bound and parts.needed[label] > 0 and not met & bit:
             return True
     return bool(odd & (odd - 1)) if is_open else odd != 0

@@ -11,6 +11,9 @@ Costs are reduced by the prices of steps (``kernels.bound.turns``): no passage c
 nothing, so what is left to decide costs at least the sum of the cells' cheapest passages, and
 states that cannot come below the present walk are dropped. Where more states are left than the
 beam takes, the dearest ones are dropped, too. All amounts are half microseconds.
+
+Over a whole ground a beam of few states soon has none that is one ring. So several may close there
+at a price (``ring_price``), and ``kernels.windows.rings`` joins them.
 """
 
 import numpy as np
@@ -32,6 +35,7 @@ from fasaco_edge.kernels.windows.memory import (
     MOST_IDS,
     NO_END,
     NUMBER,
+    RING_PRICE,
     STATES,
     Ends,
     Here,
@@ -67,6 +71,7 @@ def solve_window(
     program: Program,
     beam: int,
     noise: int,
+    allowance: int,
     random: NDArray[np.uint64],
 ) -> int:
     """Solve a window anew; return by how much the walk's cost changes [half us], 0 if not at all.
@@ -80,9 +85,10 @@ def solve_window(
         beam: most states kept after a cell.
         noise: up to so much is added to each passage's cost at random, so that the walk may
             become a little dearer.
+        allowance: so much dearer it may become for sure: several rings in the window become one.
         random: state of the stream, uint64 (1,).
     """
-    begin_window(ground, passages, terms, window, program, noise, random)
+    begin_window(ground, passages, terms, window, program, noise, allowance, 0, random)
     while advance_window(ground, passages, terms, window, program, beam):
         pass
     return end_window(ground, passages, terms, window, program)
@@ -96,9 +102,11 @@ def begin_window(
     window: Window,
     program: Program,
     noise: int,
+    allowance: int,
+    ring_price: int,
     random: NDArray[np.uint64],
 ) -> None:
-    """Begin to solve a window; see ``solve_window``."""
+    """Begin to solve a window; see ``solve_window``, and for ``ring_price`` above."""
     lines, wide = max(window.rows, window.cols), min(window.rows, window.cols)
     at, count = program.at, 0
     for line in range(lines):
@@ -112,6 +120,7 @@ def begin_window(
     ids = _name_rim(ground, passages, program, first, count)
     at[LINE], at[NUMBER], at[LAYER], at[STATES] = 0, 0, 0, 0
     at[COUNT], at[IDS], at[BEGIN_ID], at[END_ID] = count, ids, -1, -1
+    at[RING_PRICE] = ring_price
     for index in range(first, ids):
         if program.rim[index, 1] == BEGIN:
             at[BEGIN_ID] = index
@@ -121,7 +130,7 @@ def begin_window(
         return
     may_end = at[END_ID] >= 0
     now, last = price_cells(ground, passages, terms, program, count, noise, random, may_end)
-    at[LIMIT], at[LAST] = now - (0 if noise else 1), last
+    at[LIMIT], at[LAST] = now + allowance - (0 if noise else 1), last
     if at[LIMIT] <= program.left[0]:
         return
     _join_outside(ground, passages, program, first, ids)
@@ -169,7 +178,10 @@ def advance_window(
             program.parts.sizes[LEADS] = 0
             _list_frontier(ground, program, window, line, place, here)
             list_rim(program, number, 2 * wide + 2, at[IDS], is_free)
-        ends = Ends(begins, end_id, is_needed, number >= at[LAST], is_free, is_checked)
+        price = at[RING_PRICE]
+        may_close = price > 0 or number >= at[LAST]
+        is_given = end_id >= 0 and not is_free and cell == passages.ends[1]
+        ends = Ends(begins, end_id, is_needed, may_close, price, is_given, is_free, is_checked)
         at[STATES] = decide(program, here, ends, at[LAYER], at[STATES], beam, at[LIMIT])
         at[LAYER] = 1 - at[LAYER]
         at[NUMBER] = number + 1

@@ -40,7 +40,7 @@ def apply(
     was_closed: int,
     words: int,
 ) -> int:
-    """Write the state after a choice into ``scratch``; return whether the ring is closed, or -1."""
+    """Write the state after a choice into ``scratch``; return how many rings are closed, or -1."""
     taken, mates = program.taken, program.scratch
     pairing, ahead, below = code & 255, code >> 8 & 3, code >> 10 & 3
     cell, spare = here.cell, here.spare_id
@@ -57,7 +57,7 @@ def apply(
     if code >> 12 & 1:
         taken[size] = ends.end_id
         size += 1
-    if was_closed and size:
+    if was_closed and size and not ends.ring_price:
         return -1
     closed = was_closed
     for word in range(words):
@@ -81,9 +81,9 @@ def apply(
             mates[one] = NO_END
         else:
             if mates[one] == other:
-                if closed or not ends.may_close:
+                if not ends.may_close or (closed and not ends.ring_price):
                     return -1
-                closed = 1
+                closed += 1
             else:
                 mate, further = mates[one], mates[other]
                 mates[mate], mates[further] = further, mate
