@@ -8,6 +8,7 @@ import pytest
 from tests.benchmarks.__main__ import main
 
 FLOOR = np.ones((6, 8), bool)
+BOUNDS = {"ring": 210.0, "row": 206.0}
 
 
 @pytest.fixture
@@ -33,6 +34,8 @@ def test_tours_are_compared_with_the_best_known(instances, capsys):
     runs = {each["ground"]: each for each in json.loads(out)["runs"]}
     assert {name: each["cost_s"] for name, each in runs.items()} == {"ring": 210.0, "row": 206.0}
     assert all(0 < each["bound_s"] <= each["best_s"] for each in runs.values())
+    # At the end of a row every tour turns back, in the corner of the ring to one side.
+    assert {name: each["bound_s"] for name, each in runs.items()} == BOUNDS
 
 
 def test_walks_over_maps_have_a_certified_gap_at_each_price(capsys, tmp_path):
