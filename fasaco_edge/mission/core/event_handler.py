@@ -88,7 +88,6 @@ class EventHandler:
             again = "robot is on coverable ground again"
             route.want(again if route.revision else self.ledger.first_plan_reason)
         elif change := area.change_since(before):
-            self.line.note_area(before)
             route.want(str(change), change.window)
 
     def _apply(self, event: Event | PatchRun) -> None:

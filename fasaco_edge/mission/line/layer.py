@@ -15,19 +15,16 @@ from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.fine_raster import strips
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import PathUpdate
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.coverage.floor_tiles import pixels_under
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFloor
-from fasaco_edge.mission.line.asides import marked, not_worth_the_way
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.out_of_reach import REASONS, causes_of
 from fasaco_edge.mission.line.polisher import Polisher
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # A cell of which less floor is left is not driven to again [m2].
@@ -62,15 +59,12 @@ class LineLayer:
         route: Route,
     ) -> None:
         self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
-        self._config = sweeping.line if sweeping else None
         self._polisher = Polisher(sweeping.line) if sweeping else None
         self._ahead: LineAhead | None = None
         # What may have changed of map and floor since the last look, and which cells were asked
         # for then, and in reach, on which window.
         self._touched: Window | None = None
         self._is_dropped = False
-        # Whether the tally has what may have changed.
-        self._is_taken = False
         # Where what is out of reach may have changed, and was not looked at.
         self._unexplained: Window | None = None
         self._asked: tuple[Window, NDArray[np.bool_], NDArray[np.bool_]] | None = None
@@ -87,7 +81,7 @@ class LineLayer:
         floor = self._map.floor
         if floor is None or (floor is self._seen[0] and floor.revision == self._seen[1]):
             return
-        self._seen, self._is_taken = (floor, floor.revision), False
+        self._seen = floor, floor.revision
         if self._ahead is None:
             self._ahead = LineAhead(floor)
             self._asked, self._touched = None, None
@@ -101,39 +95,6 @@ class LineLayer:
             window and window.moved(*floor.shift) for window in (self._touched, self._unexplained)
         )
         self._touched = Window.around(touched, floor.touched)
-
-    def note_area(self, before: ReachableArea) -> None:
-        """Take cells for covered that are new in reach, and whose floor is not worth the way.
-
-        To be called where what is in reach has changed, before a plan is asked for.
-        """
-        ahead, area, config = self._ahead, self._map.area, self._config
-        floor, path = self._map.floor, self._route.path_to_keep
-        if ahead is None or area is None or config is None or floor is None or not len(path):
-            return
-        window = area.lattice.window
-        decided = self._map.is_decided(window)
-        is_under_way = config.price_s_m2 > 0.0 and self._orders.order_state.begun
-        if not is_under_way or decided is None or window != floor.stands.lattice.window:
-            return
-        still_open = area.reachable & self._orders.open_cells(window)
-        # What is not decided yet will be elsewhere, or larger, soon.
-        new = decided & ~carried(before.reachable, before.lattice.window, window)
-        on_path = marked(path, window)
-        asides = still_open & new & ~on_path
-        if not asides.any():
-            return
-        self._take_floor(self._touched)
-        self._is_taken = True
-
-        def left_m2(cells: list[Cell]) -> float:
-            # Also what the tool comes over on the way there.
-            part = floor.pixels_of(marked(np.array(cells), window))
-            return ahead.tally.missed_m2(part) if part else 0.0
-
-        goals = on_path | still_open & ~new
-        for cell in not_worth_the_way(area.lattice, asides, goals, left_m2, config):
-            self._ledger.credit(cell)
 
     def note_pose(self, pose: Pose2D) -> None:
         """Note where the robot is now: on its line, maybe."""
@@ -156,8 +117,7 @@ class LineLayer:
         if ahead is None or stamped is None or self._polisher is None or self._map.floor is None:
             return update
         touched, self._touched = self._touched, None
-        self._take_floor(None if self._is_taken else touched)
-        self._is_taken = False
+        self._take_floor(touched)
         reason = ""
         if update is not None:
             ahead.lay(update.cells, stamped.pose)
