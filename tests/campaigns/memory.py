@@ -44,7 +44,7 @@ KINDS = ("maps", "moving", "updates", "mappers")
 # Mappers that speak at once.
 MAPPERS = 3
 # A daemon is asked for its status so often before it counts as stuck.
-ANSWERS_S = 60.0
+ANSWERS_S = 180.0
 
 
 @dataclass(frozen=True)
@@ -130,13 +130,22 @@ def pour(flood: Flood, daemon: Daemon, outsider: Outsider, seconds: float) -> in
     return sent
 
 
-def settled(outsider: Outsider, daemon: Daemon) -> dict[str, Any]:
-    """Return the status once the daemon has nothing to do any more."""
+def settled(
+    outsider: Outsider, daemon: Daemon, earlier: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return the status once the daemon has nothing to do any more.
+
+    Args:
+        outsider, daemon: whom to ask, and about whom.
+        earlier: the status before something was sent, of which it has to tell.
+    """
     until, before = time.monotonic() + ANSWERS_S, ()
+    known = earlier and (earlier["map"]["revision"], earlier["errors"]["total"])
     while daemon.process.poll() is None:
         status = outsider.ask_status()
         now = (status["map"]["revision"], status["errors"]["total"], status["plan"]["planning"])
-        if (now == before and not now[2]) or time.monotonic() > until:
+        is_settled = now == before and not now[2] and now[:2] != known
+        if is_settled or time.monotonic() > until:
             return status
         before = now
         time.sleep(1.2)
@@ -163,9 +172,9 @@ def run_flood(
             outsider.put("map", map_bytes(room(8.0, 6.0)))
             outsider.put("pose", pose_bytes(0.75, 0.75))
             outsider.wait_status(lambda status: status["state"] == "covering")
-            before = settled(outsider, daemon)["map"]["revision"]
+            before = settled(outsider, daemon)
             sent = pour(flood, daemon, outsider, seconds)
-            status = settled(outsider, daemon)
+            status = settled(outsider, daemon, before)
             peak = peak_mb(daemon.pid) if status else 0.0
     finally:
         processes.PROGRAM = PROGRAM
@@ -174,7 +183,7 @@ def run_flood(
         needs_mb=round(needs / 1e6), error="", broken="the daemon has ended",
     )  # fmt: skip
     if status:
-        row.taken = status["map"]["revision"] - before
+        row.taken = status["map"]["revision"] - before["map"]["revision"]
         row.error = status["errors"]["last"]
         row.outcome, row.broken = "taken" if row.taken else "refused", ""
         # Updates of a map that was refused are refused in their turn, for want of it.

@@ -12,7 +12,6 @@ from tests.campaigns import come_and_go
 YOUNG = ("rss_mb", "cores")
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("hub", come_and_go.HUBS)
 def test_who_comes_and_goes_leaves_nothing_behind(tmp_path, hub):
     campaign = come_and_go.run_campaign(tmp_path, mappers=30, daemons=3, rest_s=3.0, hub=hub)

@@ -11,7 +11,6 @@ from tests.campaigns import hostile_user
 from tests.campaigns.trap import Trap
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.skipif(bool(hostile_user.why_not()), reason=hostile_user.why_not())
 def test_nothing_that_another_user_has_prepared_is_loaded_or_written_through(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hostile")

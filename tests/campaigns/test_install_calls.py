@@ -62,7 +62,7 @@ def test_an_installation_is_there_or_not(tmp_path_factory):
     with bare_robot(tmp_path_factory.mktemp("lab"), folders) as robot:
         for version in versions:
             words = ("env", "SETTLE_S=1", *STRACE, CALLS, "-o", LOG, f"/srv/{version}/install.sh")
-            robot.run(*words, timeout_s=110.0)
+            robot.run(*words, timeout_s=600.0)
             seen = Installation()
             with (robot.root / LOG.lstrip("/")).open(errors="replace") as log:
                 for call in calls_of(log):

@@ -19,7 +19,6 @@ SMALL = {"map": {"max_pixels": 4_000_000, "max_lattice_cells": 60_000}}
 limited = pytest.mark.skipif(bool(why_not()), reason=why_not())
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize(
     ("flood", "outcome", "error"),
     [
@@ -39,7 +38,6 @@ def test_a_daemon_takes_no_more_than_it_says(tmp_path, flood, outcome, error):
 
 
 @limited
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     "flood",
     [
@@ -55,7 +53,6 @@ def test_a_daemon_lives_under_its_units_limit(tmp_path, flood):
 
 
 @limited
-@pytest.mark.timeout(300)
 def test_under_a_smaller_limit_it_takes_smaller_maps_and_says_so(tmp_path):
     limit = 400 << 20
     with memory_group(limit) as group:
@@ -68,7 +65,6 @@ def test_under_a_smaller_limit_it_takes_smaller_maps_and_says_so(tmp_path):
 
 
 @limited
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("kind", ["maps", "updates"])
 def test_a_recorder_lives_under_its_units_limit(tmp_path, kind):
     pytest.importorskip("rerun")

@@ -35,7 +35,7 @@ def building(tmp_path):
 def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
     pytest.importorskip("rerun")
     out = tmp_path / "demo"
-    options = ("--map", building, "--speed", 60, "--timeout", 300)
+    options = ("--map", building, "--speed", 60, "--timeout", 1200)
     ended = fasaco_edge("demo", *options, "--out", out, "--json")
     assert ended.code == 0, ended.err
     summary = json.loads(ended.out)

@@ -56,7 +56,9 @@ def test_two_processes_compile_what_is_missing(tmp_path, monkeypatch):
     for file in [*missing, *folder.glob("complete-*")]:
         file.unlink()
     monkeypatch.setitem(ENVIRONMENT, "NUMBA_CACHE_DIR", str(tmp_path))
-    told = json.loads(fasaco_edge("warmup", "--jobs", "2", "--json").out)
+    ended = fasaco_edge("warmup", "--jobs", "2", "--json")
+    assert ended.code == 0, ended
+    told = json.loads(ended.out)
     assert (told["ready"], told["folder"]) == (True, str(folder))
     assert len(missing) >= len(names)
     assert all(file.exists() for file in missing)

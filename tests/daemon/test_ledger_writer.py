@@ -185,6 +185,7 @@ def test_new_ledgers_do_not_make_a_failing_disk_busy(tmp_path, monkeypatch):
         tries.append(descriptor)
         raise OSError(errno.EIO, "Input/output error")
 
+    monkeypatch.setattr(ledger_writer, "RETRY_S", 600.0)
     writer = open_ledger(tmp_path, "robot", CELL_M)
     monkeypatch.setattr(os, "fsync", failing)
     for length in range(1, 60):
@@ -192,7 +193,7 @@ def test_new_ledgers_do_not_make_a_failing_disk_busy(tmp_path, monkeypatch):
         time.sleep(0.005)
     assert len(tries) == 1
     # One last try, then it ends.
-    writer.close(5.0)
+    writer.close(60.0)
     assert len(tries) == 2
 
 

@@ -110,7 +110,7 @@ def test_what_is_on_the_disk_outlives_a_kill(tmp_path):
 
 def trail_of(outsider: Outsider) -> tuple[PheromoneMessage, int]:
     """Return the living trail, once there is one, and the revision of the path in force."""
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 150
     while outsider.get("@rpc/pheromone")[0].ok is None and time.monotonic() < deadline:
         time.sleep(0.05)
     told = outsider.ask("@rpc/pheromone")

@@ -128,7 +128,7 @@ def is_running(pid: int) -> bool:
         return False
 
 
-COMMAND_S = 400.0
+COMMAND_S = 1500.0
 
 
 @dataclass(frozen=True)
