@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, TypeVar, cast
 from fasaco_edge.kernels import release
 from fasaco_edge.kernels.cache import note_complete, own_folder
 from fasaco_edge.kernels.release import ANY_PROCESSOR, KERNEL_SUFFIX, KERNELS, kernel_module
-from fasaco_edge.kernels.sealed import UnsoundFileError, read_sealed, write_sealed
+from fasaco_edge.kernels.sealed import MissingFileError, UnsoundFileError, read_sealed, write_sealed
 
 # numba takes settings from .numba_config.yaml in the working folder, which may be anybody's: at
 # import, unless there is no reader of YAML, and before it compiles, unless no file has that name.
@@ -118,13 +118,11 @@ class _KernelCache:
         triple, *processor = target.codegen().magic_tuple()
         if not release.why_unusable():
             file = release.FOLDER / self._file_name(signature, triple, *ANY_PROCESSOR)
-            if os.path.exists(file) and (result := _rebuilt(file, signature, target)) is not None:
+            if (result := _rebuilt(file, signature, target)) is not None:
                 return result
         if (folder := _own_folder()) is None:
             return None
         file = folder / self._file_name(signature, triple, *processor)
-        if not os.path.lexists(file):
-            return None
         result = _rebuilt(file, signature, target)
         if result is not None:
             _USED.add(file.name)
@@ -202,6 +200,8 @@ def _rebuilt(file: Path, signature: object, target: CPUContext) -> object:
         if kept_for != signature:
             return None
         result: object = CompileResult._rebuild(target, *parts)
+    except MissingFileError:
+        return None
     except UnsoundFileError as why:
         FAULTS.cannot_load(file, why)
         return None
