@@ -387,6 +387,7 @@ class Senseless:
                 "spare_share": self._rng.choice([0.0, 0.05]),
                 "seed": self._rng.randrange(2**63),
                 "budget_s": self._rng.choice([0.02, 0.1]),
+                "line": self._rng.choice(["thorough", "thorough", "quick", "cells"]),
             },
             "map": {"free_at_most": self._rng.choice([25] * 6 + [0, 45])},
             "robot": {"quarter_turn_s": self._rng.choice([1.5, 0.0])},

@@ -15,6 +15,7 @@ import time
 from collections import Counter, OrderedDict, deque
 from contextlib import ExitStack, suppress
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Self
 
@@ -23,8 +24,16 @@ import yaml
 import zenoh
 import zenoh.ext
 
+from fasaco_edge.daemon.memory import floor_pixels
+from fasaco_edge.grid.fine_raster import (
+    RobotDiscs,
+    blocked_pixels,
+    fine_geometry,
+    map_to_raster,
+)
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.host.processes import peak_mb, resident_mb
+from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.maps import decode_occupancy_grid
@@ -32,6 +41,7 @@ from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from tests.campaigns import raw_messages
 from tests.campaigns.senseless import SILENT, Event, pixels_of
+from tests.campaigns.senseless_mission import NEAR_PX
 from tests.support.processes import Daemon, daemon_process, free_endpoint
 from tests.support.router import router_process
 from tests.support.service_manager import Manager
@@ -132,6 +142,10 @@ class Judge:
         check("path_attachment.json", about)
         path = decode_path(payload)
         self.walk, self.driven = path.xy, 0
+        lines = [config.get("line", "cells") != "cells" for config in list(self.configs)[-2:]]
+        if any(lines):
+            self._see_line(path.xy, about, is_sure=all(lines))
+            return
         promise(about["steps"] == max(len(path.xy) - 1, 0), f"{len(path.xy)} poses, {about}")
         cell_m = self.configs[-1]["robot"]["tool_width_m"]
         cells = np.floor(path.xy[:, ::-1] / cell_m).astype(np.int64)
@@ -147,6 +161,16 @@ class Judge:
         holds = any(_holds(lattice, cells) for lattice in known)
         promise(holds, f"path {about['revision']} leaves the map it names: {about}, {shown}")
         self.counts["paths judged on their map"] += 1
+
+    def _see_line(self, xy: np.ndarray[Any, Any], about: dict[str, Any], *, is_sure: bool) -> None:
+        """Judge a line over the floor: the robot touches nothing from its first point on."""
+        promise(bool(np.isfinite(xy).all()), f"path {about['revision']} leads nowhere")
+        shown = self._maps.get(about["map_stamp_ns"])
+        if shown is None or shown["rows"] * shown["cols"] > MOST_JUDGED_PIXELS or not is_sure:
+            return
+        holds = any(_is_clear(shown, config, xy[1:]) for config in list(self.configs)[-2:])
+        promise(holds, f"path {about['revision']} touches what is not free: {about}, {shown}")
+        self.counts["lines judged on their map"] += 1
 
     def _lattice(self, shown: Event, config: Event) -> CoverageLattice | None:
         """Return the lattice of a map by a configuration; None of one too large to judge."""
@@ -166,6 +190,17 @@ class Judge:
 def _holds(lattice: CoverageLattice, cells: np.ndarray[Any, Any]) -> bool:
     nothing = np.zeros(lattice.states.shape, bool)
     return ReachableArea(lattice, nothing).drivable_prefix(cells.astype(np.int32)) == len(cells)
+
+
+def _is_clear(shown: Event, config: Event, xy: np.ndarray[Any, Any]) -> bool:
+    robot, free = config["robot"], config["map"]["free_at_most"]
+    grid = decode_occupancy_grid(raw_messages.occupancy_grid(shown, pixels_of(shown)))
+    discs = RobotDiscs(robot["radius_m"], robot["tool_width_m"], free)
+    geometry, parts = fine_geometry(grid.geometry, discs, floor_pixels(grid.cells.size))
+    blocked = blocked_pixels(grid, geometry, parts, free, (0, geometry.rows))
+    radius = robot["radius_m"] / geometry.resolution - NEAR_PX
+    points = [map_to_raster(geometry, x, y) for x, y in xy.tolist()]
+    return all(is_clear(blocked, *start, *end, radius) for start, end in pairwise(points))
 
 
 class Campaign:
@@ -391,7 +426,8 @@ class Campaign:
                 **sections,
             )
         )
-        self.judge.configs.append({"robot": self._robot, "map": maps})
+        line = sections.get("planner", {}).get("line", "cells")
+        self.judge.configs.append({"robot": self._robot, "map": maps, "line": line})
         self.judge.walk = np.empty((0, 2))
         self._longest_ms = 0.0
         self._wait("the daemon is there", lambda: self._asked_status() is not None)
@@ -438,7 +474,8 @@ class Campaign:
         after = {**before, **{key: before.get(key, {}) | part for key, part in sections.items()}}
         file.write_text(yaml.safe_dump(after))
         self.judge.look()
-        self.judge.configs.append({"robot": self._robot, "map": after["map"]})
+        line = after.get("planner", {}).get("line", "cells")
+        self.judge.configs.append({"robot": self._robot, "map": after["map"], "line": line})
         self._daemon.process.send_signal(signal.SIGHUP)
 
     def _restart_router(self, away_s: float) -> None:

@@ -13,6 +13,7 @@ import random
 import time
 from collections import Counter
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import msgspec
@@ -20,11 +21,14 @@ import numpy as np
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
-from fasaco_edge.daemon.loop.outbox import headings
+from fasaco_edge.daemon.loop.mission_runner import mission_config
+from fasaco_edge.daemon.loop.outbox import MOST_SQUARES, headings
 from fasaco_edge.daemon.loop.status import mission_report
+from fasaco_edge.daemon.loop.trail_publisher import ShownTrail
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.grid.lattice import CoverageLattice, Footprint
-from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.grid.fine_raster import map_to_raster
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.mission.core.events import (
     CommandReceived,
     Decision,
@@ -36,9 +40,9 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.map.ground import Ground
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.mission.orders.order_state import OrderState
-from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import ColonySnapshot, SearchProgress, StopRecorder
 from fasaco_edge.planners.registry import planner_of
 from fasaco_edge.wire.json_text import encode_json
@@ -54,11 +58,14 @@ from fasaco_edge.wire.poses import PoseDecoder
 from fasaco_edge.wire.schemas import TF_MESSAGE
 from tests.campaigns import raw_messages
 from tests.campaigns.senseless import Event, pixels_of
+from tests.mission.test_line import check_tally
 
 MOST_CELLS = 20_000
 # A mission that is kept is read again once in so many turns; a lattice made afresh more often.
 KEPT_EVERY, FRESH_EVERY = 40, 5
 HONEST_TURNS = 6
+# What may be lost where a line goes from the raster to the map and back [pixels].
+NEAR_PX = 1e-3
 
 
 class BrokenInvariantError(AssertionError):
@@ -118,30 +125,18 @@ class MissionTrial:
             self._robot = sections.get("robot", {})
         known = {key: value for key, value in sections.items() if key != "ros2"}
         known["robot"] = self._robot | known.get("robot", {}) if keeps_site else self._robot
+        known["map"] = {**known.get("map", {}), "max_lattice_cells": MOST_CELLS}
         config = msgspec.convert(known, DaemonConfig)
-        robot, planner = config.robot, config.planner
-        self._footprint = Footprint(
-            robot.tool_width_m,
-            robot.radius_m,
-            config.map.free_at_most,
-            config.map.occupied_at_least,
-        )
+        planner = config.planner
         self._planner = planner_of(planner.name, planner.colony(), 1, planner.local_search)
-        mission = Mission(
-            MissionConfig(
-                self._footprint,
-                MOST_CELLS,
-                robot.cost(),
-                config.mission,
-                0.05 if isinstance(self._planner, NearOptimal) else 0.0,
-            )
-        )
+        self._config = mission_config(config, self._planner)
+        mission = Mission(self._config)
         self._poses = PoseDecoder(config.pose.schema)
         self._asked: PlanRequest | None = None
         if before is not None:
             kept = before.snapshot()
             snapshot = decode_ledger(encode_ledger(kept), kept.cell_m)
-            if snapshot.cell_m == robot.tool_width_m:
+            if snapshot.cell_m == config.cell_m:
                 if snapshot.tiles:
                     mission.restore_ledger(snapshot)
                 mission.restore_order(OrderState.from_json(snapshot.note))
@@ -229,7 +224,9 @@ class MissionTrial:
         if update is not None:
             assert lattice is not None
             self._check_walk(update.cells)
-            xy = lattice.centres(update.cells)
+            if update.xy is not None:
+                self._check_line(update.xy)
+            xy = lattice.centres(update.cells) if update.xy is None else update.xy
             payload = self._say(
                 "path", lambda: encode_path(xy, headings(xy), grid.frame, grid.stamp_ns)
             )
@@ -243,8 +240,23 @@ class MissionTrial:
                 "coverage",
                 lambda: encode_occupancy_grid(coverage_grid(*values, grid.frame, grid.stamp_ns)),
             )
+            self._say("floor", lambda: self._floor(grid))
+            self._say("trail", self._trail)
         report = encode_json({"report": mission_report(mission, mission.order_state)})
         json.loads(report)
+
+    def _floor(self, grid: OccupancyGrid) -> bytes:
+        """Return the swept floor as it is published, b"" where it is too wide to be shown."""
+        shown = self._mission.floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
+        return b"" if shown is None else encode_occupancy_grid(shown)
+
+    def _trail(self) -> bytes:
+        """Return the living trail, and where it points to, as they are published."""
+        held = self._mission.trail.snapshot()
+        if not held.window.rows * held.window.cols:
+            return b""
+        shown = ShownTrail(held, self._config.footprint.cell_m, "map", 1, 1, 1)
+        return b"".join(shown.field()) + shown.directions()
 
     def _say(self, what: str, encode: Callable[[], bytes]) -> bytes | None:
         try:
@@ -289,11 +301,17 @@ class MissionTrial:
         mission, order = self._mission, self._mission.order_state.order
         if mission.grid is None or mission.lattice is None or (order and order.keep_out):
             return
-        fresh = CoverageLattice.from_map(mission.grid, self._footprint, MOST_CELLS)
+        fresh = Ground(self._config)
+        fresh.begin(mission.grid)
         geometry = mission.grid.geometry
-        _hold(fresh.window == mission.lattice.window, f"window over {geometry}")
-        _hold(np.array_equal(fresh.states, mission.lattice.states), f"states over {geometry}")
-        _hold(np.array_equal(fresh.steps, mission.lattice.steps), f"steps over {geometry}")
+        for name in ("window", "states", "steps"):
+            now, anew = getattr(mission.lattice, name), getattr(fresh.lattice, name)
+            _hold(np.array_equal(now, anew), f"{name} over {geometry}")
+        if fresh.floor is not None:
+            for name in ("blocked", "places"):
+                now, anew = getattr(mission._map.floor, name), getattr(fresh.floor, name)
+                _hold(np.array_equal(now, anew), f"{name} over {geometry}")
+            check_tally(mission)
         self.counts["lattices made afresh"] += 1
 
     def _check_walk(self, cells: np.ndarray[Any, Any]) -> None:
@@ -306,6 +324,18 @@ class MissionTrial:
         _hold(bool(lattice.coverable[local[:, 0], local[:, 1]].all()), "path on other ground")
         apart = np.abs(np.diff(cells, axis=0)).sum(axis=1)
         _hold(bool((apart == 1).all()), "path not connected")
+
+    def _check_line(self, xy: np.ndarray[Any, Any]) -> None:
+        """Check that a line leads over places where the robot may be."""
+        floor = self._mission._map.floor
+        assert floor is not None
+        _hold(bool(np.isfinite(xy).all()), "a line that leads nowhere")
+        radius = floor.discs.radius_m / floor.geometry.resolution - NEAR_PX
+        points = [map_to_raster(floor.geometry, x, y) for x, y in xy.tolist()]
+        # On its way to the line it may stand anywhere: too near to a wall, say.
+        for start, end in pairwise(points[1:]):
+            _hold(bool(is_clear(floor.blocked, *start, *end, radius)), f"a wall at {start}, {end}")
+        self.counts["lines"] += 1
 
     def _check_recovery(self, event: Event) -> None:
         """Give an honest map and honest poses, as a robot would that begins anew."""

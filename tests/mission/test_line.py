@@ -127,6 +127,11 @@ def with_obstacle(grid, row, col, size=6, value=100):
     return OccupancyGrid(grid.geometry, cells)
 
 
+def shifted(grid, by_m):
+    origin = replace(grid.geometry.origin, x=grid.geometry.origin.x + by_m)
+    return OccupancyGrid(replace(grid.geometry, origin=origin), grid.cells)
+
+
 def test_a_room_is_swept_to_its_rim():
     grid = room(3.0, 2.4)
     robot = Robot(Mission(CONFIG))
@@ -351,6 +356,45 @@ def test_a_robot_that_was_carried_away_gets_a_line_from_there():
     assert judge_floor(grid, np.array(robot.trail), ROBOT).figures.swept_share > 0.9
 
 
+@pytest.mark.parametrize(
+    "other",
+    [lambda grid: shifted(grid, 0.012), lambda grid: part_of(grid, 0, 0, 40, 50)],
+    ids=["on another raster", "of another size"],
+)
+def test_a_map_that_comes_while_the_robot_is_nowhere_is_swept_afterwards(other):
+    grid = room(3.0, 2.4)
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(grid))
+    robot.drive(10)
+    here, robot.at = robot.at, (50.0, 50.0)
+    robot.now += 2.0
+    robot.tell()
+    robot.tell(MapReceived(other(grid)))
+    robot.tell(MapReceived(grid))
+    robot.at = here
+    robot.now += 2.0
+    robot.tell()
+    check_tally(robot.mission)
+    robot.finish()
+    assert judge_floor(grid, np.array(robot.trail), ROBOT).figures.swept_share > 0.95
+
+
+def test_a_robot_that_jumped_ahead_on_its_path_is_not_led_back_through_a_new_wall():
+    grid = room(6.0, 0.5)
+    robot = Robot(Mission(CONFIG), at=(4.0, 1.25))
+    robot.tell(MapReceived(grid))
+    turned = False
+    while not (turned and robot.at[0] > 2.5):
+        robot.drive()  # to the nearer end of the corridor, and back over cells that are covered
+        turned |= robot.at[0] < 2.3
+    robot.at = (robot.at[0] + 1.3, robot.at[1])
+    robot.tell()
+    col, row = grid.geometry.to_pixels(robot.at[0] - 0.65, 1.25)
+    blocked = with_obstacle(grid, int(row) - 6, int(col), 4)
+    robot.tell(MapReceived(blocked))
+    assert_clear(robot, blocked)
+
+
 @pytest.mark.parametrize("yaw", [0.0, 0.5])
 def test_a_map_on_another_raster_costs_the_polish_alone(yaw):
     grid = room(3.0, 2.4, yaw)
@@ -359,9 +403,7 @@ def test_a_map_on_another_raster_costs_the_polish_alone(yaw):
     robot.at = (2.6 * cos - 1.6 * sin, 2.6 * sin + 1.6 * cos)
     robot.tell(MapReceived(grid))
     robot.drive(20)
-    origin = grid.geometry.origin
-    moved = replace(grid.geometry, origin=replace(origin, x=origin.x + 0.012))
-    robot.tell(MapReceived(OccupancyGrid(moved, grid.cells)))
+    robot.tell(MapReceived(shifted(grid, 0.012)))
     check_tally(robot.mission)
     robot.finish()
     assert judge_floor(grid, np.array(robot.trail), ROBOT).figures.swept_share > 0.95

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker
     from fasaco_edge.mission.core.events import PlanRequest
     from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.planners.planner import CoveragePlanner
 
 _LOST = (PatchesLost, "")
 
@@ -276,45 +277,49 @@ class Loader:
 
     def _load(self) -> tuple[Mission, PlanningWorker]:
         from fasaco_edge.daemon.loop.worker import PlanningWorker  # noqa: PLC0415
-        from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
         from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415
-        from fasaco_edge.planners.fasaco import Fasaco  # noqa: PLC0415
-        from fasaco_edge.planners.living_trail import TrailRules  # noqa: PLC0415
-        from fasaco_edge.planners.near_optimal import NearOptimal  # noqa: PLC0415
         from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
         warm_up(self._report)
         release_unused()
-        robot, maps, planner = self._config.robot, self._config.map, self._config.planner
-        cell_m = self._config.cell_m
-        footprint = Footprint(cell_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least)
-        colony = planner.colony()
-        chosen = planner_of(planner.name, colony, planner.threads, planner.local_search)
+        planner = self._config.planner
+        chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
-        config = MissionConfig(
-            footprint,
-            maps.max_lattice_cells,
-            robot.cost(cell_m),
-            self._config.mission,
-            planner.spare_share if isinstance(chosen, NearOptimal) else 0.0,
-            self._sweeping(),
-            TrailRules(colony.alpha, colony.tau0),
-            isinstance(chosen, Fasaco),
-        )
         first = (
             OrderState.autostart() if self._config.mission.autostart else OrderState.idle(NO_ORDER)
         )
-        return Mission(config, first), worker
-
-    def _sweeping(self) -> Sweeping | None:
-        from fasaco_edge.planners.line import LINES  # noqa: PLC0415
-
-        robot, line = self._config.robot, LINES.get(self._config.planner.line)
-        if line is None:
-            return None
-        line = replace(line, speed_m_s=robot.speed_m_s, quarter_turn_s=robot.quarter_turn_s)
-        return Sweeping(robot.tool_width_m, floor_pixels(self._config.map.max_pixels), line)
+        return Mission(mission_config(self._config, chosen), first), worker
 
     def _report(self, stage: str) -> None:
         self.stage = f"kernels: {stage}"
+
+
+def mission_config(config: DaemonConfig, chosen: CoveragePlanner) -> MissionConfig:
+    """Return the configuration of a daemon's mission that ``chosen`` plans for."""
+    from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
+    from fasaco_edge.planners.fasaco import Fasaco  # noqa: PLC0415
+    from fasaco_edge.planners.living_trail import TrailRules  # noqa: PLC0415
+    from fasaco_edge.planners.near_optimal import NearOptimal  # noqa: PLC0415
+
+    robot, maps, planner, cell_m = config.robot, config.map, config.planner, config.cell_m
+    return MissionConfig(
+        Footprint(cell_m, robot.radius_m, maps.free_at_most, maps.occupied_at_least),
+        maps.max_lattice_cells,
+        robot.cost(cell_m),
+        config.mission,
+        planner.spare_share if isinstance(chosen, NearOptimal) else 0.0,
+        _sweeping(config),
+        TrailRules(planner.alpha, planner.tau0),
+        isinstance(chosen, Fasaco),
+    )
+
+
+def _sweeping(config: DaemonConfig) -> Sweeping | None:
+    from fasaco_edge.planners.line import LINES  # noqa: PLC0415
+
+    robot, line = config.robot, LINES.get(config.planner.line)
+    if line is None:
+        return None
+    line = replace(line, speed_m_s=robot.speed_m_s, quarter_turn_s=robot.quarter_turn_s)
+    return Sweeping(robot.tool_width_m, floor_pixels(config.map.max_pixels), line)

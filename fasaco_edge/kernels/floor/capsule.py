@@ -2,7 +2,7 @@
 
 All lengths are in pixels, and pixel (i, j) is the unit square around the point (y = i, x = j). A
 capsule is convex, so it meets each row of pixels in one stretch, found from the two discs at its
-ends and the two straight sides between them.
+ends and the two straight sides between them. What of it lies outside of the raster does not count.
 """
 
 from typing import NamedTuple
@@ -168,10 +168,14 @@ def _add_stretch(
     capsule: NDArray[np.float64],
     i: int,
     radius: float,
+    cols: int,
     stretches: NDArray[np.int64],
     count: int,
 ) -> int:
-    """Sort a capsule's pixels of row i in among ``count`` stretches; return how many there are."""
+    """Sort a capsule's pixels of row i in among ``count`` stretches; return how many there are.
+
+    Of the row's ``cols`` pixels: the robot may come near to the raster's rim, and beyond it.
+    """
     ay, ax, by, bx = capsule[Y0], capsule[X0], capsule[Y1], capsule[X1]
     side_y, side_x, slope = capsule[SIDE_Y], capsule[SIDE_X], capsule[SLOPE]
     square = radius * radius
@@ -179,7 +183,7 @@ def _add_stretch(
     left = -_right_of(i, ay, -ax, by, -bx, -side_y, side_x, -slope, square)
     if not left <= right:
         return count
-    begin, end = int(np.ceil(left - RIM)), int(np.floor(right + RIM))
+    begin, end = max(int(np.ceil(left - RIM)), 0), min(int(np.floor(right + RIM)), cols - 1)
     if begin > end:
         return count
     place = count
@@ -240,18 +244,19 @@ def _lost(
 
 
 @inlined
-def rows_of(scratch: Scratch, count: int, radius: float) -> tuple[int, int]:
-    """Return the first and the last row that some capsules may meet."""
+def rows_of(scratch: Scratch, count: int, radius: float, rows: int) -> tuple[int, int]:
+    """Return the first and the last one of ``rows`` that some capsules may meet."""
     capsules = scratch.capsules
     low, high = capsules[0, Y0], capsules[0, Y1]
     for number in range(1, count):
         low, high = min(low, capsules[number, Y0]), max(high, capsules[number, Y1])
-    return int(np.ceil(low - radius - RIM)), int(np.floor(high + radius + RIM))
+    first, last = int(np.ceil(low - radius - RIM)), int(np.floor(high + radius + RIM))
+    return max(first, 0), min(last, rows - 1)
 
 
 @inlined
 def stretches_of(
-    scratch: Scratch, i: int, taken: int, given: int, radius: float
+    scratch: Scratch, i: int, cols: int, taken: int, given: int, radius: float
 ) -> tuple[int, int]:
     """Fill in the stretches of row i before and after; return how many there are of each."""
     capsules, before, after = scratch.capsules, scratch.before, scratch.after
@@ -259,9 +264,9 @@ def stretches_of(
     for number in range(taken + given):
         if capsules[number, Y0] - radius <= i <= capsules[number, Y1] + radius:
             if number < taken:
-                olds = _add_stretch(capsules[number], i, radius, before, olds)
+                olds = _add_stretch(capsules[number], i, radius, cols, before, olds)
             else:
-                news = _add_stretch(capsules[number], i, radius, after, news)
+                news = _add_stretch(capsules[number], i, radius, cols, after, news)
     return olds, news
 
 
@@ -301,10 +306,11 @@ def swept_more(
         most_lost: once more pixels than these are swept no longer, the rest is not looked at.
     """
     before, after = scratch.before, scratch.after
-    first, last = rows_of(scratch, taken + given, radius)
+    rows, cols = counts.shape
+    first, last = rows_of(scratch, taken + given, radius, rows)
     more = lost = 0
     for i in range(first, last + 1):
-        olds, news = stretches_of(scratch, i, taken, given, radius)
+        olds, news = stretches_of(scratch, i, cols, taken, given, radius)
         row = counts[i]
         done = -1
         for number in range(olds):
@@ -333,17 +339,18 @@ def exchange(sweeps: Sweeps, scratch: Scratch, taken: int, given: int, radius: f
     """Count the first ``taken`` capsules out and the next ``given`` in, where they differ."""
     before, after = scratch.before, scratch.after
     counts = sweeps.counts
-    first, last = rows_of(scratch, taken + given, radius)
+    rows, cols = counts.shape
+    first, last = rows_of(scratch, taken + given, radius, rows)
     for i in range(first, last + 1):
-        olds, news = stretches_of(scratch, i, taken, given, radius)
+        olds, news = stretches_of(scratch, i, cols, taken, given, radius)
         row, blocks = counts[i], sweeps.left[i >> BLOCK]
-        col = counts.shape[1]
+        col = cols
         if olds:
             col = min(col, before[0, 0])
         if news:
             col = min(col, after[0, 0])
-        while col < counts.shape[1]:
-            less, end = _over(before, olds, col, counts.shape[1])
+        while col < cols:
+            less, end = _over(before, olds, col, cols)
             times, end = _over(after, news, col, end)
             if times != less:
                 _add(row, blocks, col, end - 1, times - less)

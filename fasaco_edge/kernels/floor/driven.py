@@ -41,11 +41,11 @@ def note_driven(
     for number in range(len(points) - 1):
         a, b = points[number], points[number + 1]
         prepare(scratch.capsules, 0, a[0], a[1], b[0], b[1], radius)
-        first, last = rows_of(scratch, 1, radius)
-        for i in range(max(first, 0), min(last + 1, rows)):
-            if not stretches_of(scratch, i, 1, 0, radius)[0]:
+        first, last = rows_of(scratch, 1, radius, rows)
+        for i in range(first, last + 1):
+            if not stretches_of(scratch, i, cols, 1, 0, radius)[0]:
                 continue
-            for j in range(max(stretches[0, 0], 0), min(stretches[0, 1] + 1, cols)):
+            for j in range(stretches[0, 0], stretches[0, 1] + 1):
                 before = state[i, j]
                 state[i, j] = (before | DRIVEN) & (255 - OPEN)
                 if before & OPEN:

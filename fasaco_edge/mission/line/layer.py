@@ -118,26 +118,28 @@ class LineLayer:
             return update
         touched, self._touched = self._touched, None
         self._take_floor(touched)
-        reason = ""
+        reason, path = "", self._route.path
+        # By its cells it is further on than by its line, which leads where it need not drive.
+        is_further = path.index > ahead.cell
         if update is not None:
             ahead.lay(update.cells, stamped.pose)
-        elif self._is_dropped:
-            ahead.lay(self._route.path.ahead, stamped.pose)
-            reason = "map on another raster"
+        elif self._is_dropped or (is_further and touched is not None):
+            ahead.lay(path.ahead, stamped.pose)
+            reason = "map on another raster" if self._is_dropped else "robot further on its path"
         self._is_dropped = False
         if touched is not None and ahead.check(touched):
             reason = "line blocked"
         if touched is not None or self._is_settled is None:
             self._is_settled = not self._orders.is_exploring
         # What the robot waits for is told first; the rest comes with the next pose.
-        is_waited_for = update is not None or reason
+        is_waited_for = update is not None or reason or is_further
         if not is_waited_for:
             self._explain()
             if self._polisher.polish(ahead, self._map.floor, may_anneal=self._is_settled):
                 reason = "line polished"
-        if update is None and reason and len(self._route.path.ahead):
+        if update is None and reason and len(path.ahead):
             ahead.rebase()
-            update = self._route.publish(self._route.path.ahead, reason, now)
+            update = self._route.publish(path.ahead, reason, now)
         if update is None:
             return None
         ahead.note_told()
@@ -195,15 +197,16 @@ class LineLayer:
             ahead.tally.forget_driven()
             news = ANYWHERE
         self._pixels = swept.pixels
-        parts = [self._asked_part(floor), touched]
-        if (part := Window.around(*parts)) and (part := part.intersection(whole)):
-            assert self._asked is not None
+        part = Window.around(self._asked_part(floor), touched)
+        if self._asked is not None and self._asked[0] != floor.stands.lattice.window:
+            self._asked = None
+        if self._asked is not None and part and (part := part.intersection(whole)):
             self._unexplained = Window.around(self._unexplained, part)
             for strip in strips(part):
                 wanted = floor.reached(self._asked[1], strip)
                 ahead.tally.set_open(strip, wanted, swept.swept_on(floor.geometry, strip))
         driven = pixels_under(news, floor.geometry).intersection(whole) if news else None
-        if driven is not None and driven != part and self._asked is not None:
+        if driven is not None and driven != part:
             for strip in strips(driven):
                 ahead.tally.set_open(strip, None, swept.swept_on(floor.geometry, strip))
         self._swept = swept, swept.changes
@@ -211,15 +214,14 @@ class LineLayer:
     def _asked_part(self, floor: FloorMap) -> Window | None:
         """Find which cells are asked for now; return the pixels where that has changed."""
         area = self._map.area
-        if area is None:
+        # While the robot is nowhere nothing is known of it; after that all is looked at.
+        if area is None or area.lattice.window != floor.stands.lattice.window:
             return None
         window = area.lattice.window
         asked = area.reachable & self._orders.asked_for(window)
         before, self._asked = self._asked, (window, asked, area.reachable)
         if before is None:
             return Window(0, 0, floor.geometry.rows, floor.geometry.cols)
-        if window != floor.stands.lattice.window:
-            return None
         changed = asked != carried(before[1], before[0], window)
         changed |= area.reachable != carried(before[2], before[0], window)
         return floor.pixels_of(changed) if changed.any() else None

@@ -75,15 +75,34 @@ class LineAhead:
         if is_same and floor.shift is not None:
             shape = floor.geometry.rows, floor.geometry.cols
             if floor.shift != (0, 0) or shape != self.tally.shape:
-                self.tally.move(shape, floor.shift)
-                self.line = self.line.moved(floor.shift)
-                self._here = self._here + np.array(floor.shift)
-                self._unchecked = self._unchecked and self._unchecked.moved(*floor.shift)
+                self._move(shape, floor.shift)
             return False
         self.tally = SweepTally(floor)
         dropped, self.line = bool(len(self.line)), Line()
         self._cut = self._unchecked = None
         return dropped
+
+    def _move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
+        """Lie on a raster of another shape, (rows, cols), on which pixels have moved."""
+        edges, before = _edges(self.line.points), self.tally.shape
+        self.line = self.line.moved(by)
+        moved = _edges(self.line.points)
+        # What a raster lacks of an edge was not counted, or is no longer.
+        beyond = self._is_beyond(edges, before) | self._is_beyond(moved, shape)
+        self.tally.exchange(edges[beyond], edges[:0])
+        self.tally.move(shape, by)
+        self.tally.exchange(edges[:0], moved[beyond])
+        self._here = self._here + np.array(by)
+        self._unchecked = self._unchecked and self._unchecked.moved(*by)
+
+    def _is_beyond(self, edges: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.bool_]:
+        """Return which edges, float64 (n, 4), the tool leaves a raster of some shape on, bool."""
+        low, high = np.minimum(edges[:, :2], edges[:, 2:]), np.maximum(edges[:, :2], edges[:, 2:])
+        margin = self._tool + 1.0
+        beyond: NDArray[np.bool_] = np.any(
+            (low < margin) | (high > np.array(shape) - 1.0 - margin), axis=1
+        )
+        return beyond
 
     def lay(self, walk: NDArray[np.int32], pose: Pose2D) -> None:
         """Lay the line along a walk; what leads along the same cells stays.
@@ -97,6 +116,8 @@ class LineAhead:
         is_beginning = common_beginning(walk, ahead) == len(walk)
         if len(walk) < len(ahead) > 1 and len(line) and is_beginning:
             self._walk, self.line, self.cell, self._cut = ahead, line, 0, len(walk)
+            if self._unchecked is not None:
+                self.check(self._unchecked)
             return
         if self.is_cut and self.is_followed and np.array_equal(walk, ahead):
             self._walk, self.line, self.cell, self._cut = ahead, line, 0, None
@@ -148,9 +169,12 @@ class LineAhead:
         ]
         if not blocked:
             return False
+        if self._cut is not None:
+            # Beyond the cut the walk may lead where no cell is any more.
+            self._walk, self._cut, self._unchecked = self._walk[: self._cut], None, None
         first, last = blocked[0], blocked[-1] + 1
         head = [Piece(line.part(0, first + 1), 0)] if first else []
-        self._join([*head, Piece(self.line.part(last), last)])
+        self._join([*head, Piece(line.part(last), last)])
         return True
 
     def drive(self, pose: Pose2D) -> None:
@@ -328,6 +352,8 @@ class LineAhead:
             & (low[:, 1] < part.col1)
             & (high[:, 1] > part.col0)
         )
+        # What is no longer on the raster is not near any part of it.
+        near |= ((low < 0.0) | (high > np.array(self.tally.shape) - 1.0)).any(axis=1)
         numbers: list[int] = np.flatnonzero(near).tolist()
         return numbers
 
