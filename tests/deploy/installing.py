@@ -30,7 +30,7 @@ class Robot(Lab):
         """Run a release's installer; its exit code has to be ``code``."""
         script = f"/srv/{version}/install.sh"
         told = ("env", "SETTLE_S=1", f"HOME={HOME}", script, *words)
-        done = self.run(*told, check=False, timeout_s=110.0)
+        done = self.run(*told, check=False, timeout_s=600.0)
         assert done.returncode == code, f"{done.returncode}\n{done.stdout}{done.stderr}"
         return done
 

@@ -56,7 +56,7 @@ class Lab:
         return [*NSENTER, f"--target={self.pid}", "--", *alone, *words]
 
     def run(
-        self, *words: str, check: bool = True, timeout_s: float = 60.0
+        self, *words: str, check: bool = True, timeout_s: float = 600.0
     ) -> subprocess.CompletedProcess[str]:
         """Run a program inside, as root; with ``check`` an exit code but 0 is a failure."""
         done = subprocess.run(
