@@ -23,7 +23,8 @@ from fasaco_edge.grid.map_files import read_coverage_grid, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import ctrl_c_asks
 from fasaco_edge.planners.cost import CoverageCost, count_turns
-from fasaco_edge.planners.division import Division, Fleet, divide
+from fasaco_edge.planners.fleet.division import Division, divide
+from fasaco_edge.planners.fleet.sharing import Fleet
 from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
 
 MOST_ROBOTS = 32

@@ -27,8 +27,9 @@ from fasaco_edge.kernels.lattice.reach import update_reach
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.division import Fleet, divide
 from fasaco_edge.planners.effort import effort_for
+from fasaco_edge.planners.fleet.division import divide
+from fasaco_edge.planners.fleet.sharing import Fleet
 from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import CoveragePath, walk_figures

@@ -14,7 +14,8 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.fleet.split import FAR, WORST, best_split, ways_from
 from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
-from fasaco_edge.planners.division import Fleet, divide
+from fasaco_edge.planners.fleet.division import divide
+from fasaco_edge.planners.fleet.sharing import Fleet
 
 TURNS = CoverageCost(1.0, 1.5)
 

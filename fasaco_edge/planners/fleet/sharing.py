@@ -1,11 +1,12 @@
-"""Division of a ground among several robots: one walk each, balanced by cost.
+"""A search for walks of several robots that share a connected ground, about equal in cost.
 
 1. One closed walk over all that any of them can reach, by the project's search.
 2. It is split in two, for two groups of robots, and each part again, until every robot has one
    (``kernels.fleet.split``): that costs hardly a step, and balances but for the ways from the
    starts.
 3. Round by round, pairs of robots whose parts touch put their walks together, improve them by
-   local search, and split them anew.
+   local search, and split them anew; or one leaves some cells to the other. Without a gain the
+   groups grow, and at last all begins anew with another walk.
 
 The longest walk decides when all is done: its cost is the makespan.
 """
@@ -22,12 +23,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels import EAST, NORTH
 from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import MICROSECONDS, CoverageCost
-from fasaco_edge.planners.loops import Loop, LoopGround
+from fasaco_edge.planners.fleet.loops import Loop, LoopGround
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import (
     AnyOf,
@@ -69,68 +69,6 @@ class Fleet:
     threads: int = 1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Division:
-    """A walk for each robot; together they cover all that any of them can reach.
-
-    Attributes:
-        walks: of each robot, int32 (n, 2), n >= 1: cells (row, col), its start first.
-        costs_s: what each costs [s].
-        cells: cells to cover.
-        lower_bound_steps: no division has a shorter longest walk.
-        rounds: rounds of pairs.
-    """
-
-    walks: tuple[NDArray[np.int32], ...]
-    costs_s: tuple[float, ...]
-    cells: int
-    lower_bound_steps: int
-    rounds: int
-
-
-def divide(lattice: CoverageLattice, fleet: Fleet, stop: StoppingCriterion) -> Division:
-    """Share all that can be reached out among robots.
-
-    Args:
-        lattice: where they can be; they do not mind each other's places.
-        fleet: the robots, at least one.
-        stop: when to end early; it sees cost and steps of the longest walk.
-
-    Raises:
-        StartOutsideMap, StartBlocked: a robot cannot stand where it begins; its number, from 1,
-            is in the text.
-        NothingToCover: no cell is coverable.
-    """
-    reached = [_reached(lattice, start, number) for number, start in enumerate(fleet.starts, 1)]
-    walks: list[NDArray[np.int32]] = [np.empty((0, 2), np.int32)] * len(fleet.starts)
-    cells = least = rounds = 0
-    left = list(range(len(fleet.starts)))
-    while left:
-        # Those in one part of the building share it.
-        here = lattice.local(fleet.starts[left[0]])
-        together = [robot for robot in left if reached[robot][here]]
-        group = replace(fleet, starts=[fleet.starts[robot] for robot in together])
-        sharing = _Sharing(lattice, group, reached[left[0]])
-        for _ in sharing.run(stop):
-            if stop(sharing.progress()):
-                break
-        for robot, walk in zip(together, sharing.walks(stop), strict=True):
-            walks[robot] = walk
-        cells += sharing.cells
-        least, rounds = max(least, sharing.lower_bound_steps), rounds + sharing.rounds
-        left = [robot for robot in left if robot not in together]
-    costs_s = tuple(fleet.cost.of_walk(walk) for walk in walks)
-    return Division(tuple(walks), costs_s, cells, least, rounds)
-
-
-def _reached(lattice: CoverageLattice, start: Cell, number: int) -> NDArray[np.bool_]:
-    try:
-        problem = CoverageProblem.of(lattice, start)
-    except FasacoError as error:
-        raise type(error)(f"robot {number}: {error}") from error
-    return problem.to_cover
-
-
 class _Best(NamedTuple):
     """The best division so far: the robots' loops, who covers each cell, the worst cost [us]."""
 
@@ -139,7 +77,7 @@ class _Best(NamedTuple):
     worst_us: int
 
 
-class _Sharing:
+class Sharing:
     """A running division of one connected part of a lattice; a generator of pauses."""
 
     def __init__(self, lattice: CoverageLattice, fleet: Fleet, reached: NDArray[np.bool_]) -> None:

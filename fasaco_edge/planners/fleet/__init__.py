@@ -1,0 +1,1 @@
+"""One walk for each of several robots that share a ground."""
