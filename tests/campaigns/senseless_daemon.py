@@ -426,8 +426,8 @@ class Campaign:
                 **sections,
             )
         )
-        line = sections.get("planner", {}).get("line", "cells")
-        self.judge.configs.append({"robot": self._robot, "map": maps, "line": line})
+        self._line = sections.get("planner", {}).get("line", "cells")
+        self.judge.configs.append({"robot": self._robot, "map": maps, "line": self._line})
         self.judge.walk = np.empty((0, 2))
         self._longest_ms = 0.0
         self._wait("the daemon is there", lambda: self._asked_status() is not None)
@@ -474,8 +474,9 @@ class Campaign:
         after = {**before, **{key: before.get(key, {}) | part for key, part in sections.items()}}
         file.write_text(yaml.safe_dump(after))
         self.judge.look()
-        line = after.get("planner", {}).get("line", "cells")
-        self.judge.configs.append({"robot": self._robot, "map": after["map"], "line": line})
+        # What is driven stays as it was until a restart.
+        config = {"robot": self._robot, "map": after["map"], "line": self._line}
+        self.judge.configs.append(config)
         self._daemon.process.send_signal(signal.SIGHUP)
 
     def _restart_router(self, away_s: float) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 import numpy as np
 import pytest
@@ -84,9 +84,16 @@ def test_floor_is_that_under_the_tool_of_the_simulated_robot(told, review, recor
     assert review.floor.figures.illegal_share == 0.0
 
 
-def test_the_walk_is_that_of_the_simulated_robot(told, review, truth, recording):
-    cells = [cell for cell, _ in truth]
-    assert [tuple(cell) for cell in review.drive.cells.tolist()] == cells
+def test_the_walk_is_that_of_the_simulated_robot(told, review, recording):
+    cells = [tuple(cell) for cell in review.drive.cells.tolist()]
+    # Poses come four times in a simulated second: the rim of the tool may pass a centre between
+    # two of them. What it passes well inside is there, and nothing that it came not even near.
+    well, nearly = (
+        [cell for cell, _ in passed_cells(recording.trail, TOOL_M, reach)] for reach in (0.42, 0.58)
+    )
+    for some, more in ((well, cells), (cells, nearly)):
+        left = groupby(more)
+        assert all(any(cell == other for other, _ in left) for cell, _ in groupby(some))
     assert told["steps"] == len(cells) - 1
     assert told["revisits"] == len(cells) - len(set(cells))
     assert told["turns_90"] == quarter_turns(cells)

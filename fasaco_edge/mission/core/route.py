@@ -1,6 +1,4 @@
-"""Route: the path the robot was given, what is kept of it while the robot rests, and the plan under
-way.
-"""
+"""Route: the path the robot was given, what is kept of it at a stop, and the plan under way."""
 
 from __future__ import annotations
 
