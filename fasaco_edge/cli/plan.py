@@ -13,12 +13,19 @@ import numpy as np
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, check_output, writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.plan_line import Ground, Line, PlannedFloor, judged_floor, write_line
+from fasaco_edge.cli.plan_line import (
+    Ground,
+    Line,
+    PlannedFloor,
+    judged_floor,
+    read_lattice,
+    write_line,
+)
 from fasaco_edge.cli.plan_options import CELLS, EPILOG, add_options, check, settle
 from fasaco_edge.cli.plan_progress import watching
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
+from fasaco_edge.grid.map_files import find_map
 from fasaco_edge.host.processes import ctrl_c_asks
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.cost import CoverageCost
@@ -56,11 +63,11 @@ def run(args: argparse.Namespace) -> int:
         _check_no_floor(args, file)
     for output in (args.path_out, args.xy_out, args.png):
         check_output(output)
-    compile_kernels()
     if args.robots or args.robots_xy:
         from fasaco_edge.cli.plan_fleet import plan_fleet
 
         return plan_fleet(args, file)
+    compile_kernels()
     ground = _read(args, file)
     problem = _pose(args, ground)
     asked = Interrupt()
@@ -94,15 +101,9 @@ def _check_no_floor(args: argparse.Namespace, file: Path) -> None:
 
 
 def _read(args: argparse.Namespace, file: Path) -> Ground:
-    from fasaco_edge.grid.lattice import CoverageLattice, Footprint
-
-    if file.suffix == ".npy":
-        cells = CoverageLattice.from_free(read_coverage_grid(file), args.cell)
-        return Ground(cells, None, _start(args, cells, file))
-    grid = read_map(file)
-    cells = CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius))
+    grid, cells = read_lattice(args, file)
     start = _start(args, cells, file)
-    if args.line == CELLS:
+    if grid is None or args.line == CELLS:
         return Ground(cells, grid, start)
     return Ground.of_floor(args, grid, cells, start)
 

@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,18 +15,19 @@ from numpy.typing import NDArray
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Exit, writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.plan_line import line_through
+from fasaco_edge.cli.plan_line import line_through, read_lattice
 from fasaco_edge.cli.plan_options import ANYWHERE, CELLS, HOME
 from fasaco_edge.cli.plan_progress import watching
+from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
-from fasaco_edge.grid.map_files import read_coverage_grid, read_map
-from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import ctrl_c_asks
 from fasaco_edge.planners.cost import CoverageCost, count_turns
-from fasaco_edge.planners.fleet.division import Division, divide
-from fasaco_edge.planners.fleet.sharing import Fleet
 from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
+
+if TYPE_CHECKING:
+    from fasaco_edge.grid.lattice import Cell, CoverageLattice
+    from fasaco_edge.grid.occupancy import OccupancyGrid
+    from fasaco_edge.planners.fleet.division import Division
 
 MOST_ROBOTS = 32
 
@@ -33,11 +35,12 @@ MOST_ROBOTS = 32
 def plan_fleet(args: argparse.Namespace, file: Path) -> int:
     """Plan, print the figures, write what was asked for."""
     _check(args)
-    if file.suffix == ".npy":
-        grid, lattice = None, CoverageLattice.from_free(read_coverage_grid(file), args.cell)
-    else:
-        grid = read_map(file)
-        lattice = CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius))
+    compile_kernels()
+    # After that, as it imports the compiler.
+    from fasaco_edge.planners.fleet.division import divide
+    from fasaco_edge.planners.fleet.sharing import Fleet
+
+    grid, lattice = read_lattice(args, file)
     starts = args.robots or [lattice.cell_at(*xy) for xy in args.robots_xy]
     _check_apart(starts)
     cost = CoverageCost.for_robot(lattice.cell_m, args.speed_m_s, args.turn_s)

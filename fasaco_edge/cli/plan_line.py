@@ -121,6 +121,19 @@ class Ground:
         return line_over(walk, self.stands, self.floor, config, is_end_fixed=ends).xy
 
 
+def read_lattice(
+    args: argparse.Namespace, file: Path
+) -> tuple[OccupancyGrid | None, CoverageLattice]:
+    """Return the map in a file, None for a coverage grid, and the lattice of cells over it."""
+    from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+    from fasaco_edge.grid.map_files import read_coverage_grid, read_map
+
+    if file.suffix == ".npy":
+        return None, CoverageLattice.from_free(read_coverage_grid(file), args.cell)
+    grid = read_map(file)
+    return grid, CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius))
+
+
 def _lattice_deg(args: argparse.Namespace, grid: OccupancyGrid) -> float:
     """Return the angle that is asked for, or that of the walls [deg]."""
     from fasaco_edge.grid.walls import wall_direction

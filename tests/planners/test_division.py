@@ -92,6 +92,16 @@ def test_it_is_the_same_on_any_number_of_threads(cost):
         assert (one == other).all()
 
 
+def test_it_begins_anew_with_the_largest_seed():
+    """Corridors of one cell have to be driven twice, which the bound does not know."""
+    free = np.zeros((9, 9), np.bool_)
+    free[4] = free[:, 4] = True
+    fleet = Fleet([(4, 4), (4, 5)], STEPS_ALONE, seed=2**63 - 1)
+    division = divide(CoverageLattice.from_free(free), fleet, rounds(60))
+    check(free, fleet.starts, division, returns=True)
+    assert division.rounds == 60
+
+
 def test_robots_in_two_parts_of_a_building_share_theirs():
     free = np.ones((8, 17), np.bool_)
     free[:, 8] = False

@@ -48,6 +48,8 @@ SHIFTED, FEW = 0.5, 6
 GAINLESS_PAIRS = 4
 # After so many it begins anew, with another walk over all.
 GAINLESS_ROUNDS = 40
+# A seed is below this.
+SEEDS = 2**63
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +151,7 @@ class Sharing:
         problem = CoverageProblem.of(
             self._lattice, start, end=start, cost=self._fleet.cost, reachable=self._reached
         )
-        planner = NearOptimal(ColonyConfig(seed=self._fleet.seed + attempt))
+        planner = NearOptimal(ColonyConfig(seed=(self._fleet.seed + attempt) % SEEDS))
         tour = planner.plan(problem, partial(self._is_tour_over, stop))
         robots = range(len(self._starts))
         loops = self._ground.parted(self._ground.loop_of(tour.cells), robots)
@@ -207,11 +209,10 @@ class Sharing:
         free = np.ones(robots, np.bool_)
         groups: list[tuple[int, ...]] = []
         while (apart := np.where(free[:, None] & free, apart, -1.0)).max() >= 0.0:
-            one = (
-                int(np.argmax(costs_us)) if not groups and size > 2 else int(apart.max(1).argmax())
-            )
-            group = [one]
-            while len(group) < (2 if groups else size) and apart[group].max() >= 0.0:
+            # The first group is the worst robot's, where it is to be a large one.
+            most = 2 if groups else size
+            group = [int(np.argmax(costs_us if most > 2 else apart.max(axis=1)))]
+            while len(group) < most and apart[group].max() >= 0.0:
                 group.append(int(apart[group].max(0).argmax()))
                 apart[:, group] = -1.0
             free[group] = False
