@@ -61,10 +61,12 @@ class Queue:
     Attributes:
         length: items at most.
         size: of all together at most [bytes]; one alone may be larger.
+        at_once: items that one take hands out at most; the others wait for the next.
     """
 
     length: int
     size: float = math.inf
+    at_once: float = math.inf
 
 
 class Mailbox(Generic[Item]):
@@ -111,9 +113,10 @@ class Mailbox(Generic[Item]):
                 self._lost[kind] += 1
 
     def take(self, timeout_s: float) -> list[tuple[str, Item]]:
-        """Return everything there is as (kind, item); wait up to ``timeout_s`` [s] for it.
+        """Return what there is as (kind, item); wait up to ``timeout_s`` [s] for it.
 
-        Newest-only kinds come first. What is spaced stays until its time has come.
+        Newest-only kinds come first. What is spaced stays until its time has come, and what is
+        more than a queue hands out at once until the next take.
         """
         deadline = time.monotonic() + timeout_s
         with self._changed:
@@ -127,9 +130,11 @@ class Mailbox(Generic[Item]):
             items = list(self._newest.items())
             self._newest = {}
             for kind in ready:
-                items.extend((kind, item) for item in self._queued[kind])
-                self._queued[kind].clear()
-                self._sizes[kind] = 0
+                queue = self._queued[kind]
+                for _ in range(int(min(len(queue), self._bounds[kind].at_once))):
+                    item = queue.popleft()
+                    self._sizes[kind] -= self._size_of(item)
+                    items.append((kind, item))
             if self._spacing is not None and self._spacing.kind in ready:
                 self._free_at = now + self._spacing.seconds
             return items

@@ -17,7 +17,6 @@ from fasaco_edge.grid.fine_raster import (
     RobotDiscs,
     blocked_pixels,
     fine_geometry,
-    raster_to_map,
     stand_placement,
 )
 from fasaco_edge.grid.floor import StandLattice, states_of
@@ -137,11 +136,8 @@ class FloorMap:
         lattice = self.stands.lattice
         if not lattice.contains(cell):
             return None
-        at = self.stands.stands[lattice.local(cell)]
-        if np.isnan(at[0]):
-            return None
-        ((x, y),) = raster_to_map(self.geometry, at[None]).tolist()
-        return x, y
+        y, x = self.stands.stands[lattice.local(cell)].tolist()
+        return None if math.isnan(y) else self.geometry.to_map(x + 0.5, y + 0.5)
 
     def box_of(self, cell: Cell) -> Window:
         """Return the smallest box of the raster's pixels around a cell."""

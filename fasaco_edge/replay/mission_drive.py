@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -67,7 +68,7 @@ class MissionDrive:
 
     def __init__(self, config: DaemonConfig, ledger: LedgerSnapshot | None = None) -> None:
         max_pixels, planner = config.map.max_pixels, config.planner
-        self.mailbox = make_mailbox(max_pixels, map_spacing_s=0.0)
+        self.mailbox = make_mailbox(max_pixels, map_spacing_s=0.0, most_poses=math.inf)
         self._inbox = Inbox(_NoBus(), config.keys(), self.mailbox, config.poses(), max_pixels)
         loader = Loader(config, self.mailbox)
         while (loaded := loader.poll()) is None:

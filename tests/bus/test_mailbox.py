@@ -41,6 +41,21 @@ def test_a_full_queue_loses_its_oldest_and_says_how_many():
     assert box.take_lost("update") == 0
 
 
+def test_more_than_is_handed_out_at_once_waits_for_the_next_take():
+    box = Mailbox({"pose": Queue(9, 30, at_once=2)}, size_of=len)
+    for number in range(1, 6):
+        box.post("pose", bytes(number))
+    box.post("map", b"m")
+    assert box.take(0) == [("map", b"m"), ("pose", bytes(1)), ("pose", bytes(2))]
+    started = time.monotonic()
+    assert [len(item) for _, item in box.take(60.0)] == [3, 4]
+    assert [len(item) for _, item in box.take(60.0)] == [5]
+    assert time.monotonic() - started < 30.0, "waited for another post"
+    box.post("pose", bytes(30))
+    assert [len(item) for _, item in box.take(0)] == [30], "their sizes are given back"
+    assert box.take_lost("pose") == 0
+
+
 def weighed(length, size):
     return Mailbox({"update": Queue(length, size)}, size_of=len)
 

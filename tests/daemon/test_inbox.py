@@ -9,7 +9,13 @@ import pytest
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.session import BusSettings, open_bus
-from fasaco_edge.daemon.loop.inbox import Inbox, Received, make_mailbox, take_batch
+from fasaco_edge.daemon.loop.inbox import (
+    MOST_POSES,
+    Inbox,
+    Received,
+    make_mailbox,
+    take_batch,
+)
 from fasaco_edge.errors import MalformedMessage, PatchWithoutBase, PlanFailed
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.core.events import (
@@ -65,6 +71,17 @@ class Arrivals:
 def arrivals():
     with open_bus(BusSettings("peer", (), (free_endpoint(),))) as bus:
         yield Arrivals(bus)
+
+
+def test_a_map_does_not_wait_for_a_thousand_poses(arrivals):
+    for _ in range(1000):
+        arrivals.post("pose", pose_bytes(1.0, 1.0))
+    arrivals.post("map", MAP)
+    taken = [arrivals.decode()[0]]
+    assert taken[0] == [MapReceived, *[PoseReceived] * MOST_POSES]
+    while taken[-1]:
+        taken.append(arrivals.decode()[0])
+    assert sum(map(len, taken)) == 1001, "none is lost"
 
 
 def test_the_newest_map_comes_first_and_updates_in_order(arrivals):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.arrival import Sample
@@ -38,6 +38,8 @@ ASK_FOR_MAP_S = 2.0
 # Least time between two maps that are taken [s]: a flood of maps, by mistake or malice, must not
 # take a core. No mapper is that fast.
 MAP_SPACING_S = 0.05
+# So many poses are taken in one cycle at most: what else arrives must not wait for a thousand.
+MOST_POSES = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,15 +114,19 @@ def take_batch(mailbox: Mailbox[object], timeout_s: float) -> Batch:
     return batch
 
 
-def make_mailbox(max_pixels: int, map_spacing_s: float = MAP_SPACING_S) -> Mailbox[object]:
-    """Return the mailbox of a daemon; a replay, whose clock is another, spaces nothing.
+def make_mailbox(
+    max_pixels: int, map_spacing_s: float = MAP_SPACING_S, most_poses: float = MOST_POSES
+) -> Mailbox[object]:
+    """Return the mailbox of a daemon; a replay, whose clock is another, holds nothing back.
 
     Poses are queued, because each adds to what the tool has passed over; some seconds of them
     are enough. A map does not clear the one before it, because it may be broken. An update
     changes the map before it, so it waits with that map.
     """
     spacing = Spacing("map", map_spacing_s, followers=("map_update",))
-    return Mailbox(queues(max_pixels), spacing, _size_of)
+    bounds = queues(max_pixels)
+    bounds["pose"] = replace(bounds["pose"], at_once=most_poses)
+    return Mailbox(bounds, spacing, _size_of)
 
 
 def _size_of(item: object) -> int:

@@ -136,12 +136,11 @@ class CoverageLedger:
         last = self._last or pose
         if math.hypot(pose.x - last.x, pose.y - last.y) > JUMP_CELLS * self._cell_m:
             last = pose
-        place_of = place_of or self._centre
-        swept = self._swept(last, pose, place_of)
-        entered = swept - self._under_tool
+        near = self._near(last, pose, place_of or self._centre)
+        entered = self._swept(last, pose, near) - self._under_tool
         for cell in entered:
             self._visit(cell)
-        self._under_tool = self._swept(pose, pose, place_of)
+        self._under_tool = self._swept(pose, pose, near)
         self._last = pose
         return entered
 
@@ -212,25 +211,32 @@ class CoverageLedger:
     def _centre(self, cell: Cell) -> Point | None:
         return (cell[1] + 0.5) * self._cell_m, (cell[0] + 0.5) * self._cell_m
 
-    def _swept(
+    def _near(
         self, start: Pose2D, end: Pose2D, place_of: Callable[[Cell], Point | None]
-    ) -> frozenset[Cell]:
-        """Return the cells whose place is within half a cell of the segment."""
+    ) -> dict[Cell, Point]:
+        """Return the cells that reach within half a cell of the segment, with their places."""
         cell_m, half = self._cell_m, 0.5 * self._cell_m
         rows = _span(min(start.y, end.y) - half, max(start.y, end.y) + half, cell_m)
         cols = _span(min(start.x, end.x) - half, max(start.x, end.x) + half, cell_m)
-        dx, dy = end.x - start.x, end.y - start.y
-        length2 = dx * dx + dy * dy
-        cells = []
+        near = {}
         for row in rows:
             for col in cols:
                 place = place_of((row, col))
-                if place is None:
-                    continue
-                px, py = place[0] - start.x, place[1] - start.y
-                along = min(max((px * dx + py * dy) / length2, 0.0), 1.0) if length2 else 0.0
-                if math.hypot(px - along * dx, py - along * dy) < half:
-                    cells.append((row, col))
+                if place is not None:
+                    near[row, col] = place
+        return near
+
+    def _swept(self, start: Pose2D, end: Pose2D, near: dict[Cell, Point]) -> frozenset[Cell]:
+        """Return the cells, of those near, whose place is within half a cell of the segment."""
+        half = 0.5 * self._cell_m
+        dx, dy = end.x - start.x, end.y - start.y
+        length2 = dx * dx + dy * dy
+        cells = []
+        for cell, place in near.items():
+            px, py = place[0] - start.x, place[1] - start.y
+            along = min(max((px * dx + py * dy) / length2, 0.0), 1.0) if length2 else 0.0
+            if math.hypot(px - along * dx, py - along * dy) < half:
+                cells.append(cell)
         return frozenset(cells)
 
 

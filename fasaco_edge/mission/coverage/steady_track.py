@@ -60,6 +60,15 @@ class SteadyTrack:
         """Return the places of the newest poses, as they seem now."""
         return [self._place(index) for index in range(self._done, len(self._poses))]
 
+    def box_ahead(self) -> tuple[float, float, float, float] | None:
+        """Return a box that these places lie in: least x and y, most x and y [m]; None for none."""
+        if not self.is_behind:
+            return None
+        # Each is a mean of poses.
+        around = self._poses[max(self._done - self._beside, 0) :]
+        xs, ys = [pose.x for pose in around], [pose.y for pose in around]
+        return min(xs), min(ys), max(xs), max(ys)
+
     def end(self) -> list[Place]:
         """Return the last places: the way of the robot to its next pose is unknown."""
         places = self._places(len(self._poses))

@@ -78,8 +78,9 @@ class SweptFloor:
         # The newest pose, and the place up to which all is kept.
         self._last: Pose2D | None = None
         self._kept_to: Place | None = None
-        # What was swept beyond that; not made yet after another pose.
+        # What was swept beyond that, not made yet after another pose; and where that is at most.
         self._ahead: tuple[Window, Mask] | None = None
+        self._around_ahead: Window | None = None
         self._tiles: dict[TilePlace, Bits] = {}
         # The tiles that no snapshot shares.
         self._own: set[TilePlace] = set()
@@ -139,13 +140,11 @@ class SweptFloor:
                 return  # a pose told again, as with each map, says nothing of how poses scatter
         else:
             self._end_track()
-        before, _ = self._swept_ahead()
+        before = self._around_ahead
         self._keep(self._track.add(pose))
-        self._ahead = None
-        if self._track.is_behind or before.rows:
-            # What is not kept yet has changed, too.
-            after, _ = self._swept_ahead()
-            self._note(Window.around(before, after))
+        self._begin_ahead()
+        # What is not kept yet has changed, too.
+        self._note(Window.around(before, self._around_ahead))
 
     def changed_since(self, changes: int) -> Window | None:
         """Return where pixels may have changed since there were so many changes; None for none.
@@ -186,15 +185,15 @@ class SweptFloor:
             self._note(ANYWHERE)
         if self._last is not None:
             self._keep(self._track.add(self._last))
-            self._ahead = None
+            self._begin_ahead()
 
     def _end_track(self) -> None:
         """Keep what was swept up to the newest pose."""
-        before, _ = self._swept_ahead()
+        before = self._around_ahead
         self._keep(self._track.end())
-        self._kept_to, self._ahead = None, None
-        if before.rows:
-            self._note(before)
+        self._kept_to = None
+        self._begin_ahead()
+        self._note(before)
 
     def _note(self, window: Window | None) -> None:
         """Note that pixels of a window may have changed."""
@@ -207,6 +206,24 @@ class SweptFloor:
             window, under = self._under(self._kept_to or place, place)
             self._mark(window, np.packbits(under, axis=1))
             self._kept_to = place
+
+    def _begin_ahead(self) -> None:
+        """Find where what is swept beyond what is kept may lie; what it is is seen when asked."""
+        self._ahead, self._around_ahead = None, None
+        box = self._track.box_ahead()
+        if box is not None:
+            x0, y0, x1, y1 = box
+            start = self._kept_to
+            if start is not None:
+                x0, y0, x1, y1 = (
+                    min(x0, start.x),
+                    min(y0, start.y),
+                    max(x1, start.x),
+                    max(y1, start.y),
+                )
+            rows = _span(y0, y1, 0.5 * self._tool_m + TOUCH_M, 1)
+            cols = _span(x0, x1, 0.5 * self._tool_m + TOUCH_M, 8)
+            self._around_ahead = Window(rows[0], cols[0], rows[1], cols[1])
 
     def _swept_ahead(self) -> tuple[Window, Mask]:
         """Return what seems to be swept beyond what is kept, and where."""

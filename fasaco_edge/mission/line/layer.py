@@ -101,7 +101,6 @@ class LineLayer:
         ahead = self._ahead
         if ahead is None:
             return
-        self._take_floor()
         before = self._route.held.index
         ahead.drive(pose)
         self._route.follow_line(ahead.cell)
@@ -163,11 +162,12 @@ class LineLayer:
         ahead, floor, covered = self._ahead, self._map.floor, self._ledger.current
         assert ahead is not None
         assert floor is not None
-        for row, col in passed.tolist():
-            cell = (row, col)
-            if not covered.has_visited(cell) and (
-                ahead.tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2
-            ):
+        cells = dict.fromkeys((row, col) for row, col in passed.tolist())
+        unseen = [cell for cell in cells if not covered.has_visited(cell)]
+        if unseen:
+            self._take_floor()
+        for cell in unseen:
+            if ahead.tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2:
                 self._ledger.credit(cell)
 
     def _explain(self) -> None:
