@@ -71,11 +71,6 @@ class LowerBound:
         self._is_first = True
 
     @property
-    def knows_turns(self) -> bool:
-        """Whether turns are priced: they cost, and the lattice is not too large."""
-        return self._turns
-
-    @property
     def cost_s(self) -> float:
         """What no walk costs less than [s]."""
         return self.cost_us / MICROSECONDS

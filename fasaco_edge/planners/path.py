@@ -70,11 +70,6 @@ class CoveragePath:
         """How far its cost is above the bound (``cost / bound - 1``); None without a bound."""
         return gap_to(self.lower_bound_cost_s, self.cost_s)
 
-    @property
-    def step_gap(self) -> float | None:
-        """How far its steps are above their bound, whatever turns cost; None without a bound."""
-        return gap_to(self.lower_bound_steps, self.steps)
-
 
 @dataclass(frozen=True, slots=True)
 class WalkFigures:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge import kernels as cell
-from fasaco_edge.grid.geometry import GridGeometry, Window
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import OCCUPIED, UNKNOWN, MapPatch, OccupancyGrid
 from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
 from fasaco_edge.wire.fields import (
@@ -131,27 +131,15 @@ def _least_and_most(cells: NDArray[np.int8]) -> tuple[int, int]:
 DIRECTION_VALUES = 25
 
 
-def directions_grid(
-    window: Window,
-    cell_m: float,
-    pointed: NDArray[np.int8],
-    share: NDArray[np.float32],
-    frame: str = "map",
-    stamp_ns: int = 0,
-) -> OccupancyGrid:
-    """Return where a trail points to, to be sent by ``encode_occupancy_grid``.
+def direction_values(pointed: NDArray[np.int8], share: NDArray[np.float32]) -> NDArray[np.int8]:
+    """Return the values, int8 (rows, cols), of a grid that shows where a trail points to.
 
     Args:
-        window: which cells of the lattice.
-        cell_m: edge of a cell [m].
         pointed: int8 (rows, cols), direction 0..3 of the strongest step, -1 for none.
         share: float32 (rows, cols), its share of the cell's pheromone, 0 to 1.
-        frame: name of the map frame.
-        stamp_ns: time of the trail [ns].
     """
     steps = np.rint(share * (DIRECTION_VALUES - 1)).astype(np.int8)
-    values = np.where(pointed < 0, np.int8(UNKNOWN), pointed * np.int8(DIRECTION_VALUES) + steps)
-    return OccupancyGrid(GridGeometry.of_cells(window, cell_m), values, frame, stamp_ns)
+    return np.where(pointed < 0, np.int8(UNKNOWN), pointed * np.int8(DIRECTION_VALUES) + steps)
 
 
 def directions_of(grid: OccupancyGrid) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
@@ -166,23 +154,12 @@ def directions_of(grid: OccupancyGrid) -> tuple[NDArray[np.int8], NDArray[np.flo
     return pointed, share.astype(np.float32)
 
 
-def coverage_grid(
-    window: Window,
-    cell_m: float,
-    states: NDArray[np.uint8],
-    visits: NDArray[np.uint16],
-    frame: str = "map",
-    stamp_ns: int = 0,
-) -> OccupancyGrid:
-    """Return the coverage of ``window``, to be sent by ``encode_occupancy_grid``.
+def coverage_values(states: NDArray[np.uint8], visits: NDArray[np.uint16]) -> NDArray[np.int8]:
+    """Return the values, int8 (rows, cols), of a grid that shows what is covered.
 
     Args:
-        window: which cells of the lattice.
-        cell_m: edge of a cell [m].
         states: uint8 (rows, cols), the lattice's: UNKNOWN, BLOCKED or COVERABLE.
         visits: uint16 (rows, cols), how often the tool has passed over each cell.
-        frame: name of the map frame.
-        stamp_ns: time of the coverage [ns].
     """
     values = np.full(states.shape, CoverageValue.UNKNOWN, np.int8)
     values[states == cell.BLOCKED] = CoverageValue.BLOCKED
@@ -190,4 +167,4 @@ def coverage_grid(
     values[coverable] = CoverageValue.TO_COVER
     values[coverable & (visits == 1)] = CoverageValue.COVERED
     values[coverable & (visits > 1)] = CoverageValue.RECOVERED
-    return OccupancyGrid(GridGeometry.of_cells(window, cell_m), values, frame, stamp_ns)
+    return values

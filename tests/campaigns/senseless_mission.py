@@ -27,6 +27,7 @@ from fasaco_edge.daemon.loop.status import mission_report
 from fasaco_edge.daemon.loop.trail_publisher import ShownTrail
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.fine_raster import map_to_raster
+from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.mission.core.events import (
@@ -47,7 +48,7 @@ from fasaco_edge.planners.planner import ColonySnapshot, SearchProgress, StopRec
 from fasaco_edge.planners.registry import planner_of
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import (
-    coverage_grid,
+    coverage_values,
     decode_map_update,
     decode_occupancy_grid,
     encode_occupancy_grid,
@@ -234,12 +235,10 @@ class MissionTrial:
                 decode_path(payload)
             self.counts["paths"] += 1
         if lattice is not None and self._turns % FRESH_EVERY == 0:
-            visits = mission.ledger.visits(lattice.window)
-            values = (lattice.window, lattice.cell_m, lattice.states, visits)
-            self._say(
-                "coverage",
-                lambda: encode_occupancy_grid(coverage_grid(*values, grid.frame, grid.stamp_ns)),
-            )
+            geometry = GridGeometry.of_cells(lattice.window, lattice.cell_m)
+            values = coverage_values(lattice.states, mission.ledger.visits(lattice.window))
+            covered = OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns)
+            self._say("coverage", lambda: encode_occupancy_grid(covered))
             self._say("floor", lambda: self._floor(grid))
             self._say("trail", self._trail)
         report = encode_json({"report": mission_report(mission, mission.order_state)})

@@ -118,7 +118,6 @@ def test_a_path_is_read_only_and_counts_its_steps():
     path = CoveragePath(np.array([[0, 0], [0, 1], [0, 2]], np.int32), "fasaco", 0)
     assert path.steps == 2
     assert path.gap is None
-    assert dataclasses.replace(path, lower_bound_steps=2).step_gap == 0.0
     assert dataclasses.replace(path, cost_s=3.0, lower_bound_cost_s=2.0).gap == 0.5
     assert CoveragePath(np.empty((0, 2), np.int32), "fasaco", 0).steps == 0
     with pytest.raises(ValueError, match="read-only"):

@@ -26,7 +26,7 @@ from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import CoverageValue, directions_grid, encode_occupancy_grid
+from fasaco_edge.wire.maps import CoverageValue, direction_values, encode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
 from fasaco_edge.wire.poses import encode_pose_stamped
@@ -39,9 +39,9 @@ CONFIG = DaemonConfig(
 )
 ORIGIN = (-1.0, -2.0)
 ROWS, COLS = 120, 160
-# The box that turns up half-way, where the map said free: rows and columns of pixels.
 # What the robot leaves of each square that it passes is little.
 SWEPT_PERCENT = 90
+# The box that turns up half-way, where the map said free: rows and columns of pixels.
 SURPRISE = (slice(80, 92), slice(40, 52))
 
 
@@ -142,8 +142,8 @@ class Mission:
         seen = cols < self.seen_cells
         pointed[rows[seen], cols[seen]] = ways[seen]
         share = np.where(pointed < 0, 0, 0.75).astype(np.float32)
-        window = self._window(pointed)
-        grid = directions_grid(window, CELL_M, pointed, share)
+        geometry = GridGeometry.of_cells(self._window(pointed), CELL_M)
+        grid = OccupancyGrid(geometry, direction_values(pointed, share))
         self._directions.put(encode_occupancy_grid(grid))
 
     def _window(self, shown: NDArray[np.generic]) -> Window:

@@ -18,7 +18,7 @@ from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import maps
 from fasaco_edge.wire.maps import (
     decode_occupancy_grid,
-    directions_grid,
+    direction_values,
     directions_of,
     encode_occupancy_grid,
 )
@@ -44,7 +44,12 @@ def test_coverage_values() -> None:
     )
     # A cell that became blocked after it was covered shows as blocked.
     visits = np.array([[0, 3, 0], [1, 2, 65535]], np.uint16)
-    grid = maps.coverage_grid(Window(-1, 2, 1, 5), 0.4, states, visits, "floor", 7)
+    grid = OccupancyGrid(
+        GridGeometry.of_cells(Window(-1, 2, 1, 5), 0.4),
+        maps.coverage_values(states, visits),
+        "floor",
+        7,
+    )
     assert grid.cells.tolist() == [[-1, 100, 0], [50, 75, 75]]
     assert (grid.frame, grid.stamp_ns) == ("floor", 7)
     assert grid.geometry.origin == Pose2D(0.8, -0.4)
@@ -107,7 +112,8 @@ def test_counts_must_fit() -> None:
 def test_directions_are_told_to_a_twenty_fourth():
     pointed = np.array([[-1, 0, 1], [2, 3, 3]], np.int8)
     share = np.array([[0.0, 0.25, 1.0], [0.52, 0.7, 1.0]], np.float32)
-    grid = directions_grid(Window(-2, 4, 0, 7), 0.3, pointed, share, "hall", 7)
+    geometry = GridGeometry.of_cells(Window(-2, 4, 0, 7), 0.3)
+    grid = OccupancyGrid(geometry, direction_values(pointed, share), "hall", 7)
     assert grid.cells.tolist() == [[-1, 6, 49], [62, 92, 99]]
     there = decode_occupancy_grid(encode_occupancy_grid(grid))
     assert (there.frame, there.stamp_ns) == ("hall", 7)

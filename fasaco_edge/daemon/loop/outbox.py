@@ -23,13 +23,14 @@ from fasaco_edge.daemon.loop.last_samples import LastSamples
 from fasaco_edge.daemon.loop.trail_publisher import ShownTrail
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.errors import FasacoError, NotPublished
+from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import command_document
 from fasaco_edge.wire import schemas, topics
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import coverage_grid, encode_occupancy_grid
+from fasaco_edge.wire.maps import coverage_values, encode_occupancy_grid
 from fasaco_edge.wire.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
@@ -222,12 +223,9 @@ class CoveragePublisher:
         if lattice is None or grid is None:
             return
         self._published_at, self._key = now, key
-        visits = mission.ledger.visits(lattice.window)
-        self._outbox.coverage(
-            coverage_grid(
-                lattice.window, lattice.cell_m, lattice.states, visits, grid.frame, grid.stamp_ns
-            )
-        )
+        geometry = GridGeometry.of_cells(lattice.window, lattice.cell_m)
+        values = coverage_values(lattice.states, mission.ledger.visits(lattice.window))
+        self._outbox.coverage(OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns))
 
 
 class FloorPublisher:

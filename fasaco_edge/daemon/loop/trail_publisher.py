@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fasaco_edge.grid.geometry import GridGeometry
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.living_trail import (
     TrailSnapshot,
     branching,
@@ -16,7 +18,7 @@ from fasaco_edge.planners.living_trail import (
 )
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire.json_text import encode_json
-from fasaco_edge.wire.maps import directions_grid, encode_occupancy_grid
+from fasaco_edge.wire.maps import direction_values, encode_occupancy_grid
 from fasaco_edge.wire.path_documents import TrailAttachment
 from fasaco_edge.wire.pheromone import encode_pheromone
 
@@ -64,11 +66,9 @@ class ShownTrail:
 
     def directions(self) -> bytes:
         """Return where it points to as a payload."""
-        pointed, share = directions(self.held.tau)
-        window = self.held.window
-        return encode_occupancy_grid(
-            directions_grid(window, self.cell_m, pointed, share, self.frame, self.stamp_ns)
-        )
+        geometry = GridGeometry.of_cells(self.held.window, self.cell_m)
+        values = direction_values(*directions(self.held.tau))
+        return encode_occupancy_grid(OccupancyGrid(geometry, values, self.frame, self.stamp_ns))
 
 
 class TrailPublisher:
