@@ -32,7 +32,7 @@ class WrongFrame(FasacoError):
 
 
 class TransformLoop(FasacoError):
-    """Transforms of ROS 2 hang frames on each other, so that none leads to the map."""
+    """ROS 2 transforms form a loop, so that none leads to the map."""
 
     code = "transform_loop"
     hint = "each frame has one parent: look for two programs that publish transforms of one frame"
@@ -49,31 +49,31 @@ class MapTooLarge(FasacoError):
 
 
 class MapTooFar(FasacoError):
-    """The lattice over a map reaches beyond what the protocol's messages can tell."""
+    """The lattice over a map has coordinates that messages cannot hold."""
 
     code = "map_too_far"
     hint = "check the map's origin; give maps in a frame whose origin is nearer"
 
 
 class NotPublished(FasacoError):
-    """A message could not be made or sent; those before and after it are not touched."""
+    """A message could not be encoded or sent; no other message is affected."""
 
     code = "not_published"
-    hint = "the message is left out, all else goes on; report it with the log"
+    hint = "the message is skipped, the daemon continues; report it with the log"
 
 
 class PlanFailed(FasacoError):
-    """The planner broke on a problem, which it never should."""
+    """The planner failed with an internal error."""
 
     code = "plan_failed"
-    hint = "it is tried again with the next map, or after a while; report it with the log"
+    hint = "planning is retried with the next map, or after a while; report it with the log"
 
 
 class MissionBroke(FasacoError):
-    """The mission met something that it never should."""
+    """The mission failed with an internal error."""
 
     code = "mission_broke"
-    hint = "it begins again from the ledger; report it with the log"
+    hint = "it restarts from the ledger; report it with the log"
 
 
 class MapFileError(FasacoError):
@@ -87,7 +87,7 @@ class PatchWithoutBase(FasacoError):
     """A map update came before any map, or does not fit the one there is."""
 
     code = "patch_without_base"
-    hint = "publish the full map once, latched, or again: it was asked for; updates refer to it"
+    hint = "publish the full map first, latched, and again when asked: updates refer to it"
 
 
 class StartOutsideMap(FasacoError):
@@ -140,17 +140,17 @@ class NotYet(FasacoError):
 
 
 class BadQuery(FasacoError):
-    """A query has a parameter or a payload that it does not take."""
+    """A query has a parameter or a payload that it does not accept."""
 
     code = "bad_query"
-    hint = "leave out what the query does not take; see protocol/README.md, Queries"
+    hint = "remove what the query does not accept; see protocol/README.md, Queries"
 
 
 class UnknownQuery(FasacoError):
-    """Nothing of that name can be asked."""
+    """There is no query of that name."""
 
     code = "unknown_query"
-    hint = "ask for one of the names listed"
+    hint = "use one of the names listed"
 
 
 class BadConfiguration(FasacoError):
@@ -166,15 +166,15 @@ class OpenToEveryone(BadConfiguration):
     code = "open_to_everyone"
     hint = (
         "choose bus.security.kind tls or user (protocol/README.md, Security), listen on 127.0.0.1, "
-        "or say bus.open_to_everyone: true"
+        "or set bus.open_to_everyone: true"
     )
 
 
 class DiskFailed(FasacoError):
-    """A disk is broken or full, or the computer is out of files or memory: it may pass."""
+    """A disk is broken or full, or the computer is out of files or memory: perhaps only for now."""
 
     code = "disk_failed"
-    hint = "look at the disk, and make room there; a service tries again by itself"
+    hint = "check the disk and free space on it; a service retries by itself"
 
 
 class BusUnavailable(FasacoError):
@@ -188,9 +188,7 @@ class ClockBeforeCertificate(BusUnavailable):
     """By this computer's clock a certificate is not valid yet."""
 
     code = "clock_before_certificate"
-    hint = (
-        "is the clock set? `date -u`; timedatectl set-ntp true, or wait until the network is there"
-    )
+    hint = "check the clock with `date -u`; timedatectl set-ntp true, or wait for the network"
 
 
 class MissingExtra(FasacoError):
@@ -201,20 +199,20 @@ class MissingExtra(FasacoError):
 
 
 class ProcessEnded(FasacoError):
-    """A process that was started to serve ended by itself."""
+    """A child process ended unexpectedly."""
 
     code = "process_ended"
 
 
 class UnreadableRecording(FasacoError):
-    """A file is no recording, or ends within a frame."""
+    """A file is not a recording, or ends within a frame."""
 
     code = "unreadable_recording"
-    hint = "a recorder started in its folder cuts a torn recording at the last whole frame"
+    hint = "a recorder started in the same folder cuts a torn recording after its last whole frame"
 
 
 class DifferentRuns(FasacoError):
-    """Files are taken for the parts of one recording, and are of several."""
+    """Files given as the parts of one run are of several runs."""
 
     code = "different_runs"
     hint = "review the parts of one run at a time, or compare two runs with --against"
@@ -227,17 +225,17 @@ class LedgerFileError(FasacoError):
 
 
 class LedgerFullError(FasacoError):
-    """A ledger is full: what lay farthest from the robot is to be covered again."""
+    """A ledger is full: what lay farthest from the robot was dropped and is to be covered again."""
 
     code = "ledger_full"
-    hint = "look for poses or maps that jump; begin anew (`mission reset`) in another building"
+    hint = "check for poses or maps that jump; in another building start over with `mission reset`"
 
 
 class LedgerMismatchError(FasacoError):
     """A ledger is of another building, of other cells, or of another release."""
 
     code = "ledger_mismatch"
-    hint = "it was kept aside and a new one begun; nothing has to be done to go on"
+    hint = "it was renamed and a new one started; nothing has to be done to continue"
 
 
 class OrderError(FasacoError):
@@ -248,10 +246,10 @@ class OrderError(FasacoError):
 
 
 class CommandError(FasacoError):
-    """A command that makes no sense in the state the mission is in."""
+    """A command that is not possible in the mission's state."""
 
     code = "not_now"
-    hint = "ask for the status, and start a mission first"
+    hint = "check the status, and start a mission first"
 
 
 class NobodyAnswersError(FasacoError):

@@ -75,17 +75,17 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=1.0,
         metavar="S",
-        help="wait so long before memory is read [s] (default: %(default)g)",
+        help="wait before memory is read [s] (default: %(default)g)",
     )
     parser.add_argument(
         "--idle",
         type=seconds_above_zero,
         default=5.0,
         metavar="S",
-        help="how long a daemon without a map is watched [s] (default: %(default)g)",
+        help="how long a daemon without a map is measured [s] (default: %(default)g)",
     )
     parser.add_argument(
-        "--ants", type=positive, default=200, help="of the one plan (default: %(default)s)"
+        "--ants", type=positive, default=200, help="ants of the plan (default: %(default)s)"
     )
 
 

@@ -63,14 +63,14 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--rounds",
         type=positive,
         default=6,
-        help="blocks with and without, by turns, so many of each (default: %(default)s)",
+        help="blocks with and without the daemon, alternating, each (default: %(default)s)",
     )
     parser.add_argument(
         "--block",
         type=_block,
         default=5.0,
         metavar="S",
-        help=f"length of one [s], at most {LONGEST_BLOCK_S:g} (default: %(default)g)",
+        help=f"length of a block [s], at most {LONGEST_BLOCK_S:g} (default: %(default)g)",
     )
 
     parser.add_argument(
@@ -199,7 +199,7 @@ JITTER = Benchmark(
     "tell how late it wakes. Beside it a real daemon covers a building of 50 m x 50 m in which a "
     "crate moves each second, with the unit's niceness and, where that may be, its CPU weight; in "
     "every other block the daemon is held. First both may run on all cores, then both are pinned "
-    "to one: the worst case. What the machine does besides is in both columns.",
+    "to one: the worst case. Other load on the machine affects both columns.",
     add_options=_add_options,
     count=lambda args: 2 * len(PLACES) * int(args.rounds),
     measure=_measure,

@@ -58,19 +58,19 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--samples", type=positive, default=200, help="maps to publish (default: %(default)s)"
     )
     parser.add_argument(
-        "--ants", type=positive, default=8, help="ants of each plan (default: %(default)s)"
+        "--ants", type=positive, default=8, help="ants per plan (default: %(default)s)"
     )
     parser.add_argument(
         "--pause",
         type=seconds,
         default=0.05,
         metavar="S",
-        help="between a path and the next map [s] (default: %(default)g)",
+        help="pause between a path and the next map [s] (default: %(default)g)",
     )
     parser.add_argument(
         "--recorder",
         action="store_true",
-        help=f"as many maps again with a recorder beside the daemon, in {ROUNDS} turns each, and "
+        help=f"repeat with a recorder beside the daemon, alternating in {ROUNDS} rounds, and "
         "compare",
     )
 

@@ -72,7 +72,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=positive,
         default=2,
         metavar="N",
-        help="threads to try against one, 1 to leave it out (default: %(default)s)",
+        help="number of threads to compare with one; 1 skips the comparison (default: %(default)s)",
     )
 
 
@@ -213,8 +213,8 @@ SPEED = Benchmark(
     name="speed",
     summary="the compiled colony's time, on one thread and on several",
     description="Plan with FaSACO on each grid several times, kernels warm, on one thread and, by "
-    "turns, on several. Reads: times are medians with their range, which shows how quiet the "
-    "machine was; ants/s is by the wall clock.",
+    "turns, on several. Times are medians with their range, which shows how quiet the machine "
+    "was; ants/s is by the wall clock.",
     add_options=_add_options,
     count=_count,
     measure=_measure,

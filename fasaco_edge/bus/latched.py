@@ -183,7 +183,7 @@ class LatchedSubscription(Subscription):
             self._awaits_tokens = False
 
     def _on_tokens(self, tokens: list[str], is_whole: bool) -> None:
-        """Take account of who is there, and of who is gone if all were told."""
+        """Add the publishers of ``tokens``; where these are all, forget the others."""
         found = {"/".join(key.rpartition("/@adv/pub/")[2].split("/")[:2]): key for key in tokens}
         with self._lock:
             self._awaits_tokens = False

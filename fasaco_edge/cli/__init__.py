@@ -26,18 +26,16 @@ COMMANDS = {
     "plan": "plan a coverage path offline",
     "run": "run the daemon: maps come in over Zenoh, paths go out",
     "mission": "command a running daemon: start, pause, resume, cancel, replan, reset, status",
-    "ask": "ask a running daemon: status, path, coverage, pheromone, config, replan ...",
+    "ask": "query a running daemon: status, path, coverage, pheromone, config, replan ...",
     "watch": "watch a robot's mission live in this terminal",
     "record": "record a robot's mission into a Rerun recording (.rrd)",
-    "review": "tell what happened in a recorded mission",
-    "replay": "play a recorded mission again and compare its decisions",
+    "review": "report what happened in a recorded mission",
+    "replay": "replay a recorded mission and compare its decisions",
     "simulate": "simulate a robot with a laser scanner on the bus",
     "bench": "measure speed, footprint, latency and jitter on this machine",
     "maps": "list the maps that come with the package",
     "warmup": "compile the kernels into the cache, so that the first plan starts at once",
-    "check-config": (
-        "check a configuration: all that is wrong, with line, value and what is allowed"
-    ),
+    "check-config": "check a configuration: every fault, with line, value and what is allowed",
     "doctor": "check host, bus and configuration, and say what to do",
 }
 """Each command, and its line in the list of them."""
@@ -91,7 +89,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="fasaco-edge",
         description="Coverage path planning with fast-spanning ant colonies, on a robot.",
-        epilog="Begin with `fasaco-edge demo`. Each command explains itself with --help.",
+        epilog="Begin with `fasaco-edge demo`. Each command has --help.",
     )
     parser.add_argument("--version", action="version", version=f"fasaco-edge {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")

@@ -41,16 +41,16 @@ if TYPE_CHECKING:
 EPILOG = """\
 examples:
   fasaco-edge ask status
-  fasaco-edge ask path                      how long it is, and why it is what it is
-  fasaco-edge ask pheromone                 the living trail, and how decided it is
+  fasaco-edge ask path                      its length, and the reason for it
+  fasaco-edge ask pheromone                 the living trail, and how distinct its directions are
   fasaco-edge ask pheromone --param cohort=0
   fasaco-edge ask replan                    a full new plan, now
   fasaco-edge ask config --json
 
-Orders are given with `fasaco-edge mission`; what can be asked and what is answered stands in
-protocol/README.md.
+Commands are given with `fasaco-edge mission`; protocol/README.md describes the queries and their
+answers.
 
-exit codes: 0 answered; 1 refused, or nobody answered; 2 not understood; 78 no name for a robot
+exit codes: 0 answered; 1 refused, or no answer; 2 usage error; 78 invalid robot name
 """
 
 
@@ -62,7 +62,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="parameter of the question; may be repeated",
+        help="parameter of the query; may be repeated",
     )
     add_question(parser)
 
@@ -257,7 +257,7 @@ def _trail_figures(reply: Reply) -> dict[str, object]:
 
 
 COMMAND = Command(
-    description="Put a question to a running daemon over Zenoh, and show the answer.",
+    description="Query a running daemon over Zenoh and show the answer.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

@@ -25,7 +25,7 @@ WIDTH = 80
 BENCHMARKS: tuple[Benchmark[Any], ...] = (SPEED, FOOTPRINT, LATENCY, JITTER)
 
 EPILOG = """\
-Each benchmark explains itself with --help, prints a table or --json, and can be
+Each benchmark has --help, prints a table or --json, and can be
 interrupted (Ctrl-C): it then reports what it has measured so far. Figures are
 medians with their range; run them on a quiet machine.
 """

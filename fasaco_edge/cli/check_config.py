@@ -16,14 +16,14 @@ from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.errors import BadConfiguration
 
 EPILOG = """\
-It reads the file as the daemon does and starts nothing. It looks at no file that the
-configuration names: keys and passwords may be there for the service alone; `fasaco-edge doctor`,
-run as its user, looks at those.
+It reads the file as the daemon does and starts nothing. It does not read files that the
+configuration names: keys and passwords may be readable for the service only;
+`fasaco-edge doctor`, run as the service's user, checks those.
 exit codes: 0 a daemon would start with it, 78 it would not (EX_CONFIG)
 
 examples:
   fasaco-edge check-config /etc/fasaco-edge/config.yaml
-  fasaco-edge check-config robot.yaml --show    # with the defaults of all that it leaves out
+  fasaco-edge check-config robot.yaml --show    # with defaults filled in
   fasaco-edge check-config robot.yaml --json | jq -r '.faults[] | "\\(.line): \\(.said)"'
 """
 
@@ -86,8 +86,8 @@ def _print(file: Path, faults: list[Fault]) -> None:
 
 
 COMMAND = Command(
-    description="Check a configuration before a daemon starts with it: all that is wrong, "
-    "each with its line, the value, and what is allowed.",
+    description="Check a configuration before a daemon starts with it; list every fault with its "
+    "line, the value, and what is allowed.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

@@ -18,8 +18,8 @@ from fasaco_edge.doctor.finding import Finding, Level
 from fasaco_edge.doctor.report import findings
 
 EPILOG = """\
-Nothing is started or changed: it joins the bus for a second, listens, and asks. Run it as the user
-the daemon runs as, or as root, so that it may read what the daemon reads. The checks:
+Nothing is started or changed: it joins the bus for a second, listens, and queries. Run it as the
+daemon's user or as root, so that it can read what the daemon reads. The checks:
   configuration   whether the file is in order
   platform        processor, system, Python
   C library       whether it is new enough for the installed packages
@@ -37,8 +37,8 @@ the daemon runs as, or as root, so that it may read what the daemon reads. The c
   roles           who may publish maps, command, view and record
   limits          how much each sender may send
 
-each line is ok; warn: it works, but should be looked at; or fail, with what to do.
-exit codes: 0 nothing failed, 1 something did
+Each line is ok; warn: works, but needs attention; or fail, with what to do.
+exit codes: 0 nothing failed, 1 something failed
 
 examples:
   fasaco-edge doctor --config /etc/fasaco-edge.yaml
@@ -52,9 +52,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--config",
         type=Path,
         metavar="FILE",
-        help="the daemon's YAML configuration (default: what a daemon without one does)",
+        help="the daemon's YAML configuration (default: the built-in defaults)",
     )
-    parser.add_argument("--recordings", type=Path, metavar="DIR", help="where recordings are to go")
+    parser.add_argument("--recordings", type=Path, metavar="DIR", help="folder for recordings")
     add_json(parser, "the findings")
 
 
@@ -94,7 +94,7 @@ def _print(found: list[tuple[str, Finding]]) -> None:
 
 COMMAND = Command(
     description="Check the host on which a daemon runs or will run, the bus and the "
-    "configuration: what is missing, what is open to whom, and what to do about it.",
+    "configuration: what is missing, who has access to what, and what to do about it.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

@@ -17,7 +17,7 @@ from fasaco_edge.wire.json_text import decode_json, encode_json
 EPILOG = """\
 examples:
   fasaco-edge mission status
-  fasaco-edge mission start                         everything the robot can come to
+  fasaco-edge mission start                         everything the robot can reach
   fasaco-edge mission start --passes 2 --return-home
   fasaco-edge mission start --zone "kitchen:0,0;4,0;4,3;0,3" --zone "hall:4,0;6,0;6,9;4,9"
   fasaco-edge mission start --keep-out "1,1;2,1;2,2;1,2"
@@ -25,33 +25,33 @@ examples:
   fasaco-edge mission pause && fasaco-edge mission resume
 
 evening.yaml, or the same as JSON; all lengths in metres in the frame of the map:
-  zones:                      # one after the other; without any: everything reachable
+  zones:                      # one after the other; if none: everything reachable
     - name: kitchen
       polygon: [[0, 0], [4, 0], [4, 3], [0, 3]]
       passes: 2
     - name: hall
       polygon: [[4, 0], [6, 0], [6, 9], [4, 9]]
-  keep_out:                   # never to be touched
+  keep_out:                   # the robot must not touch these
     - [[1, 1], [2, 1], [2, 2], [1, 2]]
-  passes: 1                   # of zones that say nothing else, and of everything
-  return_home: true           # in the end, to where the mission began
-  keep_covered: false         # true: what is covered already needs no first pass
+  passes: 1                   # of zones without passes, and of everything
+  return_home: true           # at the end, to where the mission began
+  keep_covered: false         # true: skip what is already covered in the first pass
 
-Each pass counts from its beginning: what was covered before is covered again. An order, how far
-it is, and whether it is paused outlive the daemon. Where a daemon is told nothing, it covers
-everything by itself (mission.autostart of its configuration).
+Each pass starts from zero: what was covered before is covered again. An order, its progress, and
+whether it is paused survive a restart of the daemon. A daemon without an order covers everything
+by itself (mission.autostart of its configuration).
 
-exit codes: 0 done; 1 refused, or nobody answered; 2 not understood; 78 no name for a robot
+exit codes: 0 done; 1 refused, or no answer; 2 usage error; 78 invalid robot name
 """
 
 COMMANDS = {
-    "start": "begin an order, in place of the one before; the same one goes on",
-    "pause": "let the robot stand; what it passes over still counts",
+    "start": "start an order in place of the current one; the same order continues",
+    "pause": "stop the robot; what it passes over still counts as covered",
     "resume": "go on",
-    "cancel": "stop, and forget the order; what is covered is remembered",
-    "replan": "search for a full new plan now, beginning with the path there is",
-    "reset": "stop, and forget the order and what is covered; the ledger is kept aside",
-    "status": "tell state, progress, and what could not be reached",
+    "cancel": "stop and drop the order; what is covered is kept",
+    "replan": "plan in full now, starting from the current path",
+    "reset": "stop and drop the order and what is covered; the ledger's file is renamed",
+    "status": "show state, progress, and what could not be reached",
 }
 
 
@@ -87,10 +87,10 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--passes", type=int, metavar="N", help="how often to cover (default: 1)")
     parser.add_argument(
-        "--return-home", action="store_true", help="in the end drive to where the mission began"
+        "--return-home", action="store_true", help="at the end drive to where the mission began"
     )
     parser.add_argument(
-        "--keep-covered", action="store_true", help="what is covered already needs no first pass"
+        "--keep-covered", action="store_true", help="skip what is already covered in the first pass"
     )
 
 
@@ -162,7 +162,7 @@ def _polygon(text: str) -> list[list[float]]:
 
 
 COMMAND = Command(
-    description="Command the mission of a running daemon over Zenoh, and see how far it is.",
+    description="Command the mission of a running daemon over Zenoh, and show its progress.",
     run=run,
     add_options=_add_commands,
     epilog=EPILOG,

@@ -34,30 +34,29 @@ examples:
 figures:
   revisits         steps + 1 - distinct cells
   recovered_cells  distinct cells visited twice or more
-  n_r_paper        revisits with the way home, to compare with the paper's Table I
+  n_r_paper        revisits including the way home, to compare with the paper's Table I
   cost_s           seconds the robot drives and turns
   lattice_deg      angle of the cells' rows to the x axis of the map frame; cells
-                   (row, col) of a line over the floor are counted along them
-  gap              cost_s / lower_bound_cost_s - 1, of steps and turns together
-  floor            of a YAML map, on its own pixels, by a tool as wide as --cell:
-                   reachable_m2, all that the tool touches where the robot's disc can
-                   come to; the share of it that the line sweeps; seconds_per_m2 swept;
-                   patches left of more than 4 dm2, the largest; illegal_share, the part
-                   of the line where the robot would touch what is not known free
+                   (row, col) of a line over the floor are counted along these rows
+  gap              cost_s / lower_bound_cost_s - 1, steps and turns together
+  floor            (YAML maps) measured on the map's pixels, with a tool as wide as --cell:
+                   reachable_m2, all that the tool touches wherever the robot's disc can
+                   be; the share of it that the line sweeps; seconds_per_m2 swept; patches
+                   larger than 4 dm2 not swept, the largest; illegal_share, the part of
+                   the line where the robot would touch what is not known to be free
 
 figures of several robots:
-  makespan_steps   steps of the longest walk; makespan_s what the costliest takes
+  makespan_steps   steps of the longest walk; makespan_s seconds of the costliest
   lower_bound_makespan_steps
-                   no division of the floor has a shorter longest walk
+                   steps that the longest walk cannot be below
   balance          mean steps of the walks / makespan_steps
-  swept_twice      cells that two or more robots pass
+  swept_twice      cells that two or more robots visit
 
-fasaco searches until its budget ends, the walk is proven to be the best, or all ants
-have walked: a complete walk within milliseconds, then better ones by local search,
-begun anew where the colony's ants lead (on up to 8,000 cells; larger grounds have
-local search alone). --no-local-search is the
-paper's colony alone. The colony's options are for fasaco; aco takes all but the
-velocities, the others none.
+fasaco searches until its budget ends, the walk is proven optimal, or all ants have
+walked: a complete walk within milliseconds, then better ones by local search, restarted
+from walks of the colony's ants (up to 8,000 cells; larger maps have local search only).
+--no-local-search is the paper's colony alone. The colony's options apply to fasaco; aco
+takes all but the velocities, the other planners none.
 """
 
 # The search's budget where nobody says, and ants that serve local search best. The
@@ -145,8 +144,8 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         nargs="+",
         action="extend",
         metavar="R,C",
-        help="cells that several robots start in, which share the floor: one walk each, the "
-        "longest as short as can be found",
+        help="start cells of several robots that share the floor: one walk each, the longest as "
+        "short as possible",
     )
     start.add_argument(
         "--robots-xy",
@@ -154,14 +153,14 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         nargs="+",
         action="extend",
         metavar="X,Y",
-        help="the same as points [m]; of one with a minus sign first, --robots-xy=-1,2",
+        help="the same as points [m]; --robots-xy=-1,2 if the first begins with a minus sign",
     )
     group.add_argument(
         "--cell",
         type=float,
         default=DEFAULT_CELL_M,
         metavar="M",
-        help="width of the tool [m]; cells are as wide, but for the overlap of a line over the "
+        help="width of the tool [m]; cells are as wide, less the overlap of a line over the "
         "floor (default: %(default)s)",
     )
     group.add_argument(
@@ -169,7 +168,7 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         type=float,
         default=DEFAULT_RADIUS_M,
         metavar="M",
-        help="radius of the robot [m]; no part in a .npy grid (default: %(default)s)",
+        help="radius of the robot [m]; ignored with a .npy grid (default: %(default)s)",
     )
     end = group.add_mutually_exclusive_group()
     end.add_argument(
@@ -198,7 +197,7 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         "--turn-s",
         type=float,
         metavar="S",
-        help="a quarter-turn on the spot [s]; 0 looks for the fewest steps, as the paper does "
+        help="time of a quarter-turn on the spot [s]; 0 minimises steps, as the paper does "
         f"(default: 0; {TURN_S:g} for a line over the floor)",
     )
 
@@ -208,16 +207,17 @@ def _add_line(group: argparse._ArgumentGroup) -> None:
         "--line",
         choices=(CELLS, "quick", "thorough"),
         default=CELLS,
-        help="cells: through the centres of the cells, as the paper's planners; quick, thorough: "
-        "the robot stands in a cell where it can, and the line is polished against the floor that "
-        "it sweeps, where a square metre is worth 60 or 180 s; of a YAML map "
+        help="cells: through the centres of the cells, as the paper's planners do; quick, "
+        "thorough: off the centres where walls require it, and optimised for the floor that it "
+        "sweeps, a square metre being worth 60 or 180 s; needs a YAML map "
         "(default: %(default)s)",
     )
     group.add_argument(
         "--overlap",
         type=float,
         metavar="SHARE",
-        help="of the tool's width, by which neighbouring cells of a line over the floor overlap "
+        help="overlap of neighbouring cells of a line over the floor, as a share of the tool's "
+        "width "
         f"(default: {OVERLAP:g})",
     )
 
@@ -225,9 +225,9 @@ def _add_line(group: argparse._ArgumentGroup) -> None:
         "--align",
         type=_alignment,
         metavar="walls|axes|DEG",
-        help="what the cells of a line over the floor lie along: most of the building's walls, as "
-        "the map has them; the axes of the map frame; or so many degrees to these, "
-        f"counter-clockwise (default: {WALLS})",
+        help="direction of the cells' rows of a line over the floor: along most of the "
+        "building's walls, the axes of the map frame, or an angle to these [degrees "
+        f"counter-clockwise] (default: {WALLS})",
     )
 
 
@@ -255,8 +255,9 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--visibility",
         choices=VISIBILITIES,
-        help="what eta of equation (5) is 1 over: the distance to the neighbour, 1, as in the "
-        "paper; the distance an ant will go; the neighbour's open neighbours "
+        help="eta of equation (5) is the inverse of: the distance to the neighbour (1, as in the "
+        "paper); the distance that an ant goes in this move; the neighbour's number of open "
+        "neighbours "
         f"(default: {SEARCH_VISIBILITY}; {PAPER_VISIBILITY} without local search)",
     )
     group.add_argument(
@@ -268,23 +269,24 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         type=int,
         default=1,
         metavar="N",
-        help="ants walk on so many; the path is the same for any number (default: %(default)s)",
+        help="threads that ants walk on; the path is the same for any number (default: "
+        "%(default)s)",
     )
     group.add_argument(
-        "--no-local-search", action="store_true", help="the paper's colony alone, no budget set"
+        "--no-local-search", action="store_true", help="the paper's colony alone, no time budget"
     )
     group.add_argument(
         "--budget",
         type=float,
         metavar="S",
-        help="end the search after so long with the best walk it has [s] "
+        help="time after which the search ends with its best walk [s] "
         f"(default: {BUDGET_S:g}; none without local search)",
     )
     group.add_argument(
         "--target-gap",
         type=float,
         metavar="G",
-        help="end it once the walk is proven to take at most so much longer than the quickest, "
+        help="end the search once the walk is proven to be within this share of the optimum, "
         "0.01 for 1 %% (default: none)",
     )
 
@@ -294,16 +296,16 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
         "--path-out",
         type=Path,
         metavar="FILE.csv",
-        help="write the walk: header row,col; robot,row,col of several",
+        help="write the walk: header row,col (several robots: robot,row,col)",
     )
     group.add_argument(
         "--xy-out",
         type=Path,
         metavar="FILE.csv",
-        help="write the line to be driven, in the map frame, straight from point to point [m]: "
-        "header x_m,y_m; robot,x_m,y_m of several; of a YAML map, as a .npy grid has no frame",
+        help="write the line to be driven as points in the map frame [m]: header x_m,y_m "
+        "(several robots: robot,x_m,y_m); needs a YAML map, as a .npy grid has no frame",
     )
-    group.add_argument("--png", type=Path, metavar="FILE", help="draw the walk")
+    group.add_argument("--png", type=Path, metavar="FILE", help="write a picture of the walk")
     add_json(group, "the figures")
 
 

@@ -32,22 +32,22 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--config",
         type=Path,
         metavar="FILE",
-        help="the daemon's YAML configuration: robot, bus, pose and recording, in place of the "
-        "options for those; - reads it as JSON from standard input",
+        help="the daemon's YAML configuration (robot, bus, pose and recording) in place of these "
+        "options; - reads JSON from standard input",
     )
     parser.add_argument(
         "--pose-schema",
         choices=POSE_SCHEMAS,
         default=POSE_STAMPED,
         metavar="TYPE",
-        help=f"type of poses that come without one: {', '.join(POSE_SCHEMAS)} "
+        help=f"type of poses whose samples name none: {', '.join(POSE_SCHEMAS)} "
         "(default: %(default)s)",
     )
     parser.add_argument(
         "--ros2",
         type=ros_config,
         metavar="JSON",
-        help="the block ros2 of the daemon's configuration: record these topics, too",
+        help="the block ros2 of the daemon's configuration: also record these topics",
     )
     _add_room(parser)
     parser.add_argument(
@@ -56,8 +56,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=(DEFAULT_HOST, DEFAULT_PORT),
         metavar="[HOST:]PORT",
-        help="let viewers watch, too: `rerun rerun+http://HOST:PORT/proxy`; anybody who reaches "
-        f"the port may (default: {DEFAULT_HOST}:{DEFAULT_PORT})",
+        help="also serve live viewers: `rerun rerun+http://HOST:PORT/proxy`; anybody who can "
+        f"connect to the port may watch (default: {DEFAULT_HOST}:{DEFAULT_PORT})",
     )
     add_robot_on_bus(parser)
 
@@ -82,35 +82,35 @@ def address(text: str) -> tuple[str, int]:
 
 
 def _add_room(parser: argparse.ArgumentParser) -> None:
-    room = parser.add_argument_group("room on the disk")
+    room = parser.add_argument_group("disk space")
     room.add_argument(
         "--part-mb",
         type=int,
         default=64,
         metavar="MB",
-        help="go on in the next file after so many megabytes (default: %(default)s)",
+        help="size after which the next file begins [MB] (default: %(default)s)",
     )
     room.add_argument(
         "--part-min",
         type=float,
         default=10.0,
         metavar="MIN",
-        help="or minutes; 0 for never (default: %(default)g)",
+        help="time after which the next file begins [min]; 0 for never (default: %(default)g)",
     )
     room.add_argument(
         "--quota-mb",
         type=int,
         default=0,
         metavar="MB",
-        help="of more than this of the robot's recordings in DIR delete the oldest files, never "
-        "the one being written; 0 for no limit (default: %(default)s)",
+        help="size of the robot's recordings in DIR above which the oldest files are deleted, "
+        "never the one being written [MB]; 0 for no limit (default: %(default)s)",
     )
     room.add_argument(
         "--least-free-mb",
         type=int,
         default=50,
         metavar="MB",
-        help="write nothing while the disk has less room (default: %(default)s)",
+        help="pause recording while the disk has less free space [MB] (default: %(default)s)",
     )
 
 

@@ -31,17 +31,17 @@ if TYPE_CHECKING:
     from fasaco_edge.replay.replay import RecordedRun
 
 DESCRIPTION = """\
-Play the samples of a recording to the mission again, through the same code that the
-daemon runs, and tell what it decides. A recording with a turn log is played turn by turn, and
-each decision compared with the recorded one, bit for bit: the first that is another ends it,
-and the command, with code 1. One without is played approximately: time is that of the samples
-and planning is counted in work. The same files give the same decisions on any machine.
+Feed the samples of a recording to the mission again, through the same code that the daemon
+runs, and report what it decides. A recording with a turn log is replayed cycle by cycle, and each
+decision compared with the recorded one, bit for bit: the first that differs ends it, with exit
+code 1. One without is replayed approximately: time is that of the samples and planning is counted
+in work. The same files give the same decisions on any machine.
 """
 EPILOG = """\
-The column `then` tells whether the path is cell by cell the one that was recorded. Without
-turn log a recording does not tell in full which samples the daemon took together, nor the work
-of plans that came to nothing: a path that differs is no error then. With --config or --work the
-replay is of another mission, and approximate, too.
+The column `then` tells whether the path equals the recorded one cell by cell. Without a turn log
+a recording does not tell in full which samples the daemon took together, nor the work of plans
+that were not used: a different path is no error then. With --config or --work the replay is of
+another mission, and approximate, too.
 """
 
 
@@ -63,7 +63,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--work",
         type=_count,
         metavar="N",
-        help="proposals of each plan (default: what was recorded with its path)",
+        help="proposals of each plan (default: as recorded with its path)",
     )
     parser.add_argument("--json", action="store_true", help="print a JSON document")
 

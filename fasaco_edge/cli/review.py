@@ -24,16 +24,17 @@ from fasaco_edge.review.comparison import (
     setup_words,
     side_by_side,
 )
-from fasaco_edge.review.document import ReviewDocument, document_of, explanations
+from fasaco_edge.review.document import ReviewDocument, explanations
+from fasaco_edge.review.figures import document_of
 from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
 
 DESCRIPTION = """\
-Tell what happened in a recorded mission: coverage over time, replans and why they came, the
-worst moments, faults. Parts of one run are taken together. Files are only read, also those that
-a crash cut short: of them, what is whole is told.
+Report what happened in a recorded mission: coverage over time, replans and their reasons, the
+worst moments, faults. Parts of one run are read together. Files are only read; of files that a
+crash cut short, the whole part is used.
 """
 
 
@@ -46,14 +47,14 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE",
-        help="the parts of another run, to be set beside it",
+        help="the parts of another run to compare with",
     )
-    parser.add_argument("--json", action="store_true", help="print a JSON document, see below")
+    parser.add_argument("--json", action="store_true", help="print JSON, described below")
     parser.add_argument(
         "--png", type=Path, metavar="FILE", help="write a picture of the (first) run"
     )
     parser.add_argument(
-        "--html", type=Path, metavar="FILE", help="write a page, one file that needs no net"
+        "--html", type=Path, metavar="FILE", help="write a page, one file that needs no network"
     )
     parser.add_argument(
         "--export",
@@ -141,12 +142,10 @@ def print_review(review: Review, document: ReviewDocument) -> None:
     console.print(terminal.figures(rows.card_rows(document)))
     _print_curve(console, review)
     console.print(terminal.figures(rows.figure_rows(document)))
-    _print_table(console, "Why replans came", rows.REASONS, rows.reason_rows(document))
+    _print_table(console, "Reasons of replans", rows.REASONS, rows.reason_rows(document))
     _print_table(console, "The slowest replans", rows.REPLANS, rows.replan_rows(review))
     moments = rows.moment_rows(review)
-    _print_table(
-        console, "Worst moments", ("what", "how much", "at", "what else is known"), moments
-    )
+    _print_table(console, "Worst moments", ("what", "how much", "at", "context"), moments)
     troubles = rows.trouble_rows(review.troubles)
     _print_table(console, "Troubles", ("state", "at", "for", "reason"), troubles[:MOST_TROUBLES])
     if len(troubles) > MOST_TROUBLES:
@@ -167,7 +166,7 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
         (kind, str(mine), str(theirs), f"{mine - theirs:+d}")
         for kind, (mine, theirs) in reason_counts([one, other])
     ]
-    _print_table(console, "Why replans came", ("reason", *names, "difference"), counts)
+    _print_table(console, "Reasons of replans", ("reason", *names, "difference"), counts)
     for document in (one, other):
         _print_remarks(console, document)
 

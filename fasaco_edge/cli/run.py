@@ -12,20 +12,20 @@ from pathlib import Path
 from fasaco_edge.cli.console.arguments import Command, Exit
 
 EPILOG = """\
-Without a file the daemon answers at tcp/127.0.0.1:7447 (where a router listens
-there already, it joins that one) under the keys fasaco/@v1/robot/...:
+Without a file the daemon listens at tcp/127.0.0.1:7447 (or joins the router that already
+listens there) and uses the keys fasaco/@v1/robot/...:
   in    map, map_update, pose      ROS messages in CDR
   out   path, coverage, pheromone  ROS messages in CDR
         status                     JSON, on change and once a second
-        command                    JSON, each command that was taken
+        command                    JSON, each accepted command
         alive                      liveliness token
   ask   @rpc/path, @rpc/status, @rpc/coverage, @rpc/mission
-It covers everything it can reach, unless it is told otherwise (`fasaco-edge mission`) or to wait
-for an order (mission.autostart: false). Order and coverage are kept on disk: after a restart the
-mission goes on where it stopped.
-As a service (deploy/) it tells systemd when it is ready and that it gets on, and reads its
-configuration again at SIGHUP: what can change at run time (planner, map, the robot's speeds, the
-mission's patience) does; what cannot is named; a file that is wrong is kept out.
+It covers everything it can reach, unless it is given an order (`fasaco-edge mission`) or set to
+wait for one (mission.autostart: false). Order and coverage are kept on disk: after a restart the
+mission continues where it stopped.
+As a service (deploy/) it notifies systemd when it is ready, feeds the watchdog, and reloads its
+configuration at SIGHUP: settings that can change at run time (planner, map, the robot's speeds,
+the mission's timeouts) are applied, others are listed; a faulty file is rejected as a whole.
 """
 
 

@@ -38,13 +38,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="[m]"
     )
     parser.add_argument(
-        "--range", type=float, default=3.5, metavar="M", help="reach of the scanner [m]"
+        "--range", type=float, default=3.5, metavar="M", help="range of the scanner [m]"
     )
     parser.add_argument(
-        "--map-hz", type=float, default=2.0, metavar="HZ", help="maps a simulated second, 1 to 5"
+        "--map-hz", type=float, default=2.0, metavar="HZ", help="maps per simulated second, 1 to 5"
     )
     parser.add_argument(
-        "--trail-out", type=Path, metavar="FILE.csv", help="write where it drove, header x,y"
+        "--trail-out", type=Path, metavar="FILE.csv", help="write the driven positions, header x,y"
     )
     add_robot_on_bus(parser)
 
@@ -90,8 +90,8 @@ def _report(progress: Progress) -> None:
 
 
 COMMAND = Command(
-    description="A differential-drive robot with a 360-degree scanner in a building it does "
-    "not know. It publishes the map it has scanned so far and its pose, and follows the "
+    description="A differential-drive robot with a 360-degree scanner in a building unknown to "
+    "it. It publishes the map it has scanned so far and its pose, and follows the "
     "newest path, until SIGTERM or SIGINT.",
     run=run,
     add_options=_add_options,

@@ -22,36 +22,36 @@ from fasaco_edge.kernels import cache, release
 # The compiler has 850 MB in the end.
 TWO_NEED_BYTES = 2_000_000_000
 EPILOG = """\
-An installation from a release folder brings compiled kernels along and compiles nothing, as long as
-they are whole and numba, llvmlite and Python are those they were made for.
+An installation from a release folder ships compiled kernels and compiles nothing, as long as
+they are intact and numba, llvmlite and Python have the versions they were made for.
 
-The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Code in it is for
-these very sources, for one numba, llvmlite and Python, and for one processor; a daemon that finds
-none compiles it itself, with its first map. Each file is checked before it is used: one that is
-damaged is compiled again. A folder that others than root and you may write, or could put another
-in place of, is not used, but a temporary one: `chmod go-w` on what is named mends that. A relative
-$XDG_CACHE_HOME counts as none; a user without a home has the temporary folder, too.
-exit codes: 0 all is there, 1 (--check) it is not
+The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Its code is for
+these sources, one version each of numba, llvmlite and Python, and one processor; a daemon that
+finds none compiles it with its first map. Each file is checked before use; a damaged one is
+compiled again. A folder that anybody but root and you could write to or replace is not used, but
+a temporary one instead: `chmod go-w` on the named folder mends that. A relative $XDG_CACHE_HOME is
+ignored; a user without a home gets the temporary folder, too.
+exit codes: 0 all kernels are there, 1 (--check) some are not
 
 examples:
   fasaco-edge warmup
-  fasaco-edge warmup --check || echo 'the first plan will take its time'
+  fasaco-edge warmup --check || echo 'the first plan will be slow'
   NUMBA_CACHE_DIR=/var/cache/fasaco-edge/numba fasaco-edge warmup --prune
 """
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--check", action="store_true", help="compile nothing, tell whether all is there"
+        "--check", action="store_true", help="compile nothing, report whether all kernels are there"
     )
     parser.add_argument(
-        "--prune", action="store_true", help="then remove what other versions have left there"
+        "--prune", action="store_true", help="then remove kernels of other versions"
     )
     parser.add_argument(
         "--for-release",
         type=Path,
         metavar="DIR",
-        help="compile for any processor of this kind into DIR, for a release to bring along",
+        help="compile for any processor of this architecture into DIR, to ship with a release",
     )
     parser.add_argument(
         "--jobs",

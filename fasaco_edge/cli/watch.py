@@ -31,21 +31,21 @@ EPILOG = """\
 examples:
   fasaco-edge watch                                    a daemon on this machine
   fasaco-edge watch --connect tcp/192.168.1.20:7447 --robot hall2
-  fasaco-edge watch --once                             one picture of how it stands
-  fasaco-edge watch | tee mission.log                  lines, where there is no terminal
+  fasaco-edge watch --once                             one picture of the current state
+  fasaco-edge watch | tee mission.log                  lines of text, without a terminal
   fasaco-edge watch --json | jq .coverage.fraction
 
-f shows the pheromone trail in place of coverage and path, and back: bright is where the paths so
-far lead. q or Ctrl-C ends it. Row by row the picture is the map, north up: y grows upwards. Where
-no map is published on the native key `map` (under ROS 2, say) the coverage is drawn alone.
-NO_COLOR=1 and TERM=dumb are kept to.
+f toggles between the pheromone trail and coverage with path: bright is where the paths so far
+lead. q or Ctrl-C quits. The picture shows the map with north up: y grows upwards. If no map is
+published on the native key `map` (under ROS 2, say) only the coverage is drawn. NO_COLOR=1 and
+TERM=dumb are honoured.
 
-exit codes: 0 ended as asked; 1 --once and nobody answered, or the terminal is gone
+exit codes: 0 quit by the user; 1 --once without an answer, or the terminal is gone
 """
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--once", action="store_true", help="print one picture and end")
+    parser.add_argument("--once", action="store_true", help="print one picture and exit")
     parser.add_argument("--json", action="store_true", help="print each status as a line of JSON")
     parser.add_argument(
         "--timeout",

@@ -46,7 +46,7 @@ class RobotConfig(Section, frozen=True):
     """The robot: its name on the bus, its size [m], and what driving takes it.
 
     ``quarter_turn_s`` is a turn by 90 degrees on the spot [s], braking and starting
-    included; 0 looks for the fewest steps whatever the turns. ``overlap`` is by what share of the
+    included; 0 minimises steps, whatever the turns. ``overlap`` is by what share of the
     tool's width lanes overlap where a line is driven (``planner.line``).
     """
 

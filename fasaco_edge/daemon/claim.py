@@ -174,7 +174,7 @@ class NameClaim(Claim):
             self._is_settled = ClaimState.PLANS in (self.state, *self._others.values())
         self.decide(self._others, now, in_touch=self._bus.is_in_touch())
         if self.rival_yielded:
-            LOG.warning("another daemon of this name planned, too, and has yielded to this one")
+            LOG.warning("another daemon of this name was planning, too, and has yielded")
         return self.state is not before
 
     def announce(self) -> None:

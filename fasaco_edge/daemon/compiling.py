@@ -71,7 +71,7 @@ class KernelCompiler:
         if (code := self._process.returncode) != 0:
             raise ProcessEnded(
                 f"the kernels were not compiled: the compiler {_ended(code)}",
-                hint="is there memory for it (500 MB)? try `fasaco-edge warmup`",
+                hint="check that 500 MB of memory are free, then try `fasaco-edge warmup`",
             )
         if self._stages:
             LOG.info("kernels compiled in %.0f s", time.monotonic() - self._started)
@@ -102,7 +102,7 @@ def _ended(code: int) -> str:
     if code >= 0:
         return f"ended with {code}"
     name = signal.Signals(-code).name
-    return f"was killed by {name}" + (", as for want of memory" if name == "SIGKILL" else "")
+    return f"was killed by {name}" + (", probably out of memory" if name == "SIGKILL" else "")
 
 
 def main() -> None:

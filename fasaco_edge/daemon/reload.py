@@ -56,7 +56,7 @@ class Reload:
         try:
             written = self._read()
         except BadConfiguration as error:
-            text = "configuration refused, the one before stays in force: %s (%s)"
+            text = "configuration refused, the previous one stays in force: %s (%s)"
             extra = {"event": "reload_refused", "code": error.code}
             LOG.error(text, error, error.hint, extra=extra)
             raise

@@ -110,7 +110,7 @@ class RecorderSupervisor:
             # What follows is the same as for a recorder that died.
             assert self._process is not None
             self._process.kill()
-            reason = f"no word for {patience_s:.0f} s"
+            reason = f"no status for {patience_s:.0f} s"
             return SupervisedRecorder("silent", self._restarts, reason)
         if self._report is None:
             return SupervisedRecorder("starting", self._restarts)

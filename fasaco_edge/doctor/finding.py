@@ -110,7 +110,7 @@ class CheckContext:
         config: the daemon's configuration.
         file: where that was read; None for the defaults.
         unit: the daemon's unit, as systemd has it; None where there is none.
-        recordings: where recordings are to go; None where nobody said.
+        recordings: folder for recordings; None if none was given.
         root: the computer's root folder.
     """
 

@@ -56,8 +56,8 @@ def system(context: CheckContext) -> Finding:
     if sys.version_info < LEAST_PYTHON:
         return fail(f"{found}: too old", "install Python 3.11 or newer", details)
     if cores == 1:
-        to_do = "let whatever controls the robot have a higher priority: the unit has Nice=10"
-        return warn(f"{found}: planning shares it with all else", to_do, details)
+        to_do = "give the robot's controller a higher priority: the unit has Nice=10"
+        return warn(f"{found}: planning shares it with everything else", to_do, details)
     return ok(found, details)
 
 
@@ -80,13 +80,13 @@ def clock(context: CheckContext) -> Finding:
     """Check the clock, on which recordings, certificates and stamps depend."""
     written = (Path(__file__)).stat().st_mtime
     now = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime())
-    wait = "timedatectl set-ntp true, or wait until the network is there"
+    wait = "timedatectl set-ntp true, or wait for the network"
     if time.time() < written - 86_400:
-        found = f"{now}, before this program was installed: the computer forgot the time"
+        found = f"{now}, before this program was installed: the clock was reset"
         return fail(found, wait)
     kept = kernel_clock()
     if kept is None:
-        return warn(f"{now}; it is not known whether that is right", wait)
+        return warn(f"{now}; it is not known whether it is synchronised", wait)
     is_synchronised, error_s = kept
     if is_synchronised or (context.root / "run/systemd/timesync/synchronized").exists():
         return ok(f"{now}, synchronised, off by at most {error_s:.3g} s")
@@ -116,7 +116,7 @@ def _model(root: Path) -> str:
 def _features(root: Path) -> str:
     flags = f"{_cpuinfo(root, 'flags')} {_cpuinfo(root, 'Features')}".split()
     known = [feature for feature in FEATURES if feature in flags]
-    return "processor features: " + (", ".join(known) or "none that matter")
+    return "processor features: " + (", ".join(known) or "none relevant")
 
 
 def _cpuinfo(root: Path, name: str) -> str:
@@ -150,18 +150,18 @@ def memory(context: CheckContext) -> Finding:
     unit = context.unit
     limit = unit.limit("MemoryMax") if unit else None
     if version is None:
-        holds = "limits of the unit do not hold" if limit else "no limit on memory would hold"
+        holds = "limits of the unit are not enforced" if limit else "a limit would not be enforced"
         return warn(
             f"{found}; the memory controller is off: {holds}", _how_to_enable(context.root), details
         )
     if free_mb < WANTED_MB:
-        to_do = "end what else runs, or plan with larger cells (robot.tool_width_m)"
-        return warn(f"{found}; the daemon may want {WANTED_MB} MB", to_do, details)
+        to_do = "stop other programs, or plan with larger cells (robot.tool_width_m)"
+        return warn(f"{found}; the daemon may need {WANTED_MB} MB", to_do, details)
     if limit and limit < needed_bytes(context.config):
         high, most = limits_mib(context.config)
         smaller = afforded(context.config, limit).map
         found += f"; the unit's limit is {limit / 1e6:.0f} MB: maps of no more than "
-        found += f"{smaller.max_pixels} pixels and {smaller.max_lattice_cells} cells are taken"
+        found += f"{smaller.max_pixels} pixels and {smaller.max_lattice_cells} cells are accepted"
         to_do = f"systemctl edit fasaco-edge: MemoryHigh={high}M, MemoryMax={most}M"
         return warn(found, to_do, details)
     return ok(found, details)

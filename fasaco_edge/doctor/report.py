@@ -50,14 +50,14 @@ class _RunningCheck:
             self._found = warn(str(error), error.hint)
         except Exception as error:
             # A computer may have faults that nobody thought of.
-            said = f"could not be found out: {type(error).__name__}: {error}"
+            said = f"check failed: {type(error).__name__}: {error}"
             self._found = warn(said, "please report this")
 
     def finding(self, deadline: float) -> Finding:
         """Return what it finds until ``deadline`` [s, monotonic]."""
         self._thread.join(max(deadline - time.monotonic(), 0.0))
         return self._found or warn(
-            f"no answer after {PATIENCE_S:g} s", "look whether a disk or somebody on the bus hangs"
+            f"no answer after {PATIENCE_S:g} s", "check whether a disk or a peer on the bus hangs"
         )
 
 
@@ -71,7 +71,7 @@ def findings(
     Args:
         path: a configuration; None for the defaults.
         checks: what to look at besides.
-        recordings: where recordings are to go.
+        recordings: folder for recordings.
     """
     deadline = time.monotonic() + PATIENCE_S
     try:

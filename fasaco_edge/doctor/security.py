@@ -16,8 +16,8 @@ from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
 
 SHOWS = {
     "none": "by anybody there",
-    "tls": "by whoever shows a certificate of the CA",
-    "user": "by whoever knows a password",
+    "tls": "by anybody with a certificate of the CA",
+    "user": "by anybody with a password",
 }
 
 
@@ -29,19 +29,19 @@ def endpoints(context: CheckContext) -> Finding:
     details += [f"{endpoint}: connects there" for endpoint in bus.connect]
     beyond = [endpoint for endpoint in bus.listen if not is_local(endpoint)]
     if not beyond:
-        where = "on this computer alone" if bus.listen else "nowhere"
+        where = "on this computer only" if bus.listen else "nowhere"
         return ok(f"listens {where}; security: {kind}", details)
     found = f"listens beyond this computer; security: {kind}"
     if kind == "none":
         return warn(
-            f"{found}: everybody in reach may give maps, poses and commands",
-            "choose bus.security.kind tls, or keep the network to yourself",
+            f"{found}: anybody who can connect may send maps, poses and commands",
+            "choose bus.security.kind tls, or use a private network",
             details,
         )
     if kind == "user":
         return warn(
-            f"{found}: names are checked, but all that is said can be read on the way",
-            "choose bus.security.kind tls where others share the network",
+            f"{found}: users are authenticated, but traffic is not encrypted",
+            "choose bus.security.kind tls if others share the network",
             details,
         )
     return ok(found, details)
@@ -51,7 +51,7 @@ def roles(context: CheckContext) -> Finding:
     """Check that each role has a name."""
     security = context.config.bus.security
     if security.kind == "none":
-        return ok("no roles: whoever reaches the daemon may do everything")
+        return ok("no roles: anybody who can connect may do everything")
     names = security.names()
     details = [
         f"{role} ({', '.join(who) or 'nobody'}): {ROLES[role].description}"
@@ -64,8 +64,8 @@ def roles(context: CheckContext) -> Finding:
     if missing:
         lacking = " or ".join(missing)
         return warn(
-            f"nobody is {lacking}: what that role does, nobody can do",
-            f"name somebody in bus.security.roles.{missing[0]}",
+            f"nobody has the role {lacking}, nor may do what it allows",
+            f"add a name to bus.security.roles.{missing[0]}",
             details,
         )
     count = len({name for who in names.values() for name in who})
@@ -76,7 +76,7 @@ def limits(context: CheckContext) -> Finding:
     """Show how much each sender may send."""
     bus = context.config.bus
     if bus.security.kind == "none" and not bus.open_to_everyone:
-        own = f"takes in at most {1 / MAP_SPACING_S:g} maps a second, the newest always"
+        own = f"accepts at most {1 / MAP_SPACING_S:g} maps a second, always the newest"
         return ok(f"no limits on senders; the daemon {own}")
     most = bus.security.limits
     return ok(
@@ -96,7 +96,7 @@ SECRETS = {
     "tls": ("private_key",),
     "user": ("password_file", "dictionary_file"),
 }
-HOW_TO = "protocol/README.md, Security, tells how to make them"
+HOW_TO = "protocol/README.md, Security, shows how to make them"
 
 
 def identity(context: CheckContext) -> Finding:
@@ -104,7 +104,7 @@ def identity(context: CheckContext) -> Finding:
     bus = context.config.bus
     security, listens = bus.security, bool(bus.listen)
     if security.kind == "none":
-        return ok("shows no name, asks for none")
+        return ok("no authentication, neither way")
     try:
         security.of_daemon(context.config.keys().prefix)
         if security.kind == "user":

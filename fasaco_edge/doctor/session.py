@@ -130,26 +130,26 @@ def session(context: CheckContext) -> Finding:
         found = f"nobody answers at {', '.join(silent)}: the daemon {then}"
         return make(found, "start the router there, or correct bus.connect", details)
     if not is_taken:
-        return ok("nobody is in the way", details)
+        return ok("the endpoints are free", details)
     try:
         with _joined(context) as joined:
             met = " and ".join(joined.met()) or "nobody"
             return ok(f"joined {met} as a client", details)
     except BusUnavailable as error:
-        to_do = "end what listens there, or choose another port in bus.listen"
-        found = f"what listens there does not speak Zenoh with us: {error}"
+        to_do = "stop the program that listens there, or choose another port in bus.listen"
+        found = f"the program that listens there does not accept a Zenoh session: {error}"
         return fail(found, to_do, details)
 
 
 def peers(context: CheckContext) -> Finding:
     """Check who is on the bus: the daemon, other robots, maps and poses."""
     if not any(answers(endpoint) is not False for endpoint in _ways(context)):
-        return ok("nobody to ask: neither daemon nor router is there")
+        return ok("neither a daemon nor a router answers")
     try:
         with _joined(context) as bus:
             return _seen(context, bus)
     except (BadConfiguration, BusUnavailable) as error:
-        return warn(f"could not be asked: {error}", error.hint)
+        return warn(f"could not connect: {error}", error.hint)
 
 
 def _seen(context: CheckContext, bus: Bus) -> Finding:
@@ -172,13 +172,13 @@ def _seen(context: CheckContext, bus: Bus) -> Finding:
         found = f"no daemon of robot {keys.robot!r}; {_in_words(heard)}"
         return ok(found, details)
     if status is None:
-        found = "the daemon runs, and does not tell us how it is"
-        to_do = "ask under a name with the role viewer (bus.security.roles)"
+        found = "the daemon runs, but does not answer for its status"
+        to_do = "connect under a name with the role viewer (bus.security.roles)"
         return warn(found, to_do, details)
     found = f"the daemon runs: {status.state}, {status.reason}"
     if len(claims) > 1:
         found = f"{len(claims)} daemons have the name {keys.robot!r}, of which one plans; {found}"
-        to_do = "end those that wait, or give them names of their own (robot.name)"
+        to_do = "stop those that wait, or give each a name of its own (robot.name)"
         return warn(found, to_do, details)
     lacking = [kind for kind in ("map", "pose") if getattr(status, kind) is None]
     if lacking:
@@ -209,7 +209,7 @@ def _listen(bus: Bus, wanted: dict[str, list[str]]) -> dict[str, int]:
 
 def _in_words(heard: dict[str, int]) -> str:
     there = [f"{kind}s" for kind, count in heard.items() if count]
-    return f"{' and '.join(there)} come in" if there else "neither map nor pose comes in"
+    return f"{' and '.join(there)} received" if there else "no maps and no poses received"
 
 
 def _status(bus: Bus, key: str) -> Status | None:

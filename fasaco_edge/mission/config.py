@@ -25,7 +25,7 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         autostart: whether everything is covered once where nobody orders anything.
-        retries: how often what is blocked or left over in the end is tried again.
+        retries: how often cells that were blocked or left over are tried again at the end.
         retry_s: pause before each retry [s].
         lost_pose_s: the pose is lost after this time without one [s]; 0 for never.
         stale_map_s: the map is stale after this time without a map or an update [s]; 0 for never.

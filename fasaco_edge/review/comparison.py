@@ -70,13 +70,13 @@ def setup_words(one: ReviewDocument, other: ReviewDocument) -> str:
     """Return a sentence on whether two runs compare."""
     setup = setup_differences(one, other)
     if not setup:
-        return "Both were set up alike."
+        return "Both had the same setup."
     if do_compare(setup):
-        return "They were set up differently:"
+        return "They had different setups:"
     another = ", ".join(name for name, _, _ in setup if name in ANOTHER_PROBLEM)
     return (
-        f"These are not two runs of one problem: {another} differ. What hangs on that is shown, "
-        "and not compared."
+        f"These are not two runs of one problem: {another} differ. Figures that depend on that "
+        "are shown, but not compared."
     )
 
 

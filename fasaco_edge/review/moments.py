@@ -49,7 +49,7 @@ class Moment:
         what: which figure it is the extreme of.
         value, unit: how much it was.
         at_s: when it began [s].
-        note: what else is known of it.
+        note: context of it.
     """
 
     what: str
@@ -210,7 +210,7 @@ def kind_of(reason: str) -> str:
         changes = [change for change in _CHANGES if change in reason]
         cells = "" if "passages changed" in changes else "cells "
         return _MAP + cells + " and ".join(changes) if changes else "map"
-    return _DETAIL.split(reason, maxsplit=1)[0].strip() or "no reason told"
+    return _DETAIL.split(reason, maxsplit=1)[0].strip() or "no reason given"
 
 
 def worst_moments(

@@ -23,7 +23,8 @@ from fasaco_edge.review.comparison import (
     setup_differences,
     setup_words,
 )
-from fasaco_edge.review.document import ReviewDocument, document_of
+from fasaco_edge.review.document import ReviewDocument
+from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.pictures import (
     branching_panel,
     coverage_panel,
@@ -98,31 +99,31 @@ KINDS = {True: "good", False: "bad", None: "open"}
 # What a browser may do with it: show pictures that are in it, and its own style.
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 INTRODUCTION = (
-    "A robot was to pass over every place it can reach, on a map that grows while it drives. "
-    "The ground is divided into square cells as wide as its tool; a cell is covered when the "
-    "tool has passed over its centre. Cells are not all of the floor: strips along walls lie in "
-    "none; what the tool swept is told in square metres. Whenever the map shows something new, "
-    "the way is planned anew: a replan."
+    "A robot was to cover every place it can reach, on a map that grows while it drives. "
+    "The floor is divided into square cells as wide as its tool; a cell is covered when the "
+    "tool has passed over its centre. Cells do not include all of the floor: strips along walls "
+    "belong to none; what the tool swept is given in square metres. When the map shows something "
+    "new, the path is planned again: a replan."
 )
 GLOSSARY = {
-    "reachable floor": "all that the tool touches at the places that the robot can come to, on the "
-    "pixels of the last map; swept is what of it the tool passed over",
-    "floor swept by the ledger": "what the robot itself had as swept in the end, in reach or not",
+    "reachable floor": "all that the tool touches wherever the robot can be, on the pixels of the "
+    "last map; swept is the part of it that the tool passed over",
+    "floor swept by the ledger": "what the daemon counted as swept at the end, reachable or not",
     "patch left": "reachable floor in one piece that was not swept; 4 dm2 are 20 x 20 cm",
     "covered again": "cells that were passed over more than once",
-    "out of reach": "cells where the robot would fit, but that it cannot come to",
+    "out of reach": "cells where the robot would fit, but that it cannot get to",
     "steps": "moves from one cell to the next",
     "revisits": "visits of cells beyond the first of each",
-    "replan": "a plan made anew; its time is that of planning alone",
+    "replan": "a new plan; its time is that of planning only",
     "map: cells more, fewer": "a new map showed more or less ground to cover than the one before",
-    "gap": "time of a plan, steps and turns, above the time that no plan can do without",
-    "changed on the map": "the rectangle in which cells came, went or have other neighbours",
-    "plans that became no path": "they found the path there was, or the map had changed meanwhile",
-    "better further on": "spare time was used to find a better rest of the way",
-    "p99": "of a hundred replans, 99 were not slower",
-    "degraded": "poses or maps had stopped, or a pose jumped; the robot went on",
-    "blocked": "the robot could not go on",
-    "refused": "messages that were broken or made no sense; each is ignored",
+    "gap": "time of a plan (steps and turns) above a lower bound for every plan, as a share of it",
+    "changed on the map": "the rectangle in which cells or their neighbours changed",
+    "plans that became no path": "they equalled the current path, or the map had outdated them",
+    "better further on": "spare time was used to improve the rest of the path",
+    "p99": "99 of 100 replans took at most so long",
+    "degraded": "poses or maps had stopped, or a pose jumped; the robot continued",
+    "blocked": "the robot could not continue",
+    "refused": "malformed or implausible messages; each is ignored",
 }
 
 
@@ -153,7 +154,7 @@ def page_of(review: Review, other: Review | None = None) -> str:
             _remarkable(each, figures, len(documents))
             for each, figures in zip(reviews, documents, strict=True)
         ),
-        _section("What the words mean", _table(("", ""), GLOSSARY.items(), "plain")),
+        _section("Glossary", _table(("", ""), GLOSSARY.items(), "plain")),
         element(
             "footer",
             "Written by ",
@@ -182,7 +183,7 @@ def _verdict(figures: ReviewDocument, index: int, of: int) -> Html:
 
 
 def _setup(one: ReviewDocument, other: ReviewDocument) -> Html:
-    """Return in what the set-ups of two runs differ."""
+    """Return the differences between the setups of two runs."""
     found = setup_differences(one, other)
     table = (_table(("", one.recording, other.recording), found),) if found else ()
     return _section("Do they compare?", element("p", setup_words(one, other)), *table)
@@ -217,11 +218,11 @@ def _maps(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> Htm
         picture = draw_map(review, MAP_ROOM)
         shown = element("p", review.no_lattice or "no pose was recorded")
         if picture is not None:
-            text = "map, covered cells, floor not swept, and the way of the robot"
+            text = "map, covered cells, floor not swept, and the robot's track"
             shown = _image(picture, text)
         maps.append(element("figure", shown, _table(("", ""), rows.card_rows(figures), "plain")))
     kind = "maps two" if len(maps) > 1 else "maps"
-    return _section("The map in the end", element("div", *maps, class_=kind))
+    return _section("Final map", element("div", *maps, class_=kind))
 
 
 def _image(picture: Image.Image, text: str) -> Html:
@@ -237,9 +238,9 @@ def _fields(review: Review, of: int, name: str) -> Html:
     if not pictures:
         return Html()
     words = (
-        "Where the robot means to drive next is bright: each path that was published has "
-        "strengthened the steps it takes. What it has driven is half as strong, and what no path "
-        "leads over, or the map has just shown, is dark."
+        "Bright is where the robot is going to drive: each published path strengthens the steps "
+        "it takes. Driven steps are half as strong; what no path crosses, or the map has just "
+        "shown, is dark."
     )
     figures = (
         element(
@@ -289,20 +290,20 @@ def _reasons(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> 
         return [element("p", "There were none.")]
     if len(documents) == 1:
         return [
-            _table(("why it came", *rows.REASONS[1:]), rows.reason_rows(documents[0])),
-            element("p", "The slowest ones:"),
+            _table(("reason", *rows.REASONS[1:]), rows.reason_rows(documents[0])),
+            element("p", "The slowest:"),
             _table(rows.REPLANS, rows.replan_rows(reviews[0]), "notes"),
         ]
     names = (each.recording for each in documents)
-    return [_table(("why it came", *names), [(kind, *map(str, n)) for kind, n in counts])]
+    return [_table(("reason", *names), [(kind, *map(str, n)) for kind, n in counts])]
 
 
 def _remarkable(review: Review, figures: ReviewDocument, of: int) -> Html:
     """Return moments, troubles, faults and remarks of one run."""
     moments = rows.moment_rows(review)
-    parts = [_table(("worst moments", "how much", "at", "what else is known"), moments, "notes")]
+    parts = [_table(("worst moments", "how much", "at", "context"), moments, "notes")]
     troubles, faults = rows.trouble_rows(review.troubles), rows.fault_rows(figures)
-    none = "It was never degraded, blocked or silent, and the recorder could always write."
+    none = "The mission was never degraded, blocked or silent, and the recorder could always write."
     titles = ("trouble", "at", "for", "why")
     parts.append(_table(titles, troubles, "notes") if troubles else element("p", none))
     none = "No message was refused."

@@ -109,8 +109,8 @@ def coverage_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
         known = reviews[0].known_fractions
         points = time.points(known[:, 0], 100 * known[:, 1])
         lines.append(Line("", FAINT, points, dotted=False, width=1.4))
-    one = "blue: of all cells known in the end; grey: of those known then"
-    caption = one if len(reviews) == 1 else "of all cells that each run knew in the end"
+    one = "blue: of all cells known at the end; grey: of those known at the time"
+    caption = one if len(reviews) == 1 else "of all cells that each run knew at the end"
     y = Axis.linear("%", [100.0])
     return Panel("Covered share of all cells", caption, time.axis, y, tuple(lines))
 
@@ -145,7 +145,7 @@ def state_panel(review: Review) -> Panel:
         lines.append(Line("", colour, points, dotted=False, width=BAND_PX))
     ticks = tuple((float(level), SHORT.get(name, name)) for level, name in enumerate(names))
     y = Axis("", -0.7, max(len(names) - 0.3, 0.7), ticks)
-    return Panel("What the mission was doing", "", time.axis, y, tuple(lines))
+    return Panel("State of the mission", "", time.axis, y, tuple(lines))
 
 
 def branching_panel(review: Review) -> Panel | None:
@@ -156,9 +156,9 @@ def branching_panel(review: Review) -> Panel | None:
     time = TimeAxis.over(review.duration_s)
     curve = time.points(points[:, 0], points[:, 1])
     y = Axis.linear("", [0.0, *points[:, 1].tolist()])
-    caption = "mean number of directions of a cell within reach of its strongest; 1: all is decided"
+    caption = "mean number of a cell's directions within reach of its strongest; 1: only one"
     line = Line("", COLOURS[0], curve, dotted=False, width=2.2)
-    return Panel("How decided the trail was", caption, time.axis, y, (line,))
+    return Panel("Branching of the trail", caption, time.axis, y, (line,))
 
 
 def saved_panel(review: Review) -> Panel | None:
@@ -180,7 +180,7 @@ def saved_panel(review: Review) -> Panel | None:
         for colour, points in saved
     ]
     y = Axis.linear("s", [0.0, *(value for _, points in saved for value in points[:, 1].tolist())])
-    caption = "blue: local search, red: ants; off the time of the walks that they began with"
+    caption = "blue: local search, red: ants; time taken off the initial walks"
     return Panel("Saved by search, all plans together", caption, time.axis, y, tuple(lines))
 
 

@@ -67,7 +67,7 @@ def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
         ended = "another order" if order.ended_by == "start" else order.ended_by
         how = {
             True: "complete",
-            False: f"not complete: {order.state or 'nothing was told'}"
+            False: f"not complete: {order.state or 'no state recorded'}"
             + (f" when {ended} came" if ended else " at the end of the recording"),
             None: "not known whether it was completed",
         }[order.complete]
@@ -79,11 +79,11 @@ def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
 
 def _ending(document: ReviewDocument) -> str:
     if document.complete:
-        return "complete: every cell it was to cover, and could reach, is covered"
+        return "complete: every reachable cell of the order is covered"
     if document.complete is None:
-        return "the recording does not tell whether it was completed"
+        return "not recorded whether it was completed"
     how = "ended" if document.is_ended else "broke off"
-    return f"not complete: the recording {how} when the mission was {document.state}"
+    return f"not complete: the recording {how} while the mission was {document.state}"
 
 
 def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:

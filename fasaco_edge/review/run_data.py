@@ -118,7 +118,7 @@ class RunData:
         plan_log: plans, by the turn log.
         grid: the map at the end, with all updates.
         keep_out: polygons of the last order.
-        config, version, robot: of the daemon, as its last status has them.
+        config, version, robot: of the daemon, by its last status.
         undecodable: samples that could not be read, by topic.
         last_s: when the last sample came.
     """

@@ -57,7 +57,7 @@ class SimulationConfig:
         robot_radius_m: radius that the planner uses [m].
         padding_m: what that radius has in excess of the hull [m]. The hull is what
             collides: a robot as wide as its corridor would touch at the first rounding error.
-        range_m: reach of the scanner [m].
+        range_m: range of the scanner [m].
         free_at_most: occupancy values up to this are free [percent].
         map_chunk_m: the published map grows by blocks of about this size [m].
         tick_s: the simulation's time step [s].

@@ -114,11 +114,11 @@ def status_line(view: RobotView, now: float) -> str:
     if view.trouble:
         return f"waiting for the bus at {one_line(view.trouble)}"
     if view.gone_since is not None:
-        return "waiting for the daemon to come back"
+        return "waiting for the daemon to return"
     if not view.is_here:
         return f"waiting for a daemon of robot {view.robot}"
     if status is None:
-        return "the daemon has said nothing yet"
+        return "no status from the daemon yet"
     if view.silent_s(now):
         return "the daemon is silent"
     fraction = status.coverage.fraction if status.coverage else 0.0

@@ -182,9 +182,9 @@ LEGEND = (
 
 
 FIELD_LEGEND = (
-    (picture.FIELD[0], "no path leads there"),
-    (picture.FIELD[len(picture.FIELD) // 2], "did, or was driven"),
-    (picture.FIELD[-1], "each path leads there"),
+    (picture.FIELD[0], "no path"),
+    (picture.FIELD[len(picture.FIELD) // 2], "past path, or driven"),
+    (picture.FIELD[-1], "every path"),
     (picture.WALL, "wall"),
     (picture.HEADING, "robot"),
 )
@@ -307,13 +307,13 @@ def headline(view: RobotView, now: float) -> Text:
         line.append(f"waiting for the bus at {one_line(view.trouble)}", "red")
     elif view.gone_since is not None:
         gone = age(now - view.gone_since)
-        line.append(f"the daemon is gone for {gone}; waiting for it to come back", "bold red")
+        line.append(f"the daemon has been gone for {gone}; waiting for it to return", "bold red")
     elif not view.is_here:
         others = ", ".join(sorted(view.robots - {view.robot}))
         line.append("waiting for a daemon of that name", "yellow")
         line.append(f"; on this bus: {one_line(others)}" if others else "")
     elif status is None:
-        line.append("the daemon has said nothing yet", "yellow")
+        line.append("no status from the daemon yet", "yellow")
     elif silent:
         line.append(f"silent for {age(silent)}", "bold red")
     else:

@@ -175,7 +175,7 @@ class RobotView:
         (self.robots.add if token.here else self.robots.discard)(token.robot)
         if was_here and not self.is_here:
             self.gone_since = now
-            self.events.add(now, "the daemon is gone; waiting for it to come back", BAD)
+            self.events.add(now, "the daemon is gone; waiting for it to return", BAD)
         elif self.is_here and not was_here:
             back = self.gone_since is not None
             # It has not had the time to publish a status.

@@ -225,7 +225,8 @@ class TransformTree:
         while (link := self._links.pop(frame, None)) is not None:
             names.append(frame)
             frame = link[0].frame
-        return TransformLoop(f"tf: these frames hang on each other: {', '.join(names[:8])}")
+        looped = ", ".join(names[:8])
+        return TransformLoop(f"tf: the transforms of these frames form a loop: {looped}")
 
 
 def _placed(frame: Pose2D, pose: Pose2D) -> Pose2D:

@@ -35,7 +35,7 @@ class CoverageReport(Document, frozen=True):
         covered: of those.
         recovered: of those, covered more than once.
         remaining: of those, still to cover.
-        unreachable: cells where the robot would fit, but cannot come to.
+        unreachable: cells where the robot would fit, but that it cannot get to.
         free_out_of_reach_m2: area the map knows to be free, but in no reachable cell.
         fraction: covered share of coverable.
     """
@@ -64,7 +64,7 @@ class FloorReport(Document, frozen=True):
     Attributes:
         swept_m2: floor that the tool has passed over, within reach now or not.
         reachable_m2: floor that the tool can reach and is asked to sweep, as far as that is known;
-            null where the robot drives through the middles of cells.
+            null if the robot drives through the centres of cells.
         left: what of that is not swept, and why, the largest first; null where that is not known.
         out_of_reach: floor that the map shows free and the tool cannot come to, asked for or not,
             and why, the largest first; null where that is not known.
@@ -126,7 +126,7 @@ class MissionReport(Document, frozen=True):
     """The order, and how far it is.
 
     Attributes:
-        paused: whether the robot is to stand.
+        paused: whether the mission is paused.
         zone: what is being covered; null for everything reachable.
         pass: which pass that is; null without an order.
         passes: of how many.

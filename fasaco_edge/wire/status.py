@@ -136,7 +136,7 @@ class LedgerReport(Document, frozen=True):
     Attributes:
         path: the file; .previous behind its name is the one before.
         age_s: since it was last written; null before the first time.
-        restored_cells: covered cells taken over from before the restart.
+        restored_cells: covered cells loaded at the start.
         fault: what is or was wrong with it, and what to do.
     """
 

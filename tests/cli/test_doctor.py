@@ -76,7 +76,7 @@ def test_what_is_open_to_everyone_is_told(doctor):
     told, code = doctor(listen=["tcp/0.0.0.0:7447"], open_to_everyone=True)
     assert code == 0
     assert told["endpoints"]["level"] == "warn"
-    assert "everybody in reach may give maps" in told["endpoints"]["found"]
+    assert "anybody who can connect may send maps" in told["endpoints"]["found"]
     assert told["endpoints"]["details"] == [
         "tcp/0.0.0.0:7447: from other computers, by anybody there"
     ]
@@ -154,7 +154,7 @@ def test_who_can_read_the_key(doctor, ca, mode, level):
 def test_a_role_that_nobody_has(doctor, ca):
     told, _ = doctor(**tls(ca.files("robot"), roles={"viewer": ["eye"]}))
     assert told["roles"]["level"] == "warn"
-    assert told["roles"]["found"].startswith("nobody is mapper or operator")
+    assert told["roles"]["found"].startswith("nobody has the role mapper or operator")
 
 
 def test_user_and_password(doctor, tmp_path):
@@ -171,7 +171,7 @@ def test_user_and_password(doctor, tmp_path):
     told, code = doctor(**bus)
     assert code == 0
     assert told["identity"]["found"] == "user 'robot'; boss: a role, but no password"
-    assert "can be read on the way" in told["endpoints"]["found"]
+    assert "traffic is not encrypted" in told["endpoints"]["found"]
     dictionary.write_text("slam:one\nboss\n")
     broken, code = doctor(**bus)
     assert code == 1

@@ -221,5 +221,5 @@ def test_a_disk_that_fails_is_no_wrong_configuration():
     ended = fasaco_edge("run", "--config", "/proc/self/mem")
     assert ended.code == 1
     assert "/proc/self/mem: Input/output error" in ended.err
-    assert "look at the disk" in ended.err
+    assert "check the disk" in ended.err
     assert fasaco_edge("run", "--config", "/proc/self").code == 78, "that is a mistake"

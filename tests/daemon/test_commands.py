@@ -266,7 +266,7 @@ def test_the_command_line(tmp_path):
         assert refused.out == ""
         assert refused.err == (
             "fasaco-edge: there is no mission to pause\n"
-            "  hint: ask for the status, and start a mission first\n"
+            "  hint: check the status, and start a mission first\n"
         )
         refused = fasaco_edge("mission", "resume", "--connect", running.endpoint, "--json")
         assert (refused.code, json.loads(refused.out)["code"]) == (1, "not_now")

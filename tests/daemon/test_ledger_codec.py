@@ -200,7 +200,7 @@ def test_another_version_is_named_with_what_to_do():
     ) as told:
         decode_ledger(enveloped(b"whatever it holds", version=4), CELL_M)
     assert "install the release that wrote it" in told.value.hint
-    assert "give the file its name back" in told.value.hint
+    assert "rename the file back" in told.value.hint
 
 
 def test_other_cells_are_named_with_what_to_do():
@@ -209,7 +209,7 @@ def test_other_cells_are_named_with_what_to_do():
     ) as t:
         decode_ledger(encode_ledger(lane(3)), 0.5)
     assert "set robot.tool_width_m to 0.3 (and robot.overlap, planner.line" in t.value.hint
-    assert "give the file its name back" in t.value.hint
+    assert "rename the file back" in t.value.hint
 
 
 def test_cells_that_differ_by_a_hair_are_told_apart():

@@ -157,7 +157,7 @@ def test_a_new_one_that_the_disk_does_not_give_is_told_and_kept(written, moved):
         environment = ENVIRONMENT | watch.environment
         command = [sys.executable, "-c", LOADS, str(written)]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    told = "gone on from the ledger before the newest (robot.ledger.new: Input/output error)"
+    told = "resumed from the previous ledger (robot.ledger.new: Input/output error)"
     assert done.stdout.startswith(f"4 {told}; kept as robot.ledger.new.broken-"), done.stdout
     (kept,) = written.glob("robot.ledger.new.broken-*")
     assert kept.read_bytes() == encode_ledger(lane(5))

@@ -60,7 +60,7 @@ def test_a_file_cut_at_any_byte_falls_back_to_the_one_before(written):
         found = load(written)
         assert contents(found.ledger) == contents(lane(3))
         assert isinstance(found.fault, LedgerFileError)
-        assert str(found.fault).startswith("gone on from the ledger before the newest (robot.led")
+        assert str(found.fault).startswith("resumed from the previous ledger (robot.led")
         assert "check the disk" in found.fault.hint
         (aside,) = set(names(written)) - set(NAMES)
         assert aside.startswith("robot.ledger.broken-")
@@ -95,7 +95,7 @@ def test_two_broken_ones_are_said_and_kept(written):
     for said in (
         "robot.ledger: torn",
         "robot.ledger.previous: not a ledger",
-        "begun anew",
+        "a new one was started",
         "kept as",
     ):
         assert said in str(found.fault)
@@ -140,7 +140,7 @@ def test_a_ledger_of_something_else_is_kept_and_not_overwritten(written, newest,
     assert found.ledger is None
     assert isinstance(found.fault, LedgerMismatchError)
     assert re.search(said, str(found.fault))
-    assert "to go on with it" in found.fault.hint
+    assert "to continue with it" in found.fault.hint
     file.write(lane(1))
     kept = {path.read_bytes() for path in written.iterdir() if "mismatch" in path.name}
     assert kept == {newest, encode_ledger(lane(3))}
@@ -179,7 +179,7 @@ def test_what_could_not_be_set_aside_is_before_anything_is_written(written, monk
 def test_a_second_process_is_refused(tmp_path):
     first = LedgerFile(tmp_path, "robot")
     first.lock()
-    with pytest.raises(LedgerFileError, match="another daemon keeps the ledger") as told:
+    with pytest.raises(LedgerFileError, match="another daemon uses the ledger") as told:
         LedgerFile(tmp_path, "robot").lock()
     assert "--state" in told.value.hint
     LedgerFile(tmp_path, "mower-2").lock()
@@ -220,7 +220,7 @@ def test_a_folder_that_comes_later_is_locked_before_it_is_written(tmp_path):
     second.lock()
     folder.unlink()
     first.write(lane(1))
-    with pytest.raises(LedgerFileError, match="another daemon keeps the ledger"):
+    with pytest.raises(LedgerFileError, match="another daemon uses the ledger"):
         second.write(lane(2))
     first.write(lane(3))
     assert contents(load(folder).ledger) == contents(lane(3))

@@ -127,7 +127,7 @@ def test_another_ledger_never_overwrites_the_one_kept_aside(tmp_path):
     # What still waited was of the old building, and may be written or not.
     assert on_disk(aside) in (contents(lane(7)), contents(lane(8)))
     assert document(writer)["restored_cells"] == 0
-    assert document(writer)["fault"].startswith("of another building: it was kept aside")
+    assert document(writer)["fault"].startswith("of another building: it was renamed")
 
 
 def test_each_new_beginning_keeps_what_there_was_until_then(tmp_path, caplog):
@@ -166,7 +166,7 @@ def test_a_disk_that_fails_is_told_once_and_tried_again(tmp_path, monkeypatch, c
     wait_until(lambda: len(tries) >= 4)
     told = document(writer)["fault"]
     assert f"cannot write {tmp_path / 'robot.ledger'}: No space left on device" in told
-    assert "kept in memory and tried again" in told
+    assert "kept in memory" in told
     assert caplog.text.count("No space left") == 1
     assert len(writer.take_faults()) == 1
     assert min(b - a for a, b in pairwise(tries)) >= 0.05, "no busy loop"

@@ -176,7 +176,7 @@ def test_a_torn_file_is_told(covered):
     with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
         status = outsider.wait_status(lambda status: status["errors"]["total"] > 0)
         assert status["errors"]["by_code"] == {"ledger_file": 1}
-        assert "gone on from the ledger before the newest" in status["ledger"]["fault"]
+        assert "resumed from the previous ledger" in status["ledger"]["fault"]
         assert status["ledger"]["restored_cells"] == COVERED
         assert "WARNING" in running.log_text()
         assert status["ledger"]["fault"] in running.log_text()
@@ -187,7 +187,7 @@ def test_two_torn_files_are_told_and_it_begins_anew(covered):
         (covered / "state" / name).write_bytes(b"")
     with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
         status = begin(outsider)
-        assert "begun anew" in status["ledger"]["fault"]
+        assert "a new one was started" in status["ledger"]["fault"]
         assert status["coverage"]["covered"] == 1
     assert [name for name in state_files(covered) if ".broken-" in name]
 
@@ -242,8 +242,8 @@ def test_a_second_daemon_for_the_robot_is_refused(tmp_path):
         outsider.ask_status()
         with daemon_process(tmp_path) as second:
             assert second.process.wait(120) == 1
-            assert "another daemon keeps the ledger" in second.log_text()
-            assert "hint: end it, or give this one another robot.name" in second.log_text()
+            assert "another daemon uses the ledger" in second.log_text()
+            assert "hint: stop it, or give this one another robot.name" in second.log_text()
             second.process.returncode = 0
 
 

@@ -107,7 +107,7 @@ def test_a_map_that_breaks_the_mission_is_given_up_for_the_next(breaking):
     status = stand(client, lambda status: status["errors"]["by_code"].get("mission_broke") == 2)
     status = stand(client, lambda status: status["state"] == "waiting for map")
     assert status["reason"] == (
-        "the mission broke off: ZeroDivisionError: division by zero: waits for another map"
+        "the mission failed: ZeroDivisionError: division by zero: waits for another map"
     )
     client.put("map", map_bytes(room(3.0, 3.0)))
     stand(client, lambda status: status["state"] == "covering")

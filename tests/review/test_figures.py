@@ -91,7 +91,7 @@ def test_states_said_again_go_on():
         ("first plan, 30 cells were covered before", "first plan"),
         ("the pose jumped 1.20 m", "the pose jumped"),
         ("better further on", "better further on"),
-        ("", "no reason told"),
+        ("", "no reason given"),
     ],
 )
 def test_reasons_have_kinds(reason, kind):

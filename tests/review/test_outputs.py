@@ -20,8 +20,8 @@ from fasaco_edge.cli.review import print_review
 from fasaco_edge.drawing import palette
 from fasaco_edge.grid.geometry import FARTHEST_M, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.review.document import document_of
 from fasaco_edge.review.export import export
+from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.page import page_of
 from fasaco_edge.review.pictures import SIZE, draw_review
@@ -219,7 +219,7 @@ def test_texts_of_a_recording_are_no_mark_up_on_the_page(review):
     text = page_of(replace(review, states=states))
     page = Page(text)
     assert "script" not in page.names
-    assert f"when the mission was {evil[:-1]}\\x1b" in page.text
+    assert f"while the mission was {evil[:-1]}\\x1b" in page.text
     assert "\x1b" not in text
 
 

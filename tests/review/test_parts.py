@@ -13,7 +13,7 @@ pytest.importorskip("rerun")
 from fasaco_edge.cli import main
 from fasaco_edge.errors import DifferentRuns, UnreadableRecording
 from fasaco_edge.review.comparison import side_by_side
-from fasaco_edge.review.document import document_of
+from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import encode_json

@@ -217,7 +217,7 @@ def test_the_trail_is_shown_at_some_moments_and_how_decided_it_was(review):
     assert branching_panel(review) is not None
     page = page_of(review)
     assert page.count('alt="pheromone field"') == len(pictures)
-    assert "How decided the trail was" in page
+    assert "Branching of the trail" in page
 
 
 def test_the_page_shows_what_ants_and_local_search_saved(review, recording):
@@ -345,7 +345,7 @@ def test_the_command_prints_a_report(recording, told):
     for text in (
         f"{told['covered_cells']} of {told['coverable_cells']} cells",
         "Coverage over time",
-        "Why replans came",
+        "Reasons of replans",
         "slowest replan",
         "malformed_message",
         ": complete",

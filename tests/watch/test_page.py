@@ -95,7 +95,7 @@ def test_the_trail_takes_the_place_of_coverage_and_path():
     assert "777777" in shown[lane]
     assert "111111" in shown[lane - 4]
     assert "*" not in "".join(line[:45] for line in shown[1:-6])
-    assert "each path leads there" in "".join(shown)
+    assert "every path" in "".join(shown)
     assert not page.toggle_field()
     assert page.lines(view, NOW, 80, 24) == before
 
@@ -177,7 +177,7 @@ def test_a_daemon_that_is_gone_or_silent_is_named_so():
     silent = "\n".join(Page(console(colours=None)).lines(view, NOW + 60.0, 80, 24))
     assert "silent for 60 s" in silent
     view.take("token", Token("robot", here=False), NOW)
-    assert "gone for 0.0 s; waiting for it to come back" in page_of(view)
+    assert "gone for 0.0 s; waiting for it to return" in page_of(view)
     view.take("token", Token("robot", here=True), NOW)
     assert "COVERING" in page_of(view)
     assert "the daemon is back" in page_of(view)

@@ -150,7 +150,7 @@ def test_it_outlives_the_daemon(tmp_path):
             terminal.wait_text("COVERING")
             first.process.send_signal(signal.SIGKILL)
             first.process.wait()
-        screen = terminal.wait_text("waiting for it to come back")
+        screen = terminal.wait_text("waiting for it to return")
         assert "the daemon is gone" in screen
         with daemon_process(tmp_path, bus=bus):
             terminal.wait_text("WAITING FOR MAP")

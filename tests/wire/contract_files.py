@@ -33,7 +33,7 @@ WILDCARDS: dict[str, str] = {
     "fasaco/@v1/*/status": "`status` of every robot",
     "fasaco/@v1/*/alive": "`alive` of every robot",
     "fasaco/@v1/**/alive": "`alive` and `recorder/alive` of every robot",
-    "fasaco/@v1/robot/map*": "nothing: not even Zenoh takes it",
+    "fasaco/@v1/robot/map*": "nothing: Zenoh rejects it",
     "fasaco/@v1/robot/map$*": "`map` and `map_update`",
     "fasaco/@v1/robot/@rpc/*": "the queries",
     "fasaco/@v1/*/@rpc/status": "the query `status` of every robot",

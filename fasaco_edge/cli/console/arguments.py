@@ -63,7 +63,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
         "--log-level",
         choices=("debug", "info", "warning", "error"),
         default="info",
-        help="how much to say on standard error (default: %(default)s)",
+        help="log level on standard error (default: %(default)s)",
     )
     # For the processes that other commands start: they end when those do.
     parser.add_argument("--with-parent", type=int, metavar="PID", help=argparse.SUPPRESS)
@@ -130,7 +130,7 @@ def with_negative_pairs(words: Sequence[str]) -> list[str]:
 def add_robot_on_bus(parser: argparse.ArgumentParser) -> None:
     """Add what names a robot on the bus and how to get there."""
     parser.add_argument("--robot", default="robot", metavar="NAME", help="name of the robot")
-    parser.add_argument("--base", default="fasaco", metavar="KEY", help="what all keys begin with")
+    parser.add_argument("--base", default="fasaco", metavar="KEY", help="prefix of all keys")
     parser.add_argument(
         "--connect",
         action="append",
@@ -140,8 +140,8 @@ def add_robot_on_bus(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--security",
         metavar="FILE",
-        help="YAML file that shows who this is, where that is asked: `kind: tls` with "
-        "`tls: {root_ca: ..., certificate: ..., private_key: ...}`, or `kind: user` with "
+        help="YAML file with this client's credentials, if the bus requires them: `kind: tls` "
+        "with `tls: {root_ca: ..., certificate: ..., private_key: ...}`, or `kind: user` with "
         "`user: {name: ..., password_file: ...}`",
     )
 

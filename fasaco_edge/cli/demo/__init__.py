@@ -38,7 +38,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--line",
         choices=("cells", "quick", "thorough"),
         default="thorough",
-        help="what the robot is given: the centres of cells, or a line polished against the floor "
+        help="what the robot is given: the centres of cells, or a line optimised for the floor "
+        "it sweeps "
         "(default: %(default)s)",
     )
     parser.add_argument("--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="[m]")
@@ -49,9 +50,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--out", type=Path, metavar="DIR", help="folder for the results (default: ./runs/<time>)"
     )
     add_json(parser, "the summary")
-    parser.add_argument(
-        "--timeout", type=float, default=1800.0, metavar="S", help="give up after so long [s]"
-    )
+    parser.add_argument("--timeout", type=float, default=1800.0, metavar="S", help="time limit [s]")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -80,8 +79,8 @@ def run(args: argparse.Namespace) -> int:
 
 COMMAND = Command(
     description="Start daemon, recorder and a simulated robot as processes of their own that "
-    "talk Zenoh over loopback; show the mission; end when every reachable cell is covered. "
-    "Leaves a recording (.rrd), a picture and the figures in the output folder.",
+    "talk Zenoh over loopback; show the mission; exit when every reachable cell is covered. "
+    "Writes a recording (.rrd), a picture and the figures to the output folder.",
     run=run,
     add_options=_add_options,
 )

@@ -121,8 +121,7 @@ def decode_ledger(payload: bytes, cell_m: float | None) -> LedgerSnapshot:
     if version not in _HEADS:
         raise LedgerMismatchError(
             f"the ledger is of version {version}, this release reads versions 1 to {VERSION}",
-            hint="to go on with it, install the release that wrote it, and give the file its "
-            "name back",
+            hint="to continue with it, install the release that wrote it and rename the file back",
         )
     try:
         snapshot = _decode_body(_inflated(body), version)
@@ -131,9 +130,8 @@ def decode_ledger(payload: bytes, cell_m: float | None) -> LedgerSnapshot:
     if cell_m is not None and snapshot.cell_m != cell_m:
         raise LedgerMismatchError(
             f"the ledger's cells are {snapshot.cell_m} m wide, the configuration's {cell_m} m",
-            hint=f"to go on with it, set robot.tool_width_m to {snapshot.cell_m} (and "
-            "robot.overlap, planner.line to what they were), and give the "
-            "file its name back",
+            hint=f"to continue with it, set robot.tool_width_m to {snapshot.cell_m} (and "
+            "robot.overlap, planner.line to what they were), and rename the file back",
         )
     return snapshot
 

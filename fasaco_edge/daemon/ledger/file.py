@@ -90,8 +90,8 @@ class LedgerFile:
             return LoadedLedger(ledger, self._taken(path, broken))
         if broken:
             lost = LedgerFileError(
-                f"no ledger could be read ({_reasons(broken)}): begun anew",
-                hint="everything is to be covered again; check the disk",
+                f"no ledger could be read ({_reasons(broken)}): a new one was started",
+                hint="everything has to be covered again; check the disk",
             )
             return LoadedLedger(fault=self._after_aside(lost, broken, "broken"))
         # What appears later, on a disk that is mounted late, was not read: not overwritten either.
@@ -145,8 +145,8 @@ class LedgerFile:
         except BlockingIOError as error:
             os.close(lock)
             raise LedgerFileError(
-                f"another daemon keeps the ledger {self.path}",
-                hint="end it, or give this one another robot.name, mission.state_dir or --state",
+                f"another daemon uses the ledger {self.path}",
+                hint="stop it, or give this one another robot.name, mission.state_dir or --state",
             ) from error
         except OSError:
             pass  # there are no locks on this disk
@@ -163,8 +163,7 @@ class LedgerFile:
         if path != self._previous and not broken:
             return None
         fault = LedgerFileError(
-            f"gone on from the ledger before the newest "
-            f"({_reasons(broken) or f'no {self.path.name}'})",
+            f"resumed from the previous ledger ({_reasons(broken) or f'no {self.path.name}'})",
             hint="the last second or two before the end may be lost; check the disk",
         )
         return self._after_aside(fault, broken, "broken")

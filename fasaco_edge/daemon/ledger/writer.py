@@ -157,7 +157,7 @@ def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False)
     try:
         kept = file.set_aside("fresh")
         if kept:
-            LOG.info("begun anew; what was covered before is kept as %s", ", ".join(kept))
+            LOG.info("started over; what was covered before is kept as %s", ", ".join(kept))
         return LedgerWriter(file, LoadedLedger())
     except OSError as error:
         return LedgerWriter(file, LoadedLedger(fault=_cannot_write(file, error)))
@@ -233,7 +233,7 @@ class LedgerWriter:
             self._changed.notify()
         self._thread.join(timeout_s)
         if self._thread.is_alive():
-            LOG.warning("the disk is too slow: the last of the ledger may not be on it")
+            LOG.warning("the disk is too slow: the last changes of the ledger may be lost")
 
     def _run(self) -> None:
         failed = False
@@ -281,6 +281,6 @@ class LedgerWriter:
 def _cannot_write(file: LedgerFile, error: Exception) -> LedgerFileError:
     return LedgerFileError(
         f"cannot write {file.path}: {reason_of(error)}",
-        hint="progress is kept in memory and tried again; make room there, or the folder "
+        hint="progress is kept in memory, and writing is retried; free space, make the folder "
         "writable, or choose another (mission.state_dir, --state)",
     )

@@ -252,14 +252,14 @@ class Loop:
         a second chance; a mission that fails again soon goes on with the next map.
         """
         LOG.exception("mission", extra={"event": "mission_broke"})
-        fault = MissionBroke(f"the mission broke off: {type(error).__name__}: {error}")
+        fault = MissionBroke(f"the mission failed: {type(error).__name__}: {error}")
         self._status.faults.count([fault])
         now, failed_at = time.monotonic(), self._failed_at
         self._failed_at = now
         self._status.waits = f"{fault}: waits for another map"
         self._withdraw_path(mission, str(fault))
         held = self._runner.held() if now - failed_at > SOON_S else []
-        self._restart("the mission broke off", held=held)
+        self._restart("the mission failed", held=held)
         return Decision(answers=tuple(Answer(asked.number, fault) for asked in commands))
 
     def _withdraw_path(self, mission: Mission, reason: str) -> None:

@@ -144,7 +144,7 @@ class EventHandler:
         before = self.ledger.current.frame
         misfit = self.ledger.move_to(frame)
         if misfit is None and before not in ("", frame):
-            why = f"map and poses are in frame {frame!r} now, no more in {before!r}"
+            why = f"map and poses are in frame {frame!r} now, no longer in {before!r}"
             self.begin_order(self.orders.order_state.in_other_frame(why))
         if not is_other_map and misfit is None:
             return

@@ -31,7 +31,7 @@ class Coverage:
         coverable: cells that are coverable and reachable.
         covered: those of them that the tool has passed over.
         recovered: those it has passed over at least twice.
-        unreachable: cells where the robot would fit but cannot come to.
+        unreachable: cells where the robot would fit, but that it cannot get to.
         cell_m2: area of a cell [m2].
         free_out_of_reach_m2: area known to be free, but in no reachable cell [m2].
     """

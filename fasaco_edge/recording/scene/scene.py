@@ -102,7 +102,7 @@ class Scene:
         self.add_line(entities.MISSION_LOG, f"command: {command}")
 
     def add_path(self, message: PathMessage, about: PathAttachment) -> None:
-        """Draw the path to drive, over the one before it, and log why it came."""
+        """Draw the path to drive, over the one before it, and log reason."""
         anchor = self._anchor
         if anchor is None and len(message.xy):
             anchor = self._anchored(Pose2D(*message.xy[0].tolist()))

@@ -31,7 +31,7 @@ class Verdict:
         missed: those of them that the robot never was in.
         problems: what is wrong, such as steps through walls; empty if nothing is.
         steps: from cell to cell.
-        revisits: visits of cells beyond each one's first.
+        revisits: visits of cells after each one's first.
         quarters: how far the robot turned, in quarter-turns.
         reached: after what time [s] and how many steps each of MILESTONES was reached, None
             where it was not.

@@ -213,7 +213,7 @@ class Conditions:
 
 
 class OnlineMission:
-    """A robot in a building it does not know.
+    """A robot in a building unknown to it.
 
     Attributes:
         building: where it is.

@@ -1,0 +1,206 @@
+"""The figures of a review, gathered into its JSON document."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from fasaco_edge.drawing.spread import percentile
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.scene.runcard import flat_settings
+from fasaco_edge.review.document import (
+    MapSize,
+    PheromoneFigures,
+    RecordedFile,
+    Replan,
+    ReviewDocument,
+    TimesTaken,
+    Trouble,
+)
+
+if TYPE_CHECKING:
+    from fasaco_edge.review.review import Review
+    from fasaco_edge.review.run_data import PublishedPath
+    from fasaco_edge.wire.replies import FloorLeft
+
+
+def document_of(review: Review) -> ReviewDocument:
+    """Return all figures of a review."""
+    record, data, replans, faults = review.record, review.data, review.replans, review.faults
+    began = datetime.fromtimestamp(1e-9 * record.began_ns, UTC)
+    told = ReviewDocument(
+        recording=record.recording_id,
+        files=[
+            RecordedFile(str(part.path), part.bytes, part.torn_bytes, part.has_footer)
+            for part in record.parts
+        ],
+        robot=data.robot or None,
+        version=data.version or None,
+        config=dict(flat_settings(data.config)),
+        began=f"{began:%Y-%m-%dT%H:%M:%SZ}",
+        duration_s=round(review.duration_s, 3),
+        state=review.state or None,
+        complete=review.complete,
+        orders=[
+            replace(order, at_s=round(order.at_s, 3), until_s=round(order.until_s, 3))
+            for order in review.orders
+        ],
+        paths=len(data.paths),
+        replans=len(replans.later),
+        replans_by_reason=replans.by_reason,
+        first_plan_ms=_rounded(replans.first.plan_ms) if replans.first else None,
+        replan_ms_p50=_rounded(replans.milliseconds(50)),
+        replan_ms_p99=_rounded(replans.milliseconds(99)),
+        replan_ms_max=_rounded(replans.milliseconds(100)),
+        replan_ms_by_reason={
+            kind: TimesTaken(_rounded(median), _rounded(most))
+            for kind, (median, most) in replans.spread_by_reason.items()
+        },
+        replan_list=[_replan(path) for path in replans.later],
+        restored_cells=data.restored_cells,
+        states={name: round(s, 3) for name, s in review.seconds_by_state.items()},
+        troubles=[
+            Trouble(s.name, s.reason, _rounded(s.begin_s), _rounded(s.seconds))
+            for s in review.troubles
+        ],
+        worst=[replace(m, value=round(m.value, 3), at_s=round(m.at_s, 3)) for m in review.moments],
+        faults=faults.total,
+        faults_by_code=faults.by_code,
+        recorder_lost=faults.lost,
+        samples_missing=review.missing,
+        unreadable=dict(data.undecodable),
+        remarks=list(faults.complaints),
+        not_recorded=_not_recorded(review),
+    )
+    _add_coverage(told, review)
+    _add_plans(told, review)
+    told.pheromone = _pheromone(review)
+    for member, entity in PLOTTED.items():
+        if (points := record.plots.get(entity)) is not None:
+            setattr(told, member, _rounded(float(points[:, 1].max())))
+    return told
+
+
+PLOTTED = {
+    "memory_mb_max": f"{entities.MEMORY}/planner",
+    "recorder_memory_mb_max": f"{entities.MEMORY}/recorder",
+    "processor_percent_max": entities.PROCESSOR,
+    "threads_max": entities.THREADS,
+}
+"""Members that are the most of a curve, and the curve."""
+
+
+def _add_coverage(told: ReviewDocument, review: Review) -> None:
+    if (grid := review.data.grid) is not None:
+        told.map = MapSize(grid.geometry.rows, grid.geometry.cols, grid.geometry.resolution)
+    if (counts := review.counts) is not None:
+        told.covered_cells, told.coverable_cells = counts.covered, counts.coverable
+        told.recovered_cells, told.unreachable_cells = counts.recovered, counts.unreachable
+        told.coverage_from = counts.source
+    if (floor := review.floor) is not None:
+        figures = floor.figures
+        told.reachable_m2 = _rounded(figures.reachable_m2)
+        told.swept_m2 = _rounded(figures.swept_m2)
+        told.patches_over_4_dm2 = figures.patches_over_4_dm2
+        told.largest_patch_m2 = _rounded(figures.largest_patch_m2)
+    if (ledger := review.data.ledger_floor) is not None:
+        told.ledger_swept_m2 = ledger.swept_m2
+        told.left_by_reason = _by_reason(ledger.left)
+        told.out_of_reach_by_reason = _by_reason(ledger.out_of_reach)
+    if (walk := review.walk) is not None:
+        told.steps, told.revisits = walk.steps, walk.revisits
+        told.turns_90, told.turns_180 = walk.turns_90, walk.turns_180
+    if review.drive is not None:
+        told.driven_m = round(review.drive.driven_m, 2)
+    if (reached := review.reached_s) is not None:
+        told.reached_s = {str(percent): _rounded(at_s) for percent, at_s in reached.items()}
+
+
+def _by_reason(floor: tuple[FloorLeft, ...] | None) -> dict[str, float] | None:
+    return None if floor is None else {part.reason: part.m2 for part in floor}
+
+
+def _add_plans(told: ReviewDocument, review: Review) -> None:
+    """Add counts and times of plans by the turn log, if there is one."""
+    made = review.data.plan_log.plans
+    if not made:
+        return
+    plans = [plan for plan in made if not plan.is_attempt]
+    attempts = [plan for plan in made if plan.is_attempt]
+    took = [plan.took_ms for plan in plans]
+    told.plans, told.plans_unused = len(plans), sum(not plan.is_used for plan in plans)
+    told.plan_ms_p50, told.plan_ms_p99, told.plan_ms_max = (
+        _rounded(percentile(took, percent)) for percent in (50, 99, 100)
+    )
+    told.attempts, told.attempts_used = len(attempts), sum(plan.is_used for plan in attempts)
+
+
+def _pheromone(review: Review) -> PheromoneFigures:
+    plots = review.record.plots
+    spanned, branching = (
+        float(points[-1, 1]) if (points := plots.get(entity)) is not None else None
+        for entity in (entities.TRAIL_CELLS, entities.BRANCHING)
+    )
+    counts = review.counts
+    fitting = counts.coverable + (counts.unreachable or 0) if counts is not None else 0
+    share = spanned / fitting if spanned is not None and fitting else None
+    return PheromoneFigures(review.record.field_count, _rounded(share), _rounded(branching))
+
+
+def _replan(path: PublishedPath) -> Replan:
+    about = path.about
+    return Replan(
+        at_s=_rounded(path.at_s),
+        revision=about.revision,
+        reason=about.reason,
+        plan_ms=_rounded(path.plan_ms),
+        steps=about.steps,
+        planned_steps=about.planned_steps,
+        lower_bound_steps=about.lower_bound_steps,
+        lower_bound_cost_s=about.lower_bound_cost_s,
+        gap=about.gap,
+        cost_s=about.planned_cost_s,
+        changed=about.changed,
+    )
+
+
+FLOOR = "reachable_m2, swept_m2, patches_over_4_dm2, largest_patch_m2"
+
+
+def _not_recorded(review: Review) -> dict[str, str]:
+    data, why = review.data, {}
+    if not data.statuses:
+        why["robot, version, config, state"] = "no status of the daemon was recorded"
+    if review.drive is None:
+        why["steps, revisits, turns_90, turns_180, driven_m, reached_s"] = review.no_lattice
+        why[FLOOR] = review.no_lattice
+    elif review.data.restored_cells:
+        restored = review.data.restored_cells
+        before = (
+            f"{restored} cells were covered before the recording, which does not tell which ones"
+        )
+        why["reached_s"] = why[FLOOR] = before
+    elif review.floor is None:
+        why[FLOOR] = "no pose lies on the map"
+    if data.ledger_floor is None:
+        why["ledger_swept_m2, left_by_reason, out_of_reach_by_reason"] = (
+            "no recorded status has figures of the floor"
+        )
+    if review.counts is None:
+        why["covered_cells, coverable_cells, recovered_cells"] = (
+            "the daemon's last recorded count is outdated, and poses do not tell all"
+        )
+    if not review.replans.later:
+        why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "there was no replan"
+    if not data.plan_log.plans:
+        why["plans, plans_unused, plan_ms_p50, plan_ms_p99, plan_ms_max, attempts"] = (
+            "there is no turn log"
+        )
+    if review.faults.lost is None:
+        why["recorder_lost"] = "no recorded status has figures of the recorder"
+    return why
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 3)
