@@ -8,8 +8,8 @@ A batch is ``_HEAD`` and the deflated MessagePack of a list of lanes, which hold
 share topic, key, schema and length. Large payloads have a lane for themselves.
 
 The difference, or residual, is the exclusive or: zero where nothing changed. All first bytes of
-several payloads come first, then all second bytes, so that what seldom changes makes long runs of
-zeros. Where nearly all is zero, only the lengths of the runs are stored, and the bytes that are
+several payloads come first, then all second bytes, so that bytes that rarely change make long runs
+of zeros. Where nearly all is zero, only the lengths of the runs are stored, and the bytes that are
 not zero: a map of a million pixels of which some hundred have changed takes some hundred bytes.
 """
 

@@ -2,7 +2,7 @@
 
 A name, a reason or a message off the bus, out of a file or a recording may hold what a terminal
 obeys (escapes, C0 and C1 controls), what turns a line about or hides in it (overrides, joiners,
-fillers), line ends that feign another line, and mark-up. Whoever writes to people writes through
+fillers), line ends that feign another line, and mark-up. All output to people goes through
 here: ``cli.console``, ``daemon.notify``, ``drawing`` and ``review``.
 """
 
@@ -14,7 +14,7 @@ import reprlib
 from html import escape
 
 MOST = 2_000
-"""What is shown of a text at most [characters]; it goes on where nobody reads any more."""
+"""What is shown of a text at most [characters]; longer texts are cut."""
 
 # What a terminal obeys, or nobody sees: controls, line and paragraph separators, overrides and
 # isolates, joiners, fillers, tags, lone surrogates. By code point, so that no Python's own
@@ -44,7 +44,7 @@ def lines(text: str, most: int | None = None) -> str:
 
 
 def shown(value: object) -> str:
-    """Return a value as it was written, unless somebody wrote a book, or one that holds itself."""
+    """Return a value as it was written, shortened if it is long, deep or contains itself."""
     try:
         return one_line(_SHOWN.repr(value))
     except (ValueError, RecursionError):  # an integer of thousands of digits; a tree of as many

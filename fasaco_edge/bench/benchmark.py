@@ -1,7 +1,7 @@
 """A benchmark: options, samples one by one, and a report on any number of them.
 
 A new benchmark is a file that ends with a ``Benchmark``, and a row of ``BENCHMARKS`` in
-``fasaco_edge.cli.bench`` or ``tests.benchmarks.__main__``. Whoever runs it may stop between two
+``fasaco_edge.cli.bench`` or ``tests.benchmarks.__main__``. The user may interrupt it between two
 samples, or within one, and still gets the report on those there are.
 """
 

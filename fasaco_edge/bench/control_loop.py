@@ -2,7 +2,7 @@
 
 A process of its own, ``python -m fasaco_edge.bench.control_loop HZ SECONDS``: how late it woke,
 tick by tick, goes to standard output, as microseconds, a line each. Deadlines are absolute: who
-wakes late once is not late for ever.
+wakes late once does not stay late.
 """
 
 from __future__ import annotations

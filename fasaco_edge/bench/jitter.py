@@ -28,7 +28,7 @@ from fasaco_edge.host.processes import python_program
 # As the daemon's unit has it.
 NICENESS, WEIGHT = 10, 20
 HZ = 100
-# After the daemon was let go on, until it is at work again.
+# Time for a resumed daemon to be at work again.
 SETTLE_S = 0.5
 # A daemon that is held longer loses its sessions: Zenoh's lease is ten seconds.
 LONGEST_BLOCK_S = 6.0

@@ -101,7 +101,7 @@ def _turns(args: argparse.Namespace) -> list[tuple[bool, int]]:
     """Return of each turn whether it is recorded, and its number of maps."""
     if not args.recorder:
         return [(False, args.samples)]
-    # By turns: what else goes on on the machine then meets both.
+    # Alternating: other load on the machine then affects both.
     rounds = min(ROUNDS, args.samples)
     shares = [args.samples // rounds + (turn < args.samples % rounds) for turn in range(rounds)]
     return [(recorded, share) for share in shares for recorded in (False, True)]

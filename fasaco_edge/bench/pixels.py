@@ -76,7 +76,7 @@ class Patches:
     def of(cls, mask: Mask) -> Patches:
         """Return the patches of ``mask``, bool (rows, cols)."""
         rows, cols = mask.shape
-        # A pixel more, never marked: no run goes on in the next row.
+        # One pixel more, never marked: no run continues in the next row.
         flat = np.zeros(rows * (cols + 1) + 1, np.int8)
         flat[1:].reshape(rows, cols + 1)[:, :cols] = mask
         change = np.diff(flat)

@@ -35,7 +35,7 @@ HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
 CRATE_PLACES, CRATE_STEP_PX = 12, 12
 POSES_HZ = 10
 SPEED_M_S = 0.5
-# A crate moves so often [s]: each time the rest of the path is planned anew.
+# Period at which a crate moves [s]: each time the rest of the path is replanned.
 MAP_EVERY_S = 1.0
 # The first path needs the kernels; on a slow computer their loading takes long.
 PATH_TIMEOUT_S = 300.0

@@ -5,4 +5,4 @@ from __future__ import annotations
 from typing import Final
 
 DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
-"""Where a daemon listens, and a client connects to, unless they are told otherwise."""
+"""Where a daemon listens, and a client connects to, by default."""

@@ -215,7 +215,7 @@ class LatchedSubscription(Subscription):
                 return
             last = self._last_mark.get(name)
             if last and not mark and _ticks(sample) >= self._stamps.get(name, 0):
-                # It was started anew under the same name: what an answer has overtaken is older.
+                # It was restarted under the same name: what an answer has overtaken is older.
                 del self._last_mark[name]
                 last = None
             is_gap = name in self._publishers and _leaves_gap(name, mark, last)

@@ -67,7 +67,7 @@ class Roll:
         self._is_asking = False
 
     def there(self) -> frozenset[str]:
-        """Return the keys of the tokens that stood when that was last answered."""
+        """Return the keys of the tokens that existed at the last answer."""
         return self._there
 
     def ask(self, period_s: float) -> None:
@@ -82,7 +82,7 @@ class Roll:
     def _take(self, found: list[str], is_whole: bool) -> None:
         with self._lock:
             self._is_asking = False
-            # The first counts as it is: to wait for one that is frozen may take for ever.
+            # The first counts as it is: waiting for a frozen one may never end.
             if is_whole or not self.version:
                 self._there = frozenset(found)
                 self.version += 1

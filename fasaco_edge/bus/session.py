@@ -1,6 +1,6 @@
 """Session on the Zenoh bus: publishers, subscribers, queryables, queries.
 
-Choices that hold for every process, and why:
+Choices for every process, and why:
 
 * no multicast scouting and no shared memory: only what is configured can be reached, and the idle
   session stays small;
@@ -89,7 +89,7 @@ class Bus:
         self._declared: list[Any] = []
         self._served: list[_Served] = []
         # Callers hold these, too. No object of Zenoh may be left to the last garbage collection, in
-        # which its threads and the interpreter may wait for each other for ever.
+        # which its threads and the interpreter may deadlock.
         self._lent: list[Publisher | Subscription] = []
         self._asker = Asker()
 

@@ -40,8 +40,8 @@ COMMANDS = {
 }
 """Each command, and its line in the list of them."""
 
-# A broken or full disk, a computer that is out of files or memory. Who is told so does not look
-# for a mistake in the configuration, and a service is started again.
+# A broken or full disk, a computer that is out of files or memory. Its exit code is not that of a
+# faulty configuration, so that a service is restarted.
 _PASSING = frozenset(
     (errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE)
 )
@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
-    """Run the command that ``parser`` finds in ``words``; each error is told, and is a code."""
+    """Run the command that ``parser`` finds in ``words``; report errors; return the exit code."""
     # Whatever the caller's mask is: what is written here, no other user may change.
     os.umask(os.umask(0o022) | 0o022)
     clean_streams()

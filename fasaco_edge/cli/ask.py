@@ -119,7 +119,7 @@ def add_question(parser: argparse.ArgumentParser) -> None:
 
 
 def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: bytes = b"") -> Reply:
-    """Ask; ``parameters`` as they stand behind ``?``.
+    """Query; ``parameters`` as they follow ``?``.
 
     Raises:
         RefusedError: the answer is an error; with ``--json`` it is printed as it came.
@@ -145,26 +145,26 @@ def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: byte
 
 def show_mission(reply: Reply) -> None:
     """Print the state and the mission in a status, or in the answer to a command."""
-    told = decode_tolerant(reply.payload, replies.Reply)
-    mission, console = told.mission, out()
-    console.print(figures(_rows(told)))
+    answer = decode_tolerant(reply.payload, replies.Reply)
+    mission, console = answer.mission, out()
+    console.print(figures(_rows(answer)))
     if mission.zones:
         console.print(_zones(mission.zones))
     if mission.unreached.areas:
         console.print(_unreached(mission.unreached))
 
 
-def _rows(told: replies.Reply) -> list[tuple[str, str]]:
-    mission = told.mission
-    rows = [("robot", told.robot), ("state", told.state), ("reason", told.reason)]
+def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
+    mission = answer.mission
+    rows = [("robot", answer.robot), ("state", answer.state), ("reason", answer.reason)]
     if mission.ordered is not None:
         began = "begun by itself" if mission.ordered == "itself" else "as ordered"
         stage = phrases.stage(mission)
         rows.append(("mission", f"{stage}, {began}"))
-    if told.coverage is not None:
-        rows.append(("covered", phrases.covered(told.coverage)))
-    if told.floor is not None:
-        rows.append(("floor swept", phrases.swept(told.floor)))
+    if answer.coverage is not None:
+        rows.append(("covered", phrases.covered(answer.coverage)))
+    if answer.floor is not None:
+        rows.append(("floor swept", phrases.swept(answer.floor)))
     if mission.keep_out:
         rows.append(("keep-out zones", str(mission.keep_out)))
     if mission.return_home:
@@ -241,15 +241,15 @@ def _coverage_figures(reply: Reply) -> dict[str, object]:
 
 def _trail_figures(reply: Reply) -> dict[str, object]:
     trail = decode_pheromone(reply.payload)
-    # The living trail comes with what is told of it; nobody walked for it.
+    # The living trail comes with an attachment; its message has no cohort.
     colony = {"cohort": trail.cohort, "velocity": trail.velocity, "ants": trail.ants}
-    told = decode_json(reply.attachment) if reply.attachment else colony
+    about = decode_json(reply.attachment) if reply.attachment else colony
     return {
         "frame": trail.frame,
         "rows": trail.geometry.rows,
         "cols": trail.geometry.cols,
         "cell_m": trail.geometry.resolution,
-        **told,
+        **about,
         "best_steps": trail.best_steps,
         "trail_min": trail.trail_min,
         "trail_max": trail.trail_max,

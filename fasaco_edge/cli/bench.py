@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _measure(benchmark: Benchmark[Sample], args: argparse.Namespace) -> tuple[list[Sample], bool]:
-    """Return the samples, and whether somebody did not want to wait for all of them."""
+    """Return the samples, and whether the user interrupted the measurement."""
     samples: list[Sample] = []
     with terminal.progress() as bar:
         task = bar.add_task(benchmark.name, total=benchmark.count(args))

@@ -59,7 +59,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Look, and report."""
+    """Run the checks and print them."""
     found = list(findings(args.config, recordings=args.recordings))
     if args.json:
         print_json(_document(found))

@@ -47,7 +47,7 @@ exit codes: 0 done; 1 refused, or no answer; 2 usage error; 78 invalid robot nam
 COMMANDS = {
     "start": "start an order in place of the current one; the same order continues",
     "pause": "stop the robot; what it passes over still counts as covered",
-    "resume": "go on",
+    "resume": "continue a paused mission",
     "cancel": "stop and drop the order; what is covered is kept",
     "replan": "plan in full now, starting from the current path",
     "reset": "stop and drop the order and what is covered; the ledger's file is renamed",
@@ -57,9 +57,9 @@ COMMANDS = {
 
 def _add_commands(parser: argparse.ArgumentParser) -> None:
     names = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for name, told in COMMANDS.items():
-        described = told[0].upper() + told[1:] + "."
-        command = names.add_parser(name, help=told, description=described)
+    for name, text in COMMANDS.items():
+        described = text[0].upper() + text[1:] + "."
+        command = names.add_parser(name, help=text, description=described)
         add_common(command)
         if name == "start":
             _add_order(command)
@@ -108,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _order(args: argparse.Namespace) -> dict[str, object]:
-    """Return the order as a document, checked: what is wrong is told without a daemon."""
+    """Return the order as a document, checked: faults are reported without a daemon."""
     options = {
         "zones": args.zone,
         "keep_out": args.keep_out,
@@ -116,7 +116,7 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
         "return_home": args.return_home,
         "keep_covered": args.keep_covered,
     }
-    # Not by their truth: no passes at all are a mistake to be told.
+    # Not by their truth: 0 passes are a mistake to report.
     given = {
         name: value for name, value in options.items() if value is not None and value is not False
     }

@@ -59,7 +59,7 @@ from walks of the colony's ants (up to 8,000 cells; larger maps have local searc
 takes all but the velocities, the other planners none.
 """
 
-# The search's budget where nobody says, and ants that serve local search best. The
+# The search's default budget, and the colony's settings that serve local search best. The
 # colony alone is the paper's, and walks to its end.
 BUDGET_S = 1.0
 SEARCH_Q0, PAPER_Q0 = 0.98, 0.7
@@ -70,7 +70,7 @@ OVERLAP, MOST_OVERLAP = 0.08, 0.5
 # What the cells of a line over the floor lie along; or an angle [deg].
 WALLS, AXES = "walls", "axes"
 MOST_ANGLE_DEG = 360.0
-# A quarter-turn on the spot of a line over the floor, where nobody says [s].
+# Default of a quarter-turn on the spot, of a line over the floor [s].
 TURN_S = 1.5
 
 

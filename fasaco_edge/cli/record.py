@@ -74,7 +74,7 @@ def ros_config(text: str) -> RosConfig:
 
 
 def address(text: str) -> tuple[str, int]:
-    """Read ``HOST:PORT`` or ``PORT``; an IPv6 host stands in brackets."""
+    """Read ``HOST:PORT`` or ``PORT``; an IPv6 host is in brackets."""
     host, _, port = text.rpartition(":")
     if not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
         raise argparse.ArgumentTypeError(f"must be [HOST:]PORT, got {text!r}")

@@ -134,7 +134,7 @@ def _path(update: PathUpdate) -> dict[str, object]:
 
 
 class Summary(msgspec.Struct):
-    """What a replay came to."""
+    """The result of a replay."""
 
     duration_s: float
     state: str
@@ -225,7 +225,7 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
     return rows
 
 
-# Of samples that are not as they were taken, so many are named.
+# Most differing samples that are named.
 NAMED = 5
 
 
@@ -237,7 +237,7 @@ class Versions(msgspec.Struct):
 
 
 class Comparison(msgspec.Struct):
-    """What a replay by turns came to."""
+    """The result of a replay by cycles."""
 
     equal: bool
     turns: int
@@ -269,7 +269,7 @@ def _comparison(replay: CycleReplay, record: CycleRecord) -> Comparison:
 
 
 def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
-    """Return what a replay by turns came to, for people."""
+    """Return the result of a replay by cycles, for people."""
     if compared is None:
         return [("replay", "approximate: there is no turn log from the beginning, or it is unused")]
     turns = f"{compared.turns_equal} of {compared.turns} turns"

@@ -73,14 +73,16 @@ def run(args: argparse.Namespace) -> int:
         check_output(file)
     review = _read(args.recordings, "recording")
     other = _read(args.against, "the other one") if args.against else None
-    told = document_of(review)
+    document = document_of(review)
     if args.json:
-        both = side_by_side(told, document_of(other)) if other else msgspec.to_builtins(told)
+        both = (
+            side_by_side(document, document_of(other)) if other else msgspec.to_builtins(document)
+        )
         print_json(both)
     elif other:
-        print_comparison(told, document_of(other))
+        print_comparison(document, document_of(other))
     else:
-        print_review(review, told)
+        print_review(review, document)
     if args.png:
         from fasaco_edge.review.pictures import draw_review
 

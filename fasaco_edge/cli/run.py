@@ -44,7 +44,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fresh",
         action="store_true",
-        help="cover everything anew; the progress there is is kept aside",
+        help="cover everything again; existing progress is set aside in a file of its own",
     )
 
 

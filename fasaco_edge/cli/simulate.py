@@ -50,7 +50,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Drive until told to stop."""
+    """Drive until a signal."""
     from fasaco_edge.planners.grids import start_point
     from fasaco_edge.simulation.node import run_simulation
     from fasaco_edge.simulation.robot import SimulationConfig

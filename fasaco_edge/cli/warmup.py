@@ -60,7 +60,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="processes that compile (default: 2 where there are two cores and 2 GB to spare)",
     )
-    # What the second of two runs: the last stage first.
+    # The second of two processes: the last stage first.
     parser.add_argument("--backward", action="store_true", help=argparse.SUPPRESS)
     add_json(parser, "the result")
 

@@ -58,7 +58,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Watch until told to stop."""
+    """Watch until a signal."""
     keys, console, view = Keys(args.robot, args.base), out(), RobotView(args.robot)
     with Feed(client_settings(args), keys) as feed:
         try:
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
 def _leave(code: int) -> NoReturn:
     """End the process here.
 
-    A session that has lost its router leaves threads behind that still let go of callbacks after
+    A session that has lost its router leaves threads behind that still release callbacks after
     it was closed (Zenoh 1.10). Where the interpreter ends meanwhile, the C library aborts the
     process with "FATAL: exception not rethrown".
     """

@@ -194,9 +194,9 @@ def _home(path: Path) -> Path:
 class RecordingConfig(Section, frozen=True):
     """How large and how old a file may become, and what all may take.
 
-    A recording goes on in the next file after ``part_mb`` [MB] or ``part_min`` [min], 0 for
-    never. Of more than ``quota_mb`` [MB] of this robot's files the oldest are deleted; 0 for
-    no limit. Nothing is written while the disk has less than ``least_free_mb`` [MB] free.
+    The next file begins after ``part_mb`` [MB] or ``part_min`` [min], 0 for never. Above
+    ``quota_mb`` [MB] of this robot's files the oldest are deleted; 0 for no limit. Recording pauses
+    while the disk has less than ``least_free_mb`` [MB] free.
     """
 
     part_mb: Annotated[int, Meta(ge=1, le=100_000)] = 64

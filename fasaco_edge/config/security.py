@@ -179,7 +179,7 @@ class SecurityConfig(Section, frozen=True):
                 transport = access.user_password(user.name, password, dictionary_file)
             case _:
                 return {}
-        # Gossip would tell everybody where everybody is, and let them make us connect there.
+        # Gossip would tell every peer where the others are, and let them make us connect there.
         return {"transport": transport, "scouting": {"gossip": {"enabled": False}}}
 
     def of_daemon(self, prefix: str, ros: access.Role | None = None) -> dict[str, Any]:

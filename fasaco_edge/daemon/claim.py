@@ -2,7 +2,7 @@
 
 Each shows a liveliness token ``claim/<its Zenoh id>/<waits, yields or plans>``. A daemon that
 finds another planning waits until that one is gone. Which of several waiting daemons is next, and
-which goes on where two find that both plan (they could not see each other), depends on their ids
+which one continues if both plan (they could not see each other), depends on their ids
 alone: both sides come to the same result, whatever their clocks say.
 """
 

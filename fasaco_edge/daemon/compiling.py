@@ -24,7 +24,7 @@ from fasaco_edge.kernels.cache import cache_folder, missing_from
 LOG = logging.getLogger(__name__)
 
 MODULE = "fasaco_edge.daemon.compiling"
-# Longer than any one stage takes on a small computer; asked for with each anew [s].
+# Longer than any stage takes on a small computer; requested for each stage [s].
 STAGE_S = 600.0
 LOOK_S = 0.02
 # A stage may add 250 MB to this, within what the unit may have in all (MemoryHigh=).

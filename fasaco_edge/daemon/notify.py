@@ -92,7 +92,7 @@ class ServiceManager:
 class Watchdog:
     """Notifies the service manager's watchdog, from the loop and only while planning progresses.
 
-    A thread of its own would go on beside a loop that hangs.
+    A thread of its own would keep feeding it beside a loop that hangs.
 
     Attributes:
         remark: added to the status line of the service; "" for nothing.

@@ -51,7 +51,7 @@ def run_daemon(
         config: the configuration.
         record_to: folder for recordings; without it there are none.
         state: folder of the coverage ledger, in place of the configuration's.
-        fresh: set aside the ledger, and cover everything anew.
+        fresh: set the ledger aside, and cover everything again.
         read: reads the configuration again, when a service manager sends SIGHUP.
 
     Raises:

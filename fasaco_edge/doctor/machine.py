@@ -108,7 +108,7 @@ def kernel_clock() -> tuple[bool, float] | None:
 
 
 def _model(root: Path) -> str:
-    """Return what the computer is called: a board by its name, a PC by its processor's."""
+    """Return the computer's name: that of a board, or of a PC's processor."""
     board = _read(root / "proc/device-tree/model").rstrip("\0\n")
     return board or _cpuinfo(root, "model name")
 
@@ -171,7 +171,7 @@ def controller(root: Path) -> int | None:
     """Return which version of control groups limits memory; None where none does."""
     if "memory" in _read(root / "sys/fs/cgroup/cgroup.controllers").split():
         return 2
-    # The names of version 1's stand there even where the kernel was told to leave them out.
+    # The names of version 1's are listed even where the kernel was configured without them.
     enabled = re.search(r"^memory\s+\d+\s+\d+\s+1$", _read(root / "proc/cgroups"), re.MULTILINE)
     return 1 if enabled and (root / "sys/fs/cgroup/memory").is_dir() else None
 

@@ -30,7 +30,7 @@ CHECKS = (
 )
 
 
-# For all together [s]: a disk, a network or somebody on the bus may not answer.
+# For all together [s]: a disk, a network or a peer on the bus may not answer.
 PATIENCE_S = 2.0
 
 
@@ -49,7 +49,7 @@ class _RunningCheck:
         except FasacoError as error:
             self._found = warn(str(error), error.hint)
         except Exception as error:
-            # A computer may have faults that nobody thought of.
+            # A computer may have unforeseen faults.
             said = f"check failed: {type(error).__name__}: {error}"
             self._found = warn(said, "please report this")
 

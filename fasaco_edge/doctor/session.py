@@ -40,7 +40,7 @@ def address_of(endpoint: str) -> tuple[str, int] | None:
 
 
 def answers(endpoint: str) -> bool | None:
-    """Tell whether somebody listens at an endpoint; None where that cannot be found out."""
+    """Tell whether a program listens at an endpoint; None if that is unknown."""
     address = address_of(endpoint)
     if address is None:
         return None
@@ -100,13 +100,13 @@ def _listening(root: Path, port: int) -> set[str]:
     return inodes
 
 
-# So long is listened for maps and poses [s]; poses come ten times a second.
+# Time to listen for maps and poses [s]; poses come ten times a second.
 LISTEN_S = 0.7
 ASK_S = 0.7
 
 
 def session(context: CheckContext) -> Finding:
-    """Check that a session can be opened as the daemon would, or find who is in its place."""
+    """Check that a session can be opened as the daemon would, or name what prevents it."""
     bus = context.config.bus
     try:
         check_settings(bus.settings(context.config.keys().prefix, context.config.ros2 or None))
@@ -229,7 +229,7 @@ def _ways(context: CheckContext) -> list[str]:
 
 @contextmanager
 def _joined(context: CheckContext) -> Iterator[Bus]:
-    """Join the bus as one client more, by the endpoints at which somebody answers."""
+    """Join the bus as an additional client, by the endpoints that answer."""
     ways = tuple(way for way in _ways(context) if answers(way) is not False)
     secured = context.config.bus.security.of_client()
     with open_bus(BusSettings("client", ways, (), secured)) as bus:

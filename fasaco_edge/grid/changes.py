@@ -184,7 +184,7 @@ def stale_cells(
     thresholds: Thresholds,
     within: Window | None,
 ) -> NDArray[np.bool_]:
-    """Return which cells of the new window must be classified anew, bool (rows, cols).
+    """Return which cells of the new window must be classified again, bool (rows, cols).
 
     Args:
         grids: the map before and the new one.

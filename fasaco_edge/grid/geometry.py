@@ -23,7 +23,7 @@ RASTER_STEPS = 2048
 # to 10,000 km. ``protocol/limits.yaml`` has the same number.
 FARTHEST_M = 2e7
 
-# Of a lattice, where nobody says less.
+# Default limit of a lattice.
 MAX_LATTICE_CELLS = 4_000_000
 
 # Limits of the edge of a pixel [m], as there.

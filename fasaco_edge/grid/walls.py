@@ -195,7 +195,7 @@ class _Votes:
         total = int(lengths.sum())
         if not total:
             return None
-        # Below and above them the bins go on, turned by a quarter.
+        # Below and above them the bins continue, turned by a quarter.
         length, sum_x, sum_y = (
             _added_up(np.concatenate(parts), half)[BINS : 2 * BINS]
             for parts, half in (

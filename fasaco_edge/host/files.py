@@ -47,7 +47,7 @@ def read_own(path: str | Path, most: int = -1) -> bytes:
     """Return what is in a plain file of ours, or of root's, that is no link; ``most`` bytes of it.
 
     Raises:
-        OSError: that failed, or it is somebody else's.
+        OSError: that failed, or it belongs to another user.
     """
     with _open_plain(path, partial(_check_owner, path)) as file:
         return file.read(most)
@@ -69,10 +69,10 @@ def _open_plain(path: str | Path, check: Callable[[os.stat_result], None]) -> Bi
 
 
 def make_own_folder(folder: Path) -> None:
-    """Make a folder, or take the one there is, if it is ours, and no link of somebody's.
+    """Make a folder, or take an existing one that is ours and no link of another user's.
 
     Raises:
-        OSError: that failed, or it is somebody else's.
+        OSError: that failed, or it belongs to another user.
     """
     folder.mkdir(exist_ok=True)
     _check_owner(folder, folder.lstat())
@@ -89,7 +89,7 @@ _MOST_LINKS = 40
 
 
 class UntrustedFileError(Exception):
-    """Somebody else could have written this; the text says what, and who."""
+    """Another user could have written this; the text says what, and who."""
 
 
 def why_not_trusted(folder: Path, user: int | None = None) -> str:

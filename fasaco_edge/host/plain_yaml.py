@@ -1,7 +1,7 @@
-"""Plain YAML: a document that somebody wrote, of bounded size and depth.
+"""Plain YAML: a document written by a user, of bounded size and depth.
 
-Aliases count as what they stand for: 500 bytes of them can stand for gigabytes. Tags, which make
-other things of a text than it says, are refused.
+Aliases count as what they expand to: 500 bytes of them can be gigabytes. Tags, which turn a text
+into other types, are refused.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import yaml
 MOST_BYTES = 1_048_576
 MOST_VALUES = 50_000
 MOST_DEPTH = 32
-# Of an integer: nobody writes longer ones, and Python refuses to show those of 4300 digits.
+# Most digits of an integer: Python refuses to show those of 4300 digits.
 MOST_DIGITS = 100
 
 

@@ -21,7 +21,7 @@ from types import FrameType
 def python_program(module: str, *words: str) -> list[str]:
     """Return the command line that runs a module with this interpreter.
 
-    ``-m`` alone would search the working folder first, which may be anybody's. An isolated
+    ``-m`` alone would search the working folder first, which others may write to. An isolated
     interpreter starts an isolated one: neither environment nor home say what is imported.
     """
     shut = "-I" if sys.flags.isolated else "-P"

@@ -1,6 +1,6 @@
 """Where the files that come with the package lie: the maps and the protocol.
 
-In a source checkout they stand beside the package; a wheel carries them inside
+In a source checkout they are beside the package; a wheel carries them inside
 it, in ``_share``.
 """
 

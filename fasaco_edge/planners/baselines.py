@@ -7,7 +7,7 @@ may come out nearer to that end: the cheaper reading is taken.
 
 Spiral-STC and ZigZag are as the paper's authors ran them. Their Spiral-STC is a backtracking
 spiral: it keeps to the wall on its right, counter-clockwise, until nothing open is beside it,
-and goes on from the nearest open cell. Their ZigZag tries the directions in one fixed order at
+and continues from the nearest open cell. Their ZigZag tries the directions in one fixed order at
 every cell and leaves dead ends the same way. Both are given here without the extra steps that
 their code makes at dead ends, which Table I counts too; see ``tests/benchmarks/RESULTS.md``.
 """

@@ -13,7 +13,7 @@ tau0 needs no tuning to the map's size. A walk may have to end in a given cell:
 ants go there by a shortest way when all is covered.
 
 Where a mission has a living trail (``planners.living_trail``) and a walk that was still to be
-driven, the search goes on instead of beginning anew: ants walk on that trail, as large a share of
+driven, the search continues instead of restarting: ants walk on that trail, as large a share of
 them as is new of the cells to cover, and the best walk so far is the one before, with what no
 longer holds cut out and what is new put in.
 """

@@ -325,7 +325,7 @@ class Search:
                     return
 
     def _solve_windows(self) -> Iterator[None]:
-        """Solve windows of the walk anew, if turns cost; go on where they were left."""
+        """Solve windows of the walk anew, if turns cost; continue where they were left."""
         windows = None if self._is_proven() else self._window_search()
         if windows is None or not self._load_windows():
             return
@@ -345,7 +345,7 @@ class Search:
         return self._windows
 
     def _load_windows(self) -> bool:
-        """Let windows go on from the walk, or where they were left; return whether they can."""
+        """Let windows continue from the walk, or where they were left; return whether they can."""
         self._in_windows = self._windows is not None and self._windows.load(self._walk)
         return self._in_windows
 

@@ -91,7 +91,7 @@ class WindowSearch:
         self._tally = np.zeros(4, np.int64)
         # Steps of the best walk, counted when its cost was that.
         self._counted_us, self._steps = -1, 0
-        # What the state goes on from.
+        # The walk that the state continues from.
         self._walk: NDArray[np.int32] | None = None
 
     def _no_passages(self) -> Passages:
@@ -100,7 +100,7 @@ class WindowSearch:
     def load(self, walk: NDArray[np.int32]) -> bool:
         """Begin with a walk, framed cells int32 (n,); return False if that cannot be.
 
-        With the walk that was loaded or taken last it goes on where it was left.
+        With the walk loaded or taken last it continues where it was left.
         """
         if walk is self._walk:
             return True

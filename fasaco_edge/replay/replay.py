@@ -32,7 +32,7 @@ from fasaco_edge.wire.settings import Settings
 from fasaco_edge.wire.status import Status
 from fasaco_edge.wire.topics import COMMAND, RECORDED_INPUTS, TURNS
 
-# How long the mission goes on after the last sample [s]: plans come, patience ends.
+# How long the mission runs after the last sample [s]: plans finish, timeouts expire.
 TAIL_S = 3.0
 # Samples this close together are taken in one cycle: the daemon's loop needs about as long to
 # wake up.
@@ -185,7 +185,7 @@ class Replay:
 
     def _take(self, arrivals: list[Arrival]) -> Iterator[ReplayStep]:
         """Take samples in one cycle, after those that come before it."""
-        # By the wall clock, which goes on where the machine was started again.
+        # By the wall clock, which runs on while the machine restarts.
         now = max(1e-9 * (arrivals[0].wall_ns + self._base_ns), self._now)
         yield from self._wait(now)
         yield self._cycle(now, arrivals)

@@ -42,7 +42,7 @@ class MapSize(msgspec.Struct):
 
 
 class Replan(msgspec.Struct):
-    """A plan made anew that became a path."""
+    """A replan that became a path."""
 
     at_s: float | None
     revision: int

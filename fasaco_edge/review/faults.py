@@ -80,7 +80,7 @@ def _plotted(plots: Mapping[str, NDArray[np.float64]]) -> Counter[str]:
 
 
 def _over_restarts(counts: Iterable[Mapping[str, int]]) -> Counter[str]:
-    """Return the sum of counts that begin anew whenever a daemon does."""
+    """Return the sum of counts that a restart of the daemon resets."""
     ended: Counter[str] = Counter()
     newest: Counter[str] = Counter()
     for count in counts:

@@ -29,7 +29,7 @@ def document_of(review: Review) -> ReviewDocument:
     """Return all figures of a review."""
     record, data, replans, faults = review.record, review.data, review.replans, review.faults
     began = datetime.fromtimestamp(1e-9 * record.began_ns, UTC)
-    told = ReviewDocument(
+    document = ReviewDocument(
         recording=record.recording_id,
         files=[
             RecordedFile(str(part.path), part.bytes, part.torn_bytes, part.has_footer)
@@ -73,13 +73,13 @@ def document_of(review: Review) -> ReviewDocument:
         remarks=list(faults.complaints),
         not_recorded=_not_recorded(review),
     )
-    _add_coverage(told, review)
-    _add_plans(told, review)
-    told.pheromone = _pheromone(review)
+    _add_coverage(document, review)
+    _add_plans(document, review)
+    document.pheromone = _pheromone(review)
     for member, entity in PLOTTED.items():
         if (points := record.plots.get(entity)) is not None:
-            setattr(told, member, _rounded(float(points[:, 1].max())))
-    return told
+            setattr(document, member, _rounded(float(points[:, 1].max())))
+    return document
 
 
 PLOTTED = {
@@ -91,37 +91,37 @@ PLOTTED = {
 """Members that are the most of a curve, and the curve."""
 
 
-def _add_coverage(told: ReviewDocument, review: Review) -> None:
+def _add_coverage(document: ReviewDocument, review: Review) -> None:
     if (grid := review.data.grid) is not None:
-        told.map = MapSize(grid.geometry.rows, grid.geometry.cols, grid.geometry.resolution)
+        document.map = MapSize(grid.geometry.rows, grid.geometry.cols, grid.geometry.resolution)
     if (counts := review.counts) is not None:
-        told.covered_cells, told.coverable_cells = counts.covered, counts.coverable
-        told.recovered_cells, told.unreachable_cells = counts.recovered, counts.unreachable
-        told.coverage_from = counts.source
+        document.covered_cells, document.coverable_cells = counts.covered, counts.coverable
+        document.recovered_cells, document.unreachable_cells = counts.recovered, counts.unreachable
+        document.coverage_from = counts.source
     if (floor := review.floor) is not None:
         figures = floor.figures
-        told.reachable_m2 = _rounded(figures.reachable_m2)
-        told.swept_m2 = _rounded(figures.swept_m2)
-        told.patches_over_4_dm2 = figures.patches_over_4_dm2
-        told.largest_patch_m2 = _rounded(figures.largest_patch_m2)
+        document.reachable_m2 = _rounded(figures.reachable_m2)
+        document.swept_m2 = _rounded(figures.swept_m2)
+        document.patches_over_4_dm2 = figures.patches_over_4_dm2
+        document.largest_patch_m2 = _rounded(figures.largest_patch_m2)
     if (ledger := review.data.ledger_floor) is not None:
-        told.ledger_swept_m2 = ledger.swept_m2
-        told.left_by_reason = _by_reason(ledger.left)
-        told.out_of_reach_by_reason = _by_reason(ledger.out_of_reach)
+        document.ledger_swept_m2 = ledger.swept_m2
+        document.left_by_reason = _by_reason(ledger.left)
+        document.out_of_reach_by_reason = _by_reason(ledger.out_of_reach)
     if (walk := review.walk) is not None:
-        told.steps, told.revisits = walk.steps, walk.revisits
-        told.turns_90, told.turns_180 = walk.turns_90, walk.turns_180
+        document.steps, document.revisits = walk.steps, walk.revisits
+        document.turns_90, document.turns_180 = walk.turns_90, walk.turns_180
     if review.drive is not None:
-        told.driven_m = round(review.drive.driven_m, 2)
+        document.driven_m = round(review.drive.driven_m, 2)
     if (reached := review.reached_s) is not None:
-        told.reached_s = {str(percent): _rounded(at_s) for percent, at_s in reached.items()}
+        document.reached_s = {str(percent): _rounded(at_s) for percent, at_s in reached.items()}
 
 
 def _by_reason(floor: tuple[FloorLeft, ...] | None) -> dict[str, float] | None:
     return None if floor is None else {part.reason: part.m2 for part in floor}
 
 
-def _add_plans(told: ReviewDocument, review: Review) -> None:
+def _add_plans(document: ReviewDocument, review: Review) -> None:
     """Add counts and times of plans by the turn log, if there is one."""
     made = review.data.plan_log.plans
     if not made:
@@ -129,11 +129,14 @@ def _add_plans(told: ReviewDocument, review: Review) -> None:
     plans = [plan for plan in made if not plan.is_attempt]
     attempts = [plan for plan in made if plan.is_attempt]
     took = [plan.took_ms for plan in plans]
-    told.plans, told.plans_unused = len(plans), sum(not plan.is_used for plan in plans)
-    told.plan_ms_p50, told.plan_ms_p99, told.plan_ms_max = (
+    document.plans, document.plans_unused = len(plans), sum(not plan.is_used for plan in plans)
+    document.plan_ms_p50, document.plan_ms_p99, document.plan_ms_max = (
         _rounded(percentile(took, percent)) for percent in (50, 99, 100)
     )
-    told.attempts, told.attempts_used = len(attempts), sum(plan.is_used for plan in attempts)
+    document.attempts, document.attempts_used = (
+        len(attempts),
+        sum(plan.is_used for plan in attempts),
+    )
 
 
 def _pheromone(review: Review) -> PheromoneFigures:

@@ -224,7 +224,7 @@ def worst_moments(
     Args:
         data: of the samples.
         states: of the mission, in order.
-        replans: plans made anew.
+        replans: plans after the first.
         fractions: float64 (n, 2), when [s] and the covered share as the daemon published it.
     """
     found: list[Moment | None] = []

@@ -15,7 +15,7 @@ from fasaco_edge.review.run_data import RunData, StatusSample
 # What comes so soon after a status [s] is still of the same step.
 SAME_STEP_S = 1.5
 ENDS = ("cancel", "reset")
-# In these an order is over, or there is none: the same one begins anew.
+# In these an order is over, or there is none: the same one would start again.
 OVER = ("done", "idle")
 
 

@@ -112,7 +112,7 @@ class Review:
             before.
         first_s: float64 (n,), when each cell was first covered, ascending.
         counts: of cells; None where that is not recorded.
-        replans: plans made anew.
+        replans: plans after the first.
         states: of the mission, in order.
         recorder_states: of the recorder.
         moments: the worst ones.
@@ -191,7 +191,7 @@ class Review:
 
     @property
     def orders(self) -> tuple[OrderChapter, ...]:
-        """What was ordered, and what came of each."""
+        """The orders, and the outcome of each."""
         return chapters(self.data, self.states, self.known_fractions, self.duration_s)
 
 

@@ -101,12 +101,12 @@ def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
     megabytes = sum(part.bytes for part in parts) / 1e6
     state = "" if document.is_ended else ", not ended in order"
     return [
-        ("robot", document.robot or "not told"),
+        ("robot", document.robot or "not recorded"),
         ("began", _began(document.began)),
         ("duration", clock(document.duration_s)),
         ("map", size),
-        ("version", document.version or "not told"),
-        ("settings", ", ".join(settings) or "not told"),
+        ("version", document.version or "not recorded"),
+        ("settings", ", ".join(settings) or "not recorded"),
         ("recording", f"{len(parts)} part{'s' * (len(parts) != 1)}, {megabytes:.1f} MB{state}"),
     ]
 

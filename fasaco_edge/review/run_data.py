@@ -145,7 +145,7 @@ class RunData:
 
     @property
     def ledger_floor(self) -> FloorReport | None:
-        """What the daemon told of the floor last; None where it did not."""
+        """The daemon's last report of the floor; None if there is none."""
         floors = (each.status.floor for each in reversed(self.statuses))
         return next((floor for floor in floors if floor is not None), None)
 

@@ -5,7 +5,7 @@ a run shows is the path's doing. It comes to rest at every corner, which is what
 cost time.
 
 A path begins at the centre of the cell the robot was in when it was planned.
-Since then the robot has gone on: through the first waypoints, if the new path
+Since then the robot has moved on: through the first waypoints, if the new path
 begins like the old one, or off to a side. Only what it has driven through may
 be left out. To ask merely where the robot is would not do: a path that goes
 into a dead end and comes back passes the same place twice.

@@ -128,7 +128,7 @@ class Activity(enum.Enum):
     NO_WAY = "no_way"
     """It sees no clear way to the path's beginning, and looks again after every scan."""
     COLLIDED = "collided"
-    """The path led into an obstacle; it stands before it and waits for another path."""
+    """The path led into an obstacle; it stops there and waits for another path."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from fasaco_edge.wire.topic_types import NEWEST, Topic
 from fasaco_edge.wire.topics import PHEROMONE, TOPICS
 
 WATCHED = [topic for topic in TOPICS if topic.queues.watch is not None]
-# The daemon makes the field for who listens: that is asked for.
+# The daemon makes the field only while a subscriber exists: it is requested.
 SUBSCRIBED = [topic for topic in WATCHED if topic is not PHEROMONE]
 QUEUED = {"token": Queue(256)} | {
     topic.name: Queue(topic.queues.watch, MAX_MESSAGE_BYTES)
@@ -26,7 +26,7 @@ QUEUED = {"token": Queue(256)} | {
     if topic.queues.watch is not None and topic.queues.watch > NEWEST
 }
 RETRY_S = 0.5
-# So long the end may wait for a host that does not answer.
+# Longest time that the end may wait for a host that does not answer.
 END_S = 0.5
 
 
@@ -71,7 +71,7 @@ class Feed:
         return self._mailbox.take(timeout_s)
 
     def want_field(self, wants: bool) -> None:
-        """Have the pheromone field sent, too, from now on, or no more."""
+        """Subscribe to the pheromone field, or unsubscribe."""
         with self._lock:
             self._wants_field = wants
             if self._bus is not None:

@@ -43,7 +43,7 @@ def take(feed: Feed, view: RobotView, timeout_s: float) -> list[tuple[str, objec
 
 
 def watch_on_screen(feed: Feed, view: RobotView, console: Console) -> None:
-    """Show the mission until somebody types q, or a signal asks for the end.
+    """Show the mission until q is typed or a signal arrives.
 
     f shows the living trail in place of coverage and path, and back.
 
@@ -68,8 +68,8 @@ def watch_on_screen(feed: Feed, view: RobotView, console: Console) -> None:
 
 
 def watch_in_lines(feed: Feed, view: RobotView) -> None:
-    """Print what happens, and once a second the state, until a signal asks for the end."""
-    # What is there already comes within the first second.
+    """Print what happens, and once a second the state, until a signal arrives."""
+    # What exists already arrives within the first second.
     printed, last_line, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
     with stop_event(*END_SIGNALS) as stop:
         while not stop.is_set():
@@ -86,7 +86,7 @@ def watch_in_lines(feed: Feed, view: RobotView) -> None:
 
 
 def watch_as_json(feed: Feed, view: RobotView) -> None:
-    """Print each status as a line of JSON, until a signal asks for the end."""
+    """Print each status as a line of JSON, until a signal arrives."""
     with stop_event(*END_SIGNALS) as stop:
         while not stop.is_set():
             for topic, item in take(feed, view, FRAME_S):
@@ -204,7 +204,7 @@ class Screen:
         except OSError:
             typed = b""
         if not typed:
-            # The input has ended; it would be ready for ever.
+            # The input has ended; it would always be ready.
             self._has_input = False
         return typed.decode(errors="replace")
 
@@ -224,7 +224,7 @@ class Screen:
                 termios.tcsetattr(self._keyboard, termios.TCSADRAIN, self._before)
 
     def _suspend(self, _number: int, _frame: FrameType | None) -> None:
-        """Stop as Ctrl-Z asks, with the terminal as it was; go on where ``fg`` does."""
+        """Stop as Ctrl-Z asks, with the terminal restored; continue after ``fg``."""
         self._end()
         os.kill(os.getpid(), signal.SIGSTOP)
         self._begin()

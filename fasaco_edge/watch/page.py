@@ -21,7 +21,7 @@ from fasaco_edge.wire.status import Status, SupervisedRecorder
 
 Row = tuple[str, Text]
 
-# How a state is to be taken.
+# Colour of a state.
 STATE_COLOURS = {
     "planning": "magenta",
     "covering": "green",
@@ -33,7 +33,7 @@ STATE_COLOURS = {
 }
 LONGEST_BAR = 40
 LABEL_WIDTH = 9
-# From so many characters on optional parts are shown.
+# Width from which optional parts are shown [characters].
 WIDE = 30
 
 

@@ -72,7 +72,7 @@ def clock(at_s: float) -> str:
 
 
 def age(seconds: float) -> str:
-    """Return a time that has gone by."""
+    """Return an elapsed time as text."""
     if seconds < 10.0:
         return f"{seconds:.1f} s"
     if seconds < 120.0:

@@ -100,7 +100,7 @@ HEADING = 16
 
 # By the defaults of the daemon's configuration; only the picture depends on them.
 FREE_AT_MOST, OCCUPIED_AT_LEAST = 25, 65
-# A thin wall must not vanish between samples; larger maps than this resolves are seldom.
+# A thin wall must not vanish between samples; maps larger than this resolves are rare.
 MOST_SAMPLES = 12
 # The path the robot takes next is drawn over this much of it [m].
 NEXT_M = 3.0
@@ -196,7 +196,7 @@ _COVERAGE_AND_BLOCKED_KINDS[CoverageValue.BLOCKED] = WALL
 
 
 class MissionPicture:
-    """Draws the robot's view; map and coverage anew only where they changed.
+    """Draws the robot's view; map and coverage are redrawn only where they changed.
 
     Attributes:
         pixel_m: edge of a pixel of that picture [m]; None before the first.

@@ -26,9 +26,9 @@ from fasaco_edge.wire.settings import known_settings
 from fasaco_edge.wire.status import Status
 
 KEPT = 200
-# The field is shown in so many steps.
+# Number of levels that the field is shown in.
 FIELD_LEVELS = 7
-# How an entry is to be taken.
+# Tone of an entry.
 PLAIN, GOOD, BAD, ORDER = "plain", "good", "bad", "order"
 TROUBLED = ("blocked", "degraded")
 
@@ -226,7 +226,7 @@ class RobotView:
             self.events.add(now, text, tone)
         self.status, self.document, self._reported_at = status, sample.payload, now
         if status.path is None:
-            # A daemon that was started anew has none of the old paths.
+            # A restarted daemon has none of the old paths.
             self.walk = PathProgress()
         elif status.path.revision == self.walk.revision:
             self.walk.left(status.path.remaining_steps)

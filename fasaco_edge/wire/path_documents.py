@@ -1,4 +1,4 @@
-"""Path documents: what is told of a path beside its poses, and of the trail beside its field."""
+"""Path documents: attachments to a path's poses and to the trail's field."""
 
 from __future__ import annotations
 

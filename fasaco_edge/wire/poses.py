@@ -88,7 +88,7 @@ class Transform:
     looked at only by who needs it, in ``planar``.
 
     Attributes:
-        frame: name of the frame it is told in.
+        frame: name of the frame it is given in.
         child: name of the frame that lies there.
         stamp_ns: time of the transform [ns], by its publisher's clock.
         placement: translation x, y, z [m] and quaternion x, y, z, w.
@@ -159,7 +159,7 @@ class TransformTree:
     def __init__(self, map_frame: str, robot_frame: str) -> None:
         self._map_frame = map_frame
         self._robot_frame = robot_frame
-        # By child frame; whether it was said to hold for ever.
+        # By child frame; whether it is static.
         self._links: dict[str, tuple[Transform, bool]] = {}
         self._told: StampedPose | None = None
 
@@ -174,7 +174,7 @@ class TransformTree:
 
         Args:
             transforms: as they came.
-            is_static: whether they were said to hold for ever.
+            is_static: whether they are static.
 
         Raises:
             TransformLoop: the frames hang on each other; their links are forgotten.

@@ -36,7 +36,7 @@ class PoseSettings(Document, frozen=True):
 
 
 class MissionSettings(Document, frozen=True):
-    """How long the mission goes on without a pose [s]."""
+    """How long the mission continues without a pose [s]."""
 
     lost_pose_s: float = 0.0
 

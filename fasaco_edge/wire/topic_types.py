@@ -141,7 +141,7 @@ class Query:
         schema: message type of the answer; "" for JSON.
         json: JSON Schema of the answer; "" for none.
         payload: JSON Schema of what comes with the question; "" for none.
-        parameters: what may stand behind ``?``.
+        parameters: what may follow ``?``.
         answered: ``at once`` with the newest sample; by the ``loop`` once it has decided.
         timeout_s: how long to wait for an answer [s].
         errors: codes of errors beside ``bad_query``.

@@ -90,7 +90,7 @@ FLOOR = Topic(
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
-    qos=Qos("data_low", why="for display: whoever comes late gets it within two seconds"),
+    qos=Qos("data_low", why="for display: late joiners get it within two seconds"),
     queues=Queues(recorder=NEWEST),
     limits=("max_grid_cells",),
 )

@@ -167,7 +167,7 @@ def message_id(event: str) -> str:
 def encode_entry(fields: Mapping[str, str]) -> bytes:
     """Return an entry as the socket takes it.
 
-    A value of one line stands behind "="; one of several behind its length, uint64 little endian.
+    A value of one line follows "="; one of several lines its length, uint64 little endian.
     """
     parts = []
     for name, value in fields.items():
@@ -186,7 +186,7 @@ PLAIN, JOURNAL = "%(levelname)s %(name)s: %(message)s", "%(message)s"
 
 
 class OneLine(logging.Formatter):
-    """Writes an entry as one line, whatever its text holds; a traceback stands below, indented."""
+    """Writes an entry as one line, whatever its text holds; a traceback follows, indented."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's name
         """Return the line."""

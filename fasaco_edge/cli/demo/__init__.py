@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     out: Path = args.out or RUNS / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
     with writing(out):
         if args.out is None:
-            # Nobody named it, and anybody may have made it.
+            # Its name was not given, and anybody may have made it.
             make_own_folder(RUNS)
             make_own_folder(out)
         out.mkdir(parents=True, exist_ok=True)

@@ -188,7 +188,7 @@ class DemoMission:
                 )
 
     def _stop(self) -> None:
-        """End the robot first, so that the recording holds its last word."""
+        """End the robot first, so that the recording holds its last messages."""
         for _, process in reversed(self._processes):
             process.send_signal(signal.SIGTERM)
             try:

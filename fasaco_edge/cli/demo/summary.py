@@ -1,4 +1,4 @@
-"""What came of a demo: checked against the building itself, not by the daemon's word."""
+"""The result of a demo, checked against the building itself, not by the daemon's figures."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def summarise(args: argparse.Namespace, out: Path, ending: Ending) -> Summary:
     reachable, done = int(truth.reachable.sum()), int(covered.sum())
     status = ending.status
     if args.line != "cells" and status.coverage is not None:
-        # Over a line the robot stands beside the middles of cells: the daemon's own count.
+        # Along a line the robot passes beside the centres of cells: use the daemon's own count.
         reachable, done = status.coverage.coverable, status.coverage.covered
     summary = Summary(
         map=str(args.map),

@@ -1,6 +1,6 @@
 """A ledger as bytes: checksummed as a whole, versioned, the same on every machine.
 
-The envelope is that of every version, so that a file of another version can be told from a
+The envelope is that of every version, so that a file of another version can be distinguished from a
 broken one. Little endian:
 
     magic      8 bytes

@@ -68,7 +68,7 @@ class LedgerKeeper:
         self._kept_at = float("-inf")
 
     def restore(self, mission: Mission) -> None:
-        """Let a mission go on where the former one ended."""
+        """Let a mission continue where the former one ended."""
         if not self._before.is_empty:
             mission.restore_ledger(self._before)
         mission.restore_order(self.order_state)
@@ -145,7 +145,7 @@ def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False)
         folder: where it is kept.
         robot: the robot's name.
         cell_m: edge of a cell [m].
-        fresh: set aside what there is, and begin anew.
+        fresh: set the existing ledger aside, and start over.
 
     Raises:
         LedgerFileError: another process writes this ledger.
@@ -167,7 +167,7 @@ class LedgerWriter:
     """Writes the newest of the ledgers it is given.
 
     Attributes:
-        restored: the ledger to go on with, if any.
+        restored: the ledger to continue with, if any.
     """
 
     def __init__(self, file: LedgerFile, found: LoadedLedger) -> None:
@@ -203,7 +203,7 @@ class LedgerWriter:
     def begin_anew(self, fault: FasacoError | None, why: str) -> None:
         """Set the files aside, with the word ``why`` in their names: another ledger follows.
 
-        ``fault`` is for the status; None where somebody asked for it.
+        ``fault`` is for the status; None for a reset by command.
         """
         self._finding = fault_text(fault) if fault is not None else ""
         self._restored_cells = 0

@@ -33,7 +33,7 @@ from fasaco_edge.wire.limits import MAX_JSON_BYTES
 from fasaco_edge.wire.replies import Version, encode_error
 from fasaco_edge.wire.settings import Settings
 
-# A robot whose path changes all the time drives badly: it is planned anew no more often [s].
+# Least period of replans by request: a path that keeps changing is hard to follow [s].
 REPLAN_PERIOD_S = 1.0
 # A document of JSON, and its question.
 QUERY_BYTES = MAX_JSON_BYTES + 4096

@@ -170,11 +170,11 @@ class Loop:
         config: DaemonConfig | None = None,
         held: Sequence[Event] | None = None,
     ) -> None:
-        """Let another mission go on from the ledger, as after a restart of the daemon.
+        """Let another mission continue from the ledger, as after a restart of the daemon.
 
         Args:
             why: for the turn log, which ends.
-            config: the configuration to go on with, if another.
+            config: the new configuration, if it changed.
             held: the events to begin with; None for the map and pose there are.
         """
         self._bus.turns.end(why)
@@ -246,10 +246,10 @@ class Loop:
     def _recover(
         self, mission: Mission, commands: Sequence[CommandReceived], error: Exception
     ) -> Decision:
-        """Stop the robot, and let another mission go on from the ledger.
+        """Stop the robot, and let another mission continue from the ledger.
 
         To end the daemon would not help: a latched map comes again after a restart. The map gets
-        a second chance; a mission that fails again soon goes on with the next map.
+        a second chance; a mission that fails again soon continues with the next map.
         """
         LOG.exception("mission", extra={"event": "mission_broke"})
         fault = MissionBroke(f"the mission failed: {type(error).__name__}: {error}")

@@ -124,7 +124,7 @@ def _frame(event: Event) -> str:
 
 
 class MissionRunner:
-    """Starts a mission once there is a map, and replaces it by one that goes on from the ledger.
+    """Starts a mission once there is a map, and replaces it by one that continues from the ledger.
 
     Attributes:
         config: the configuration in force.
@@ -211,7 +211,7 @@ class MissionRunner:
         ]
 
     def restart(self, config: DaemonConfig, held: Sequence[Event]) -> None:
-        """Go back to startup, with these events; coverage and order go on from the ledger."""
+        """Go back to startup, with these events; coverage and order continue from the ledger."""
         if self.mission is not None and self.worker is not None:
             self.worker.disown()
             self._keeper.take_back(self.mission)

@@ -116,7 +116,7 @@ class Route:
         self._kept, self._before_motion = PathProgress(NO_CELLS), None
 
     def pause(self) -> None:
-        """Discard the plan under way; what it was needed for is planned once the robot goes on."""
+        """Discard the plan under way; what it was for is planned once the robot continues."""
         self.forget_failure()
         if self.pending is not None and self.is_planning and not self._is_abandoned:
             if self.pending.problem.is_full:

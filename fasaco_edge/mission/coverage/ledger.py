@@ -46,7 +46,7 @@ class LedgerSnapshot:
         total: all visits.
         tiles: the visits, uint16 (TILE, TILE), read-only; tile (i, j) has the cells from
             (TILE * i, TILE * j) on.
-        under_tool: the cells that lay under the tool: still there, it does not visit them anew.
+        under_tool: the cells that lay under the tool: still there, it does not visit them again.
         floor: what of the floor was swept, pixel by pixel.
         note: the order and how far it is, as JSON, see ``orders.order_state``; "" for none.
         trail: the pheromone.

@@ -255,7 +255,7 @@ class MissionLedger:
             covered.floor.forget(lambda window: inside(window, PIXEL_M))
 
     def move_to(self, frame: str) -> LedgerMismatchError | None:
-        """Lie in ``frame`` from now on; begin anew, and say so, if another holds covered cells."""
+        """Move to ``frame``; start over, and report it, if another holds covered cells."""
         was = self.current.frame
         if was in ("", frame):
             self.current.move_to(frame)
@@ -274,7 +274,7 @@ class MissionLedger:
         self.first_plan_reason = "first plan"
 
     def check(self, lattice: CoverageLattice, frame: str) -> LedgerMismatchError | None:
-        """Begin anew, and say so, where a map shows the ledger to be of another building."""
+        """Start over, and report it, where a map shows the ledger to be of another building."""
         if self._resumed is None:
             return None
         before, since = self._resumed

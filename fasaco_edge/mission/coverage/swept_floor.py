@@ -137,7 +137,7 @@ class SweptFloor:
         last, self._last = self._last, pose
         if last is not None and (apart := _apart(last, pose)) <= JUMP_TOOLS * self._tool_m:
             if not apart:
-                return  # a pose told again, as with each map, says nothing of how poses scatter
+                return  # a repeated pose, as with each map, is no evidence of scatter
         else:
             self._end_track()
         before = self._around_ahead

@@ -38,7 +38,7 @@ ANNEALED_M, ANNEALED_PIECE_M, ANNEALED_PIECES = 2.0, 4.0, 2
 ANNEAL_MOVES, HOTTEST = 300, 0.3
 # The robot is told of what is annealed no sooner than this [m].
 TOLD_M = 1.5
-# So many moves at most before the loop goes on.
+# Most moves before the loop continues.
 MOST_MOVES = 3000
 # Moves of points alone: no detour leads so far.
 NO_DETOURS = -1e6

@@ -42,7 +42,7 @@ class OrderState:
 
     Attributes:
         order: what to do; None for nothing at all.
-        automatic: whether it began without a command, and goes on whenever the map shows more.
+        automatic: whether it began without a command, and continues whenever the map shows more.
         stage: what is being done: zones covered pass by pass, then what was left over tried
             again, then the way home.
         zone: index of the zone.

@@ -294,7 +294,7 @@ class Sequencer:
             self._end()
 
     def reopen(self) -> None:
-        """Let an automatic order go on: the map has changed since it was over."""
+        """Let an automatic order continue: the map has changed since it was over."""
         if self.order_state.automatic and self.order_state.stage is Stage.OVER:
             self.order_state = replace(self.order_state, stage=Stage.COVERING)
 
@@ -330,7 +330,7 @@ class Sequencer:
             run.ending = f"{left} reachable {cells}{zones} {were} left over"
 
     def _is_worth_trying(self) -> bool:
-        """Tell whether there is anything to try again; searched anew if anything changed."""
+        """Tell whether there is anything to try again; searched again if anything changed."""
         key = (self._map.area, self._ledger.current.total)
         if key != self._retry_check[0]:
             self._retry_check = key, bool(self._left() or self._viewpoints())

@@ -6,7 +6,7 @@
    starts.
 3. Round by round, pairs of robots whose parts touch put their walks together, improve them by
    local search, and split them anew; or one leaves some cells to the other. Without a gain the
-   groups grow, and at last all begins anew with another walk.
+   groups grow, and finally everything restarts with another walk.
 
 The longest walk decides when all is done: its cost is the makespan.
 """
@@ -46,7 +46,7 @@ OPEN = SearchWork(perturbations=200)
 SHIFTED, FEW = 0.5, 6
 # After so many rounds without a gain the worst robot shares with one more.
 GAINLESS_PAIRS = 4
-# After so many it begins anew, with another walk over all.
+# After so many it restarts with another walk over all.
 GAINLESS_ROUNDS = 40
 # A seed is below this.
 SEEDS = 2**63
@@ -169,7 +169,8 @@ class Sharing:
         return stop(replace(share, lower_bound_cost_s=0.0))
 
     def _balance(self, size: int, pool: ThreadPoolExecutor) -> None:
-        """Let groups of robots whose parts touch share anew: the worst one's of ``size``, pairs."""
+        """Redistribute among groups of robots whose parts touch: the worst robot's
+        of ``size``, the others of two."""
         groups = self._groups(size)
         # All of them before the first is taken, as they read what that changes.
         found = list(pool.map(self._shared_anew, groups))

@@ -12,7 +12,7 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.frames import column
 
-# So many are kept at most; of more every other one is dropped.
+# Most that are kept; of more every other one is dropped.
 MOST_FIELDS = 64
 
 _DATA = pa.list_(pa.list_(pa.field("item", pa.uint8(), nullable=False)))

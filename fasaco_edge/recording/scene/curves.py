@@ -94,7 +94,7 @@ class Curves:
 
 # The shares of the coverage change with almost every sample of it, once a second.
 SHARE_SPACING_NS = 2_000_000_000
-# Counts that go on and on are drawn no more often than this.
+# Ever-growing counts are drawn no more often than this.
 COUNT_SPACING_NS = 30_000_000_000
 # Processor time is averaged over at least so many seconds.
 LEAST_SHARE_S = 30.0

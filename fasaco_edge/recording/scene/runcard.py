@@ -1,4 +1,4 @@
-"""The run card: the settings of a run and a legend, for whoever opens its recording."""
+"""The run card: the settings of a run and a legend, shown when its recording is opened."""
 
 from __future__ import annotations
 

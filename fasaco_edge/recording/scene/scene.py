@@ -32,7 +32,7 @@ DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
 # takes 120 kB.
 REFRAME_FRACTION = 0.15
-# So far above the robot it is told where the trail leads on.
+# Distance above the robot of the label that says where the trail leads.
 FORK_CELLS = 3.0
 
 

@@ -68,8 +68,8 @@ class Part:
     def _attach(self) -> None:
         """Let rerun write to the file.
 
-        Its call waits until the first message is on the disk: for ever, if the disk refuses that or
-        stalls (rerun 0.41). So it is made on a thread, which stays behind then.
+        The call waits until the first message is on the disk, and never returns if the disk refuses
+        that or stalls (rerun 0.41). So it is made on a thread, which is abandoned then.
         """
         errors = list[RuntimeError]()
 
@@ -149,8 +149,8 @@ class Part:
         """Save of a broken part what can be read: what was flushed, or nothing.
 
         Behind a frame that the disk took half of, rerun may still have written others, once there
-        was space again: they cannot be told from the rest of that frame.
-        The stream stays: to disconnect it, or to let go of it, may hang for ever (rerun 0.41).
+        was space again: they cannot be distinguished from the rest of that frame.
+        The stream stays: to disconnect or release it may hang (rerun 0.41).
         """
         os.close(self._lock)
         if not self._flushed_bytes:

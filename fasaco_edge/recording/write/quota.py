@@ -22,7 +22,7 @@ from fasaco_edge.errors import BadConfiguration
 MEGABYTE = 1_000_000
 NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
 TIME = "%Y%m%dT%H%M%SZ"
-# Free space beyond the least before recording goes on: the disk must not fill again at once.
+# Free space above the minimum before recording resumes: the disk must not fill again at once.
 RESUME_BYTES = 1_000_000
 
 LOG = logging.getLogger(__name__)
@@ -169,7 +169,7 @@ class DiskBudget:
         return _free_bytes(folder) < self.least_free_bytes
 
     def may_begin(self, folder: Path) -> bool:
-        """Return whether enough is free to go on."""
+        """Return whether there is enough space to resume."""
         return _free_bytes(folder) >= self.least_free_bytes + RESUME_BYTES
 
     def keep_quota(self, folder: Path) -> None:

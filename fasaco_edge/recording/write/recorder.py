@@ -160,7 +160,7 @@ class Recorder:
     def step(self, timeout_s: float) -> None:
         """Write what came within ``timeout_s`` [s], check that it is written, report."""
         arrivals = deque(self._inbox.take(timeout_s))
-        while arrivals:  # what is written is let go
+        while arrivals:  # release what is written
             self._write(arrivals.popleft())
             self._sync()
         self._inputs.note_lost(self._inbox.lost)
@@ -278,7 +278,7 @@ def _is_rival(payload: bytes) -> bool:
     try:
         return decode_tolerant(payload, Status).claim.stand != "plans"
     except MalformedMessage:
-        return False  # whoever reads it complains
+        return False  # its reader reports that
 
 
 def _repaired(folder: Path) -> list[str]:

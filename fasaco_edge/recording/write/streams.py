@@ -1,7 +1,7 @@
 """Rerun's streams: what each begins with, and what one leaves behind (rerun 0.41).
 
 A stream that is no longer referenced keeps two threads and half a megabyte until it is swept up.
-Each blueprint that is sent leaves a stream that references itself: for ever, if not disconnected.
+Each blueprint that is sent leaves a stream that references itself: a leak, unless disconnected.
 
 A live stream is served, never sent: to a viewer that is not there rerun's memory would grow
 without bound. Viewers join at rerun+http://HOST:PORT/proxy.
@@ -103,7 +103,7 @@ def _try_address(host: str, port: int) -> None:
 
 
 def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None:
-    """Send a blueprint as ``rr.send_blueprint`` does, and let go of what it was written with."""
+    """Send a blueprint as ``rr.send_blueprint`` does, and release its stream."""
     native = bindings.new_blueprint(
         application_id=entities.APPLICATION,
         make_default=False,
