@@ -49,7 +49,7 @@ def test_by_default_the_path_is_a_line_that_sweeps_the_rims(tmp_path):
         # Cells beside a wall have their centre within reach of it; a line goes nearer.
         in_cells = len(coverable_cells(pixels)) * TOOL_M**2
         assert figures.swept_m2 > 1.1 * in_cells
-        told = outsider.wait_status(lambda status: status["floor"]["reachable_m2"])["floor"]
+        told = outsider.wait_status(lambda status: status["path"])["floor"]
         assert told["reachable_m2"] == pytest.approx(figures.reachable_m2, rel=0.02)
         ahead, beside = (left["m2"] for left in told["left"])
         assert ahead > 10 * beside

@@ -164,6 +164,13 @@ def test_the_status_says_what_of_the_floor_is_left_and_why():
     assert told.reachable_m2 == pytest.approx(told.reached_m2 + ahead.m2 + beside.m2, abs=0.002)
 
 
+def test_before_the_first_path_no_floor_is_called_not_worth_the_way():
+    mission = Mission(CONFIG)
+    pose = PoseReceived(StampedPose(Pose2D(*START), "map"))
+    mission.step([MapReceived(room(3.0, 2.4)), pose], 0.0)
+    assert [left.reason for left in floor_report(mission).left] == ["not planned yet"]
+
+
 def test_the_status_says_what_floor_is_out_of_reach_and_why():
     # A closet without a door and a gap between two shelves, and a zone in the far corner.
     grid = room(4.8, 2.4)
