@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.bench.drive_time import DriveLimits, drive_seconds
 from fasaco_edge.bench.pixels import Mask, Patches, within
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import FREE, OccupancyGrid, marked_window
@@ -55,8 +56,9 @@ class SweepingRobot:
         tool_m: width of its tool, a disc [m].
         radius_m: radius of its own disc [m].
         speed_m_s: how fast it drives [m/s].
-        turn_s: what a quarter-turn takes [s].
+        turn_s: what a quarter-turn takes [s], where ``limits`` are not known.
         free_at_most: occupancy values up to this are known free [percent].
+        limits: its other limits; None to count turns by their angle alone.
     """
 
     tool_m: float
@@ -64,6 +66,7 @@ class SweepingRobot:
     speed_m_s: float = 0.25
     turn_s: float = 1.5
     free_at_most: int = 25
+    limits: DriveLimits | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +216,7 @@ class _Floor:
         touched |= ~self.free
         rows, cols = self.free.shape
         illegal = length = 0.0
-        is_line = line.length_px > 0
+        is_line = bool((line.starts != line.ends).any())
         for start, end in line.pieces(STEP_PX, PIECES):
             col, row = np.floor((start + end) / 2).T
             inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
@@ -250,15 +253,13 @@ class _Line:
         return cls(starts, ends)
 
     @property
-    def length_px(self) -> float:
-        return float(np.hypot(*(self.ends - self.starts).T).sum())
-
-    @property
-    def quarter_turns(self) -> float:
+    def ways_and_bends(self) -> tuple[Points, Points]:
+        """Lengths [pixels], (m,), and the turns between them [deg], (m - 1,)."""
         way = self.ends - self.starts
-        way = way[np.hypot(*way.T) > 0]
-        turned = np.diff(np.arctan2(way[:, 1], way[:, 0]))
-        return float(np.abs((turned + np.pi) % (2 * np.pi) - np.pi).sum() / (np.pi / 2))
+        lengths = np.hypot(*way.T)
+        way = way[lengths > 0]
+        turned = np.diff(np.degrees(np.arctan2(way[:, 1], way[:, 0])))
+        return lengths[lengths > 0], np.abs((turned + 180.0) % 360.0 - 180.0)
 
     def pieces(self, most_px: float, together: int) -> Iterator[tuple[Points, Points]]:
         """Yield start and end, (k, 2), of pieces of at most ``most_px``, some at a time."""
@@ -335,8 +336,11 @@ def _figures(floor: _Floor, line: _Line, reachable: Mask, swept: Mask) -> FloorF
         int(np.count_nonzero(mask)) * pixel_m * pixel_m for mask in (reachable, swept)
     )
     left_m2 = Patches.of(reachable & ~swept).pixels * pixel_m * pixel_m
-    length_m, quarters = line.length_px * pixel_m, line.quarter_turns
+    ways_px, bends_deg = line.ways_and_bends
+    length_m, quarters = float(ways_px.sum()) * pixel_m, float(bends_deg.sum()) / 90.0
     seconds = length_m / robot.speed_m_s + quarters * robot.turn_s
+    if robot.limits is not None:
+        seconds = drive_seconds(ways_px * pixel_m, bends_deg, robot.speed_m_s, robot.limits)
     return FloorFigures(
         reachable_m2=reachable_m2,
         swept_m2=swept_m2,

@@ -210,6 +210,7 @@ def figures_of(
         "unreachable_cells": int(np.count_nonzero(problem.unreachable)),
         "speed_m_s": args.speed_m_s,
         "turn_s": args.turn_s,
+        "turn_deg_s": args.turn_deg_s,
         "budget_s": args.budget,
         "target_gap": args.target_gap,
         "threads": args.threads,

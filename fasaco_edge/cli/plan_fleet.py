@@ -133,6 +133,7 @@ def _figures(
         "rounds": division.rounds,
         "speed_m_s": args.speed_m_s,
         "turn_s": args.turn_s,
+        "turn_deg_s": args.turn_deg_s,
         "budget_s": args.budget,
         "threads": args.threads,
     }

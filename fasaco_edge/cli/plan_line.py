@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.bench.drive_time import DriveLimits
 from fasaco_edge.bench.floor import (
     FloorFigures,
     JudgedFloor,
@@ -21,7 +22,7 @@ from fasaco_edge.bench.floor import (
     judge_floor,
     swept_words,
 )
-from fasaco_edge.cli.plan_options import ANYWHERE, AXES, HOME, WALLS
+from fasaco_edge.cli.plan_options import ANYWHERE, AXES, HOME, WALLS, turning
 from fasaco_edge.errors import EndBlocked, MapTooFar, MapTooLarge
 
 if TYPE_CHECKING:
@@ -117,7 +118,7 @@ class Ground:
 
         if self.floor is None or self.stands is None:
             return line_through(self.lattice, walk)
-        config = replace(LINES[args.line], speed_m_s=args.speed_m_s, quarter_turn_s=args.turn_s)
+        config = replace(LINES[args.line], speed_m_s=args.speed_m_s, turning=turning(args))
         return line_over(walk, self.stands, self.floor, config, is_end_fixed=ends).xy
 
 
@@ -179,7 +180,12 @@ def judged_floor(
     """
     if grid is None:
         return None
-    robot = SweepingRobot(args.cell, args.robot_radius, args.speed_m_s, args.turn_s)
+    limits = None
+    if args.turn_deg_s is not None:
+        limits = DriveLimits(
+            args.acceleration_m_s2, args.turn_deg_s, args.turn_deg_s2, args.steered_deg
+        )
+    robot = SweepingRobot(args.cell, args.robot_radius, args.speed_m_s, args.turn_s, limits=limits)
     return judge_floor(grid, line_xy, robot)
 
 

@@ -13,7 +13,14 @@ from fasaco_edge.cli.console.arguments import (
     pair_of_floats,
     pair_of_ints,
 )
+from fasaco_edge.config.config import RobotConfig
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.kernels.floor.turning import (
+    Turning,
+    limited_turning,
+    proportional_turning,
+    turn_seconds,
+)
 from fasaco_edge.planners.colony import VISIBILITIES
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
 from fasaco_edge.simulation.robot import SimulationConfig
@@ -112,6 +119,23 @@ def check(args: argparse.Namespace) -> None:
         _require(0.0 <= args.target_gap <= 10.0, "--target-gap", "be in [0, 10]", args.target_gap)
 
 
+def turning(args: argparse.Namespace) -> Turning:
+    """Return what turns on the spot take.
+
+    Raises:
+        BadConfiguration: a limit is impossible.
+    """
+    if args.turn_deg_s is None:
+        return proportional_turning(args.turn_s)
+    rate, rise, acceleration = args.turn_deg_s, args.turn_deg_s2, args.acceleration_m_s2
+    _require(1.0 <= rate <= 1e3, "--turn-deg-s", "be in [1, 1000] deg/s", rate)
+    _require(1.0 <= rise <= 1e5, "--turn-deg-s2", "be in [1, 100000] deg/s2", rise)
+    allowed = "be in [0.01, 100] m/s2"
+    _require(0.01 <= acceleration <= 100.0, "--acceleration-m-s2", allowed, acceleration)
+    _require(0.0 <= args.steered_deg <= 45.0, "--steered-deg", "be in [0, 45]", args.steered_deg)
+    return limited_turning(rate, rise, args.speed_m_s, acceleration, args.steered_deg)
+
+
 def settle(args: argparse.Namespace) -> None:
     """Fill in the defaults that depend on whether local search is used."""
     has_local_search = bool(PLANNERS[args.planner].with_local_search)
@@ -120,7 +144,11 @@ def settle(args: argparse.Namespace) -> None:
         args.q0 = SEARCH_Q0 if args.local_search else PAPER_Q0
     if args.visibility is None:
         args.visibility = SEARCH_VISIBILITY if args.local_search else PAPER_VISIBILITY
-    if args.turn_s is None:
+    if args.turn_deg_s is not None:
+        if args.turn_s is not None:
+            raise BadConfiguration("--turn-s and --turn-deg-s cannot both be given")
+        args.turn_s = turn_seconds(turning(args), 0.5 * math.pi)
+    elif args.turn_s is None:
         args.turn_s = 0.0 if args.line == CELLS else TURN_S
     if args.overlap is None:
         args.overlap = OVERLAP
@@ -199,6 +227,35 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         metavar="S",
         help="time of a quarter-turn on the spot [s]; 0 minimises steps, as the paper does "
         f"(default: 0; {TURN_S:g} for a line over the floor)",
+    )
+    robot = RobotConfig()
+    group.add_argument(
+        "--turn-deg-s",
+        type=float,
+        metavar="W",
+        help="in place of --turn-s: the rate of turning on the spot [deg/s]; smaller bends then "
+        "take less, and each of them braking and starting",
+    )
+    group.add_argument(
+        "--turn-deg-s2",
+        type=float,
+        default=robot.turn_deg_s2,
+        metavar="A",
+        help="its acceleration (default: %(default)s)",
+    )
+    group.add_argument(
+        "--acceleration-m-s2",
+        type=float,
+        default=robot.acceleration_m_s2,
+        metavar="A",
+        help="of driving (default: %(default)s)",
+    )
+    group.add_argument(
+        "--steered-deg",
+        type=float,
+        default=robot.steered_deg,
+        metavar="DEG",
+        help="a bend up to this is steered while driving (default: %(default)s)",
     )
 
 

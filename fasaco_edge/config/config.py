@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -24,6 +25,12 @@ from fasaco_edge.config.reading import (
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import SecurityConfig, security_faults
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.kernels.floor.turning import (
+    Turning,
+    limited_turning,
+    proportional_turning,
+    turn_seconds,
+)
 from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.cost import CoverageCost
@@ -46,8 +53,10 @@ class RobotConfig(Section, frozen=True):
     """The robot: its name on the bus, its size [m], and what driving takes it.
 
     ``quarter_turn_s`` is a turn by 90 degrees on the spot [s], braking and starting
-    included; 0 minimises steps, whatever the turns. ``overlap`` is by what share of the
-    tool's width lanes overlap where a line is driven (``planner.line``).
+    included; 0 minimises steps, whatever the turns. Where ``turn_deg_s`` is given, the
+    robot's limits count in its place: the rate of turning [deg/s], its acceleration [deg/s2], that
+    of driving [m/s2], and the largest bend that is steered while driving [deg]. ``overlap`` is by
+    what share of the tool's width lanes overlap where a line is driven (``planner.line``).
     """
 
     name: str = "robot"
@@ -55,6 +64,10 @@ class RobotConfig(Section, frozen=True):
     tool_width_m: Metres = 0.3
     speed_m_s: Annotated[float, Meta(gt=0, le=10)] = 0.25
     quarter_turn_s: Annotated[float, Meta(ge=0, le=600)] = 1.5
+    turn_deg_s: Annotated[float, Meta(ge=1, le=1000)] | None = None
+    turn_deg_s2: Annotated[float, Meta(ge=1, le=100_000)] = 180.0
+    acceleration_m_s2: Annotated[float, Meta(ge=0.01, le=100)] = 0.5
+    steered_deg: Annotated[float, Meta(ge=0, le=45)] = 1.0
     overlap: Annotated[float, Meta(ge=0, le=0.5)] = 0.08
 
     def cost(self, cell_m: float | None = None) -> CoverageCost:
@@ -64,7 +77,20 @@ class RobotConfig(Section, frozen=True):
             BadConfiguration: a step would take less than a millisecond or more than an hour.
         """
         step_m = self.tool_width_m if cell_m is None else cell_m
-        return CoverageCost.for_robot(step_m, self.speed_m_s, self.quarter_turn_s)
+        quarter_turn_s = turn_seconds(self.turning(), 0.5 * math.pi)
+        return CoverageCost.for_robot(step_m, self.speed_m_s, quarter_turn_s)
+
+    def turning(self) -> Turning:
+        """Return what turns on the spot take."""
+        if self.turn_deg_s is None:
+            return proportional_turning(self.quarter_turn_s)
+        return limited_turning(
+            self.turn_deg_s,
+            self.turn_deg_s2,
+            self.speed_m_s,
+            self.acceleration_m_s2,
+            self.steered_deg,
+        )
 
 
 class BusConfig(Section, frozen=True):

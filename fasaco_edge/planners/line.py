@@ -1,7 +1,7 @@
 """The driven line: a walk over stands, polished against the floor that it sweeps.
 
 What is minimised is seconds to drive plus a price for each reachable square metre that is left
-unswept. Lengths count at the robot's speed, turns of any angle at the time of a quarter-turn.
+unswept. Lengths count at the robot's speed, turns at what their angle takes it.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from fasaco_edge.kernels.floor.capsule import (
 )
 from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
 from fasaco_edge.kernels.floor.polish import polish
+from fasaco_edge.kernels.floor.turning import Turning, proportional_turning
 
 # What is left further from an edge is no reason for a detour of that edge [m].
 FARTHEST_M = 1.0
@@ -39,6 +40,8 @@ DESCENT_SHARE, PATCH_SHARE = 0.08, 0.12
 MOST_A_POINT = 2000
 # From the hottest temperature to none.
 COOLED = (1.0, 0.0)
+# What turns take, where nobody says.
+TURNING = proportional_turning(1.5)
 # Seed of the random moves.
 SEED = 0x9E3779B97F4A7C15
 
@@ -50,14 +53,14 @@ class LineConfig:
     Attributes:
         price_s_m2: what sweeping a square metre is worth [s/m2]; 0 for no polish.
         speed_m_s: of the robot [m/s].
-        quarter_turn_s: a turn by 90 degrees on the spot [s].
+        turning: what turns on the spot take.
         moves_m2: at most so many moves are tried for each reachable square metre.
         patch_s: a patch is swept at the end where that takes no longer than this [s].
     """
 
     price_s_m2: float = 200.0
     speed_m_s: float = 0.25
-    quarter_turn_s: float = 1.5
+    turning: Turning = TURNING
     moves_m2: int = 5000
     patch_s: float = 20.0
 
@@ -65,7 +68,7 @@ class LineConfig:
         """Return the prices on a raster of pixels ``unit_m`` wide [m]."""
         return kernel.Price(
             drive_s=unit_m / self.speed_m_s,
-            turn_s=self.quarter_turn_s / (0.5 * math.pi),
+            turning=self.turning,
             left_s=self.price_s_m2 * unit_m * unit_m,
         )
 

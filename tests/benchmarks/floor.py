@@ -83,6 +83,7 @@ def plan(building: str, truth: OccupancyGrid, start: tuple[float, float], case: 
     from fasaco_edge.grid.fine_raster import RobotDiscs
     from fasaco_edge.grid.floor import Floor, StandLattice
     from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+    from fasaco_edge.kernels.floor.turning import proportional_turning
     from fasaco_edge.planners.cost import CoverageCost
     from fasaco_edge.planners.line import LINES, line_over
     from fasaco_edge.planners.near_optimal import NearOptimal
@@ -102,7 +103,7 @@ def plan(building: str, truth: OccupancyGrid, start: tuple[float, float], case: 
     cost = CoverageCost.for_robot(cell_m, SPEED_M_S, TURN_S)
     problem = CoverageProblem.of(stands.lattice, stands.start_cell(floor), cost=cost)
     path = NearOptimal().plan(problem, limit)
-    config = replace(LINES[case], speed_m_s=SPEED_M_S, quarter_turn_s=TURN_S)
+    config = replace(LINES[case], speed_m_s=SPEED_M_S, turning=proportional_turning(TURN_S))
     began = time.process_time()
     line = line_over(path.cells, stands, floor, config, is_end_fixed=False)
     ms = 1e3 * (time.process_time() - began)
@@ -115,6 +116,7 @@ def drive(building: str, truth: OccupancyGrid, start: tuple[float, float], case:
 
     from fasaco_edge.grid.geometry import Pose2D
     from fasaco_edge.grid.lattice import Footprint
+    from fasaco_edge.kernels.floor.turning import proportional_turning
     from fasaco_edge.mission.config import Sweeping
     from fasaco_edge.mission.core.events import MapReceived, PlanReady, PoseReceived, State
     from fasaco_edge.mission.core.mission import Mission, MissionConfig
@@ -128,7 +130,7 @@ def drive(building: str, truth: OccupancyGrid, start: tuple[float, float], case:
     simulated = SimulationConfig(speed_m_s=SPEED_M_S, robot_radius_m=RADIUS_M, padding_m=0.01)
     world = World(truth, Pose2D(*start), simulated)
     cell_m = TOOL_M * (1.0 - OVERLAP)
-    line = replace(LINES[THOROUGH], speed_m_s=SPEED_M_S, quarter_turn_s=TURN_S)
+    line = replace(LINES[THOROUGH], speed_m_s=SPEED_M_S, turning=proportional_turning(TURN_S))
     cost = CoverageCost.for_robot(cell_m, SPEED_M_S, TURN_S)
     sweeping = Sweeping(TOOL_M, 25_000_000, line)
     mission = Mission(MissionConfig(Footprint(cell_m, RADIUS_M), cost=cost, sweeping=sweeping))

@@ -127,6 +127,10 @@ def test_what_is_in_order_is_shown_as_it_is_in_force(check, capsys):
         "tool_width_m": 0.3,
         "speed_m_s": 0.25,
         "quarter_turn_s": 1.5,
+        "turn_deg_s": None,
+        "turn_deg_s2": 180.0,
+        "acceleration_m_s2": 0.5,
+        "steered_deg": 1.0,
         "overlap": 0.08,
     }
     assert "secret" not in json.dumps(told["config"])

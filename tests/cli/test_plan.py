@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from fasaco_edge.bench.drive_time import DriveLimits, drive_seconds
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
@@ -49,7 +50,7 @@ KEYS = {
         "first_walk_ms",
     ),
     *("unreachable_cells", "wall_s", "cpu_s", "ended_by"),
-    *("speed_m_s", "turn_s", "budget_s", "target_gap", "threads", "floor"),
+    *("speed_m_s", "turn_s", "turn_deg_s", "budget_s", "target_gap", "threads", "floor"),
 }
 
 
@@ -365,6 +366,45 @@ def test_turns_cost_what_they_take(plan, grid_file):
     # As the simulated robot drives where nobody says.
     assert SimulationConfig().speed_m_s == 0.25
     assert turning["turns_90"] < plain["turns_90"]
+
+
+def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
+    limits = DriveLimits(0.5, 100.0, 180.0)
+    took_s, stops = [], []
+    # A quarter-turn takes both the same.
+    for turn in (("--turn-s", "1.956"), ("--turn-deg-s", "100")):
+        csv = tmp_path / "line.csv"
+        words = ["office", "--line", "quick", *turn, "--xy-out", str(csv), "--json"]
+        assert main(["plan", *words]) == 0
+        figures = json.loads(capsys.readouterr().out)
+        assert figures["turn_s"] == pytest.approx(1.956, abs=5e-4)
+        ways = np.diff(np.loadtxt(csv, delimiter=",", skiprows=1), axis=0)
+        headings = np.degrees(np.arctan2(ways[:, 1], ways[:, 0]))
+        bends = np.abs((np.diff(headings) + 180.0) % 360.0 - 180.0)
+        took_s.append(drive_seconds(np.hypot(*ways.T), bends, 0.25, limits))
+        stops.append(np.count_nonzero(bends > limits.steered_deg))
+        assert figures["floor"]["swept_share"] > 0.93
+    swept_s = figures["floor"]["seconds_per_m2"] * figures["floor"]["swept_share"]
+    assert swept_s * figures["floor"]["reachable_m2"] == pytest.approx(took_s[1], rel=0.01)
+    assert took_s[1] < 0.97 * took_s[0]
+    assert stops[1] < 0.8 * stops[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--turn-deg-s", "0"], "--turn-deg-s must be in [1, 1000] deg/s, got 0.0"),
+        (["--turn-deg-s", "nan"], "--turn-deg-s must be in [1, 1000] deg/s, got nan"),
+        (["--turn-deg-s", "90", "--turn-deg-s2", "0"], "--turn-deg-s2 must be in [1, 100000]"),
+        (["--turn-deg-s", "90", "--acceleration-m-s2", "0"], "--acceleration-m-s2 must be in"),
+        (["--turn-deg-s", "90", "--steered-deg", "90"], "--steered-deg must be in [0, 45]"),
+        (["--turn-deg-s", "90", "--turn-s", "1"], "--turn-s and --turn-deg-s"),
+        (["--turn-deg-s", "90", "--speed-m-s", "-1"], "--speed-m-s must be in (0, 10] m/s"),
+    ],
+)
+def test_impossible_limits_of_turning_are_refused(capsys, words, said):
+    assert main(["plan", "office", "--line", "quick", *words]) == Exit.CONFIG
+    assert said in capsys.readouterr().err
 
 
 def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 
 import numpy as np
@@ -14,11 +13,18 @@ from fasaco_edge.kernels.floor.bits import packed
 from fasaco_edge.kernels.floor.capsule import NEVER, Sweeps, sweep
 from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
 from fasaco_edge.kernels.floor.polish import polish
+from fasaco_edge.kernels.floor.turning import (
+    Turning,
+    limited_turning,
+    proportional_turning,
+    turn_seconds,
+)
 from fasaco_edge.planners.line import linked, memory_for_moves, numbers_along
 
 ROWS, COLS = 72, 96
 ROBOT, TOOL = 7.2, 6.0
-PRICE = kernel.Price(drive_s=0.1, turn_s=1.5 / (0.5 * math.pi), left_s=0.11)
+# By their angle; and by limits, which make each bend a stop.
+TURNINGS = proportional_turning(1.5), limited_turning(100.0, 180.0, 0.25, 0.5, 1.0)
 # Three lanes, and one that leaves much beside it.
 WAY = [(10, 10), (10, 85), (20, 85), (20, 10), (30, 10), (30, 85), (37, 10), (62, 10)]
 
@@ -26,7 +32,8 @@ WAY = [(10, 10), (10, 85), (20, 85), (20, 10), (30, 10), (30, 85), (37, 10), (62
 class Room:
     """A room with a pillar, and lanes through it."""
 
-    def __init__(self, *, is_end_fixed: bool = False) -> None:
+    def __init__(self, turning: Turning = TURNINGS[0], *, is_end_fixed: bool = False) -> None:
+        self.price = kernel.Price(drive_s=0.1, turning=turning, left_s=0.11)
         free = np.zeros((ROWS, COLS), np.bool_)
         free[2:-2, 2:-2] = True
         free[50:54, 60:64] = False
@@ -52,8 +59,9 @@ class Room:
         headings = np.arctan2(way[:, 0], way[:, 1])
         turns = np.abs((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi)
         left = int(np.count_nonzero(self.floor.sweeps.counts == 0))
-        driven_s = PRICE.drive_s * np.hypot(*way.T).sum() + PRICE.turn_s * turns.sum()
-        return float(driven_s + PRICE.left_s * left)
+        turns_s = sum(turn_seconds(self.price.turning, turn) for turn in turns.tolist())
+        driven_s = self.price.drive_s * np.hypot(*way.T).sum() + turns_s
+        return float(driven_s + self.price.left_s * left)
 
     def recounted(self) -> Sweeps:
         """Return what the line sweeps, counted anew."""
@@ -65,7 +73,7 @@ class Room:
         return Sweeps(counts, left)
 
     def run(self, stage: str, most: int = 4000) -> float:
-        args = self.line, self.floor, PRICE, self.memory
+        args = self.line, self.floor, self.price, self.memory
         if stage == "polish":
             return polish(*args, 40.0, most)
         if stage == "anneal":
@@ -75,9 +83,10 @@ class Room:
         return before - self.cost_s()
 
 
+@pytest.mark.parametrize("turning", TURNINGS)
 @pytest.mark.parametrize("stage", ["polish", "anneal", "patches"])
-def test_what_is_gained_is_what_a_slow_count_shows(stage):
-    room = Room()
+def test_what_is_gained_is_what_a_slow_count_shows(stage, turning):
+    room = Room(turning)
     before = room.cost_s()
     gained = room.run(stage)
     assert gained > 1.0

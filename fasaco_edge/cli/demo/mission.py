@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import signal
 import socket
@@ -23,6 +24,7 @@ from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.errors import BusUnavailable, ProcessEnded
 from fasaco_edge.grid.map_files import find_map
 from fasaco_edge.host.processes import python_program
+from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.watch import phrases
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_tolerant
@@ -152,8 +154,16 @@ class DemoMission:
         )
 
     def _config(self) -> dict[str, object]:
+        simulated = SimulationConfig()
         return {
-            "robot": {"radius_m": self._args.robot_radius, "tool_width_m": self._args.cell},
+            "robot": {
+                "radius_m": self._args.robot_radius,
+                "tool_width_m": self._args.cell,
+                "speed_m_s": simulated.speed_m_s,
+                "turn_deg_s": math.degrees(simulated.turn_rad_s),
+                "turn_deg_s2": math.degrees(simulated.turn_acceleration_rad_s2),
+                "acceleration_m_s2": simulated.acceleration_m_s2,
+            },
             "bus": {"listen": [self._endpoint]},
             "planner": {"seed": self._args.seed, "line": self._args.line},
         }

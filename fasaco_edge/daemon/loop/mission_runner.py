@@ -321,5 +321,5 @@ def _sweeping(config: DaemonConfig) -> Sweeping | None:
     robot, line = config.robot, LINES.get(config.planner.line)
     if line is None:
         return None
-    line = replace(line, speed_m_s=robot.speed_m_s, quarter_turn_s=robot.quarter_turn_s)
+    line = replace(line, speed_m_s=robot.speed_m_s, turning=robot.turning())
     return Sweeping(robot.tool_width_m, floor_pixels(config.map.max_pixels), line)

@@ -21,6 +21,7 @@ from fasaco_edge.kernels.floor.capsule import (
     swept_more,
 )
 from fasaco_edge.kernels.floor.seconds import chain_s
+from fasaco_edge.kernels.floor.turning import Turning
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 # A move that gains less is not made [s]: sums of floats must not go in circles.
@@ -80,10 +81,10 @@ class Floor(NamedTuple):
 
 
 class Price(NamedTuple):
-    """What is weighed: seconds for a pixel driven, a radian turned, a pixel left unswept."""
+    """What is weighed: seconds for a pixel driven, for turns, for a pixel left unswept."""
 
     drive_s: float
-    turn_s: float
+    turning: Turning
     left_s: float
 
 
@@ -231,8 +232,8 @@ def gain_above(
     if not olds:
         return -np.inf
     old, new, tool = memory.before, memory.after, floor.tool
-    longer_s = chain_s(new, lead, last_new, news, price.drive_s, price.turn_s)
-    longer_s -= chain_s(old, lead, last_old, olds, price.drive_s, price.turn_s)
+    longer_s = chain_s(new, lead, last_new, news, price.drive_s, price.turning)
+    longer_s -= chain_s(old, lead, last_old, olds, price.drive_s, price.turning)
     least_more = (longer_s + least_s) / price.left_s
     most_more = _left_around(floor.sweeps.left, new, lead, last_new, tool)
     if most_more < least_more or not _is_way(floor, new, lead, last_new):

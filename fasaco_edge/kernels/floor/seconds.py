@@ -3,7 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.kernels.floor.turning import Turning, turn_seconds
 from fasaco_edge.kernels.jit import inlined, lean_kernel
+
+_turn_s = inlined(turn_seconds)
 
 
 @inlined
@@ -40,7 +43,12 @@ def turn_between(uy: float, ux: float, vy: float, vx: float) -> float:
 
 @lean_kernel
 def chain_s(
-    points: NDArray[np.float64], first: int, last: int, count: int, drive_s: float, turn_s: float
+    points: NDArray[np.float64],
+    first: int,
+    last: int,
+    count: int,
+    drive_s: float,
+    turning: Turning,
 ) -> float:
     """Return the seconds of a chain: its edges from ``first`` to ``last``, all its turns.
 
@@ -48,7 +56,8 @@ def chain_s(
         points: float64 (count or more, 2): y, x [pixels].
         first, last: points.
         count: of points.
-        drive_s, turn_s: for a pixel driven, and a radian turned [s].
+        drive_s: for a pixel driven [s].
+        turning: what turns take.
     """
     seconds = 0.0
     for number in range(first, last):
@@ -56,10 +65,11 @@ def chain_s(
         dx = points[number + 1, 1] - points[number, 1]
         seconds += drive_s * np.sqrt(dy * dy + dx * dx)
     for number in range(1, count - 1):
-        seconds += turn_s * turn_between(
+        angle = turn_between(
             points[number, 0] - points[number - 1, 0],
             points[number, 1] - points[number - 1, 1],
             points[number + 1, 0] - points[number, 0],
             points[number + 1, 1] - points[number, 1],
         )
+        seconds += _turn_s(turning, angle)
     return seconds

@@ -1,0 +1,70 @@
+"""Drive times by limits, beside a robot that is simulated tick by tick."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fasaco_edge.bench.drive_time import DriveLimits, drive_seconds
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.kernels.floor.turning import limited_turning, turn_seconds
+from fasaco_edge.simulation.robot import ARRIVED_M, DriveState, SimulationConfig, driven
+
+CONFIG = SimulationConfig(tick_s=0.001)
+LIMITS = DriveLimits(
+    CONFIG.acceleration_m_s2,
+    math.degrees(CONFIG.turn_rad_s),
+    math.degrees(CONFIG.turn_acceleration_rad_s2),
+)
+
+
+def simulated_s(points):
+    """Drive through points (n, 2), from rest at the first, in the direction of the second."""
+    (x, y), (to_x, to_y) = points[:2]
+    state = DriveState(Pose2D(x, y, math.atan2(to_y - y, to_x - x)))
+    ticks = 0
+    for goal in points[1:]:
+        while math.dist((state.pose.x, state.pose.y), goal) > ARRIVED_M or state.speed > 0.0:
+            state = driven(state, goal, CONFIG)
+            ticks += 1
+    return ticks * CONFIG.tick_s
+
+
+def expected_s(points):
+    ways = np.diff(points, axis=0)
+    headings = np.degrees(np.arctan2(ways[:, 1], ways[:, 0]))
+    bends = np.abs((np.diff(headings) + 180.0) % 360.0 - 180.0)
+    return drive_seconds(np.hypot(*ways.T), bends, CONFIG.speed_m_s, LIMITS)
+
+
+@pytest.mark.parametrize("bend_deg", [10.0, 40.0, 90.0, 150.0])
+@pytest.mark.parametrize("way_m", [0.05, 1.0])
+def test_a_bend_takes_what_a_simulated_robot_takes(bend_deg, way_m):
+    bend = math.radians(bend_deg)
+    beyond = way_m * (1.0 + math.cos(bend)), way_m * math.sin(bend)
+    points = [(0.0, 0.0), (way_m, 0.0), beyond]
+    assert expected_s(points) == pytest.approx(simulated_s(points), rel=0.01, abs=0.03)
+
+
+def test_a_bend_that_is_steered_is_no_stop():
+    bent = drive_seconds(np.array([1.0, 1.0]), np.array([0.5]), 0.25, LIMITS)
+    assert bent == drive_seconds(np.array([2.0]), np.empty(0), 0.25, LIMITS)
+    assert drive_seconds(np.empty(0), np.empty(0), 0.25, LIMITS) == 0.0
+
+
+@pytest.mark.parametrize("bend_deg", [2.0, 30.0, 58.0, 90.0, 180.0])
+def test_what_the_planner_takes_a_turn_for_is_what_it_takes(bend_deg):
+    """On ways that are long enough to reach the speed; the judge and the planner share no code."""
+    turning = limited_turning(
+        LIMITS.turn_deg_s,
+        LIMITS.turn_deg_s2,
+        CONFIG.speed_m_s,
+        LIMITS.acceleration_m_s2,
+        LIMITS.steered_deg,
+    )
+    ways = np.array([1.0, 1.0])
+    bent = drive_seconds(ways, np.array([bend_deg]), CONFIG.speed_m_s, LIMITS)
+    straight = drive_seconds(ways, np.array([0.0]), CONFIG.speed_m_s, LIMITS)
+    assert turn_seconds(turning, math.radians(bend_deg)) == pytest.approx(bent - straight)
