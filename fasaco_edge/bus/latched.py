@@ -124,12 +124,12 @@ class LatchedSubscription(Subscription):
         questions: list[tuple[str, _Publisher | None]] = []
         self._query_tokens(now)
         with self._lock:
-            again = self._wants_again
-            if self._wants_all:
+            asks_all, again = self._wants_all, self._wants_again
+            if asks_all:
                 self._wants_all = self._wants_again = False
                 questions.append((f"{self._caches}?_max={self._depth}", None))
             for name, publisher in self._publishers.items():
-                if questions:
+                if asks_all:
                     # It is asked with all the others.
                     publisher.ask_at = now + ASK_PERIOD_S
                 elif now >= publisher.ask_at and not publisher.is_asked:
