@@ -6,6 +6,7 @@ TARGET_PYTHON ?= 3.11
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+WORKERS ?= $(shell expr 2 \* $$(nproc))
 # As images for containers set it, each of some hundred processes would compile all sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -17,9 +18,9 @@ demo: $(STAMP)  ## watch a robot cover a building nobody mapped before
 test: $(STAMP)  ## all tests
 	# Compiles once what each test would wait for.
 	$(BIN)/fasaco-edge warmup
-	# Most tests wait for processes and their timers, so four run at a time. In the order of
-	# collection: by default files with few tests, which take longest, would come last.
-	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(ARGS)
+	# Most tests wait for processes and their timers, so two per core run at a time. In the order
+	# of collection: by default files with few tests, which take longest, would come last.
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(ARGS)
 
 check: $(STAMP)  ## format, lint, types, import contracts
 	$(BIN)/ruff format --check .
