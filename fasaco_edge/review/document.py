@@ -110,7 +110,8 @@ class ReviewDocument(msgspec.Struct):
             robot drives through the centres of cells.
         coverage_from: source of the counts: `status` (the daemon) or `trail` (recorded poses and
             the last map, if the daemon's last recorded count is outdated).
-        reached_s: when 50, 90, 99 and 100 % of the cells coverable at the end were covered [s].
+        reached_s: when 50, 90, 99 and 100 % of the cells coverable at the end were covered [s];
+            by the statuses where a line over the floor is driven.
         steps: moves from cell to cell; a cell counts when the tool passes over its centre.
         revisits: visits of cells after each one's first.
         turns_90, turns_180: quarter-turns and about-turns between steps.

@@ -33,8 +33,7 @@ def covered_share(review: Review) -> Points:
     if review.drive is None or review.data.restored_cells:
         return review.known_fractions[:, 0], review.known_fractions[:, 1]
     count = len(review.first_s)
-    coverable = max(review.drive.coverage.coverable, 1)
-    return review.first_s, (np.arange(count) + 1.0) / coverable
+    return review.first_s, (np.arange(count) + 1.0) / max(review.first_of, 1)
 
 
 def replan_times(review: Review) -> Points:

@@ -43,7 +43,7 @@ from fasaco_edge.review.moments import (
     worst_moments,
 )
 from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_still_true
-from fasaco_edge.review.run_data import RunData, gather
+from fasaco_edge.review.run_data import RunData, first_counted, gather
 from fasaco_edge.wire.settings import known_settings
 
 # Progress is reported with each so many-th sample.
@@ -110,7 +110,9 @@ class Review:
         drive, walk: what the robot drove over it.
         floor: what of the reachable floor it swept; None without a drive, or where some was swept
             before.
-        first_s: float64 (n,), when each cell was first covered, ascending.
+        first_s: float64 (n,), when each cell was first covered, ascending; where a line over the
+            floor was driven, as the daemon counted: the track passes beside centres then.
+        first_of: how many cells could be covered at the end, by the same count.
         counts: of cells; None where that is not recorded.
         replans: plans after the first.
         states: of the mission, in order.
@@ -128,6 +130,7 @@ class Review:
     floor: JudgedFloor | None
     walk: WalkFigures | None
     first_s: NDArray[np.float64]
+    first_of: int
     counts: CoverageCounts | None
     replans: Replans
     states: tuple[Span, ...]
@@ -187,7 +190,7 @@ class Review:
         """When each of ``MILESTONES`` was reached [s]; None where that is not recorded."""
         if self.drive is None or self.data.restored_cells:
             return None
-        return milestones(self.first_s, self.drive.coverage.coverable)
+        return milestones(self.first_s, self.first_of)
 
     @property
     def orders(self) -> tuple[OrderChapter, ...]:
@@ -211,6 +214,8 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
     states = spans_of(_mission_states(data, record), end_s)
     replans = Replans.of(data.paths)
     fractions = record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
+    counts = _counts(data, drive, fractions)
+    first_s, first_of = _first_covered(data, drive, lattice, counts)
     return Review(
         record=record,
         data=data,
@@ -219,8 +224,9 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
         drive=drive,
         floor=floor,
         walk=walk_figures(drive.cells) if drive else None,
-        first_s=first_covered(drive, lattice) if drive and lattice else np.zeros(0),
-        counts=_counts(data, drive, fractions),
+        first_s=first_s,
+        first_of=first_of,
+        counts=counts,
         replans=replans,
         states=states,
         recorder_states=spans_of(
@@ -293,3 +299,21 @@ def _counts(
     return CoverageCounts(
         cover.covered, cover.coverable, cover.recovered, cover.unreachable, source="trail"
     )
+
+
+def _first_covered(
+    data: RunData,
+    drive: Drive | None,
+    lattice: CoverageLattice | None,
+    counts: CoverageCounts | None,
+) -> tuple[NDArray[np.float64], int]:
+    """Return when each cell was first covered [s], float64 (n,), and how many could be at the end.
+
+    A line over the floor covers cells beside whose centres it leads: only the daemon counted them.
+    """
+    is_line = known_settings(data.config).planner.line != "cells"
+    if is_line and counts is not None and counts.source == "status":
+        return first_counted(data.statuses), counts.coverable
+    if drive is None or lattice is None:
+        return np.zeros(0), 0
+    return first_covered(drive, lattice), drive.coverage.coverable

@@ -176,6 +176,18 @@ class RunData:
         return np.array(self.poses, np.float64).reshape(-1, 3)
 
 
+def first_counted(statuses: Iterable[StatusSample]) -> NDArray[np.float64]:
+    """Return when the daemon had counted each number of covered cells, float64 (n,) [s], rising.
+
+    To within the time between two statuses.
+    """
+    at_s: list[float] = []
+    for each in statuses:
+        if (coverage := each.status.coverage) is not None:
+            at_s += [each.at_s] * (coverage.covered - len(at_s))
+    return np.array(at_s, np.float64)
+
+
 def gather(samples: Iterable[Arrival], began_ns: int) -> RunData:
     """Return the data of ``samples``, in order; one that cannot be decoded is only counted."""
     reader = _SampleReader(RunData(), began_ns)

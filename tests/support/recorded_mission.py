@@ -68,12 +68,16 @@ def is_done(status: dict) -> bool:
 
 
 def record_mission(
-    folder: Path, name: str = "runs", ends=is_done, *, broken_poses: int = 0
+    folder: Path, name: str = "runs", ends=is_done, *, broken_poses: int = 0, line: str = "cells"
 ) -> Recording:
-    """Record a mission from its first map until a status ends it; some poses may be none."""
+    """Record a mission from its first map until a status ends it; some poses may be none.
+
+    ``line`` is the daemon's ``planner.line``.
+    """
     runs = folder / name
+    planner = {"budget_s": 0.05, "line": line}
     warm_up()  # so that the daemon need not compile while the robot waits
-    with daemon_process(folder, "--record", str(runs), planner={"budget_s": 0.05}) as daemon:
+    with daemon_process(folder, "--record", str(runs), planner=planner) as daemon:
         deadline = time.monotonic() + TIMEOUT_S
         while (bus := _joined(daemon.endpoint)) is None:
             assert time.monotonic() < deadline, daemon.log_text()
