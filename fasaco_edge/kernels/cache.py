@@ -102,7 +102,7 @@ def own_folder() -> Path | None:
         folder = _fresh_folder()
     if reasons and reasons[0] not in _WARNED:
         _WARNED.add(reasons[0])
-        kept = f"kept in {folder}" if folder else "not kept, each process compiles them anew"
+        kept = f"kept in {folder}" if folder else "not kept, each process compiles its own"
         LOG.warning("%s: compiled kernels are %s", reasons[0], kept)
     return folder
 

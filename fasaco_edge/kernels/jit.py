@@ -83,7 +83,7 @@ class CacheFaults:
     def cannot_keep(self, file: Path, error: OSError) -> None:
         """Log that nothing is kept."""
         self.failure = f"{file.parent} cannot be written: {error.strerror}"
-        self._log("keep", f"{self.failure}: each process compiles its kernels anew")
+        self._log("keep", f"{self.failure}: each process compiles its own kernels")
 
     def _log(self, about: str, text: str) -> None:
         LOG.log(logging.DEBUG if about in self._logged else logging.WARNING, "%s", text)
@@ -136,7 +136,7 @@ class _KernelCache:
             return
         file = folder / self._file_name(signature, *result.codegen.magic_tuple())
         try:
-            # Without the annotated source, which nobody reads here: a fifth of all files, and
+            # Without the annotated source, which is not used here: a fifth of all files, and
             # addresses in it, that differ from one process to the next.
             plain = result._replace(type_annotation="")
             write_sealed(file, dumps((signature, plain._reduce())))

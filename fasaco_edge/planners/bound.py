@@ -14,13 +14,8 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.bound.covering import covering_bound
-from fasaco_edge.kernels.bound.turns import (
-    ALONG_COLS,
-    ALONG_ROWS,
-    ascend,
-    first_prices,
-    lines_of,
-)
+from fasaco_edge.kernels.bound.lines import ALONG_COLS, ALONG_ROWS, first_prices, lines_of
+from fasaco_edge.kernels.bound.turns import ascend
 from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.cost import MICROSECONDS
 from fasaco_edge.planners.problem import CoverageProblem

@@ -220,7 +220,7 @@ def test_where_nothing_can_be_kept_kernels_are_compiled_all_the_same(installed):
     told = installed.tell(before=nowhere)
     assert (told.loaded, told.compiled, told.folder) == (0, 2, None)
     (warning,) = told.warnings
-    assert warning.endswith("compiled kernels are not kept, each process compiles them anew")
+    assert warning.endswith("compiled kernels are not kept, each process compiles its own")
 
 
 def test_two_who_compile_at_once_do_not_disturb_each_other(installed):
@@ -267,7 +267,7 @@ print(__import__("json").dumps(["", "", *[0, 0], seven.said, None]))
 """
     told = installed.tell(fill, words=disk)
     (warning,) = told.warnings
-    assert "No space left on device: each process compiles its kernels anew" in warning
+    assert "No space left on device: each process compiles its own kernels" in warning
     assert (installed.root / "left").read_text() == "[]\n"
 
 

@@ -1,7 +1,7 @@
 """The graph that walks are built on cell by cell, and the way out of their dead ends.
 
 Cells are flat indices ``row * cols + col``; n of them. A walk is an int32 array
-with a count beside it; where the array is too short the count goes on and nothing
+with a count beside it; where the array is too short the count continues and nothing
 is written, so that the caller can pass a longer one and ask again.
 """
 

@@ -15,145 +15,23 @@ to cover; and the last visit. That is the cheapest one of a given end, else it t
 a passage of the cell where that saves most: a best walk ends in a cell to cover, at its first
 visit.
 
-*Exactly feasible prices.* Along a line of cells the price of a step may fall by one step's cost
-from one to the next, or passing straight on were too cheap: pooling adjacent violators (isotonic
-regression) projects onto that. Corners and ways back are satisfied if what a side is paid stays
-within a box, one for the two sides along the row and one along the column, that add up to the
-cost of a corner. So the prices after every iteration give a valid bound; the best one counts.
+The prices after every iteration are exactly feasible (``kernels.bound.feasible``) and give a valid
+bound; the best one counts.
 
 All amounts are whole half microseconds: halves of steps, and sums that do not depend on order.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels import EAST, NORTH
-from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
-
-NO_SIDE = 1 << 60
+from fasaco_edge.kernels.bound.feasible import NO_SIDE, make_feasible
+from fasaco_edge.kernels.bound.lines import ALONG_COLS, ALONG_ROWS, Lines, StepPrices
+from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 # Of 256: what is kept of the running mean of directions, and what a new one adds. Trials on
 # grids of 170 to 9,000 cells: 230 is slower at first, 160 no better at last.
 KEPT, ADDED = 200, 56
 UNIT = 256
-
-ALONG_ROWS, ALONG_COLS = 0, 1
-
-
-class Lines(NamedTuple):
-    """Cells numbered along rows and along columns: lines of cells are runs of numbers.
-
-    Attributes:
-        sides: uint8 (m,), step masks, in the order of the rows.
-        rank: int32 (m,), number of each of them in the order of the columns.
-        links: uint8 (2, m), 1 where a step leads to the next cell: along rows, along columns.
-        wanted: uint8 (m,), 1 for cells with a passage to pay: those to cover, but for the
-            start and a given end.
-        start, end: numbers of cells; end -1 for anywhere.
-    """
-
-    sides: NDArray[np.uint8]
-    rank: NDArray[np.int32]
-    links: NDArray[np.uint8]
-    wanted: NDArray[np.uint8]
-    start: int
-    end: int
-
-
-class StepPrices(NamedTuple):
-    """Prices of the steps to the next cell: the cell pays them, the next one is paid.
-
-    All arrays are int64 (2, m): along rows, along columns, in their order.
-
-    Attributes:
-        price: in force [half us].
-        best: those of the best bound so far.
-        trend: running mean of the directions of ascent [1 / 256].
-        use: how much oftener cells pay a price than are paid it, in the cheapest passages;
-            before that is known, working memory.
-        box: what a side may be paid at most [half us].
-    """
-
-    price: NDArray[np.int64]
-    best: NDArray[np.int64]
-    trend: NDArray[np.int64]
-    use: NDArray[np.int64]
-    box: NDArray[np.int64]
-
-
-@kernel
-def lines_of(
-    steps: NDArray[np.uint8],
-    required: NDArray[np.uint8],
-    reached: NDArray[np.uint8],
-    start: int,
-    end: int,
-) -> Lines:
-    """Number the cells that can be reached.
-
-    Args:
-        steps: step masks, uint8 (rows, cols); symmetric.
-        required, reached: uint8 (rows, cols), 1 for cells to visit, and that can be reached.
-        start, end: flat cells that can be reached; end -1 for anywhere.
-    """
-    rows, cols = steps.shape
-    number = np.full((rows, cols), -1, np.int32)
-    count = 0
-    for row in range(rows):
-        for col in range(cols):
-            if reached[row, col]:
-                number[row, col] = count
-                count += 1
-    sides, wanted = np.empty(count, np.uint8), np.empty(count, np.uint8)
-    rank, links = np.empty(count, np.int32), np.empty((2, count), np.uint8)
-    counted = 0
-    for col in range(cols):
-        for row in range(rows):
-            cell = number[row, col]
-            if cell >= 0:
-                mask = steps[row, col]
-                sides[cell], wanted[cell] = mask, required[row, col]
-                rank[cell] = counted
-                links[ALONG_ROWS, cell] = mask >> EAST & 1
-                links[ALONG_COLS, counted] = mask >> NORTH & 1
-                counted += 1
-    first = number[start // cols, start % cols]
-    last = number[end // cols, end % cols] if end >= 0 else -1
-    wanted[first] = 0
-    if end >= 0:
-        wanted[last] = 0
-    return Lines(sides, rank, links, wanted, int(first), int(last))
-
-
-@kernel
-def first_prices(lines: Lines, turn: int) -> StepPrices:
-    """Return prices that rise evenly along each line, by half a turn's cost at either side of 0.
-
-    So each cell of a long strip pays its part of the turn at the end.
-
-    Args:
-        lines: the cells.
-        turn: a quarter-turn [half us].
-    """
-    size = lines.sides.size
-    price = np.zeros((2, size), np.int64)
-    for axis in range(2):
-        first = 0
-        for index in range(size):
-            if not lines.links[axis, index]:
-                length = index + 1 - first
-                for inner in range(first, index):
-                    price[axis, inner] = turn * (2 * (inner + 1 - first) - length) // (2 * length)
-                first = index + 1
-    return StepPrices(
-        price,
-        price.copy(),
-        np.zeros((2, size), np.int64),
-        np.zeros((2, size), np.int64),
-        np.zeros((2, size), np.int64),
-    )
 
 
 @lean_kernel
@@ -162,7 +40,7 @@ def ascend(
 ) -> int:
     """Improve the prices; return the best bound met [half us], ``best`` having its prices.
 
-    A subgradient method with exactly feasible iterates: each price follows how much oftener
+    A subgradient method with exactly feasible iterates: each price follows how much more often
     its step is left than entered, in the mean of the last iterations.
 
     Args:
@@ -175,7 +53,7 @@ def ascend(
     """
     best = 0
     for _ in range(times):
-        _make_feasible(lines, prices, step, turn)
+        make_feasible(lines, prices, step, turn)
         bound = _relaxed(lines, prices, step, turn)
         if bound > best:
             best = bound
@@ -298,90 +176,3 @@ def _use(lines: Lines, use: NDArray[np.int64], cell: int, side: int, times: int)
         use[ALONG_ROWS, cell - 1] -= times
     else:
         use[ALONG_COLS, lines.rank[cell] - 1] -= times
-
-
-@lean_kernel
-def _make_feasible(lines: Lines, prices: StepPrices, step: int, turn: int) -> None:
-    """Change the prices as little as it takes that no passage costs less than nothing."""
-    for axis in range(2):
-        _level(lines.links[axis], prices.price[axis], step, prices.use)
-    _fit_boxes(lines, prices, step, turn)
-    for axis in range(2):
-        _clamp(lines.links[axis], prices.price[axis], prices.box[axis], step, prices.use[0])
-
-
-@lean_kernel
-def _level(
-    links: NDArray[np.uint8], price: NDArray[np.int64], step: int, spare: NDArray[np.int64]
-) -> None:
-    """Let prices fall by no more than ``step`` from each one to the next of its line."""
-    mean, weight = spare[0], spare[1]
-    first = 0
-    for index in range(links.size):
-        if links[index]:
-            continue
-        blocks = 0
-        for inner in range(first, index):
-            mean[blocks], weight[blocks] = price[inner] + step * (inner - first), 1
-            blocks += 1
-            while blocks > 1 and mean[blocks - 2] > mean[blocks - 1]:
-                one, other = weight[blocks - 2], weight[blocks - 1]
-                total = mean[blocks - 2] * one + mean[blocks - 1] * other
-                mean[blocks - 2] = total // (one + other)
-                weight[blocks - 2] = one + other
-                blocks -= 1
-        inner = first
-        for block in range(blocks):
-            for _ in range(weight[block]):
-                price[inner] = mean[block] - step * (inner - first)
-                inner += 1
-        first = index + 1
-
-
-@lean_kernel
-def _fit_boxes(lines: Lines, prices: StepPrices, step: int, turn: int) -> None:
-    """Share the cost of a corner among a cell's two axes, each as it needs."""
-    rows, cols = prices.price[ALONG_ROWS], prices.price[ALONG_COLS]
-    corner, least, most = step + turn, step // 2, step // 2 + turn
-    for cell in range(lines.sides.size):
-        mask, rank = lines.sides[cell], lines.rank[cell]
-        along, across = most, most
-        if mask & 5 and mask & 10:
-            need, other = -NO_SIDE, -NO_SIDE
-            if mask & 1:
-                need = -rows[cell]
-            if mask & 4:
-                need = max(need, rows[cell - 1])
-            if mask & 2:
-                other = -cols[rank]
-            if mask & 8:
-                other = max(other, cols[rank - 1])
-            along = min(max(need + (corner - need - other) // 2, least), most)
-            across = corner - along
-        prices.box[ALONG_ROWS, cell], prices.box[ALONG_COLS, rank] = along, across
-
-
-@lean_kernel
-def _clamp(
-    links: NDArray[np.uint8],
-    price: NDArray[np.int64],
-    box: NDArray[np.int64],
-    step: int,
-    highest: NDArray[np.int64],
-) -> None:
-    """Keep what sides are paid within the boxes, and prices from falling faster than ``step``.
-
-    This alone makes any prices feasible; those that are level move less for it. ``highest``,
-    int64 (m,), is working memory.
-    """
-    limit = NO_SIDE
-    for index in range(links.size - 1, -1, -1):
-        limit = min(box[index + 1], limit + step) if links[index] else NO_SIDE
-        highest[index] = limit
-    before = -NO_SIDE
-    for index in range(links.size):
-        if links[index]:
-            before = min(max(price[index], -box[index], before - step), highest[index])
-            price[index] = before
-        else:
-            before = -NO_SIDE

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import kernel, lean_kernel
+from fasaco_edge.kernels.lattice.reach import UNSEEN, search
 
 NONE = -1
 # From a start to a cell that cannot be reached from it [steps]; twice this is no overflow.
@@ -259,21 +260,12 @@ def ways_from(steps: NDArray[np.uint8], start: int) -> NDArray[np.int32]:
         steps: step masks, uint8 (rows, cols).
         start: flat cell.
     """
-    size, cols = steps.size, steps.shape[1]
+    cols = steps.shape[1]
     offsets = np.array([1, cols, -1, -cols], np.int64)
-    masks = steps.ravel()
-    ways, queue = np.full(size, FAR, np.int32), np.empty(size, np.int32)
-    queue[0], ways[start] = start, 0
-    head, tail = 0, 1
-    while head < tail:
-        here = queue[head]
-        head += 1
-        for direction in range(4):
-            if not masks[here] >> direction & 1:
-                continue
-            there = here + offsets[direction]
-            if ways[there] == FAR:
-                ways[there] = ways[here] + 1
-                queue[tail] = there
-                tail += 1
+    came_from = np.full(steps.size, UNSEEN, np.uint8)
+    ways, queue = np.full(steps.size, FAR, np.int32), np.empty(steps.size, np.int32)
+    reached = search(steps.ravel(), offsets, start, -1, came_from, queue)
+    ways[start] = 0
+    for cell in queue[1:reached]:
+        ways[cell] = ways[cell - offsets[came_from[cell]]] + 1
     return ways

@@ -28,7 +28,7 @@ def search(
     goal: int,
     came_from: NDArray[np.uint8],
     queue: NDArray[np.int32],
-) -> None:
+) -> int:
     """Search breadth first from flat cell ``start`` until ``goal``, -1 for all that is reachable.
 
     Args:
@@ -37,7 +37,10 @@ def search(
         start, goal: flat cells.
         came_from: uint8 (n,), in: all UNSEEN; out: direction of the step by which each cell
             was first reached, ROOT at the start.
-        queue: int32 (n,), working memory.
+        queue: int32 (n,), out: the cells reached, nearest first.
+
+    Returns:
+        How many cells were reached.
     """
     queue[0] = start
     came_from[start] = ROOT
@@ -53,6 +56,7 @@ def search(
                 came_from[after] = direction
                 queue[tail] = after
                 tail += 1
+    return tail
 
 
 @lean_kernel

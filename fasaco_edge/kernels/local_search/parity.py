@@ -254,7 +254,7 @@ def draw_loop(tally: Tally, found: int, random: NDArray[np.uint64]) -> int:
 
 @inlined
 def _heading(ground: Ground, tally: Tally, depth: int) -> int:
-    """Return how to go on from the top of the stack: as of old, else straight; -1 for any way."""
+    """Return how to continue from the top of the stack: as before, else straight; -1 for any."""
     if depth < 2:
         return -1
     here = tally.stack[depth - 1]
@@ -314,7 +314,7 @@ def euler_walk(
     """Write into ``walk.cells`` a walk that takes each step as often as ``times`` says.
 
     Hierholzer's algorithm from the walk's ``end``, so that what it yields begins
-    with the start. Uses up ``times``. Where there is a choice it goes on as the walk
+    with the start. Uses up ``times``. Where there is a choice it continues as the walk
     did of old (``order_of_old``) or straight if ``steady``, else at random. Returns the
     walk's length.
     """

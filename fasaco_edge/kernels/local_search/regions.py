@@ -1,6 +1,6 @@
 """Regions of a large ground: where a walk changed, and parts of a walk cut out and put back.
 
-A part of the walk outside stands in the region's own walk as a jump between the two
+A part of the walk outside becomes a jump in the region's own walk, between the two
 cells just outside where it leaves and comes back; jumps and those cells stay as they
 are (``needed`` is FIXED, no step leads there), so that whatever improves the region's
 walk improves the whole one, and the whole one stays connected. Put back, the outside

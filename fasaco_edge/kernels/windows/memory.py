@@ -1,4 +1,4 @@
-"""Memory of the dynamic program over a window, and what it is told of walk, window and cell."""
+"""Memory of the dynamic program over a window, and its inputs: walk, window and cell."""
 
 from typing import NamedTuple
 
