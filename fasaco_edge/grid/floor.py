@@ -152,7 +152,8 @@ class StandLattice:
             stands += np.array(shift)
             bends += np.array(shift, np.float32)
         choose_stands(blocked, places, placement, stale, window.row0, window.col0, stands)
-        link_stands(blocked, places, placement, stale, stands, steps, bends)
+        blockers = np.zeros((2, 2), np.int64)
+        link_stands(blocked, places, placement, stale, stands, steps, bends, blockers)
         states = states_of(stands, unknown)
         return cls(CoverageLattice(window, cell_m, states, steps), stands, bends)
 

@@ -16,8 +16,8 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
-from fasaco_edge.kernels.floor.capsule import Sweeps
-from fasaco_edge.kernels.floor.driven import note_driven
+from fasaco_edge.kernels.floor.capsule import Sweeps, is_clear
+from fasaco_edge.kernels.floor.driven import note_driven, set_causes, set_open
 from fasaco_edge.kernels.floor.runs import common_runs
 from fasaco_edge.kernels.jit import note_all_compiled
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
@@ -159,10 +159,13 @@ def _take_line(room: _TinyRoom) -> None:
     under_maps = FloorMap(room.grid, room.lattice, room.footprint, discs, 100_000)
     shape = under_maps.geometry.rows, under_maps.geometry.cols
     under_maps.reached(np.zeros(room.lattice.states.shape, np.bool_), Window(0, 0, *shape))
+    is_clear(under_maps.blocked, 1.0, 1.0, 2.0, 2.0, 0.5)
     sweeps = Sweeps(np.zeros(shape, np.int16), np.zeros(shape, np.int32))
     points = np.array([(2.0, 2.0), (3.0, 2.0)])
     state = np.zeros(shape, np.uint8)
     note_driven(sweeps, state, points, 1.0, memory_for_moves().capsules)
+    set_open(sweeps, state, (0, 0), np.zeros(shape, np.bool_), np.zeros(shape, np.bool_))
+    set_causes(state, (0, 0), np.zeros(shape, np.uint8), np.zeros(4, np.int64))
     common_runs(walk, walk, 1)
 
 

@@ -17,6 +17,8 @@ from fasaco_edge.kernels.floor.capsule import (
     Sweeps,
     exchange,
     is_clear,
+    is_clear_but,
+    is_near,
     prepare,
     sweep,
     swept_more,
@@ -66,7 +68,12 @@ def test_a_way_is_clear_of_a_pixel_that_is_a_radius_away(a, b, i, j, radius):
     blocked[i, j] = True
     away = square_distance(a, b, i, j)
     if abs(away - radius) > 0.02:
-        assert is_clear(bits_of(blocked), *map(float, (*a, *b)), radius) == (away > radius)
+        way = *map(float, (*a, *b)), radius
+        blocker, is_far = np.full(2, -99), away > radius
+        assert is_clear(bits_of(blocked), *way) == is_far
+        assert is_clear_but(bits_of(blocked), *way, blocker) == is_far
+        assert blocker.tolist() == ([-99, -99] if is_far else [i, j])
+        assert not (is_far and is_near(float(i), float(j), *way))
 
 
 def test_a_wall_as_far_as_the_radius_is_not_touched():

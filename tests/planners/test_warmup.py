@@ -11,10 +11,12 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.kernels.release import KERNEL_SOURCES, kernel_module
+from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived, PlanReady, PoseReceived
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import SearchWork, WorkLimit
@@ -53,8 +55,11 @@ def changes(grid: OccupancyGrid) -> Iterator[MapReceived | PatchReceived]:
         yield MapReceived(decode_occupancy_grid(payload))
 
 
-@pytest.mark.parametrize("turn_s", [0.0, 1.5])
-def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up(turn_s):
+@pytest.mark.parametrize(
+    ("turn_s", "sweeping"),
+    [(0.0, None), (1.5, None), (1.5, Sweeping(0.3, 1_000_000, LINES["thorough"]))],
+)
+def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up(turn_s, sweeping):
     heard = []
     warm_up(heard.append)
     assert heard == list(STAGES)
@@ -67,7 +72,7 @@ def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up(turn_s):
     grid = OccupancyGrid(GridGeometry(80, 80, 0.05, Pose2D(0, 0)), pixels)
     off_the_bus = decode_occupancy_grid(encode_occupancy_grid(grid))
     cost = CoverageCost.for_robot(0.3, 0.25, turn_s)
-    mission = Mission(MissionConfig(Footprint(0.3, 0.18), cost=cost))
+    mission = Mission(MissionConfig(Footprint(0.3, 0.18), cost=cost, sweeping=sweeping))
     pose = PoseReceived(StampedPose(Pose2D(1.0, 1.0)))
     asked = mission.step([MapReceived(off_the_bus), pose], 0.0).plan
     assert asked is not None
@@ -80,8 +85,14 @@ def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up(turn_s):
     again = replace(asked.problem, before=path.cells[::-1].copy())
     assert NearOptimal().plan(again, WorkLimit(SearchWork(perturbations=5))).steps
     assert Fasaco().plan(asked.problem).steps
+    if (ahead := mission._line._ahead) is not None:
+        walk = mission.route.path.ahead
+        better = np.concatenate((walk, walk[-2:-1]))
+        better.flags.writeable = False  # as a plan's cells
+        ahead.lay(better, pose.pose.pose)
+        ahead.lay(walk, pose.pose.pose)
     for event in changes(off_the_bus):
-        assert mission.step([event], 1.0).faults == ()
+        assert mission.step([event, pose], 1.0).faults == ()
         assert mission.coverage() is not None
 
     assert compiled_signatures() == before

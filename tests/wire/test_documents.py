@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 
 import msgspec
+import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.mission.core.events import State
+from fasaco_edge.planners.path import CoveragePath, Saved
 from fasaco_edge.wire.json_text import (
     MAX_INTEGER,
     MAX_TEXT,
@@ -19,7 +21,7 @@ from fasaco_edge.wire.json_text import (
     encode_json,
     tolerant,
 )
-from fasaco_edge.wire.path_documents import PathAttachment, Rectangle
+from fasaco_edge.wire.path_documents import PathAttachment, PlanFigures, Rectangle
 from fasaco_edge.wire.replies import STATES, CoverageReport, ZoneReport
 from fasaco_edge.wire.settings import known_settings
 from fasaco_edge.wire.status import Status, SupervisedRecorder
@@ -79,6 +81,12 @@ def test_a_rectangle_is_whole_or_missing():
     edges = {"x_min": 0, "y_min": 0, "x_max": 1, "y_max": 2}
     assert tolerant({"changed": edges}, PathAttachment).changed == Rectangle(0.0, 0.0, 1.0, 2.0)
     assert tolerant({"changed": edges | {"x_min": "0"}}, PathAttachment).changed is None
+
+
+def test_a_repair_that_costs_more_has_saved_nothing():
+    path = CoveragePath(np.zeros((1, 2), np.int32), "near-optimal", 1, saved=Saved(0.5, -0.3))
+    figures = PlanFigures.of(path)
+    assert (figures.saved_by_ants_s, figures.saved_by_local_search_s) == (0.5, 0.0)
 
 
 def test_members_nobody_knows_may_be_nested_as_deep_as_json_may():

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.floor.bits import any_between
+from fasaco_edge.kernels.floor.bits import any_between, is_marked
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 # A robot exactly as wide as a door fits: so much nearer counts as not touched.
@@ -21,6 +21,8 @@ RIM = 1e-7
 BLOCK = 3
 # Counts of sweeps of pixels that the tool can never reach begin here.
 NEVER = 10_000
+# No row blocks a way; it leads out of the raster.
+CLEAR, BEYOND = -1, -2
 # A line that rises by less counts as level.
 LEVEL = 1e-9
 
@@ -97,11 +99,13 @@ def _right_side(
     return -dx / length * radius, dy / length * radius, dx / dy
 
 
-@lean_kernel
-def is_clear(
+@inlined
+def _blocked_row(
     blocked: NDArray[np.uint64], ay: float, ax: float, by: float, bx: float, radius: float
-) -> bool:
-    """Tell whether no blocked pixel comes nearer than ``radius`` to the way from a to b.
+) -> tuple[int, int, int]:
+    """Return the first row with a blocked pixel nearer than ``radius`` to the way from a to b.
+
+    With the row, the columns from and to which that may be; ``CLEAR`` or ``BEYOND`` for no row.
 
     A pixel is a square: the row's stretch that its squares may not reach into is widest where the
     row is nearest to the height of the capsule's outermost point.
@@ -120,7 +124,7 @@ def is_clear(
     low, high = ay - radius, by + radius
     first, last = int(np.floor(low + 0.5)), int(np.ceil(high - 0.5))
     if first < 0 or last >= rows:
-        return False
+        return BEYOND, 0, 0
     right_y = ay if ax > bx else by
     left_y = ay if ax < bx else by
     for i in range(first, last + 1):
@@ -139,10 +143,79 @@ def is_clear(
             left = -_right_of(y, ay, -ax, by, -bx, -side_y, side_x, -slope, square)
         from_col, to_col = int(np.floor(left + 0.5)), int(np.ceil(right - 0.5))
         if from_col < 0 or to_col >= cols:
-            return False
+            return BEYOND, 0, 0
         if from_col <= to_col and any_between(blocked[i], from_col, to_col):
-            return False
-    return True
+            return i, from_col, to_col
+    return CLEAR, 0, 0
+
+
+@inlined
+def _is_box_clear(
+    blocked: NDArray[np.uint64], ay: float, ax: float, by: float, bx: float, radius: float
+) -> bool:
+    """Tell whether nothing is blocked in the box around a capsule, which is soon seen."""
+    first, last = (
+        int(np.floor(min(ay, by) - radius + 0.5)),
+        int(np.ceil(max(ay, by) + radius - 0.5)),
+    )
+    begin, end = int(np.floor(min(ax, bx) - radius + 0.5)), int(np.ceil(max(ax, bx) + radius - 0.5))
+    if first < 0 or begin < 0 or last >= blocked.shape[0] or end >= blocked.shape[1] << 6:
+        return False
+    row = first
+    while row <= last and not any_between(blocked[row], begin, end):
+        row += 1
+    return row > last
+
+
+@lean_kernel
+def is_clear(
+    blocked: NDArray[np.uint64], ay: float, ax: float, by: float, bx: float, radius: float
+) -> bool:
+    """Tell whether no blocked pixel comes nearer than ``radius`` to the way from a to b.
+
+    Args:
+        blocked: uint64 (rows, words), see ``bits``. What lies outside is blocked, too.
+        ay, ax, by, bx: the way [pixels].
+        radius: of the robot [pixels].
+    """
+    if _is_box_clear(blocked, ay, ax, by, bx, radius - TOUCH):
+        return True
+    row, _, _ = _blocked_row(blocked, ay, ax, by, bx, radius)
+    return row == CLEAR
+
+
+@lean_kernel
+def is_clear_but(
+    blocked: NDArray[np.uint64],
+    ay: float,
+    ax: float,
+    by: float,
+    bx: float,
+    radius: float,
+    blocker: NDArray[np.int64],
+) -> bool:
+    """Tell the same; a pixel that is in the way is noted in ``blocker``, int64 (2,): row, col."""
+    row, first, last = _blocked_row(blocked, ay, ax, by, bx, radius)
+    if row < 0:
+        return row == CLEAR
+    # The one nearest to the middle is in the way of most ways beside this one, too.
+    middle = (first + last) >> 1
+    for away in range(last - first + 1):
+        for col in (middle - away, middle + away):
+            if first <= col <= last and is_marked(blocked, row, col):
+                blocker[0], blocker[1] = row, col
+                return False
+    return False
+
+
+@inlined
+def is_near(y: float, x: float, ay: float, ax: float, by: float, bx: float, radius: float) -> bool:
+    """Tell whether a point is nearer than ``radius`` to the way from a to b, for sure."""
+    dy, dx = by - ay, bx - ax
+    length2 = max(dy * dy + dx * dx, 1e-18)
+    along = min(max(((y - ay) * dy + (x - ax) * dx) / length2, 0.0), 1.0)
+    off_y, off_x = ay + along * dy - y, ax + along * dx - x
+    return off_y * off_y + off_x * off_x < (radius - 2 * TOUCH) * (radius - 2 * TOUCH)
 
 
 @inlined

@@ -1,4 +1,4 @@
-"""Driven floor: what lies under the tool's way is no longer to be swept."""
+"""Open floor: what is still to be swept, and what the robot drove over no longer is."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from fasaco_edge.kernels.jit import lean_kernel
 
 # A pixel is asked for; it is still to be swept; the robot drove over it.
 WANTED, OPEN, DRIVEN = 1, 2, 4
+# Where the state of a pixel has the cause for which it is out of reach.
+CAUSE_SHIFT, CAUSE = 3, 24
 
 
 @lean_kernel
@@ -53,3 +55,74 @@ def note_driven(
                     left[i >> BLOCK, j >> BLOCK] -= counts[i, j] == 0
                     counts[i, j] += NEVER
     return closed
+
+
+@lean_kernel
+def set_open(
+    sweeps: Sweeps,
+    state: NDArray[np.uint8],
+    corner: tuple[int, int],
+    wanted: NDArray[np.bool_],
+    swept: NDArray[np.bool_],
+) -> tuple[int, int]:
+    """Set what of a part of the raster is still to be swept: wanted, and neither swept nor driven.
+
+    Args:
+        sweeps: whose counts are higher by ``NEVER`` where a pixel is not open.
+        state: uint8 (rows, cols) of ``WANTED``, ``OPEN`` and ``DRIVEN``, changed.
+        corner: first pixel (row, col) of the part.
+        wanted: bool (rows, cols) of the part, what is asked for; empty for what was.
+        swept: bool (rows, cols) of the part.
+
+    Returns:
+        How many more pixels are wanted, and open.
+    """
+    counts, left = sweeps.counts, sweeps.left
+    more_wanted, more_open = 0, 0
+    for i in range(swept.shape[0]):
+        for j in range(swept.shape[1]):
+            row, col = corner[0] + i, corner[1] + j
+            before = state[row, col]
+            after = before & (255 - OPEN)
+            if len(wanted):
+                after = (after & (255 - WANTED)) | (WANTED * wanted[i, j])
+            if after & (WANTED | DRIVEN) == WANTED and not swept[i, j]:
+                after |= OPEN
+            if after == before:
+                continue
+            state[row, col] = after
+            more_wanted += (after & WANTED) - (before & WANTED)
+            if after & OPEN and not before & OPEN:
+                more_open += 1
+                counts[row, col] -= NEVER
+                left[row >> BLOCK, col >> BLOCK] += counts[row, col] == 0
+            elif before & OPEN and not after & OPEN:
+                more_open -= 1
+                left[row >> BLOCK, col >> BLOCK] -= counts[row, col] == 0
+                counts[row, col] += NEVER
+    return more_wanted, more_open
+
+
+@lean_kernel
+def set_causes(
+    state: NDArray[np.uint8],
+    corner: tuple[int, int],
+    causes: NDArray[np.uint8],
+    pixels: NDArray[np.int64],
+) -> None:
+    """Set why pixels of a part of the raster are out of reach.
+
+    Args:
+        state: uint8 (rows, cols), changed: causes lie from bit ``CAUSE_SHIFT`` on.
+        corner: first pixel (row, col) of the part.
+        causes: uint8 (rows, cols) of the part.
+        pixels: int64 (4,), how many have each cause, changed; what is in reach has 0.
+    """
+    for i in range(causes.shape[0]):
+        for j in range(causes.shape[1]):
+            row, col = corner[0] + i, corner[1] + j
+            before, after = (state[row, col] & CAUSE) >> CAUSE_SHIFT, causes[i, j]
+            if before != after:
+                state[row, col] = (state[row, col] & (255 - CAUSE)) | (after << CAUSE_SHIFT)
+                pixels[before] -= 1
+                pixels[after] += 1

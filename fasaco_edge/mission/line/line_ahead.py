@@ -112,6 +112,8 @@ class LineAhead:
             pose: of the robot, in or near its first cell.
         """
         self._see(pose)
+        # A plan's cells cannot be written; for those kernels would be compiled anew, on the loop.
+        walk = walk.copy()
         ahead, line = self._walk[self.cell :], self.line.renumbered(-self.cell)
         is_beginning = common_beginning(walk, ahead) == len(walk)
         if len(walk) < len(ahead) > 1 and len(line) and is_beginning:

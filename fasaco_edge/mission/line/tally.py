@@ -13,12 +13,20 @@ from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.kernels.floor.capsule import NEVER, Scratch, Sweeps, sweep_edges
-from fasaco_edge.kernels.floor.driven import DRIVEN, OPEN, WANTED, note_driven
+from fasaco_edge.kernels.floor.driven import (
+    CAUSE,
+    CAUSE_SHIFT,
+    DRIVEN,
+    OPEN,
+    WANTED,
+    note_driven,
+    set_causes,
+    set_open,
+)
 from fasaco_edge.mission.line.out_of_reach import Cause
 from fasaco_edge.planners.line import blocks_of, count_blocks, memory_for_moves
 
-# Where the state of a pixel has its ``Cause``.
-CAUSE_SHIFT, CAUSE = 3, 24
+NO_MASK = np.zeros((0, 0), np.bool_)
 
 
 class SweepTally:
@@ -37,8 +45,8 @@ class SweepTally:
         self.sweeps = Sweeps(np.full(shape, NEVER, np.int16), np.zeros(blocks_of(shape), np.int32))
         # How many pixels are wanted, and open.
         self._wanted_pixels = self._open_pixels = 0
-        # How many are out of reach for each cause.
-        self._beyond_pixels = dict.fromkeys(Cause, 0)
+        # How many are out of reach for each cause; the first number is of no use.
+        self._beyond_pixels = np.zeros(len(Cause) + 1, np.int64)
         self._tool = floor.discs.tool_m / 2 / self.unit_m
         self._scratch: Scratch = memory_for_moves().capsules
 
@@ -75,30 +83,19 @@ class SweepTally:
             wanted: bool (rows, cols) of it, what is asked for; None for what was.
             swept: bool (rows, cols) of it, what the robot has swept.
         """
-        state = self._state[part.row0 : part.row1, part.col0 : part.col1]
-        if wanted is not None:
-            self._wanted_pixels += int(np.count_nonzero(wanted))
-            self._wanted_pixels -= int(np.count_nonzero(state & WANTED))
-            state &= ~np.uint8(WANTED)
-            state |= wanted
-        before = (state & OPEN) > 0
-        now = ((state & (WANTED | DRIVEN)) == WANTED) & ~swept
-        counts = self.sweeps.counts[part.row0 : part.row1, part.col0 : part.col1]
-        counts[before & ~now] += NEVER
-        counts[now & ~before] -= NEVER
-        self._open_pixels += int(np.count_nonzero(now)) - int(np.count_nonzero(before))
-        state &= ~np.uint8(OPEN)
-        state |= now * np.uint8(OPEN)
-        count_blocks(self.sweeps, part)
+        more_wanted, more_open = set_open(
+            self.sweeps,
+            self._state,
+            (part.row0, part.col0),
+            NO_MASK if wanted is None else np.ascontiguousarray(wanted),
+            swept,
+        )
+        self._wanted_pixels += more_wanted
+        self._open_pixels += more_open
 
     def set_causes(self, part: Window, causes: NDArray[np.uint8]) -> None:
         """Set why the tool cannot come to pixels of a part, uint8 (rows, cols), see ``Cause``."""
-        state = self._state[part.row0 : part.row1, part.col0 : part.col1]
-        before = _count_causes(state)
-        state &= ~np.uint8(CAUSE)
-        state |= causes << CAUSE_SHIFT
-        for cause, after in _count_causes(state).items():
-            self._beyond_pixels[cause] += after - before[cause]
+        set_causes(self._state, (part.row0, part.col0), causes, self._beyond_pixels)
 
     def drive(self, points: NDArray[np.float64]) -> None:
         """Note that the robot has driven a line, float64 (n, 2), y, x [pixels].
@@ -137,7 +134,7 @@ class SweepTally:
     @property
     def beyond_m2(self) -> dict[Cause, float]:
         """How much free floor the tool cannot come to, for each cause [m2]."""
-        return {cause: count * self.unit_m**2 for cause, count in self._beyond_pixels.items()}
+        return {cause: int(self._beyond_pixels[cause]) * self.unit_m**2 for cause in Cause}
 
     def is_open(self, point: NDArray[np.float64]) -> bool:
         """Tell whether a point, y, x [pixels], is still to be swept."""
@@ -145,6 +142,7 @@ class SweepTally:
         return bool(self._state[row, col] & OPEN)
 
 
-def _count_causes(state: NDArray[np.uint8]) -> dict[Cause, int]:
+def _count_causes(state: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return how many pixels have each cause, int64 (4,)."""
     causes = state & np.uint8(CAUSE)
-    return {cause: int(np.count_nonzero(causes == cause << CAUSE_SHIFT)) for cause in Cause}
+    return np.array([np.count_nonzero(causes == cause << CAUSE_SHIFT) for cause in (0, *Cause)])
