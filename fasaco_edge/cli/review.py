@@ -174,7 +174,7 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
 
 
 def _print_curve(console: Console, review: Review) -> None:
-    from fasaco_edge.review.pictures import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
+    from fasaco_edge.review.panels import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
 
     at_s, shares = covered_share(review)
     if not len(at_s):

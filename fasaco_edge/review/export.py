@@ -11,7 +11,7 @@ import numpy as np
 from msgspec.structs import astuple
 from numpy.typing import NDArray
 
-from fasaco_edge.review.pictures import covered_share
+from fasaco_edge.review.panels import covered_share
 from fasaco_edge.review.review import Review
 from fasaco_edge.text import one_line
 

@@ -25,15 +25,14 @@ from fasaco_edge.review.comparison import (
 )
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.figures import document_of
-from fasaco_edge.review.pictures import (
+from fasaco_edge.review.panels import (
     branching_panel,
     coverage_panel,
-    draw_fields,
-    draw_map,
     replan_panel,
     saved_panel,
     state_panel,
 )
+from fasaco_edge.review.pictures import draw_fields, draw_map
 from fasaco_edge.review.review import Review
 from fasaco_edge.text import Html, element, html
 

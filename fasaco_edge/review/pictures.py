@@ -1,9 +1,6 @@
-"""Pictures of a review: charts over time, the map with the track, a curve of characters."""
+"""Pictures of a review: the map with the track, pheromone fields, all on one sheet."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,183 +8,14 @@ from PIL import Image
 
 from fasaco_edge.bench.floor import swept_words
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.chart import COLOURS, Axis, Line, Panel, draw_panels
-from fasaco_edge.drawing.palette import Colour
+from fasaco_edge.drawing.chart import draw_panels
 from fasaco_edge.drawing.pictures import draw_mission
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
-from fasaco_edge.recording import entities
+from fasaco_edge.review.panels import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.rows import clock
-
-Points = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""When [s], and how much from then on; both float64 (n,)."""
-
-
-def covered_share(review: Review) -> Points:
-    """Return which share of the cells coverable at the end was covered, 0 to 1.
-
-    Where some were covered before the recording began, the share of what was known then.
-    """
-    if review.drive is None or review.data.restored_cells:
-        return review.known_fractions[:, 0], review.known_fractions[:, 1]
-    count = len(review.first_s)
-    return review.first_s, (np.arange(count) + 1.0) / max(review.first_of, 1)
-
-
-def replan_times(review: Review) -> Points:
-    """Return when each replan came [s], and how long it took [ms]."""
-    timed = [path for path in review.replans.later if path.plan_ms is not None]
-    return (
-        np.array([path.at_s for path in timed], np.float64),
-        np.array([path.plan_ms for path in timed], np.float64),
-    )
-
-
-MOST_POINTS = 700
-FAINT: Colour = (150, 156, 166)
-# From the bottom up; what is not in it is drawn as the last one.
-STATES: dict[str, Colour] = {
-    "done": palette.BLUE,
-    "returning": palette.SKY,
-    "covering": palette.GREEN,
-    "planning": palette.SKY,
-    "paused": palette.PURPLE,
-    "degraded": palette.ORANGE,
-    "blocked": palette.VERMILION,
-    "silent": palette.VERMILION,
-}
-SHORT = {"waiting for map": "no map", "waiting for pose": "no pose"}
-BAND_PX = 12
-# A state is to be seen however short it was: share of the whole time.
-LEAST_SHARE = 0.006
-
-
-@dataclass(frozen=True, slots=True)
-class TimeAxis:
-    """The axis of time, and seconds per unit of it."""
-
-    axis: Axis
-    unit_s: float
-
-    @classmethod
-    def over(cls, seconds: float) -> TimeAxis:
-        """Return an axis from 0 to ``seconds``."""
-        unit_s, name = next(
-            (unit_s, name)
-            for unit_s, name, least_s in ((3600.0, "h", 14400.0), (60.0, "min", 240.0), (1, "s", 0))
-            if seconds >= least_s
-        )
-        axis = Axis.linear(f"time since the recording began [{name}]", [seconds / unit_s])
-        return cls(axis, unit_s)
-
-    def points(
-        self, at_s: NDArray[np.float64], values: NDArray[np.float64]
-    ) -> tuple[tuple[float, float], ...]:
-        """Return points of a line, not more than can be distinguished."""
-        places = np.unique(np.linspace(0, len(at_s) - 1, MOST_POINTS).round().astype(int))
-        chosen = places if len(at_s) > MOST_POINTS else np.arange(len(at_s))
-        pairs = np.column_stack((at_s[chosen] / self.unit_s, values[chosen]))
-        return tuple((float(x), float(y)) for x, y in pairs)
-
-
-def coverage_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
-    """Return how the covered share grew; of one review also the share of what was known then.
-
-    ``labels`` name two of them.
-    """
-    time = TimeAxis.over(max(review.duration_s for review in reviews))
-    lines = [
-        Line(
-            label if len(reviews) > 1 else "", colour, _curve(time, review), dotted=False, width=2.2
-        )
-        for review, label, colour in zip(reviews, labels, COLOURS, strict=False)
-    ]
-    if len(reviews) == 1:
-        known = reviews[0].known_fractions
-        points = time.points(known[:, 0], 100 * known[:, 1])
-        lines.append(Line("", FAINT, points, dotted=False, width=1.4))
-    one = "blue: of all cells known at the end; grey: of those known at the time"
-    caption = one if len(reviews) == 1 else "of all cells that each run knew at the end"
-    y = Axis.linear("%", [100.0])
-    return Panel("Covered share of all cells", caption, time.axis, y, tuple(lines))
-
-
-def replan_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
-    """Return how long replans took, a dot each."""
-    time = TimeAxis.over(max(review.duration_s for review in reviews))
-    found = [replan_times(review) for review in reviews]
-    # Two have the colours of their curves, one has another than the curve above it.
-    colours = COLOURS if len(reviews) > 1 else COLOURS[1:]
-    lines = [
-        Line(label if len(reviews) > 1 else "", colour, _dots(time, at_s, took_ms), joined=False)
-        for (at_s, took_ms), label, colour in zip(found, labels, colours, strict=False)
-    ]
-    y = Axis.linear("ms", [value for _, took_ms in found for value in took_ms.tolist()] or [1.0])
-    return Panel("Time of each replan", "", time.axis, y, tuple(lines))
-
-
-def state_panel(review: Review) -> Panel:
-    """Return what the mission was doing, a bar for each time it was in a state."""
-    time = TimeAxis.over(review.duration_s)
-    known = [name for name in STATES if any(span.name == name for span in review.states)]
-    others = [span.name for span in review.states if span.name not in STATES]
-    names = [*known, *reversed(dict.fromkeys(others))]
-    least_s = LEAST_SHARE * review.duration_s
-    lines = []
-    for span in review.states:
-        level = float(names.index(span.name))
-        begin, end = span.begin_s, max(span.end_s, span.begin_s + least_s)
-        points = ((begin / time.unit_s, level), (end / time.unit_s, level))
-        colour = STATES.get(span.name, FAINT)
-        lines.append(Line("", colour, points, dotted=False, width=BAND_PX))
-    ticks = tuple((float(level), SHORT.get(name, name)) for level, name in enumerate(names))
-    y = Axis("", -0.7, max(len(names) - 0.3, 0.7), ticks)
-    return Panel("State of the mission", "", time.axis, y, tuple(lines))
-
-
-def branching_panel(review: Review) -> Panel | None:
-    """Return how decided the trail was; None where that is not recorded."""
-    points = review.record.plots.get(entities.BRANCHING)
-    if points is None:
-        return None
-    time = TimeAxis.over(review.duration_s)
-    curve = time.points(points[:, 0], points[:, 1])
-    y = Axis.linear("", [0.0, *points[:, 1].tolist()])
-    caption = "mean number of a cell's directions within reach of its strongest; 1: only one"
-    line = Line("", COLOURS[0], curve, dotted=False, width=2.2)
-    return Panel("Branching of the trail", caption, time.axis, y, (line,))
-
-
-def saved_panel(review: Review) -> Panel | None:
-    """Return what ants and local search saved, plan by plan; None where that is not recorded."""
-    plots = review.record.plots
-    saved = [
-        (colour, points)
-        for entity, colour in (
-            (entities.SAVED_BY_LOCAL_SEARCH, COLOURS[0]),
-            (entities.SAVED_BY_ANTS, COLOURS[1]),
-        )
-        if (points := plots.get(entity)) is not None
-    ]
-    if not saved:
-        return None
-    time = TimeAxis.over(review.duration_s)
-    lines = [
-        Line("", colour, time.points(*_held(points, review.duration_s)), dotted=False, width=2.2)
-        for colour, points in saved
-    ]
-    y = Axis.linear("s", [0.0, *(value for _, points in saved for value in points[:, 1].tolist())])
-    caption = "blue: local search, red: ants; time taken off the initial walks"
-    return Panel("Saved by search, all plans together", caption, time.axis, y, tuple(lines))
-
-
-def _held(points: NDArray[np.float64], end_s: float) -> Points:
-    """Return a plot, float64 (n, 2), as one that holds each value until the next one comes."""
-    at_s = np.concatenate((points[:, 0].repeat(2)[1:], [end_s]))
-    return at_s, points[:, 1].repeat(2)
-
 
 # Fields on a page; the edge of the square that each has to fit into [px].
 FIELDS, FIELD_PX = 4, 440
@@ -214,58 +42,6 @@ def draw_fields(review: Review) -> list[tuple[float, Image.Image]]:
         shown.thumbnail((FIELD_PX, FIELD_PX))
         pictures.append((1e-9 * (field.at_ns - record.began_ns), shown))
     return pictures
-
-
-def _curve(time: TimeAxis, review: Review) -> tuple[tuple[float, float], ...]:
-    at_s, shares = covered_share(review)
-    if not len(at_s):
-        return ()
-    at_s = np.concatenate(([at_s[0]], at_s, [review.duration_s]))
-    return time.points(at_s, 100 * np.concatenate(([0.0], shares, shares[-1:])))
-
-
-def _dots(
-    time: TimeAxis, at_s: NDArray[np.float64], took_ms: NDArray[np.float64]
-) -> tuple[tuple[float, float], ...]:
-    """Return a dot for each replan; of very many the slowest of each stretch of time."""
-    if len(at_s) > MOST_POINTS:
-        stretches = np.array_split(np.arange(len(at_s)), MOST_POINTS)
-        chosen = np.array([part[np.argmax(took_ms[part])] for part in stretches])
-        at_s, took_ms = at_s[chosen], took_ms[chosen]
-    return time.points(at_s, took_ms)
-
-
-EIGHTHS, PLAIN_EIGHTHS = " ▁▂▃▄▅▆▇█", " ..::++##"
-
-
-def curve(
-    at_s: NDArray[np.float64],
-    shares: NDArray[np.float64],
-    end_s: float,
-    width: int,
-    height: int,
-    marks: str = EIGHTHS,
-) -> list[str]:
-    """Return the lines of a picture of a share that changes at some times, the top one first.
-
-    Args:
-        at_s: float64 (n,), when it changed [s], ascending.
-        shares: float64 (n,), what it was from then on, 0 to 1; before the first time it is 0.
-        end_s: the right end of the picture [s]; the left one is 0.
-        width, height: of the picture [characters].
-        marks: nine characters, from an empty one to a full one.
-    """
-    places = (np.arange(width) + 1) / width * end_s
-    index = np.searchsorted(at_s, places, side="right")
-    levels = np.concatenate(([0.0], shares))[index]
-    eighths = np.rint(np.clip(levels, 0, 1) * height * 8).astype(int)
-    # What is not nothing is to be seen, and what is not all, too.
-    eighths[(levels > 0) & (eighths == 0)] = 1
-    eighths[(levels < 1) & (eighths == 8 * height)] -= 1
-    return [
-        "".join(marks[min(max(eighth - 8 * row, 0), 8)] for eighth in eighths.tolist())
-        for row in reversed(range(height))
-    ]
 
 
 SIZE = (1600, 900)

@@ -16,7 +16,7 @@ from fasaco_edge.review.moments import (
     longest_stand,
     spans_of,
 )
-from fasaco_edge.review.pictures import curve
+from fasaco_edge.review.panels import curve
 from fasaco_edge.review.rows import clock
 from fasaco_edge.review.run_data import PlanLog, RunData
 from fasaco_edge.wire.turns import Cycle, Decided, LogStart, PlanTaken, TurnBatch
