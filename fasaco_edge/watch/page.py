@@ -133,6 +133,7 @@ def _running(status: Status) -> list[Row]:
     ]
     counted = ", ".join(f"{count} {code}" for code, count in errors.by_code.items())
     rows: list[Row] = [
+        ("drive", _text(phrases.drive(status.drive))),
         ("latency", _text(f"{', '.join(latencies)} ms" if latencies else "-")),
         ("errors", _text(counted, "red") if errors.total else _text("none")),
         ("ledger", _ledger(status)),

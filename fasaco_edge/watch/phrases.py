@@ -6,7 +6,7 @@ import time
 
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.replies import CoverageReport, FloorReport, MissionReport, ZoneReport
-from fasaco_edge.wire.status import Status
+from fasaco_edge.wire.status import DriveReport, Status
 
 # Of the wall clock to the monotonic one, when this module was imported [s].
 _OFFSET_S = time.time() - time.monotonic()
@@ -58,6 +58,17 @@ def figures(status: Status) -> str:
         f"path {revision} ({steps} steps to go), {status.plan.plans} plans, "
         f"last {status.latency_ms.plan or 0.0:.0f} ms"
     )
+
+
+def drive(report: DriveReport) -> str:
+    """Return how fast the robot drives and turns on the spot, as far as that was measured."""
+    measured = (
+        ("", report.speed_m_s, " m/s"),
+        ("90 deg ", report.quarter_turn_s, " s"),
+        ("180 deg ", report.half_turn_s, " s"),
+    )
+    words = [f"{name}{value:.2f}{unit}" for name, value, unit in measured if value is not None]
+    return ", ".join(words) or "not measured yet"
 
 
 def steady_now() -> float:

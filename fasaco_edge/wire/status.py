@@ -115,6 +115,22 @@ class LoopTimes(Document, frozen=True):
     max: Amount | None = None
 
 
+class DriveReport(Document, frozen=True):
+    """What driving takes the robot, as its poses show; null of what too little was seen.
+
+    Attributes:
+        speed_m_s: in straight driving.
+        quarter_turn_s: a turn by about 90 degrees on the spot, braking and starting included.
+        half_turn_s: a turn by about 180 degrees.
+        turns: how many turns were measured.
+    """
+
+    speed_m_s: Amount | None = None
+    quarter_turn_s: Amount | None = None
+    half_turn_s: Amount | None = None
+    turns: Count = 0
+
+
 class ErrorCounts(Document, frozen=True):
     """Faults since the start: what was refused, could not be published, or failed.
 
@@ -221,6 +237,7 @@ class Status(Document, frozen=True):
     plan: PlanCounts = PlanCounts()
     latency_ms: Latencies = Latencies()
     loop_ms: LoopTimes = LoopTimes()
+    drive: DriveReport = DriveReport()
     errors: ErrorCounts = ErrorCounts()
     ledger: LedgerReport = LedgerReport()
     recorder: SupervisedRecorder | None = None

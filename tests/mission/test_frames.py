@@ -221,4 +221,4 @@ def test_an_order_of_zones_is_dropped_with_the_frame_they_lie_in():
     drive.command("start", {"keep_out": [corners]})
     drive.tell(MAP, HERE)
     assert drive.mission.state is State.IDLE
-    assert "no more in 'odom': the order was dropped" in drive.mission.reason
+    assert "no longer in 'odom': the order was dropped" in drive.mission.reason

@@ -62,6 +62,7 @@ def status(**members: Any) -> bytes:
         "path": {**path, "planned_steps": 30, "lower_bound_steps": 29, "gap": 0.0345},
         "ledger": {"age_s": 0.4},
         "mission": {"stage": "covering", "ordered": "itself", "pass": 1, "passes": 1},
+        "drive": {"speed_m_s": 0.248, "quarter_turn_s": 1.934, "half_turn_s": None, "turns": 9},
         "latency_ms": {"plan": 4.0, "map_to_path": 9.0, "ingest": 1.0},
     }
     return encode_json(document | members)

@@ -110,6 +110,7 @@ def test_it_says_how_it_stands():
         "map: 2 cells more",
         "30 steps, bound 29",
         "everything reachable",
+        "drive     0.25 m/s, 90 deg 1.93 s",
         "map to path",
         "written 0.4 s ago",
         "errors",

@@ -30,6 +30,7 @@ from fasaco_edge.wire.replies import (
 )
 from fasaco_edge.wire.status import (
     ClaimReport,
+    DriveReport,
     Latencies,
     LedgerReport,
     MapReport,
@@ -111,6 +112,7 @@ class StatusBoard:
             plan=_plans(mission),
             latency_ms=Latencies(_ms(self.ingest_s), _ms(self.plan_s), _ms(self.map_to_path_s)),
             loop_ms=self.turns.report(),
+            drive=_drive(mission),
             errors=self.faults.counts(),
             ledger=self.ledger,
             recorder=self.recorder,
@@ -217,12 +219,28 @@ def _largest_first(*parts: tuple[float, str]) -> tuple[FloorLeft, ...]:
     return tuple(sorted((part for part in told if part.m2), key=lambda part: -part.m2))
 
 
+def _drive(mission: Mission | None) -> DriveReport:
+    if mission is None:
+        return DriveReport()
+    times = mission.drive_times()
+    return DriveReport(
+        _rounded(times.speed_m_s),
+        _rounded(times.quarter_turn_s),
+        _rounded(times.half_turn_s),
+        times.turns,
+    )
+
+
 def _plans(mission: Mission | None) -> PlanCounts:
     if mission is None:
         return PlanCounts()
     route = mission.route
     counts = (route.plans, route.unchanged, route.outdated, route.attempts)
     return PlanCounts(*counts, planning=route.is_planning)
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 3)
 
 
 def _ms(seconds: float | None) -> float | None:

@@ -23,6 +23,7 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
+from fasaco_edge.mission.coverage.drive_meter import DriveMeter
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
@@ -42,6 +43,7 @@ class EventHandler:
     route: Route
     line: LineLayer
     trail: TrailLayer
+    drive: DriveMeter
     _now: float = field(default=0.0, init=False)
     # What the events of a step lead to.
     _path: PathUpdate | None = field(default=None, init=False)
@@ -169,6 +171,8 @@ class EventHandler:
         has_jumped = self.monitor.note_pose(stamped.pose, self._now)
         if has_jumped:
             self.ledger.break_track()
+            self.drive.break_track()
+        self.drive.note(stamped)
         motion = self.ledger.map_motion(stamped.pose)
         self.trail.note_motion(motion)
         uncertain = self.ledger.forget_uncertain(stamped.pose)

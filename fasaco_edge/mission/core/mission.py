@@ -18,6 +18,7 @@ from fasaco_edge.mission.core.events import Decision, Event
 from fasaco_edge.mission.core.executive import Executive
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
+from fasaco_edge.mission.coverage.drive_meter import DriveMeter, DriveTimes
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import Coverage, ZoneProgress, zone_progress
@@ -52,7 +53,8 @@ class Mission:
         owners = self._map, self._ledger, monitor, self._orders, self.route
         self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
         self._trail = TrailLayer(config, self._map, self.route)
-        self._handler = EventHandler(*owners, self._line, self._trail)
+        self._drive = DriveMeter()
+        self._handler = EventHandler(*owners, self._line, self._trail, self._drive)
         self._executive = Executive(*owners, self._trail)
         self.restore_order(order or OrderState.autostart())
 
@@ -95,6 +97,10 @@ class Mission:
     def floor_to_sweep(self) -> FloorToSweep | None:
         """Return how much floor is to be swept; None where cells are counted."""
         return self._line.to_sweep
+
+    def drive_times(self) -> DriveTimes:
+        """Return what driving takes the robot, as its poses show."""
+        return self._drive.times
 
     def unreached(self) -> Unreached:
         """Return what of the order stays uncovered as things are."""
