@@ -20,15 +20,15 @@ from fasaco_edge.wire.status import ClaimReport
 
 LOG = logging.getLogger(__name__)
 
-# Two that start at the same moment see each other's tokens within this [s].
+# Time within which two that start together see each other's tokens [s].
 SETTLE_S = 0.2
 # How often to ask for tokens while one daemon plans [s]; otherwise in each cycle.
 ASK_PERIOD_S = 1.0
-# How long the others need to find a router again that was away [s].
+# Time that the others need to reconnect to a restarted router [s].
 REJOIN_S = 3.0
 # A session silent for this long is dead to the others: Zenoh's lease [s].
 LEASE_S = 10.0
-# Longest wait for a daemon that could plan and does not [s]: its lease, and some.
+# Longest wait for a daemon that could plan and does not [s]: its lease and a margin.
 PATIENCE_S = 15.0
 
 _ID = re.compile(r"[0-9a-f]{1,32}")
@@ -119,7 +119,7 @@ class Claim:
         self._was_in_touch = in_touch
 
     def _wait_for_calm(self, first: str, now: float) -> None:
-        """Plan once nobody has planned for a while, and no other id comes first."""
+        """Plan once none has planned for a while, and no other id is smaller."""
         if self._calm_since is None:
             self._calm_since = now
         is_calm_for_s = now - self._calm_since - self._calm_s
@@ -157,7 +157,7 @@ class NameClaim(Claim):
         return f"another daemon of this name plans: Zenoh id {self.rival}"
 
     def update(self, now: float) -> bool:
-        """Look for the others; tell whether the state of this daemon has changed.
+        """Query the others; return whether the state of this daemon has changed.
 
         The token follows with ``announce``, once the former path is withdrawn.
         """
@@ -170,7 +170,7 @@ class NameClaim(Claim):
             self._version = self._roll.version
             self._others = claims_in(self._roll.there())
             self._others.pop(self._bus.id, None)
-            # Where nobody plans, somebody soon will.
+            # If none plans, one soon will.
             self._is_settled = ClaimState.PLANS in (self.state, *self._others.values())
         self.decide(self._others, now, in_touch=self._bus.is_in_touch())
         if self.rival_yielded:

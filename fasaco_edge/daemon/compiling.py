@@ -29,12 +29,12 @@ STAGE_S = 600.0
 LOOK_S = 0.02
 # A stage may add 250 MB to this, within what the unit may have in all (MemoryHigh=).
 MOST_MB = 220.0
-# What the process says: one of these words, a tab and a text, line by line.
+# Lines that the process prints: one of these words, a tab and a text.
 REASON, STAGE, WARNING = "reason", "stage", "warning"
 
 
 class KernelCompiler:
-    """Starts the process at once, beside whatever else a start has to do."""
+    """Starts the process at once, in parallel with the rest of the startup."""
 
     def __init__(self, manager: ServiceManager) -> None:
         self._manager = manager
@@ -43,7 +43,7 @@ class KernelCompiler:
         self._process: subprocess.Popen[str] | None = None
         folder = cache_folder()
         if folder is None:
-            return  # that is logged already; what it compiled would be lost
+            return  # already logged; what it compiled would be lost
         if folder == release.FOLDER:
             return
         self._process = subprocess.Popen(

@@ -13,7 +13,7 @@ from fasaco_edge.wire.status import ErrorCounts, LoopTimes
 
 LOG = logging.getLogger(__name__)
 
-# A cycle longer than this [s] makes what arrives meanwhile late.
+# Cycles longer than this are late [s].
 LATE_S = 0.1
 # Durations are counted to within 10 %, in logarithmic buckets, the last for all beyond 18 minutes:
 # so the figures of a year take as much memory as those of a minute.
@@ -102,11 +102,11 @@ class MapLatency:
         self._asked: float | None = None
 
     def call_for_plan(self) -> None:
-        """Note that the newest map calls for a plan."""
+        """Note that the newest map needs a plan."""
         self._unanswered = self._unanswered or self.arrived
 
     def ask(self) -> None:
-        """Note that a plan was asked for."""
+        """Note that a plan was requested."""
         self._asked, self._unanswered = self._unanswered, None
 
     def answer(self) -> float | None:

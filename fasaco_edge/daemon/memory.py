@@ -63,7 +63,7 @@ SPARE = 1.1
 # The smallest limits ever applied: a small flat.
 LEAST_PIXELS, LEAST_CELLS = 250_000, 10_000
 
-# Of these kinds no more than so much waits, either.
+# Limit of what waits of these kinds [bytes].
 QUEUED_BYTES = 8 * MAX_POSE_BYTES
 
 

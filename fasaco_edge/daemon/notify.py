@@ -23,7 +23,7 @@ LOG = logging.getLogger(__name__)
 PATIENCE_S = 1.0
 # `systemctl status` shows one line [characters].
 MOST_SAID = 500
-# Of the longest silence allowed: a cycle may be late, and a message may get lost.
+# Share of the longest allowed silence: a cycle may be late, and a message may get lost.
 SHARE = 0.25
 
 
@@ -34,7 +34,7 @@ class ServiceManager:
 
     Attributes:
         is_there: whether there is one.
-        watchdog_s: silence after which it takes this process for hung [s]; 0 for no limit.
+        watchdog_s: silence after which it considers this process hung [s]; 0 for no limit.
     """
 
     def __init__(self, environ: MutableMapping[str, str] = os.environ) -> None:
@@ -58,11 +58,11 @@ class ServiceManager:
             self._status = text
 
     def alive(self) -> None:
-        """Report progress; due within each ``watchdog_s``."""
+        """Report progress; required at least every ``watchdog_s``."""
         self._send("WATCHDOG=1")
 
     def extend(self, seconds: float) -> None:
-        """Ask for so much more time [s] to start."""
+        """Request this much more time to start [s]."""
         self._send(f"EXTEND_TIMEOUT_USEC={seconds * 1e6:.0f}")
 
     def reloading(self) -> None:

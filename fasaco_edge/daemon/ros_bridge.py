@@ -86,7 +86,7 @@ class RosPublisher:
         self._count = 0
 
     def forget(self) -> None:
-        """Keep nothing of what was said for those who join late."""
+        """Drop the sample kept for late joiners."""
         self._publisher.forget()
 
     def put(self, said: Shared) -> None:

@@ -25,9 +25,9 @@ LOG = logging.getLogger(__name__)
 
 FIRST_PAUSE_S = 1.0
 LONGEST_PAUSE_S = 30.0
-# A recorder whose process lives and that reports nothing for this long hangs.
+# A running recorder without a report for this long is considered hung.
 SILENT_AFTER_S = 10.0
-# Its first report may take longer: a slow computer loads its libraries for half a minute.
+# Its first report may take longer: slow computers load its libraries for half a minute.
 START_WITHIN_S = 120.0
 
 

@@ -21,10 +21,10 @@ Period = Annotated[float, Meta(ge=0, le=86_400)]
 
 
 class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
-    """Whether a mission starts without an order, and how patient it is.
+    """Whether a mission starts without an order, and its timeouts.
 
     Attributes:
-        autostart: whether everything is covered once where nobody orders anything.
+        autostart: whether everything is covered once without an order.
         retries: how often cells that were blocked or left over are tried again at the end.
         retry_s: pause before each retry [s].
         lost_pose_s: the pose is lost after this time without one [s]; 0 for never.

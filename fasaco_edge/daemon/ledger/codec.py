@@ -65,7 +65,7 @@ MOST_BYTES = (
     + 2_000_000
 )
 """Of a body, and of a file, which is smaller; longer ones are not read."""
-# Pheromone is rounded so much at once.
+# Number of values of pheromone that are rounded at a time.
 _AT_ONCE = 1 << 18
 # Mostly zeros and ones: the fastest level takes a hundredth of the size.
 _LEVEL = 1
@@ -73,7 +73,7 @@ _LEVEL = 1
 
 def encode_ledger(snapshot: LedgerSnapshot) -> bytes:
     """Return a ledger as the bytes of a file."""
-    # Part by part: a large ledger is not in memory as a whole once more.
+    # Part by part: a large ledger is not copied in memory as a whole.
     deflater = zlib.compressobj(_LEVEL)
     body = b"".join([*map(deflater.compress, _parts(snapshot)), deflater.flush()])
     return _ENVELOPE.pack(MAGIC, VERSION, _checksum(VERSION, body), len(body)) + body
@@ -82,7 +82,7 @@ def encode_ledger(snapshot: LedgerSnapshot) -> bytes:
 def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
     frame, floor = snapshot.frame.encode(), snapshot.floor.tiles
     counts = (len(frame), len(snapshot.under_tool), len(snapshot.tiles), len(floor))
-    # A larger one than is read would cost the whole ledger.
+    # One larger than what is read would make the ledger unreadable.
     trail = snapshot.trail if snapshot.trail.tau.size <= 4 * MAX_LATTICE_CELLS else NO_TRAIL
     yield _HEADS[VERSION].pack(snapshot.cell_m, snapshot.total, *counts, *trail.tau.shape[:2])
     yield frame

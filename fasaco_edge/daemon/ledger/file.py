@@ -24,13 +24,13 @@ from fasaco_edge.host.durable import make_folder, sync_folder, write_through
 from fasaco_edge.host.files import open_own, read_own
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 
-# So many files of each kind are kept aside, and the largest.
+# Number of renamed files of each kind that are kept, beside the largest.
 KEPT_ASIDE = 3
 
 
 @dataclass(frozen=True, slots=True)
 class LoadedLedger:
-    """What there was on disk: a ledger, or none; and what was wrong, if anything."""
+    """What was on disk: a ledger or none; and the fault, if any."""
 
     ledger: LedgerSnapshot | None = None
     fault: FasacoError | None = None
@@ -62,7 +62,7 @@ class LedgerFile:
             LedgerFileError: another process has it.
         """
         self._exclusive = True
-        # What there is no folder for yet is locked before it is written.
+        # If there is no folder yet, the lock is taken before the first write.
         with contextlib.suppress(OSError):
             self._take_lock()
 
@@ -94,7 +94,7 @@ class LedgerFile:
                 hint="everything has to be covered again; check the disk",
             )
             return LoadedLedger(fault=self._after_aside(lost, broken, "broken"))
-        # What appears later, on a disk that is mounted late, was not read: not overwritten either.
+        # A file that appears later, on a disk mounted late, was not read and is not overwritten.
         self._unwanted = [(path, "unread") for path in (self.path, self._previous)]
         return LoadedLedger()
 
@@ -113,11 +113,11 @@ class LedgerFile:
             self._take_lock()
         kept = self._rename_unwanted()
         if self._moving and self._new.exists():
-            self._move_on()  # it may be the only whole one but that before
+            self._move_on()  # it may be the only whole one beside its predecessor
         try:
             write_through(self._new, payload)
         except OSError:
-            # Half a file only takes room from others, on a disk that may be full.
+            # Half a file only takes space, on a disk that may be full.
             self._new.unlink(missing_ok=True)
             raise
         self._moving = True
@@ -125,7 +125,7 @@ class LedgerFile:
         return kept
 
     def set_aside(self, why: str) -> list[str]:
-        """Keep what there is under other names, and return these.
+        """Rename existing files, and return the new names.
 
         Args:
             why: a word for the new names.

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# Coverage that is a second old is on disk, although a cycle takes up to a tenth of a second, and
-# a memory card some tenths.
+# Period of writes, so that coverage is on disk within a second, although a cycle takes up to 0.1 s
+# and a memory card some tenths more.
 PERIOD_S = 0.5
-# Of floor and trail alone, so much may wait: they change with every pose or path, and a memory card
-# wears out.
+# Period if only floor and trail changed: they do with every pose or path, and memory cards wear
+# out.
 FLOOR_PERIOD_S = 1.0
 # Time between tries after a failure [s].
 RETRY_S = 2.0
@@ -38,7 +38,7 @@ MOST_WAIT_S = 1.0
 
 
 class _Kept(NamedTuple):
-    """What was last given to be written: visits, changes of swept floor and trail, the order."""
+    """The state last handed over: visits, changes of swept floor and trail, the order."""
 
     visits: int
     floor_changes: int
@@ -46,7 +46,7 @@ class _Kept(NamedTuple):
     order_state: OrderState
 
     def may_wait_s(self, before: _Kept) -> float:
-        """Return how long after the former one this may wait [s]."""
+        """Return how long this may wait after the former one [s]."""
         if self.order_state != before.order_state:
             return 0.0
         return PERIOD_S if self.visits != before.visits else FLOOR_PERIOD_S
@@ -74,11 +74,11 @@ class LedgerKeeper:
         mission.restore_order(self.order_state)
 
     def take_back(self, mission: Mission) -> None:
-        """Take what a mission has done, for the one that replaces it."""
+        """Take over a mission's progress for the one that replaces it."""
         self._before, self.order_state = mission.snapshot(), mission.order_state
 
     def keep(self, mission: Mission | None, now: float) -> None:
-        """Have changes written: an order at once, coverage once a period."""
+        """Write changes: an order at once, coverage once a period."""
         if mission is not None:
             changes = mission.floor.changes, mission.trail.changes
             held = _Kept(mission.ledger.total, *changes, mission.order_state)
@@ -177,7 +177,7 @@ class LedgerWriter:
         self._file = file
         self._written_at: float | None = None
         self._faults = deque[FasacoError]()
-        # What keeps it from writing now; what was wrong with the files at the start.
+        # Why it cannot write now; what was wrong with the files at the start.
         self._trouble, self._finding = "", ""
         if found.fault is not None:
             self._finding = log_fault(LOG, found.fault)
@@ -261,7 +261,7 @@ class LedgerWriter:
             if kept:
                 LOG.warning("the ledger before is kept as %s", ", ".join(kept))
         except Exception as error:
-            # Whatever it is, it must not cost the mission.
+            # No failure here may stop the mission.
             fault = _cannot_write(self._file, error)
             if str(fault) not in self._trouble:
                 self._trouble = log_fault(LOG, fault)

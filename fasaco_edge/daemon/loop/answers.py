@@ -1,7 +1,7 @@
 """Answers to queries for configuration, versions and commands, and what all answers share.
 
-Configuration and versions are told on Zenoh's thread, without waiting for the loop; commands are
-answered once the mission has decided.
+Configuration and versions are answered on Zenoh's thread, without waiting for the loop; commands
+are answered once the mission has decided.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Said = Reply | Shared
 
 
 def error_reply(error: FasacoError) -> Reply:
-    """Return the answer that tells an error."""
+    """Return an error as an answer."""
     return Reply(encode_error(error), is_error=True)
 
 
@@ -77,7 +77,7 @@ LEFT_OUT = "(left out)"
 
 
 def serve_about(bus: Bus, keys: Keys, config: Callable[[], DaemonConfig]) -> None:
-    """Serve ``config``, as it is then, and ``version``; tell others what there is to ask."""
+    """Serve ``config``, as it is then, and ``version``; answer other queries with what there is."""
     version = Version(__version__, VERSION.removeprefix("@"), ZENOH_VERSION)
     documents: dict[str, Callable[[], object]] = {
         "config": lambda: config_document(config()),
@@ -116,7 +116,7 @@ def _tell(document: Callable[[], object], request: Request) -> Reply:
 
 
 def _unknown(keys: Keys, request: Request) -> Reply | None:
-    """Answer what no other queryable does: this one gets every query."""
+    """Answer what no other queryable answers: this one gets every query."""
     if any(matches(request.key, keys.rpc(name)) for name in topics.RPC_NAMES):
         return None
     name = request.key.rpartition("/")[2]
@@ -126,11 +126,11 @@ def _unknown(keys: Keys, request: Request) -> Reply | None:
 
 
 class Commands:
-    """Serves ``@rpc/mission`` and ``@rpc/replan``; a question waits until the loop answers."""
+    """Serves ``@rpc/mission`` and ``@rpc/replan``; a query waits until the loop answers."""
 
     def __init__(self, bus: Bus, keys: Keys, mailbox: Mailbox[object]) -> None:
         self._count = 0
-        # Questions that the mission decides on, by number, and those for the status alone.
+        # Queries that the mission decides on, by number, and those for the status alone.
         self._open: dict[int, Question] = {}
         self._status_questions: list[Question] = []
         self._decided: list[Answer] = []
@@ -180,7 +180,7 @@ class Commands:
 
     @property
     def are_asked(self) -> bool:
-        """Whether anybody waits for an answer."""
+        """Whether a query waits for an answer."""
         return bool(self._open or self._status_questions)
 
     def note(self, answers: Sequence[Answer], now: float) -> None:

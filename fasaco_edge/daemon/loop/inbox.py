@@ -33,12 +33,12 @@ if TYPE_CHECKING:
     from fasaco_edge.planners.planner import ColonySnapshot
 
 MAPS = ("map", "map_update")
-# Updates without their map come in swarms; the map is asked for no more often than this [s].
+# Least period of queries for the map: updates without their map come in bursts [s].
 ASK_FOR_MAP_S = 2.0
-# Least time between two maps that are taken [s]: a flood of maps, by mistake or malice, must not
-# take a core. No mapper is that fast.
+# Least time between two maps that are taken [s]: a flood of maps must not take a core. No mapper
+# is that fast.
 MAP_SPACING_S = 0.05
-# So many poses are taken in one cycle at most: what else arrives must not wait for a thousand.
+# Most poses of a cycle: other samples must not wait for a thousand.
 MOST_POSES = 32
 
 

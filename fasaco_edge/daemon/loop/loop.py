@@ -134,7 +134,7 @@ class Loop:
         """Wait while another daemon of this name plans; tell whether to run a cycle."""
         claim, mission = self._bus.claim, self._runner.mission
         if claim.update(now):
-            self._status.stands_back = claim.reason if claim.state.is_waiting else ""
+            self._status.yield_reason = claim.reason if claim.state.is_waiting else ""
             if claim.state.is_waiting:
                 self._bus.turns.end(claim.reason)
                 if mission is not None:
@@ -145,8 +145,8 @@ class Loop:
         elif claim.rival_yielded and mission is not None:
             # The robot may have got the other's last path after ours: an empty one.
             self._restart("another daemon planned, too")
-        elif self._status.stands_back:
-            self._status.stands_back = claim.reason
+        elif self._status.yield_reason:
+            self._status.yield_reason = claim.reason
         return not claim.is_uncertain(now)
 
     def _reload_config(self, batch: Batch) -> None:
@@ -211,7 +211,7 @@ class Loop:
         mission, events, faults = self._runner.mission_for(events, self._bus.claim.state)
         self._count_faults(faults)
         if mission is None:
-            return Decision(answers=self._runner.answer(commands, self._status.stands_back))
+            return Decision(answers=self._runner.answer(commands, self._status.yield_reason))
         self._status.waits = "no map yet"
         maps = mission.map_revision
         try:

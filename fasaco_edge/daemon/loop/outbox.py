@@ -239,7 +239,7 @@ class FloorPublisher:
     def publish(self, mission: Mission, now: float) -> None:
         """Publish the swept floor if that is due."""
         if not self._outbox.shows_floor:
-            self._key = ()  # who listens next has not got it
+            self._key = ()  # the next listener has not received it
             return
         floor, grid = mission.floor, mission.grid
         key = (floor, floor.changes)

@@ -55,7 +55,7 @@ class StatusBoard:
 
     Attributes:
         claim: who this daemon is, and whether it plans, as the status has it.
-        stands_back: why another daemon plans, and this one does not; "" where it does.
+        yield_reason: why another daemon plans, and this one does not; "" where it does.
     """
 
     def __init__(self, config: DaemonConfig) -> None:
@@ -69,7 +69,7 @@ class StatusBoard:
         self.path: PathUpdate | None = None
         self.waits = "no map yet"
         self.claim = ClaimReport()
-        self.stands_back = ""
+        self.yield_reason = ""
         self._config = config
         self.show(config)
         self._started = time.monotonic()
@@ -92,7 +92,7 @@ class StatusBoard:
         claim = self.claim.stand
         key = (state, reason, revision, recorder, self.ledger.fault, order_state, claim)
         # Many small faults are not worth a message each: the heartbeat counts them.
-        heartbeat_s = float("inf") if self.stands_back else HEARTBEAT_S
+        heartbeat_s = float("inf") if self.yield_reason else HEARTBEAT_S
         wait = LEAST_INTERVAL_S if key != self._sent_key else heartbeat_s
         if now - self._sent_at < wait:
             return None
@@ -136,8 +136,8 @@ class StatusBoard:
         )
 
     def _state(self, runner: MissionRunner) -> tuple[str, str]:
-        if self.stands_back:
-            return "blocked", self.stands_back
+        if self.yield_reason:
+            return "blocked", self.yield_reason
         if (mission := runner.mission) is not None:
             return str(mission.state), mission.reason
         order_state, loading = runner.order_state, runner.loading

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
 
 # The field is shown no more often than this [s], and a large one, which takes the loop some
-# milliseconds per 100,000 cells, by so much more seldom.
+# milliseconds per 100,000 cells, less often.
 PERIOD_S = 0.5
 CELLS_PER_S = 200_000
 
@@ -88,7 +88,7 @@ class TrailPublisher:
         """Show the trail if that is due."""
         is_heard = self._outbox.shows_pheromone
         if not is_heard:
-            self._published = ()  # who listens next has not got it
+            self._published = ()  # the next listener has not received it
         trail, lattice, grid = mission.trail, mission.lattice, mission.grid
         key = (trail, trail.changes)
         is_known = key == self._kept and (not is_heard or key == self._published)

@@ -24,7 +24,7 @@ from fasaco_edge.planners.planner import (
 
 LOG = logging.getLogger(__name__)
 
-# An attempt to make a path better takes so long [s].
+# Duration of an attempt to improve a path [s].
 SPARE_S = 0.05
 
 
@@ -57,11 +57,11 @@ class PlanningWorker:
         self._requests.put(request)
 
     def interrupt(self) -> None:
-        """End the search under way with the best walk it has: something newer came."""
+        """End the current search with its best walk: there is a newer request."""
         self._interrupt.set()
 
     def disown(self) -> None:
-        """Interrupt the search; nothing of it is posted any more, and the thread ends by itself."""
+        """Interrupt the search; its result is not posted, and the thread ends by itself."""
         self._stopping.set()
         self._interrupt.set()
 
@@ -88,10 +88,10 @@ class PlanningWorker:
         budget_s = SPARE_S if request.problem.only_better else self._budget_s
         stop = StopRecorder(AnyOf(self._count, TimeBudget(budget_s), Interrupt(self._interrupt)))
         try:
-            # Costs some percent of a full plan, and a repair nothing.
+            # Costs some percent of a full plan, nothing for a repair.
             path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))
         except Exception as error:
-            # The same map comes again after a restart: to end with it helps nobody.
+            # The same map comes again after a restart: exiting would not help.
             LOG.exception("plan %d", request.number, extra={"event": "plan_failed"})
             why = f"plan {request.number} failed: {type(error).__name__}: {error}"
             self._post("plan", PlanBroken(request.number, PlanFailed(why)))

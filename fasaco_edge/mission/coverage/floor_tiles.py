@@ -28,7 +28,7 @@ ROW_BYTES = FLOOR_TILE // 8
 # Edges of the squares in which floor is shown [pixels]: whole bytes, and parts of a tile.
 SQUARES = (1, 8, 16, 32, 64, FLOOR_TILE)
 
-# So many pixels are looked up together at most.
+# Most pixels that are looked up together.
 MOST_TOGETHER = 1 << 20
 
 _BITS = np.array([bin(byte).count("1") for byte in range(256)], np.uint8)
@@ -65,7 +65,7 @@ class Similarity(NamedTuple):
         corners = [(r, c) for r in (window.row0, window.row1) for c in (window.col0, window.col1)]
         rows = [self.row0 + self.up * col + self.right * row for row, col in corners]
         cols = [self.col0 + self.right * col - self.up * row for row, col in corners]
-        # One beyond: where a centre comes to lie is rounded.
+        # One beyond: a centre's position is rounded.
         low, high = (min(rows), min(cols)), (max(rows), max(cols))
         return Window(
             *(math.floor(least) - 1 for least in low), *(math.floor(most) + 2 for most in high)

@@ -145,7 +145,7 @@ class CoverageLedger:
         return entered
 
     def break_track(self) -> None:
-        """Note that the way of the robot to its next pose is unknown."""
+        """Note that the robot's way to its next pose is unknown."""
         self._last = None
 
     def lift_tool(self) -> None:

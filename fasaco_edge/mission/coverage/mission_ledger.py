@@ -214,7 +214,7 @@ class MissionLedger:
             covered.cells.credit(cell)
 
     def break_track(self) -> None:
-        """Note that the way of the robot to its next pose is unknown."""
+        """Note that the robot's way to its next pose is unknown."""
         for covered in self._all:
             covered.cells.break_track()
             covered.floor.break_track()

@@ -48,5 +48,5 @@ class PoseScatter:
         self._before = (*self._before[-1:], pose)
 
     def break_track(self) -> None:
-        """Note that the way of the robot to its next pose is unknown."""
+        """Note that the robot's way to its next pose is unknown."""
         self._before = ()

@@ -69,7 +69,7 @@ class SweptFloor:
     """
 
     def __init__(self, tool_m: float) -> None:
-        """Begin with nothing; ``tool_m``: width of the tool [m]."""
+        """Create an empty one; ``tool_m``: width of the tool [m]."""
         self.changes = 0
         self.pixels = 0
         self.dropped = 0
@@ -84,7 +84,7 @@ class SweptFloor:
         self._tiles: dict[TilePlace, Bits] = {}
         # The tiles that no snapshot shares.
         self._own: set[TilePlace] = set()
-        # Up to which number the last changes went, and where they were.
+        # The number of the last changes, and where they were.
         self._news: deque[tuple[int, Window]] = deque(maxlen=REMEMBERED)
 
     @classmethod
@@ -159,7 +159,7 @@ class SweptFloor:
         return Window.around(*news)
 
     def break_track(self) -> None:
-        """Note that the way of the robot to its next pose is unknown."""
+        """Note that the robot's way to its next pose is unknown."""
         self._end_track()
         self._last = None
 
@@ -234,7 +234,7 @@ class SweptFloor:
                 start = place
             whole = Window.around(*(window for window, _ in parts)) or NOWHERE
             if whole.rows * whole.cols > MOST_AHEAD:
-                # Poses that scatter so widely tell of no drive, and a mask would take much memory.
+                # Poses that scatter so widely are no drive, and a mask would take much memory.
                 whole, parts = NOWHERE, []
             ahead = np.zeros((whole.rows, whole.cols), np.bool_)
             for window, under in parts:
@@ -250,7 +250,7 @@ class SweptFloor:
         reach = max(0.5 * self._tool_m - end.error_m, 0.25 * self._tool_m)
         row0, row1 = _span(start.y, end.y, reach, 1)
         col0, col1 = _span(start.x, end.x, reach, 8)
-        # Relative to the start: far from 0 a difference would drown in rounding.
+        # Relative to the start: far from 0 rounding would swamp differences.
         up = ((np.arange(row0, row1) + 0.5) * PIXEL_M - start.y)[:, np.newaxis]
         right = (np.arange(col0, col1) + 0.5) * PIXEL_M - start.x
         dx, dy = end.x - start.x, end.y - start.y

@@ -20,12 +20,12 @@ from fasaco_edge.mission.orders.zones import in_zones
 
 # This many areas are listed, the largest first; the others are counted.
 MOST_AREAS = 20
-# A robot drives to this many at most when it tries again.
+# Most areas that a robot drives to when it tries again.
 MOST_VIEWPOINTS = 256
 
 
 class Cause(IntEnum):
-    """Why a cell stays uncovered; 0 is a cell that does not."""
+    """Why a cell stays uncovered; 0 for other cells."""
 
     KEPT_OUT = 1
     BEHIND_KEEP_OUT = 2
@@ -46,7 +46,7 @@ REASONS = {
 
 @dataclass(frozen=True, slots=True)
 class UnreachedArea:
-    """Cells that hang together and stay uncovered for one reason.
+    """Connected cells that stay uncovered for one reason.
 
     Attributes:
         cells: how many.
@@ -170,7 +170,7 @@ class UnreachedFinder:
             without_zones = ReachableArea.around(free, cell).reachable
             causes[without_zones & lattice.coverable & ~reachable] = Cause.BEHIND_KEEP_OUT
         if stage is not Stage.COVERING:
-            # Before, they are still to come.
+            # Before that they are still ahead.
             causes[reachable] = Cause.LEFT_OVER
         causes[~self._uncovered(order, area)] = 0
         return causes

@@ -44,7 +44,7 @@ class Ground:
         self._plain: CoverageLattice | None = None
 
     def begin(self, grid: OccupancyGrid) -> LatticeChange:
-        """Look at a first map; return what it shows, of centres.
+        """Take the first map; return what it shows, of centres.
 
         Raises:
             MapTooLarge, MapTooFar: see ``LatticeChange.first`` and ``FloorMap``.
@@ -56,7 +56,7 @@ class Ground:
         return change
 
     def follow(self, maps: Maps, within: Window | None) -> LatticeChange:
-        """Go on from one map to the next; return what has changed, of centres.
+        """Follow from one map to the next; return what has changed, of centres.
 
         Args:
             maps: the map before and the new one.
@@ -103,7 +103,7 @@ class Ground:
         return decided
 
     def place_of(self, cell: Cell) -> Point | None:
-        """Return where the robot is to come to in a cell, x, y [m]; None for nowhere."""
+        """Return where the robot should be in a cell, x, y [m]; None for nowhere."""
         floor = self.floor
         if floor is None:
             cell_m = self._config.footprint.cell_m

@@ -18,9 +18,9 @@ from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 
-# Map and poses come in another frame alone for this long before it becomes active [s].
+# Time for which map and poses must arrive in another frame alone before it becomes active [s].
 PATIENCE_S = 10.0
-# Poses further apart than this are no stream [s].
+# Poses with gaps longer than this are no stream [s].
 GAP_S = 3.0
 
 
@@ -33,16 +33,16 @@ class FrameSelector:
 
     def __init__(self) -> None:
         self.active = ""
-        # By frame, the newest at the end.
+        # By frame, the newest last.
         self._maps: dict[str, OccupancyGrid] = {}
         self._poses: dict[str, tuple[StampedPose, float]] = {}
-        # The other frame that map and poses come in, and since when.
+        # The other frame in which map and poses arrive, and since when.
         self._rival, self._rival_since = "", 0.0
         # Whether a reset has left the decision to what comes next.
         self._is_open = False
 
     def activate(self, frame: str) -> None:
-        """Make a frame active, whatever was received."""
+        """Make a frame active unconditionally."""
         self.active = frame
 
     def note_map(self, grid: OccupancyGrid) -> bool:
@@ -107,7 +107,7 @@ class FrameSelector:
 
     @property
     def newest_map(self) -> OccupancyGrid | None:
-        """The map in the active frame, as it came; the newest of all as long as none is active."""
+        """The map in the active frame; the newest of all as long as none is active."""
         if self.active:
             return self._maps.get(self.active)
         return next(reversed(self._maps.values()), None)
@@ -171,7 +171,7 @@ class InputMonitor:
         self._pose: Pose2D | None = None
         self._pose_at = 0.0
         self._map_at = 0.0
-        # The plan that was requested from where the doubtful pose is.
+        # The plan requested from the doubtful pose.
         self._answered_by = -1
 
     def note_map(self, now: float) -> None:
@@ -185,7 +185,7 @@ class InputMonitor:
         if last is None:
             return False
         distance = math.hypot(pose.x - last.x, pose.y - last.y)
-        # Poses close in time may lie some cells apart; after a loss half a cell is a hole.
+        # Poses close in time may be some cells apart; after a loss half a cell is a gap.
         jumped = distance > (0.5 if lost else JUMP_CELLS) * self._config.footprint.cell_m
         if jumped:
             how = f"came back {distance:.2f} m from where it was lost"
@@ -199,7 +199,7 @@ class InputMonitor:
         self._pose, self.doubt = None, ""
 
     def clear_doubt(self) -> None:
-        """Take the robot to be where its pose says."""
+        """Trust the robot's pose."""
         self.doubt = ""
 
     def note_request(self, number: int) -> None:

@@ -21,9 +21,9 @@ from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, FloorSnapshot, Sim
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 
 # This many cells change between free and blocked in one map, and this share of those that were
-# known: no door and no passer-by does that.
+# known: doors and passers-by change less.
 LEAST_CELLS, LEAST_SHARE = 20, 0.1
-# A motion smaller than this is none: [m], [rad].
+# Smaller motions are ignored: [m], [rad].
 STILL_M, STILL_RAD = 0.02, math.radians(0.2)
 # How far a cell's centre may lie from the middle of four [cells] to be one with the nearest.
 NEAR = 0.1
@@ -43,7 +43,7 @@ def has_moved(change: LatticeChange) -> bool:
         for lattice in (change.before, change.after)
     )
     changed = int(np.count_nonzero((then != UNKNOWN) & (now != UNKNOWN) & (then != now)))
-    # The whole lattice is counted only where that may matter: this runs at every map.
+    # The whole lattice is counted only if necessary: this runs at every map.
     return changed >= LEAST_CELLS and changed >= LEAST_SHARE * int(
         np.count_nonzero(change.before.states != UNKNOWN)
     )
@@ -93,7 +93,7 @@ class Motion:
 def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDArray[np.int32]:
     """Return where the middles of a path's cells, int32 (n, 2), have moved to, int32 (m, 2).
 
-    What falls on the same cell one after the other is that cell once; where the map has turned,
+    Successive centres in the same cell count once; where the map has turned,
     the next cell may lie beside a corner.
     """
     y, x = ((cells.astype(np.float64) + 0.5) * cell_m).T

@@ -70,7 +70,7 @@ class MapState:
         """
         is_active_now = False
         if self.frames.active not in ("", grid.frame):
-            # It may be wanted later, if it is one that can be taken at all.
+            # It may be needed later, if it is acceptable at all.
             lattice_window(
                 grid.geometry, self._config.footprint.cell_m, self._config.max_lattice_cells
             )
@@ -86,7 +86,7 @@ class MapState:
         return self.frames.note_map(grid) or is_active_now
 
     def switch_frame(self) -> bool:
-        """Go on with map and pose of the active frame; return whether it is another map."""
+        """Continue with map and pose of the active frame; return whether the map is another one."""
         grid = self.frames.newest_map
         is_other = grid is not None and (self.grid is None or self.grid.frame != grid.frame)
         if grid is not None and is_other:
@@ -162,7 +162,7 @@ class MapState:
         return self._ground.is_decided(window)
 
     def place_of(self, cell: Cell) -> Point | None:
-        """Return where the robot is to come to in a cell, x, y [m]; None for nowhere."""
+        """Return where the robot should be in a cell, x, y [m]; None for nowhere."""
         return self._ground.place_of(cell)
 
     def take_pose(self, pose: StampedPose) -> None:
@@ -178,7 +178,7 @@ class MapState:
         self.pose = pose
 
     def update_area(self) -> None:
-        """Find out what can be reached from where the robot is."""
+        """Determine what can be reached from the robot's position."""
         cell, before, self.area = self.robot_cell(), self.area, None
         if cell is None or self.lattice is None:
             return
@@ -225,7 +225,7 @@ class MapState:
         return f"; {self.why_no_pose()}" if other else ""
 
     def why_misplaced(self) -> str:
-        """Return why the robot cannot be where it is, and what it waits for."""
+        """Return why the robot's position is invalid, and what it waits for."""
         assert self.free is not None
         assert self.lattice is not None
         assert self.pose is not None

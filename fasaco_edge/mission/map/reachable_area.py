@@ -19,7 +19,7 @@ from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, upd
 # coverable cell this close.
 ANCHOR_CELLS = 1.5
 
-# Where more of the lattice has changed, to search all of it is as fast.
+# If more of the lattice has changed, a full search is as fast.
 LOCAL_SHARE = 0.01
 
 

@@ -51,7 +51,7 @@ class MissionOrder:
     Attributes:
         zones: one after the other, in this order; at least one.
         keep_out: polygons (x, y) [m] in the map frame that the robot must not touch.
-        return_home: whether to drive back to the start in the end.
+        return_home: whether to drive back to the start at the end.
         keep_covered: whether cells covered before count in the first pass.
     """
 
@@ -85,7 +85,7 @@ class ZoneDocument(_Document, frozen=True):
 
 
 class OrderDocument(_Document, frozen=True):
-    """What to cover. Without zones: everything the robot can come to."""
+    """What to cover. Without zones: everything the robot can reach."""
 
     zones: Annotated[list[ZoneDocument], Meta(max_length=MOST_ZONES)] = []
     keep_out: Annotated[list[_Polygon], Meta(max_length=MOST_KEEP_OUT)] = []
@@ -95,7 +95,7 @@ class OrderDocument(_Document, frozen=True):
 
 
 class CommandDocument(_Document, frozen=True):
-    """What is asked of a mission; ``order`` goes with ``start`` alone."""
+    """A command to a mission; ``order`` is for ``start`` only."""
 
     command: CommandName
     order: OrderDocument | None = None
@@ -164,7 +164,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
         document.return_home,
         document.keep_covered,
     )
-    # What the types of a document do not say, and no map is needed for.
+    # Checks beyond the types of a document that need no map.
     names = [zone.name for zone in order.zones]
     for index, name in enumerate(names):
         where = f"zones[{index}].name"

@@ -38,7 +38,7 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class OrderState:
-    """An order, and how far it is carried out.
+    """An order and its progress.
 
     Attributes:
         order: what to do; None for nothing at all.
@@ -166,7 +166,7 @@ class OrderState:
 
     @classmethod
     def from_json(cls, note: str) -> OrderState:
-        """Return the state that ``to_json`` gave.
+        """Return the state encoded by ``to_json``.
 
         Raises:
             OrderError: it is of another version, or not whole.

@@ -21,7 +21,7 @@ from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.problem import CoverageProblem
 
-# Around a cell from which nothing new was seen, others show nothing new either [cells].
+# Radius around a cell from which nothing new was seen that is not visited either [cells].
 SEEN_AROUND = 1
 
 # After this many paths in a row with the same number of cells left, those wait for the retry: the
@@ -89,7 +89,7 @@ class Exploration:
         self.viewpoints = viewpoints
 
     def end_if_reached(self, zone: Zone | None, area: ReachableArea) -> None:
-        """Look no more for a zone that can be reached now."""
+        """Stop looking for a zone that can be reached now."""
         if zone is not None and self.viewpoints and is_in_reach(zone, area):
             self.viewpoints.clear()
 
@@ -115,7 +115,7 @@ def is_in_reach(zone: Zone, area: ReachableArea) -> bool:
 
 @dataclass(slots=True)
 class _Run:
-    """What is known of an order only as long as the daemon runs.
+    """State of an order that is lost with the daemon.
 
     Attributes:
         exploration: where to look from.
@@ -161,7 +161,7 @@ class Sequencer:
 
     @property
     def ending(self) -> str:
-        """How the order came to its end."""
+        """How the order ended."""
         return self._run.ending
 
     def start(self, state: OrderState) -> None:
@@ -171,7 +171,7 @@ class Sequencer:
         self._unreached.restart()
 
     def set_state(self, state: OrderState) -> None:
-        """Go on with the same order in another state, as a command has left it."""
+        """Continue with the same order in another state, after a command."""
         self.order_state = state
 
     def note_area(self) -> None:
@@ -183,7 +183,7 @@ class Sequencer:
         self._run.exploration.viewpoints.discard(cell)
 
     def begin(self, cell: Cell, now: float) -> str:
-        """Begin what is due, the robot being in ``cell``; return why a plan is wanted, or ""."""
+        """Start what is due, with the robot in ``cell``; return why a plan is wanted, or ""."""
         run = self._run
         if run.retry_at is not None and not self._is_worth_trying():
             self.advance(now)
@@ -260,7 +260,7 @@ class Sequencer:
         return in_zones(zones, window, self._config.footprint.cell_m)
 
     def note_path_end(self) -> bool:
-        """Note that a path came to its end; return whether what it left over has to wait."""
+        """Note the end of a path; return whether what it left over has to wait."""
         run, cells = self._run, self._left()
         if cells > 0:
             self._unreached.note_failure()
@@ -270,7 +270,7 @@ class Sequencer:
         return is_given_up and not run.exploration.skip_viewpoint()
 
     def advance(self, now: float) -> None:
-        """Go on to what comes next: all that could be done now is done."""
+        """Continue with what is next: all that could be done now is done."""
         state, run = self.order_state, self._run
         run.exploration.viewpoints.clear()
         following = state.next_pass()
@@ -299,7 +299,7 @@ class Sequencer:
             self.order_state = replace(self.order_state, stage=Stage.COVERING)
 
     def waiting_reason(self) -> str:
-        """Return in words what the robot waits for before it tries again."""
+        """Return what the robot waits for before it tries again, as text."""
         cells, policy = self.unreached().cells, self._config.policy
         return (
             f"{cells} {'cell' if cells == 1 else 'cells'} not reached: tried again after "
