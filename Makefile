@@ -6,7 +6,8 @@ TARGET_PYTHON ?= 3.11
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-WORKERS ?= $(shell expr 2 \* $$(nproc))
+# Most tests wait for processes and their timers: two a core, but of many cores no more than eight.
+WORKERS ?= $(shell n=$$(nproc); echo $$((n < 4 ? 2 * n : 8)))
 # As images for containers set it, each of some hundred processes would compile all sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -18,9 +19,9 @@ demo: $(STAMP)  ## watch a robot cover a building nobody mapped before
 test: $(STAMP)  ## all tests
 	# Compiles once what each test would wait for.
 	$(BIN)/fasaco-edge warmup
-	# Most tests wait for processes and their timers, so two per core run at a time. In the order
-	# of collection: by default files with few tests, which take longest, would come last.
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(ARGS)
+	# In the order of collection: by default files with few tests, which take longest, would come
+	# last. What a busy machine held up for too long runs once more; the closing line counts that.
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --reruns 1 -rR $(ARGS)
 
 check: $(STAMP)  ## format, lint, types, import contracts
 	$(BIN)/ruff format --check .
