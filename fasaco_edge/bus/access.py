@@ -215,12 +215,12 @@ def mutual_tls(root_ca: str, certificate: str, private_key: str) -> dict[str, An
     return {"link": {"protocols": ["tls"], "tls": tls}}
 
 
-def user_password(user: str, password: str, dictionary_file: str = "") -> dict[str, Any]:
+def user_password(user: str, password: str, dictionary_file: str) -> dict[str, Any]:
     """Return Zenoh's ``transport`` with authentication by user and password.
 
     Args:
         user, password: of this session.
-        dictionary_file: lines ``user:password`` of those that may connect to this session.
+        dictionary_file: lines ``user:password`` of those that may connect to it; "" for nobody.
     """
     login: dict[str, str] = {"user": user, "password": password}
     if dictionary_file:

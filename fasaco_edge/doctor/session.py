@@ -67,15 +67,15 @@ def why_not_bound(endpoint: str) -> str:
     return ""
 
 
-def program_at(endpoint: str, root: Path = Path("/")) -> str:
+def program_at(endpoint: str) -> str:
     """Return the name and process of the program that listens at an endpoint of this computer.
 
     "" where it cannot be seen: those of other users only root sees.
     """
     address = address_of(endpoint)
-    inodes = _listening(root, address[1]) if address else set()
+    inodes = _listening(address[1]) if address else set()
     sockets = {f"socket:[{inode}]" for inode in inodes}
-    for process in (root / "proc").glob("[0-9]*") if sockets else ():
+    for process in Path("/proc").glob("[0-9]*") if sockets else ():
         try:
             held = {str(file.readlink()) for file in (process / "fd").iterdir()}
             if held & sockets:
@@ -86,12 +86,12 @@ def program_at(endpoint: str, root: Path = Path("/")) -> str:
     return ""
 
 
-def _listening(root: Path, port: int) -> set[str]:
+def _listening(port: int) -> set[str]:
     """Return the inodes of the sockets that listen at a port."""
     inodes = set()
     for table in ("tcp", "tcp6"):
         try:
-            lines = (root / "proc/net" / table).read_text(encoding="ascii").splitlines()[1:]
+            lines = Path("/proc/net", table).read_text(encoding="ascii").splitlines()[1:]
         except OSError:
             continue
         for fields in map(str.split, lines):

@@ -100,17 +100,15 @@ class WallDirection:
         return self.angle_deg if abs(self.angle_deg) >= LEAST_TURN_DEG else 0.0
 
 
-def wall_direction(
-    grid: OccupancyGrid, thresholds: Thresholds = THRESHOLDS
-) -> WallDirection | None:
+def wall_direction(grid: OccupancyGrid) -> WallDirection | None:
     """Return where most walls of a map point; None where there are few, or none of them straight.
 
     A wall is where free pixels meet occupied ones. On maps that hardly have these, as some are of
     what is free alone, it is where free pixels meet any other.
     """
-    votes = _Votes.of(grid, thresholds)
+    votes = _Votes.of(grid)
     if is_of_rim := votes.rim > 4 * votes.edges:
-        votes = _Votes.of(grid, thresholds, is_rim_wall=True)
+        votes = _Votes.of(grid, is_rim_wall=True)
     yaw_deg = math.degrees(grid.geometry.origin.yaw)
     peak = votes.peak(_folded(-yaw_deg))
     if peak is None:
@@ -167,12 +165,10 @@ class _Votes:
     rim: int
 
     @classmethod
-    def of(
-        cls, grid: OccupancyGrid, thresholds: Thresholds, *, is_rim_wall: bool = False
-    ) -> _Votes:
+    def of(cls, grid: OccupancyGrid, *, is_rim_wall: bool = False) -> _Votes:
         """Return the votes of a map; ``is_rim_wall`` where all that is not free is wall."""
         sums, edges, rim = np.zeros((3, 4 * BINS), np.int64), 0, 0
-        for values in _tiles(grid, thresholds):
+        for values in _tiles(grid):
             if is_rim_wall:
                 values[values == _UNKNOWN] = _WALL
             steps = np.diff(values, axis=1), np.diff(values, axis=0)
@@ -221,7 +217,7 @@ _UNKNOWN, _FREE, _WALL = 0, 1, 3
 _TO_UNKNOWN, _TO_WALL = 1, 2
 
 
-def _tiles(grid: OccupancyGrid, thresholds: Thresholds) -> Iterator[NDArray[np.int8]]:
+def _tiles(grid: OccupancyGrid) -> Iterator[NDArray[np.int8]]:
     """Yield the kinds of joined pixels, int8, tile by tile; those without a free one are left out.
 
     A tile begins REACH before the pixels that are its own.
@@ -234,13 +230,13 @@ def _tiles(grid: OccupancyGrid, thresholds: Thresholds) -> Iterator[NDArray[np.i
             top, left = row - reach, col - reach
             bottom, right = min(row + size, rows), min(col + size, cols)
             cells = grid.cells[max(top, 0) : bottom, max(left, 0) : right]
-            free = (cells >= 0) & (cells <= thresholds.free)
+            free = (cells >= 0) & (cells <= THRESHOLDS.free)
             if not free.any():
                 continue
             values = np.full((bottom - top, right - left), _UNKNOWN, np.int8)
             here = values[max(-top, 0) :, max(-left, 0) :][: cells.shape[0], : cells.shape[1]]
             here[free] = _FREE
-            here[cells >= thresholds.occupied] = _WALL
+            here[cells >= THRESHOLDS.occupied] = _WALL
             yield _joined(values, parts)
 
 

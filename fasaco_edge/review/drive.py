@@ -56,7 +56,7 @@ def drive_over(
     lattice: CoverageLattice,
     at_s: NDArray[np.float64],
     track: NDArray[np.float64],
-    lost_pose_s: float = 0.0,
+    lost_pose_s: float,
 ) -> Drive:
     """Return the way of a robot over the lattice that the map has at the end.
 

@@ -258,8 +258,7 @@ class PublishGuard:
     All failures are counted; of each topic one in ``LOG_PERIOD_S`` is logged.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
+    def __init__(self) -> None:
         self._faults: list[FasacoError] = []
         self._logged_at: dict[str, float] = {}
 
@@ -272,7 +271,7 @@ class PublishGuard:
                 str(error) if isinstance(error, FasacoError) else f"{type(error).__name__}: {error}"
             )
             fault = NotPublished(f"{topic} was not published: {why}")
-            now = self._clock()
+            now = time.monotonic()
             if now - self._logged_at.get(topic, float("-inf")) >= LOG_PERIOD_S:
                 self._logged_at[topic] = now
                 log_fault(LOG, fault)
