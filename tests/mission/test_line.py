@@ -13,7 +13,7 @@ from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.daemon.loop.status import floor_report
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.floor.capsule import NEVER
 from fasaco_edge.kernels.floor.driven import DRIVEN, WANTED
 from fasaco_edge.mission.config import MissionConfig, Sweeping
@@ -25,6 +25,8 @@ from fasaco_edge.mission.core.events import (
     State,
 )
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.line.pieces import POLISHED
+from fasaco_edge.mission.line.polisher import AHEAD_M
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.cost import CoverageCost
@@ -400,6 +402,34 @@ def test_a_robot_that_jumped_ahead_on_its_path_is_not_led_back_through_a_new_wal
     blocked = with_obstacle(grid, int(row) - 6, int(col), 4)
     robot.tell(MapReceived(blocked))
     assert_clear(robot, blocked)
+
+
+def cost_s(ahead, line):
+    """Return what the line ahead takes, and what of the floor it leaves is worth [s]."""
+    edges = np.diff(ahead.line.points, axis=0) * ahead.tally.unit_m
+    angles = np.diff(np.unwrap(np.arctan2(*edges.T)))
+    quarters = np.abs(angles).sum() / (math.pi / 2)
+    driving_s = np.hypot(*edges.T).sum() / line.speed_m_s
+    return driving_s + 1.5 * quarters + line.price_s_m2 * ahead.tally.left_m2
+
+
+def test_a_line_on_a_map_that_grows_becomes_better_and_never_worse():
+    grid = with_obstacle(with_obstacle(room(6.0, 3.0), 22, 30), 0, 82, 62, UNKNOWN)
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(grid))
+    assert robot.mission._orders.is_exploring
+    ahead, line = robot.mission._line._ahead, CONFIG.sweeping.line
+    while (first := ahead.first_below(POLISHED)) < len(ahead.line) and (
+        ahead.lengths()[first] <= AHEAD_M
+    ):
+        robot.tell()
+    # What descends is done; the rest is moves at random.
+    costs = [cost_s(ahead, line)]
+    for _ in range(50):
+        robot.tell()
+        costs.append(cost_s(ahead, line))
+    assert np.all(np.diff(costs) <= 1e-6)
+    assert costs[-1] < costs[0] - 1.0
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.5])

@@ -134,7 +134,7 @@ class LineLayer:
         is_waited_for = update is not None or reason or is_further
         if not is_waited_for:
             self._explain()
-            if self._polisher.polish(ahead, self._map.floor, may_anneal=self._is_settled):
+            if self._polisher.polish(ahead, self._map.floor, is_settled=self._is_settled):
                 reason = "line polished"
         if update is None and reason and len(path.ahead):
             ahead.rebase()

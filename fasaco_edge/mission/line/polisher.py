@@ -34,7 +34,8 @@ MOVED_M = 6.0
 NEAR_M, AHEAD_M, PIECE_M = 5.0, 8.0, 4.0
 # Pieces are annealed from here on ahead of the robot, so long and so many, in turn [m].
 ANNEALED_M, ANNEALED_PIECE_M, ANNEALED_PIECES = 2.0, 4.0, 2
-# Moves for each of them, and the share of the temperature that the farthest is annealed at.
+# Moves for each of them, and the share of the temperature that the farthest is annealed at, where
+# the map is known.
 ANNEAL_MOVES, HOTTEST = 300, 0.3
 # The robot is told of what is annealed no sooner than this [m].
 TOLD_M = 1.5
@@ -54,11 +55,12 @@ class Polisher:
         # Which piece is annealed next.
         self._at = 0
 
-    def polish(self, ahead: LineAhead, floor: FloorMap, *, may_anneal: bool) -> bool:
+    def polish(self, ahead: LineAhead, floor: FloorMap, *, is_settled: bool) -> bool:
         """Polish what is due of the line; return whether the robot is to be told.
 
-        It is told of what is near, and once all points are moved. On a map that still grows nothing
-        is annealed: what fits its rim best is in the way of what comes behind.
+        It is told of what is near, and once all points are moved. On a map that still grows
+        (``is_settled`` is False) random moves are taken as well, but only those that lose nothing:
+        what a detour or a lane was there for may be swept by another lane since.
         """
         if self._config.price_s_m2 == 0.0 or len(ahead.line) < 3 or ahead.is_cut:
             return False
@@ -78,8 +80,7 @@ class Polisher:
             lengths = ahead.lengths()
         begin = ahead.first_below(POLISHED)
         if begin >= len(ahead.line) - 1 or lengths[begin] > AHEAD_M:
-            if may_anneal:
-                self._anneal(ahead, floor, lengths)
+            self._anneal(ahead, floor, lengths, HOTTEST if is_settled else 0.0)
             return self._is_due(ahead)
         first, last = _piece(lengths, begin, PIECE_M)
         farthest = FARTHEST_M / ahead.tally.unit_m
@@ -94,7 +95,9 @@ class Polisher:
         lengths, untold = ahead.lengths(), ahead.untold_from
         return untold < len(lengths) and bool(lengths[untold] < TOLD_M)
 
-    def _anneal(self, ahead: LineAhead, floor: FloorMap, lengths: NDArray[np.float64]) -> None:
+    def _anneal(
+        self, ahead: LineAhead, floor: FloorMap, lengths: NDArray[np.float64], hottest: float
+    ) -> None:
         """Anneal the next piece; the farther from the robot, the hotter."""
         # Where pieces begin is drawn, too: no joint stays.
         drawn = int(self._random[0] >> np.uint64(40)) / (1 << 24)
@@ -105,7 +108,7 @@ class Polisher:
         last = min(max(last, first + 4), len(lengths) - 1)
         if last - first < 4:
             return
-        heat = HOTTEST * begins_m / (ANNEALED_M + (ANNEALED_PIECES + 1) * ANNEALED_PIECE_M)
+        heat = hottest * begins_m / (ANNEALED_M + (ANNEALED_PIECES + 1) * ANNEALED_PIECE_M)
         first -= 1  # turns at the first point count
         piece = ahead.line.part(first, last + 1)
         line = linked(piece.points, ahead.tally.sweeps.left.shape, is_end_fixed=True)
