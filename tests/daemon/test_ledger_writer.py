@@ -166,7 +166,7 @@ def test_a_disk_that_fails_is_told_once_and_tried_again(tmp_path, monkeypatch, c
     wait_until(lambda: len(tries) >= 4)
     told = document(writer)["fault"]
     assert f"cannot write {tmp_path / 'robot.ledger'}: No space left on device" in told
-    assert "kept in memory" in told
+    assert "kept in memory, and writing is retried" in told
     assert caplog.text.count("No space left") == 1
     assert len(writer.take_faults()) == 1
     assert min(b - a for a, b in pairwise(tries)) >= 0.05, "no busy loop"
