@@ -62,11 +62,13 @@ class Queue:
         length: items at most.
         size: of all together at most [bytes]; one alone may be larger.
         at_once: items that one take hands out at most; the others wait for the next.
+        before: a kind that must not overtake this one: with an item of that, all are handed out.
     """
 
     length: int
     size: float = math.inf
     at_once: float = math.inf
+    before: str = ""
 
 
 class Mailbox(Generic[Item]):
@@ -130,8 +132,9 @@ class Mailbox(Generic[Item]):
             items = list(self._newest.items())
             self._newest = {}
             for kind in ready:
-                queue = self._queued[kind]
-                for _ in range(int(min(len(queue), self._bounds[kind].at_once))):
+                queue, bounds = self._queued[kind], self._bounds[kind]
+                most = math.inf if bounds.before in ready else bounds.at_once
+                for _ in range(int(min(len(queue), most))):
                     item = queue.popleft()
                     self._sizes[kind] -= self._size_of(item)
                     items.append((kind, item))

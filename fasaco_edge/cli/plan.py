@@ -21,7 +21,7 @@ from fasaco_edge.cli.plan_line import (
     read_lattice,
     write_line,
 )
-from fasaco_edge.cli.plan_options import CELLS, EPILOG, add_options, check, settle
+from fasaco_edge.cli.plan_options import CELLS, EPILOG, add_options, check, settle, turning_limits
 from fasaco_edge.cli.plan_progress import watching
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
@@ -210,7 +210,7 @@ def figures_of(
         "unreachable_cells": int(np.count_nonzero(problem.unreachable)),
         "speed_m_s": args.speed_m_s,
         "turn_s": args.turn_s,
-        "turn_deg_s": args.turn_deg_s,
+        **turning_limits(args),
         "budget_s": args.budget,
         "target_gap": args.target_gap,
         "threads": args.threads,

@@ -16,7 +16,7 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Exit, writing
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.plan_line import line_through, read_lattice
-from fasaco_edge.cli.plan_options import ANYWHERE, CELLS, HOME
+from fasaco_edge.cli.plan_options import ANYWHERE, CELLS, HOME, turning_limits
 from fasaco_edge.cli.plan_progress import watching
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
@@ -133,7 +133,7 @@ def _figures(
         "rounds": division.rounds,
         "speed_m_s": args.speed_m_s,
         "turn_s": args.turn_s,
-        "turn_deg_s": args.turn_deg_s,
+        **turning_limits(args),
         "budget_s": args.budget,
         "threads": args.threads,
     }

@@ -136,6 +136,12 @@ def turning(args: argparse.Namespace) -> Turning:
     return limited_turning(rate, rise, args.speed_m_s, acceleration, args.steered_deg)
 
 
+def turning_limits(args: argparse.Namespace) -> dict[str, float | None]:
+    """Return the limits as JSON values; None where turns are counted by their angle."""
+    names = ("turn_deg_s", "turn_deg_s2", "acceleration_m_s2", "steered_deg")
+    return {name: getattr(args, name) if args.turn_deg_s is not None else None for name in names}
+
+
 def settle(args: argparse.Namespace) -> None:
     """Fill in the defaults that depend on whether local search is used."""
     has_local_search = bool(PLANNERS[args.planner].with_local_search)
@@ -144,6 +150,13 @@ def settle(args: argparse.Namespace) -> None:
         args.q0 = SEARCH_Q0 if args.local_search else PAPER_Q0
     if args.visibility is None:
         args.visibility = SEARCH_VISIBILITY if args.local_search else PAPER_VISIBILITY
+    robot = RobotConfig()
+    for limit in ("turn_deg_s2", "acceleration_m_s2", "steered_deg"):
+        if getattr(args, limit) is None:
+            setattr(args, limit, getattr(robot, limit))
+        elif args.turn_deg_s is None:
+            option = f"--{limit.replace('_', '-')}"
+            raise BadConfiguration(f"{option} counts only with --turn-deg-s, which is missing")
     if args.turn_deg_s is not None:
         if args.turn_s is not None:
             raise BadConfiguration("--turn-s and --turn-deg-s cannot both be given")
@@ -239,23 +252,20 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--turn-deg-s2",
         type=float,
-        default=robot.turn_deg_s2,
         metavar="A",
-        help="its acceleration (default: %(default)s)",
+        help=f"its acceleration [deg/s2] (default: {robot.turn_deg_s2:g})",
     )
     group.add_argument(
         "--acceleration-m-s2",
         type=float,
-        default=robot.acceleration_m_s2,
         metavar="A",
-        help="of driving (default: %(default)s)",
+        help=f"acceleration of driving [m/s2] (default: {robot.acceleration_m_s2:g})",
     )
     group.add_argument(
         "--steered-deg",
         type=float,
-        default=robot.steered_deg,
         metavar="DEG",
-        help="a bend up to this is steered while driving (default: %(default)s)",
+        help=f"a bend up to this is steered while driving (default: {robot.steered_deg:g})",
     )
 
 

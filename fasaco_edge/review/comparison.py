@@ -16,7 +16,10 @@ SETTINGS = {
     "robot radius": "robot.radius_m",
     "planner": "planner.name",
     "seed": "planner.seed",
-    "turn time": "robot.turn_s",
+    "turn time": "robot.quarter_turn_s",
+    "turn rate": "robot.turn_deg_s",
+    "turn acceleration": "robot.turn_deg_s2",
+    "acceleration": "robot.acceleration_m_s2",
 }
 # Where these differ, walks, cells and times belong to different problems.
 ANOTHER_PROBLEM = ("tool width", "robot radius", "line", "width of lanes", "building", "orders")

@@ -179,11 +179,13 @@ class RunData:
 def first_counted(statuses: Iterable[StatusSample]) -> NDArray[np.float64]:
     """Return when the daemon had counted each number of covered cells, float64 (n,) [s], rising.
 
-    To within the time between two statuses.
+    To within the time between two statuses. What stopped counting, as after a reset or a loop
+    closure, counts from when it was covered again.
     """
     at_s: list[float] = []
     for each in statuses:
         if (coverage := each.status.coverage) is not None:
+            del at_s[coverage.covered :]
             at_s += [each.at_s] * (coverage.covered - len(at_s))
     return np.array(at_s, np.float64)
 

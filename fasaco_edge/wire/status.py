@@ -119,12 +119,14 @@ class DriveReport(Document, frozen=True):
     """What driving takes the robot, as its poses show; null of what too little was seen.
 
     Attributes:
+        planned_quarter_turn_s: what paths are planned by, of robot.quarter_turn_s or its limits.
         speed_m_s: in straight driving.
         quarter_turn_s: a turn by about 90 degrees on the spot, braking and starting included.
         half_turn_s: a turn by about 180 degrees.
         turns: how many turns were measured.
     """
 
+    planned_quarter_turn_s: Amount = 0.0
     speed_m_s: Amount | None = None
     quarter_turn_s: Amount | None = None
     half_turn_s: Amount | None = None

@@ -252,7 +252,7 @@ def test_what_was_said_before_is_heard_before_what_is_said_meanwhile(bus, endpoi
             assert samples.empty()
 
 
-def test_a_flood_of_publishers_is_not_asked(bus, endpoint):
+def test_of_a_flood_of_publishers_no_more_are_asked_than_are_remembered(bus, endpoint):
     samples = Queue()
     with publishing(endpoint) as honest:
         honest.put(b"one")

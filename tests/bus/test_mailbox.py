@@ -56,6 +56,15 @@ def test_more_than_is_handed_out_at_once_waits_for_the_next_take():
     assert box.take_lost("pose") == 0
 
 
+def test_with_what_must_not_overtake_them_all_are_handed_out():
+    box = Mailbox({"pose": Queue(9, at_once=2, before="command"), "command": Queue(9)})
+    for number in range(5):
+        box.post("pose", number)
+    assert box.take(0) == [("pose", 0), ("pose", 1)]
+    box.post("command", "reset")
+    assert box.take(0) == [("pose", 2), ("pose", 3), ("pose", 4), ("command", "reset")]
+
+
 def weighed(length, size):
     return Mailbox({"update": Queue(length, size)}, size_of=len)
 

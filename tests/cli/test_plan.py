@@ -50,7 +50,8 @@ KEYS = {
         "first_walk_ms",
     ),
     *("unreachable_cells", "wall_s", "cpu_s", "ended_by"),
-    *("speed_m_s", "turn_s", "turn_deg_s", "budget_s", "target_gap", "threads", "floor"),
+    *("speed_m_s", "turn_s", "turn_deg_s", "turn_deg_s2", "acceleration_m_s2", "steered_deg"),
+    *("budget_s", "target_gap", "threads", "floor"),
 }
 
 
@@ -399,6 +400,7 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
         (["--turn-deg-s", "90", "--acceleration-m-s2", "0"], "--acceleration-m-s2 must be in"),
         (["--turn-deg-s", "90", "--steered-deg", "90"], "--steered-deg must be in [0, 45]"),
         (["--turn-deg-s", "90", "--turn-s", "1"], "--turn-s and --turn-deg-s"),
+        (["--acceleration-m-s2", "1"], "--acceleration-m-s2 counts only with --turn-deg-s"),
         (["--turn-deg-s", "90", "--speed-m-s", "-1"], "--speed-m-s must be in (0, 10] m/s"),
     ],
 )

@@ -119,7 +119,7 @@ def test_a_recorder_that_starts_slowly_is_waited_for_and_one_that_hangs_is_not(
         finally:
             watched.close(60.0)
     assert {"starting", "recording"} <= {state.state for state in states}
-    assert states[-1].reason == "no word for 0 s"
+    assert states[-1].reason == "no status for 0 s"
 
 
 @pytest.fixture

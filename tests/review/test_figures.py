@@ -18,7 +18,9 @@ from fasaco_edge.review.moments import (
 )
 from fasaco_edge.review.panels import curve
 from fasaco_edge.review.rows import clock
-from fasaco_edge.review.run_data import PlanLog, RunData
+from fasaco_edge.review.run_data import PlanLog, RunData, StatusSample, first_counted
+from fasaco_edge.wire.replies import CoverageReport
+from fasaco_edge.wire.status import Status
 from fasaco_edge.wire.turns import Cycle, Decided, LogStart, PlanTaken, TurnBatch
 
 ALL = Span("under way", 0.0, 100.0)
@@ -40,6 +42,24 @@ def test_milestones_need_whole_cells():
     assert milestones(first_s, 5) == {50: 3.0, 90: None, 99: None, 100: None}
     assert milestones(first_s, 4) == {50: 2.0, 90: 4.0, 99: 4.0, 100: 4.0}
     assert milestones(np.zeros(0), 0) == dict.fromkeys((50, 90, 99, 100))
+
+
+@pytest.mark.parametrize(
+    ("counted", "first_s"),
+    [
+        ([(1.0, 0), (2.0, 2), (3.0, 3)], [2.0, 2.0, 3.0]),
+        # A loop closure: one of three counts no more, then others do.
+        ([(1.0, 3), (2.0, 2), (3.0, 2), (4.0, 4)], [1.0, 1.0, 4.0, 4.0]),
+        ([(1.0, 3), (2.0, 0), (3.0, 1)], [3.0]),
+    ],
+    ids=["rising", "a loop closure", "a reset"],
+)
+def test_what_stopped_counting_counts_from_when_it_was_covered_again(counted, first_s):
+    statuses = (
+        StatusSample(at_s, Status(coverage=CoverageReport(covered=covered)))
+        for at_s, covered in counted
+    )
+    assert first_counted(statuses).tolist() == first_s
 
 
 def test_the_longest_stand_neither_drives_nor_turns():

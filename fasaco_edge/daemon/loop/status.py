@@ -79,6 +79,7 @@ class StatusBoard:
     def show(self, config: DaemonConfig) -> None:
         """Show this configuration as the one in force."""
         self._shown_config = config_document(config)
+        self._cost = config.robot.cost()
 
     def due(self, runner: MissionRunner, now: float) -> Status | None:
         """Return the status if it changed or a second has passed, else None.
@@ -112,7 +113,7 @@ class StatusBoard:
             plan=_plans(mission),
             latency_ms=Latencies(_ms(self.ingest_s), _ms(self.plan_s), _ms(self.map_to_path_s)),
             loop_ms=self.turns.report(),
-            drive=_drive(mission),
+            drive=self._drive(mission),
             errors=self.faults.counts(),
             ledger=self.ledger,
             recorder=self.recorder,
@@ -146,6 +147,19 @@ class StatusBoard:
         if order_state.paused:
             return "paused", "paused by command"
         return ("loading", loading) if loading else ("waiting for map", self.waits)
+
+    def _drive(self, mission: Mission | None) -> DriveReport:
+        planned_s = round(self._cost.quarter_turn_s, 3)
+        if mission is None:
+            return DriveReport(planned_s)
+        times = mission.drive_times()
+        return DriveReport(
+            planned_s,
+            _rounded(times.speed_m_s),
+            _rounded(times.quarter_turn_s),
+            _rounded(times.half_turn_s),
+            times.turns,
+        )
 
     def _path(self, mission: Mission | None) -> PathReport | None:
         update = self.path
@@ -217,18 +231,6 @@ def _largest_first(*parts: tuple[float, str]) -> tuple[FloorLeft, ...]:
     """Return floor left for some reasons [m2], without those that are of none."""
     told = (FloorLeft(round(m2, 3), reason) for m2, reason in parts)
     return tuple(sorted((part for part in told if part.m2), key=lambda part: -part.m2))
-
-
-def _drive(mission: Mission | None) -> DriveReport:
-    if mission is None:
-        return DriveReport()
-    times = mission.drive_times()
-    return DriveReport(
-        _rounded(times.speed_m_s),
-        _rounded(times.quarter_turn_s),
-        _rounded(times.half_turn_s),
-        times.turns,
-    )
 
 
 def _plans(mission: Mission | None) -> PlanCounts:

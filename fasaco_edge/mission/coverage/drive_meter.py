@@ -2,8 +2,8 @@
 
 A turn takes what passes from ``BESIDE_S`` before it to as long after it, less what the way between
 would take at full speed: so braking and starting count, as in ``robot.quarter_turn_s``. Only turns
-with straight driving on both sides count. Medians are told: a robot that waits for somebody, or
-slips, changes them little. Times are those of the poses' stamps.
+with straight driving on both sides count, and no rate below ``TURNS_RAD_S``. Medians are reported:
+a robot that waits for somebody at a turn changes them little. Times are those of the poses' stamps.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ from fasaco_edge.grid.geometry import StampedPose
 # Straight driving before and behind a turn that shows what the turn takes [s].
 BESIDE_S = 1.5
 # From this rate on the robot turns [rad/s], measured over so long [s]: headings scatter.
-TURNS_RAD_S, OVER_S = 0.2, 0.3
+TURNS_RAD_S, OVER_S = 0.12, 0.5
 # Poses further apart than this show nothing of what was between, nearer ones no more [s].
 GAP_S, LEAST_S = 1.0, 0.05
 # Poses are kept for so long [s]: who takes longer to turn waits, or is lost.
-KEPT_S = 15.0
-# A robot that is slower in straight driving waits [m/s].
-SLOWEST_M_S = 0.01
+KEPT_S = 40.0
+# Straight driving is even: a pose may be off by this share of the way of ``BESIDE_S``. The poses of
+# a robot that stands scatter, and lead nowhere.
+UNEVEN = 0.2
 # What counts as a quarter-turn and as a half turn [rad].
 QUARTER = math.radians(70.0), math.radians(110.0)
 HALF = math.radians(150.0), math.radians(180.0)
@@ -121,9 +122,9 @@ class DriveMeter:
         if first is None or any(old.turns for old in seen[first:]):
             return
         self._measured_until = seen[after].at
-        speed_m_s = _apart(seen[middle], seen[after]) / (seen[after].at - seen[middle].at)
-        if speed_m_s > SLOWEST_M_S:
-            self._speeds.append(speed_m_s)
+        if _is_even(seen[middle : after + 1]):
+            took_s = seen[after].at - seen[middle].at
+            self._speeds.append(_apart(seen[middle], seen[after]) / took_s)
 
     def _measure_turn(self, seen: list[_Seen], last: int) -> None:
         begin = last
@@ -133,7 +134,8 @@ class DriveMeter:
         speed_m_s = _median(self._speeds)
         if first is None or speed_m_s is None or any(old.turns for old in seen[first:begin]):
             return
-        turned = abs(math.remainder(seen[last].yaw - seen[begin].yaw, math.tau))
+        yaws = [old.yaw for old in seen[begin : last + 1]]
+        turned = abs(sum(math.remainder(b - a, math.tau) for a, b in pairwise(yaws)))
         way = seen[first], seen[begin], seen[last], seen[-1]
         way_m = sum(_apart(a, b) for a, b in pairwise(way))
         took_s = seen[-1].at - seen[first].at - way_m / speed_m_s
@@ -147,6 +149,20 @@ def _before(seen: list[_Seen], index: int, seconds: float) -> int | None:
     """Return the last pose that is so much older than another one; None where none is."""
     at = seen[index].at - seconds
     return next((i for i in range(index - 1, -1, -1) if seen[i].at <= at), None)
+
+
+def _is_even(seen: list[_Seen]) -> bool:
+    """Tell whether poses lie where a robot is that drives straight at one speed."""
+    a, b = seen[0], seen[-1]
+    most_m, way_s = UNEVEN * _apart(a, b), b.at - a.at
+    return all(
+        math.hypot(
+            p.x - a.x - (b.x - a.x) * (p.at - a.at) / way_s,
+            p.y - a.y - (b.y - a.y) * (p.at - a.at) / way_s,
+        )
+        < most_m
+        for p in seen
+    )
 
 
 def _apart(a: _Seen, b: _Seen) -> float:

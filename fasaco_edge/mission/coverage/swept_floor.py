@@ -64,6 +64,7 @@ class SweptFloor:
     Attributes:
         changes: goes up with each change of what is swept; of this floor, another one has its own.
         pixels: how many are swept.
+        forgotten: how often some were forgotten.
         dropped: tiles that were dropped to hold no more than ``MOST_FLOOR_TILES``: those farthest
             from the robot at that moment.
     """
@@ -71,7 +72,7 @@ class SweptFloor:
     def __init__(self, tool_m: float) -> None:
         """Create an empty one; ``tool_m``: width of the tool [m]."""
         self.changes = 0
-        self.pixels = 0
+        self.pixels = self.forgotten = 0
         self.dropped = 0
         self._tool_m = tool_m
         self._track = SteadyTrack(tool_m)
@@ -182,6 +183,7 @@ class SweptFloor:
             else:
                 del self._tiles[place]
         if self.pixels != before:
+            self.forgotten += 1
             self._note(ANYWHERE)
         if self._last is not None:
             self._keep(self._track.add(self._last))
@@ -305,6 +307,7 @@ class SweptFloor:
             self.pixels -= count_bits(self._tiles.pop(far))
             self._own.discard(far)
         self.dropped += DROPPED_FLOOR_TILES
+        self.forgotten += 1
         self._note(ANYWHERE)
 
 

@@ -70,9 +70,10 @@ class LineLayer:
         self._asked: tuple[Window, NDArray[np.bool_], NDArray[np.bool_]] | None = None
         # Whether the map is known; None before the first look.
         self._is_settled: bool | None = None
-        # The swept floor that was seen last, and how many changes it had.
+        # The swept floor that was seen last, how many changes it had, and how often some of it
+        # had been forgotten.
         self._swept: tuple[SweptFloor | None, int] = None, 0
-        self._pixels = 0
+        self._forgotten = 0
         # The floor that was seen last, and its revision.
         self._seen: tuple[FloorMap | None, int] = None, 0
 
@@ -101,6 +102,9 @@ class LineLayer:
         ahead = self._ahead
         if ahead is None:
             return
+        # What was forgotten is open before the robot drives on: what it drives then is not.
+        if self._ledger.floor.forgotten != self._forgotten:
+            self._take_floor()
         before = self._route.held.index
         ahead.drive(pose)
         self._route.follow_line(ahead.cell)
@@ -193,10 +197,10 @@ class LineLayer:
         # Another floor, as after a reset, is another anywhere; so may be one that was forgotten.
         known, since = self._swept
         news = swept.changed_since(since) if known is swept else ANYWHERE
-        if known is not swept or swept.pixels < self._pixels:
+        if known is not swept or swept.forgotten != self._forgotten:
             ahead.tally.forget_driven()
             news = ANYWHERE
-        self._pixels = swept.pixels
+        self._forgotten = swept.forgotten
         part = Window.around(self._asked_part(floor), touched)
         if self._asked is not None and self._asked[0] != floor.stands.lattice.window:
             self._asked = None
