@@ -179,14 +179,19 @@ class RunData:
 def first_counted(statuses: Iterable[StatusSample]) -> NDArray[np.float64]:
     """Return when the daemon had counted each number of covered cells, float64 (n,) [s], rising.
 
-    To within the time between two statuses. What stopped counting, as after a reset or a loop
-    closure, counts from when it was covered again.
+    A recording has a status each quarter of a minute: between two of them cells are taken to have
+    been covered evenly. What stopped counting, as after a reset or a loop closure, counts from when
+    it was covered again.
     """
     at_s: list[float] = []
+    before_s: float | None = None
     for each in statuses:
-        if (coverage := each.status.coverage) is not None:
-            del at_s[coverage.covered :]
-            at_s += [each.at_s] * (coverage.covered - len(at_s))
+        if (coverage := each.status.coverage) is None:
+            continue
+        del at_s[coverage.covered :]
+        since_s, more = each.at_s if before_s is None else before_s, coverage.covered - len(at_s)
+        at_s += np.linspace(since_s, each.at_s, more + 1)[1:].tolist()
+        before_s = each.at_s
     return np.array(at_s, np.float64)
 
 

@@ -47,9 +47,9 @@ def test_milestones_need_whole_cells():
 @pytest.mark.parametrize(
     ("counted", "first_s"),
     [
-        ([(1.0, 0), (2.0, 2), (3.0, 3)], [2.0, 2.0, 3.0]),
+        ([(1.0, 0), (2.0, 2), (3.0, 3)], [1.5, 2.0, 3.0]),
         # A loop closure: one of three counts no more, then others do.
-        ([(1.0, 3), (2.0, 2), (3.0, 2), (4.0, 4)], [1.0, 1.0, 4.0, 4.0]),
+        ([(1.0, 3), (2.0, 2), (3.0, 2), (4.0, 4)], [1.0, 1.0, 3.5, 4.0]),
         ([(1.0, 3), (2.0, 0), (3.0, 1)], [3.0]),
     ],
     ids=["rising", "a loop closure", "a reset"],
