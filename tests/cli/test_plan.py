@@ -375,8 +375,9 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
     # A quarter-turn takes both the same.
     for turn in (("--turn-s", "1.956"), ("--turn-deg-s", "100")):
         csv = tmp_path / "line.csv"
-        words = ["office", "--line", "quick", *turn, "--xy-out", str(csv), "--json"]
-        assert main(["plan", *words]) == 0
+        # A planner without a budget: the same walk, however busy the machine.
+        words = ["flat", "--planner", "stc", "--line", "quick", *turn, "--xy-out", str(csv)]
+        assert main(["plan", *words, "--json"]) == 0
         figures = json.loads(capsys.readouterr().out)
         assert figures["turn_s"] == pytest.approx(1.956, abs=5e-4)
         ways = np.diff(np.loadtxt(csv, delimiter=",", skiprows=1), axis=0)
@@ -384,11 +385,11 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
         bends = np.abs((np.diff(headings) + 180.0) % 360.0 - 180.0)
         took_s.append(drive_seconds(np.hypot(*ways.T), bends, 0.25, limits))
         stops.append(np.count_nonzero(bends > limits.steered_deg))
-        assert figures["floor"]["swept_share"] > 0.93
+        assert figures["floor"]["swept_share"] > 0.87
     swept_s = figures["floor"]["seconds_per_m2"] * figures["floor"]["swept_share"]
     assert swept_s * figures["floor"]["reachable_m2"] == pytest.approx(took_s[1], rel=0.01)
-    assert took_s[1] < 0.97 * took_s[0]
-    assert stops[1] < 0.8 * stops[0]
+    assert took_s[1] < 0.9 * took_s[0]
+    assert stops[1] < 0.6 * stops[0]
 
 
 @pytest.mark.parametrize(
