@@ -21,8 +21,9 @@ from fasaco_edge.cli.plan_line import (
     read_lattice,
     write_line,
 )
-from fasaco_edge.cli.plan_options import CELLS, EPILOG, add_options, check, settle, turning_limits
+from fasaco_edge.cli.plan_options import CELLS, EPILOG, add_options, check, settle
 from fasaco_edge.cli.plan_progress import watching
+from fasaco_edge.cli.plan_turning import turning_limits
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map

@@ -16,8 +16,9 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Exit, writing
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.plan_line import line_through, read_lattice
-from fasaco_edge.cli.plan_options import ANYWHERE, CELLS, HOME, turning_limits
+from fasaco_edge.cli.plan_options import ANYWHERE, CELLS, HOME
 from fasaco_edge.cli.plan_progress import watching
+from fasaco_edge.cli.plan_turning import turning_limits
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import ctrl_c_asks

@@ -22,7 +22,8 @@ from fasaco_edge.bench.floor import (
     judge_floor,
     swept_words,
 )
-from fasaco_edge.cli.plan_options import ANYWHERE, AXES, HOME, WALLS, turning
+from fasaco_edge.cli.plan_options import ANYWHERE, AXES, HOME, WALLS
+from fasaco_edge.cli.plan_turning import turning
 from fasaco_edge.errors import EndBlocked, MapTooFar, MapTooLarge
 
 if TYPE_CHECKING:

@@ -13,14 +13,8 @@ from fasaco_edge.cli.console.arguments import (
     pair_of_floats,
     pair_of_ints,
 )
-from fasaco_edge.config.config import RobotConfig
+from fasaco_edge.cli.plan_turning import add_turning, settle_turning
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.kernels.floor.turning import (
-    Turning,
-    limited_turning,
-    proportional_turning,
-    turn_seconds,
-)
 from fasaco_edge.planners.colony import VISIBILITIES
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
 from fasaco_edge.simulation.robot import SimulationConfig
@@ -119,29 +113,6 @@ def check(args: argparse.Namespace) -> None:
         _require(0.0 <= args.target_gap <= 10.0, "--target-gap", "be in [0, 10]", args.target_gap)
 
 
-def turning(args: argparse.Namespace) -> Turning:
-    """Return what turns on the spot take.
-
-    Raises:
-        BadConfiguration: a limit is impossible.
-    """
-    if args.turn_deg_s is None:
-        return proportional_turning(args.turn_s)
-    rate, rise, acceleration = args.turn_deg_s, args.turn_deg_s2, args.acceleration_m_s2
-    _require(1.0 <= rate <= 1e3, "--turn-deg-s", "be in [1, 1000] deg/s", rate)
-    _require(1.0 <= rise <= 1e5, "--turn-deg-s2", "be in [1, 100000] deg/s2", rise)
-    allowed = "be in [0.01, 100] m/s2"
-    _require(0.01 <= acceleration <= 100.0, "--acceleration-m-s2", allowed, acceleration)
-    _require(0.0 <= args.steered_deg <= 45.0, "--steered-deg", "be in [0, 45]", args.steered_deg)
-    return limited_turning(rate, rise, args.speed_m_s, acceleration, args.steered_deg)
-
-
-def turning_limits(args: argparse.Namespace) -> dict[str, float | None]:
-    """Return the limits as JSON values; None where turns are counted by their angle."""
-    names = ("turn_deg_s", "turn_deg_s2", "acceleration_m_s2", "steered_deg")
-    return {name: getattr(args, name) if args.turn_deg_s is not None else None for name in names}
-
-
 def settle(args: argparse.Namespace) -> None:
     """Fill in the defaults that depend on whether local search is used."""
     has_local_search = bool(PLANNERS[args.planner].with_local_search)
@@ -150,19 +121,7 @@ def settle(args: argparse.Namespace) -> None:
         args.q0 = SEARCH_Q0 if args.local_search else PAPER_Q0
     if args.visibility is None:
         args.visibility = SEARCH_VISIBILITY if args.local_search else PAPER_VISIBILITY
-    robot = RobotConfig()
-    for limit in ("turn_deg_s2", "acceleration_m_s2", "steered_deg"):
-        if getattr(args, limit) is None:
-            setattr(args, limit, getattr(robot, limit))
-        elif args.turn_deg_s is None:
-            option = f"--{limit.replace('_', '-')}"
-            raise BadConfiguration(f"{option} counts only with --turn-deg-s, which is missing")
-    if args.turn_deg_s is not None:
-        if args.turn_s is not None:
-            raise BadConfiguration("--turn-s and --turn-deg-s cannot both be given")
-        args.turn_s = turn_seconds(turning(args), 0.5 * math.pi)
-    elif args.turn_s is None:
-        args.turn_s = 0.0 if args.line == CELLS else TURN_S
+    settle_turning(args, 0.0 if args.line == CELLS else TURN_S)
     if args.overlap is None:
         args.overlap = OVERLAP
     if args.align is None:
@@ -234,38 +193,10 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         metavar="V",
         help="speed of the robot [m/s] (default: %(default)s)",
     )
-    group.add_argument(
-        "--turn-s",
-        type=float,
-        metavar="S",
-        help="time of a quarter-turn on the spot [s]; 0 minimises steps, as the paper does "
+    add_turning(
+        group,
+        turn_s_help="time of a quarter-turn on the spot [s]; 0 minimises steps, as the paper does "
         f"(default: 0; {TURN_S:g} for a line over the floor)",
-    )
-    robot = RobotConfig()
-    group.add_argument(
-        "--turn-deg-s",
-        type=float,
-        metavar="W",
-        help="in place of --turn-s: the rate of turning on the spot [deg/s]; smaller bends then "
-        "take less, and each of them braking and starting",
-    )
-    group.add_argument(
-        "--turn-deg-s2",
-        type=float,
-        metavar="A",
-        help=f"its acceleration [deg/s2] (default: {robot.turn_deg_s2:g})",
-    )
-    group.add_argument(
-        "--acceleration-m-s2",
-        type=float,
-        metavar="A",
-        help=f"acceleration of driving [m/s2] (default: {robot.acceleration_m_s2:g})",
-    )
-    group.add_argument(
-        "--steered-deg",
-        type=float,
-        metavar="DEG",
-        help=f"a bend up to this is steered while driving (default: {robot.steered_deg:g})",
     )
 
 

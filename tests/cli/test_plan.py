@@ -9,11 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from msgspec import ValidationError, convert
 from PIL import Image
 
 from fasaco_edge.bench.drive_time import DriveLimits, drive_seconds
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console.arguments import Exit
+from fasaco_edge.cli.plan_turning import LIMITS
+from fasaco_edge.config.config import RobotConfig
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.registry import PLANNER_NAMES
@@ -397,7 +400,10 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
     [
         (["--turn-deg-s", "0"], "--turn-deg-s must be in [1, 1000] deg/s, got 0.0"),
         (["--turn-deg-s", "nan"], "--turn-deg-s must be in [1, 1000] deg/s, got nan"),
-        (["--turn-deg-s", "90", "--turn-deg-s2", "0"], "--turn-deg-s2 must be in [1, 100000]"),
+        (
+            ["--turn-deg-s", "90", "--turn-deg-s2", "0"],
+            "--turn-deg-s2 must be in [1, 100000] deg/s2",
+        ),
         (["--turn-deg-s", "90", "--acceleration-m-s2", "0"], "--acceleration-m-s2 must be in"),
         (["--turn-deg-s", "90", "--steered-deg", "90"], "--steered-deg must be in [0, 45]"),
         (["--turn-deg-s", "90", "--turn-s", "1"], "--turn-s and --turn-deg-s"),
@@ -408,6 +414,16 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
 def test_impossible_limits_of_turning_are_refused(capsys, words, said):
     assert main(["plan", "office", "--line", "quick", *words]) == Exit.CONFIG
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_limits_are_those_of_the_configuration(name):
+    _, least, most, _, _ = LIMITS[name]
+    for value in (least, most):
+        assert getattr(convert({name: value}, RobotConfig), name) == value
+    for value in (least - 1e-3, most * 1.001):
+        with pytest.raises(ValidationError):
+            convert({name: value}, RobotConfig)
 
 
 def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
