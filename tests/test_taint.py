@@ -26,7 +26,7 @@ import zenoh.ext
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, Sample
+from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.recording import entities
@@ -35,6 +35,7 @@ from fasaco_edge.recording.write.part import Part
 from fasaco_edge.samples import SampleEncoder
 from fasaco_edge.text import json_line
 from fasaco_edge.wire import schemas
+from fasaco_edge.wire.path_digest import PATH_DIGEST
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.pheromone import encode_pheromone
 from fasaco_edge.wire.topics import RPC_NAMES

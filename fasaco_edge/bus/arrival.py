@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import zenoh
-
-PATH_DIGEST = "path_digest"
-"""Topic that stands for a path in a recording: with its attachment and, as payload, the ``digest``
-of its points, float64 x, y [m]."""
-DIGEST_BYTES = 16
 
 
 class Sample:
@@ -99,8 +93,3 @@ class Arrival:
     sample: Sample
     at_ns: int
     wall_ns: int
-
-
-def digest(payload: bytes) -> bytes:
-    """Return DIGEST_BYTES bytes that no other payload has."""
-    return hashlib.blake2b(payload, digest_size=DIGEST_BYTES).digest()

@@ -16,7 +16,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from importlib import metadata
 from typing import Any, Self
 
 import zenoh
@@ -40,9 +39,6 @@ from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 from fasaco_edge.wire.topic_types import VOLATILE, Qos, Topic
-
-ZENOH_VERSION = metadata.version("eclipse-zenoh")
-
 
 # Timeout of the handshake of an incoming connection [ms], and how many may be pending.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000

@@ -1,19 +1,19 @@
 """Poses, the placement of a grid in the map frame, and windows of cells.
 
-Polygons in the map frame: what is wrong with one, and how far it reaches.
+Nothing here needs numpy itself: a program that only wants poses stays small.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
-_Value = TypeVar("_Value", np.uint8, np.bool_)
+    _Value = TypeVar("_Value", np.uint8, np.bool_)
 
 # A raster's corner is rounded to this part of a pixel: a map that grows by whole pixels stays on
 # its raster, also where its origin is rounded to float32.
@@ -71,7 +71,8 @@ class Window:
     @classmethod
     def of(cls, mask: NDArray[np.bool_]) -> Window | None:
         """Return the smallest rectangle around the marked cells, bool (n, m); None without any."""
-        rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        (rows,) = mask.max(axis=1, initial=False).nonzero()
+        (cols,) = mask.max(axis=0, initial=False).nonzero()
         if not len(rows):
             return None
         return cls(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
@@ -124,7 +125,8 @@ class Window:
         """
         rows, cols = cells[:, 0] - self.row0, cells[:, 1] - self.col0
         inside = (rows >= 0) & (rows < self.rows) & (cols >= 0) & (cols < self.cols)
-        found = np.full(len(cells), beyond, values.dtype)
+        found = rows.astype(values.dtype)
+        found.fill(beyond)
         found[inside] = values[rows[inside], cols[inside]]
         return found
 
@@ -235,106 +237,8 @@ class StampedPose:
 Point = tuple[float, float]
 Polygon = tuple[Point, ...]
 
-# A smaller polygon is a mistake [m2].
-LEAST_AREA_M2 = 1e-4
-# Pairs of edges compared at once: more take memory, and no less time.
-MOST_PAIRS = 65536
-
-
-def polygon_flaw(polygon: Polygon) -> str:
-    """Return what keeps ``polygon`` from having a clear inside, "" if nothing does.
-
-    Its points are finite; the last is joined to the first.
-    """
-    if len(polygon) < 3:
-        return f"must have at least 3 points, got {len(polygon)}"
-    if polygon[0] == polygon[-1]:
-        return "must not repeat its first point at the end"
-    for index, (here, there) in enumerate(_edges(polygon)):
-        if here == there:
-            return f"has point {index} twice in a row"
-    if crossing := _crossing(polygon):
-        return "crosses or touches itself: edges from points {} and {}".format(*crossing)
-    area = abs(_signed_area(polygon))
-    if area < LEAST_AREA_M2:
-        return f"must have an area of at least {LEAST_AREA_M2:g} m2, got {area:.3g}"
-    return ""
-
 
 def polygon_bounds(polygon: Polygon) -> tuple[float, float, float, float]:
     """Return (x_min, y_min, x_max, y_max) [m]."""
     xs, ys = zip(*polygon, strict=True)
     return min(xs), min(ys), max(xs), max(ys)
-
-
-def _edges(polygon: Polygon) -> Iterator[tuple[Point, Point]]:
-    return zip(polygon, (*polygon[1:], polygon[0]), strict=True)
-
-
-def _signed_area(polygon: Polygon) -> float:
-    # Relative to a corner: far from the origin the differences would drown in rounding.
-    x0, y0 = polygon[0]
-    return 0.5 * math.fsum(
-        (ax - x0) * (by - y0) - (bx - x0) * (ay - y0) for (ax, ay), (bx, by) in _edges(polygon)
-    )
-
-
-def _crossing(polygon: Polygon) -> tuple[int, int] | None:
-    """Return two edges, by the number of their first points, that meet where they must not.
-
-    Blocks of edges are compared with all edges, exactly only where their boxes meet.
-    """
-    start = np.array(polygon)
-    end = np.roll(start, -1, axis=0)
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    count = len(polygon)
-    for first in range(0, count - 1, block := max(MOST_PAIRS // count, 1)):
-        here, there = np.ogrid[first : min(first + block, count - 1), :count]
-        overlap = there > here
-        for axis in (0, 1):
-            overlap &= low[here, axis] <= high[there, axis]
-            overlap &= high[here, axis] >= low[there, axis]
-        one, other = np.nonzero(overlap)
-        one += first
-        meet = _meet(start[one], end[one], start[other], end[other])
-        # Neighbours share a corner, and no more: they meet if one turns back onto the other.
-        next_to = other == one + 1
-        after, before = other[next_to], one[next_to]
-        meet[next_to] = _turns_back(start[before], end[before], end[after])
-        closing = (one == 0) & (other == count - 1)
-        meet[closing] = _turns_back(start[-1], end[-1], end[0])
-        if meet.any():
-            found = int(np.argmax(meet))
-            return int(one[found]), int(other[found])
-    return None
-
-
-def _meet(
-    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Tell which segments c-d have a point in common with a-b; all points are float64 (n, 2)."""
-    of_c, of_d = _side(a, b, c), _side(a, b, d)
-    of_a, of_b = _side(c, d, a), _side(c, d, b)
-    crossing = (of_c * of_d <= 0) & (of_a * of_b <= 0)
-    # On one line they meet only where their boxes do; else the boxes do anyway.
-    overlap = (np.minimum(c, d) <= np.maximum(a, b)) & (np.maximum(c, d) >= np.minimum(a, b))
-    meet: NDArray[np.bool_] = crossing & overlap.all(axis=1)
-    return meet
-
-
-def _side(
-    a: NDArray[np.float64], b: NDArray[np.float64], point: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return on which side of the line a-b each point lies: -1, 0 or 1."""
-    ahead, off = b - a, point - a
-    side: NDArray[np.float64] = np.sign(ahead[..., 0] * off[..., 1] - ahead[..., 1] * off[..., 0])
-    return side
-
-
-def _turns_back(
-    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Tell whether the way a-b-c turns back onto itself at b."""
-    ahead, on = b - a, c - b
-    back: NDArray[np.bool_] = (_side(a, b, c) == 0) & ((ahead * on).sum(axis=-1) < 0)
-    return back

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import msgspec
 
-from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, digest
+from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.loop.inbox import Received, take_batch
 from fasaco_edge.daemon.loop.loop import TICK_S
@@ -27,6 +27,7 @@ from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.planners.planner import AnyOf, CoveragePlanner, SearchWork, WorkLimit, ignore
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
+from fasaco_edge.wire.path_digest import PATH_DIGEST, digest
 from fasaco_edge.wire.path_documents import PathAttachment
 from fasaco_edge.wire.settings import Settings
 from fasaco_edge.wire.status import Status

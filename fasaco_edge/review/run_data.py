@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival
+from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import Footprint
@@ -17,6 +17,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.orders.order import MissionOrder, read_command
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.path_digest import PATH_DIGEST
 from fasaco_edge.wire.path_documents import PathAttachment
 from fasaco_edge.wire.poses import PoseDecoder
 from fasaco_edge.wire.replies import FloorReport

@@ -10,10 +10,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Sequence
-from typing import Any, NoReturn, TypeVar
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, NoReturn
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
@@ -23,8 +20,6 @@ HEADER_SIZE = len(ENCAPSULATION)
 # The last byte counts padding.
 _FIXED_HEADER = ENCAPSULATION[:3]
 MAX_PADDING = 3
-
-_Cell = TypeVar("_Cell", np.int8, np.uint8)
 
 _UINT32 = struct.Struct("<I")
 _LENGTH = ("length of {}",)
@@ -119,12 +114,10 @@ class CdrReader:
         """Read 64-bit floats, as many as ``layout`` has; a tuple."""
         return layout.unpack_from(self._payload, self.take(8, layout.size, field))
 
-    def cells(
-        self, rows: int, cols: int, dtype: type[_Cell], field: str
-    ) -> np.ndarray[tuple[int, int], np.dtype[_Cell]]:
-        """Read rows * cols values of one byte, (rows, cols), a read-only view of the payload."""
-        start = self.take(1, rows * cols, field)
-        return np.ndarray((rows, cols), dtype, self._payload, start)
+    def octets(self, count: int, field: str) -> memoryview:
+        """Read ``count`` bytes, a view of the payload."""
+        start = self.take(1, count, field)
+        return memoryview(self._payload)[start : start + count]
 
     def string(self, field: str) -> str:
         """Read a string: its length with the NUL, UTF-8, NUL."""
@@ -155,12 +148,12 @@ class CdrReader:
             )
         return count
 
-    def peek(self, count: int) -> NDArray[np.uint8] | None:
-        """Return the next ``count`` bytes, a read-only view, without taking them; None where
-        there are fewer."""
+    def peek(self, count: int) -> memoryview | None:
+        """Return the next ``count`` bytes, a view, without taking them; None where there are
+        fewer."""
         if count > self.remaining:
             return None
-        return np.frombuffer(self._payload, np.uint8, count, self._offset)
+        return memoryview(self._payload)[self._offset : self._offset + count]
 
     def end(self) -> None:
         """Check that nothing follows the last field but padding to a multiple of four.
@@ -187,7 +180,7 @@ class CdrReader:
 class CdrWriter:
     """Writes fields in order, with the alignment ``CdrReader`` expects.
 
-    Arrays are not copied before ``payload``: until then they must not change.
+    Views are not copied before ``payload``: until then they must not change.
     """
 
     __slots__ = ("_parts", "_size", "message")
@@ -222,9 +215,9 @@ class CdrWriter:
         """Write 64-bit floats, as many as ``layout`` has."""
         self._put(8, layout.pack(*values))
 
-    def array(self, values: NDArray[Any]) -> None:
-        """Write an array's bytes as they are, in row order."""
-        self._parts.append(np.ascontiguousarray(values).data)
+    def view(self, values: memoryview) -> None:
+        """Write the bytes of a contiguous array as they are."""
+        self._parts.append(values)
         self._size += values.nbytes
 
     def octets(self, values: bytes) -> None:

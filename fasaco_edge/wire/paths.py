@@ -6,6 +6,7 @@ multiple of eight: with one frame name in all of them, they are the records of a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -16,13 +17,11 @@ from fasaco_edge.wire.cdr import CdrReader, CdrWriter, encoded_string, refuse
 from fasaco_edge.wire.fields import (
     POSE,
     SECOND_NS,
-    check_poses,
-    planar_poses,
+    check_pose,
     read_header,
     write_header,
-    yaw_of,
 )
-from fasaco_edge.wire.limits import MAX_PATH_POSES
+from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_PATH_POSES, QUATERNION_TOLERANCE
 from fasaco_edge.wire.schemas import PATH
 
 # So many poses are worked out at a time.
@@ -81,10 +80,10 @@ def encode_path(
         # A path of half a million poses is some 40 MB: beside the message, only a block of it.
         for start in range(first, last, BLOCK_POSES):
             stop = min(start + BLOCK_POSES, last)
-            poses = planar_poses(xy[start:stop], yaw[start:stop])
-            check_poses(poses, writer.message, partial(_pose_field, first=start))
+            poses = _planar_poses(xy[start:stop], yaw[start:stop])
+            _check_poses(poses, writer.message, partial(_pose_field, first=start))
             records["pose"][start - first : stop - first] = poses
-        writer.array(records)
+        writer.view(records.data)
     return writer.payload()
 
 
@@ -103,8 +102,8 @@ def decode_path(payload: bytes, max_poses: int = MAX_PATH_POSES) -> PathMessage:
     if poses is None:
         poses = _read_one_by_one(reader, frame, count)
     reader.end()
-    check_poses(poses, reader.message, _pose_field)
-    return PathMessage(frame, stamp_ns, poses[:, :2].copy(), yaw_of(poses[:, 3:]))
+    _check_poses(poses, reader.message, _pose_field)
+    return PathMessage(frame, stamp_ns, poses[:, :2].copy(), _yaw_of(poses[:, 3:]))
 
 
 def _read_records(reader: CdrReader, frame: str, count: int) -> NDArray[np.float64] | None:
@@ -113,9 +112,10 @@ def _read_records(reader: CdrReader, frame: str, count: int) -> NDArray[np.float
     text = np.frombuffer(encoded_string(frame, reader.message, "header.frame_id"), np.uint8)
     first, rest = _record(reader.position, len(text)), _record(0, len(text))
     size = first.itemsize + (count - 1) * rest.itemsize
-    block = reader.peek(size) if count else None
-    if block is None:
+    view = reader.peek(size) if count else None
+    if view is None:
         return None
+    block = np.frombuffer(view, np.uint8)
     poses = np.empty((count, 7))
     for some, to in (
         (block[: first.itemsize].view(first), poses[:1]),
@@ -139,6 +139,42 @@ def _read_one_by_one(reader: CdrReader, frame: str, count: int) -> NDArray[np.fl
                 reader.message, f"{field}.frame_id", f"{frame!r}, as the path's, or ''", repr(named)
             )
         poses[index] = reader.doubles(POSE, _pose_field(index))
+    return poses
+
+
+def _check_poses(poses: NDArray[np.float64], message: str, field_of: Callable[[int], str]) -> None:
+    """Check poses, float64 (n, 7), each position x, y, z and quaternion x, y, z, w.
+
+    Raises:
+        MalformedMessage: a coordinate is not finite or too large, or a quaternion's norm
+            is not 1; ``field_of(i)`` names pose i.
+    """
+    position, quaternion = poses[:, :3], poses[:, 3:]
+    # Negated comparisons, so that NaN is caught too.
+    with np.errstate(over="ignore", invalid="ignore"):
+        far = ~(np.abs(position) <= MAX_COORDINATE_M)
+        norm = np.sqrt(np.square(quaternion).sum(axis=1))
+        skewed = ~(np.abs(norm - 1.0) <= QUATERNION_TOLERANCE)
+    for wrong in (far.any(axis=1), skewed):
+        if wrong.any():
+            index = int(np.argmax(wrong))
+            check_pose(poses[index].tolist(), message, field_of(index))
+
+
+def _yaw_of(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the yaw [rad], float64 (n,), of quaternions x, y, z, w, float64 (n, 4), as
+    ``fields.yaw_of`` has it."""
+    x, y, z, w = quaternions.T
+    yaw: NDArray[np.float64] = np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+    return yaw
+
+
+def _planar_poses(xy: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return poses, float64 (n, 7), at points (n, 2) [m] with yaws (n,) [rad]."""
+    poses = np.zeros((len(xy), 7))
+    poses[:, :2] = xy
+    with np.errstate(invalid="ignore"):
+        poses[:, 5], poses[:, 6] = np.sin(yaw / 2), np.cos(yaw / 2)
     return poses
 
 

@@ -18,7 +18,7 @@ from fasaco_edge.wire.fields import (
     read_pose,
     write_header,
     write_pose,
-    yaw_of_one,
+    yaw_of,
 )
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
@@ -121,7 +121,7 @@ class Transform:
         if max(abs(turn[0]), abs(turn[1])) > MAX_TRANSFORM_TILT:
             expected = f"a turn about z (x and y within {MAX_TRANSFORM_TILT})"
             refuse(TF_MESSAGE, f"rotation {which}", expected, turn)
-        return Pose2D(x, y, yaw_of_one(*turn))
+        return Pose2D(x, y, yaw_of(*turn))
 
 
 def decode_transforms(payload: bytes) -> tuple[Transform, ...]:

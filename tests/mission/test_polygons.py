@@ -6,8 +6,9 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.grid.geometry import Window, polygon_flaw
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.grid.polygons import polygon_flaw
 from fasaco_edge.mission.orders.zones import cells_inside, cells_near, counts_in, without
 from tests import naive
 

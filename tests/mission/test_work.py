@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from fasaco_edge.daemon.loop.status import mission_report
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, polygon_flaw
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.polygons import polygon_flaw
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PoseReceived
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.mission.coverage.unreached import MOST_AREAS, MOST_VIEWPOINTS, viewpoints

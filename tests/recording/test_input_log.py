@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.bus.arrival import DIGEST_BYTES, PATH_DIGEST, Arrival, Sample, digest
+from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -25,6 +25,7 @@ from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter, WriterState
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
+from fasaco_edge.wire.path_digest import DIGEST_BYTES, PATH_DIGEST, digest
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.poses import decode_pose, encode_pose_stamped
 from fasaco_edge.wire.schemas import POSE_STAMPED

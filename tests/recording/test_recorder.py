@@ -19,7 +19,6 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.bus.arrival import PATH_DIGEST
 from fasaco_edge.errors import MissingExtra, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RecordedSamples
@@ -28,6 +27,7 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_occupancy_grid
+from fasaco_edge.wire.path_digest import PATH_DIGEST
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID
 from tests.support.recordings import (
     SCALAR,

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from msgspec.structs import asdict
 
-from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, Sample, digest
+from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import COVERABLE
@@ -20,6 +20,7 @@ from fasaco_edge.replay.mission_drive import ReplayStep
 from fasaco_edge.replay.replay import Replay, read_run
 from fasaco_edge.wire.json_text import encode_json
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid, encode_occupancy_grid
+from fasaco_edge.wire.path_digest import PATH_DIGEST, digest
 from fasaco_edge.wire.path_documents import PlanFigures
 from fasaco_edge.wire.poses import decode_pose
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, POSE_STAMPED

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 import yaml
 
-from fasaco_edge.bus.arrival import digest
 from fasaco_edge.cli import main
 from fasaco_edge.config.config import load_config
 from fasaco_edge.daemon.ledger.file import LedgerFile
+from fasaco_edge.wire.path_digest import digest
 
 pytest.importorskip("rerun")
 

@@ -10,6 +10,7 @@ import pytest
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.cdr import CdrReader, CdrWriter
+from fasaco_edge.wire.grid_fields import write_cells
 from tests.wire.decoders import DECODERS
 from tests.wire.mutations import seeds_of
 
@@ -71,6 +72,6 @@ def test_arrays_are_written_row_by_row_whatever_their_layout() -> None:
     cells = np.arange(12, dtype=np.int8).reshape(3, 4)
     for array in (cells, cells.copy(order="F"), cells[:, ::-1][:, ::-1]):
         writer = CdrWriter("m")
-        writer.array(array)
-        assert writer.position == 12
-        assert writer.payload() == b"\0\1\0\0" + bytes(range(12))
+        write_cells(writer, array)
+        assert writer.position == 16
+        assert writer.payload() == b"\0\1\0\0" + b"\x0c\0\0\0" + bytes(range(12))

@@ -7,7 +7,6 @@ datagram a line, with priority and fields (https://systemd.io/JOURNAL_NATIVE_PRO
 from __future__ import annotations
 
 import faulthandler
-import hashlib
 import logging
 import os
 import socket
@@ -161,6 +160,8 @@ def fields_of(record: logging.LogRecord, message: str) -> dict[str, str]:
 
 def message_id(event: str) -> str:
     """Return the 128-bit id of an event, 32 hex digits."""
+    import hashlib  # maps four megabytes, for the journal alone
+
     return hashlib.sha256(f"{IDENTIFIER}/{event}".encode()).hexdigest()[:32]
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from functools import partial
+from importlib import metadata
 from typing import cast
 
 import msgspec
@@ -16,7 +17,7 @@ import msgspec
 from fasaco_edge import __version__
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.bus.queries import Question, Reply, Request, Shared, matches
-from fasaco_edge.bus.session import ZENOH_VERSION, Bus
+from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadQuery, CommandError, FasacoError, UnknownQuery
 from fasaco_edge.mission.core.events import Answer, CommandReceived
@@ -78,7 +79,7 @@ LEFT_OUT = "(left out)"
 
 def serve_about(bus: Bus, keys: Keys, config: Callable[[], DaemonConfig]) -> None:
     """Serve ``config``, as it is then, and ``version``; answer other queries with what there is."""
-    version = Version(__version__, VERSION.removeprefix("@"), ZENOH_VERSION)
+    version = Version(__version__, VERSION.removeprefix("@"), metadata.version("eclipse-zenoh"))
     documents: dict[str, Callable[[], object]] = {
         "config": lambda: config_document(config()),
         "version": lambda: version,

@@ -14,7 +14,8 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import OrderError
-from fasaco_edge.grid.geometry import FARTHEST_M, Polygon, polygon_flaw
+from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
+from fasaco_edge.grid.polygons import polygon_flaw
 
 # Limits of an order: it is kept with the ledger, written once a second.
 MOST_ZONES = 100

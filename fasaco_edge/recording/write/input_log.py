@@ -12,11 +12,12 @@ from collections import Counter
 from dataclasses import replace
 from typing import Final
 
-from fasaco_edge.bus.arrival import PATH_DIGEST, Arrival, Sample, digest
+from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.samples import Numbered, SampleEncoder
 from fasaco_edge.wire.json_text import decode_tolerant
+from fasaco_edge.wire.path_digest import PATH_DIGEST, digest
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.status import Status
 from fasaco_edge.wire.topics import RECORDED_INPUTS
