@@ -73,6 +73,7 @@ ROLES: Mapping[str, Role] = {
     "viewer": _role("viewer", "sees path, status, coverage and pheromone"),
     "operator": _role("operator", "commands the mission, and views", includes="viewer"),
     "recorder": _role("recorder", "receives everything, publishes its status", includes="viewer"),
+    "driver": _role("driver", "drives the robot: publishes cmd_vel, and views", includes="viewer"),
     # Topics that the configuration names: see ``ros_rights``.
     "ros": Role("publishes maps, updates and poses on ROS 2 topics, sees path and coverage"),
     # A daemon connects to it: what others may do there, the router itself has to restrict.

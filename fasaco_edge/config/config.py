@@ -114,7 +114,8 @@ class BusConfig(Section, frozen=True):
         Raises:
             BadConfiguration: a file of ``security`` cannot be read.
         """
-        part = self.security.of_daemon(prefix, ros.rights() if ros else None)
+        rights = (ros.rights(), ros.driver_rights()) if ros else ()
+        part = self.security.of_daemon(prefix, *rights)
         if self.open_to_everyone:
             part |= self.security.thinned(prefix)
         return BusSettings(self.mode, self.connect, self.listen, part)

@@ -13,6 +13,7 @@ from fasaco_edge.config.reading import Section
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
 from fasaco_edge.wire.ros_keys import RosTopic, graph_key
+from fasaco_edge.wire.schemas import TWIST_SCHEMAS
 from fasaco_edge.wire.topics import ROS_TOPICS
 
 # ROS 2 design, "Topic and Service name mapping": letters, digits, _; no digit first.
@@ -34,6 +35,7 @@ class RosTopicNames(Section, frozen=True):
     tf_static: str = "/tf_static"
     coverage_path: str = "/coverage_path"
     coverage_grid: str = "/coverage_grid"
+    cmd_vel: str = "/cmd_vel"
 
 
 class RosFrames(Section, frozen=True):
@@ -77,9 +79,13 @@ class RosConfig(Section, frozen=True):
         names = ("coverage_path", "coverage_grid")
         return {ROS_TOPICS[name].topic: self._topic(name) for name in names}
 
-    def _topic(self, name: str) -> RosTopic:
+    def velocities(self, schema: str) -> RosTopic:
+        """Return what the follower publishes, of type ``schema``."""
+        return self._topic("cmd_vel", schema)
+
+    def _topic(self, name: str, schema: str = "") -> RosTopic:
         row = ROS_TOPICS[name]
-        schema = self.pose if name == "pose" else row.schemas[0]
+        schema = schema or (self.pose if name == "pose" else row.schemas[0])
         return RosTopic(self._name(getattr(self.topics, name)), schema, row.latched, row.depth)
 
     def input_key(self, topic: RosTopic) -> str:
@@ -94,9 +100,21 @@ class RosConfig(Section, frozen=True):
 
     def rights(self) -> Role:
         """Return what those may do that have the role ``ros``."""
-        heard, said = self.inputs.values(), self.outputs.values()
-        graph = [] if self.kind == "bridge" else [graph_key(self.domain)]
-        return ros_rights([*map(self.input_key, heard)], [*map(self.output_key, said)], graph)
+        said = [*map(self.output_key, self.outputs.values()), *self._driven_by]
+        return ros_rights([*map(self.input_key, self.inputs.values())], said, self._graph)
+
+    def driver_rights(self) -> Role:
+        """Return what those may do that have the role ``driver``."""
+        poses = [self.input_key(topic) for name, topic in self.inputs.items() if "map" not in name]
+        return ros_rights(self._driven_by, poses, self._graph)
+
+    @property
+    def _driven_by(self) -> list[str]:
+        return [self.output_key(self.velocities(schema)) for schema in TWIST_SCHEMAS]
+
+    @property
+    def _graph(self) -> list[str]:
+        return [] if self.kind == "bridge" else [graph_key(self.domain)]
 
     def faults(self) -> Iterator[BadConfiguration]:
         """Yield what no single value's type shows.

@@ -110,6 +110,7 @@ class RolesConfig(Section, frozen=True):
     viewer: tuple[Name, ...] = ()
     operator: tuple[Name, ...] = ()
     recorder: tuple[Name, ...] = ()
+    driver: tuple[Name, ...] = ()
     ros: tuple[Name, ...] = ()
     router: tuple[Name, ...] = ()
 
@@ -182,12 +183,18 @@ class SecurityConfig(Section, frozen=True):
         # Gossip would tell every peer where the others are, and let them make us connect there.
         return {"transport": transport, "scouting": {"gossip": {"enabled": False}}}
 
-    def of_daemon(self, prefix: str, ros: access.Role | None = None) -> dict[str, Any]:
+    def of_daemon(
+        self,
+        prefix: str,
+        ros: access.Role | None = None,
+        ros_driver: access.Role | None = None,
+    ) -> dict[str, Any]:
         """Return the same with access control for the other participants, for a daemon's session.
 
         Args:
             prefix: of all keys of the robot.
-            ros: rights of the role ``ros``; None without a section ``ros2``.
+            ros, ros_driver: rights of the roles ``ros`` and ``driver`` under ROS 2; None without a
+                section ``ros2``.
 
         Raises:
             BadConfiguration: a file cannot be read.
@@ -205,6 +212,9 @@ class SecurityConfig(Section, frozen=True):
             grants.append(
                 access.Grant("ros", self.roles.recorder, "", of="recorder", rights=inputs)
             )
+        if ros_driver is not None:
+            driver = self.roles.driver
+            grants.append(access.Grant("ros", driver, "", of="driver", rights=ros_driver))
         part["access_control"] = access.access_control(grants, ATTRIBUTES[self.kind])
         return part | self.thinned(prefix)
 

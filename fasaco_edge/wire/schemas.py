@@ -11,7 +11,11 @@ POSE_WITH_COVARIANCE_STAMPED: Final = "geometry_msgs/msg/PoseWithCovarianceStamp
 ODOMETRY: Final = "nav_msgs/msg/Odometry"
 TF_MESSAGE: Final = "tf2_msgs/msg/TFMessage"
 PATH: Final = "nav_msgs/msg/Path"
+TWIST: Final = "geometry_msgs/msg/Twist"
+TWIST_STAMPED: Final = "geometry_msgs/msg/TwistStamped"
 PHEROMONE_GRID: Final = "fasaco_msgs/msg/PheromoneGrid"
 
 POSE_SCHEMAS = (POSE_STAMPED, POSE_WITH_COVARIANCE_STAMPED, ODOMETRY)
 """What a robot's pose may come in."""
+TWIST_SCHEMAS = (TWIST, TWIST_STAMPED)
+"""What a base may be driven by."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from fasaco_edge.wire.schemas import POSE_SCHEMAS
+from fasaco_edge.wire.schemas import POSE_SCHEMAS, TWIST_SCHEMAS
 
-Role = Literal["mapper", "viewer", "operator", "recorder", "robot"]
-Direction = Literal["in", "out", "out, by the recorder", "liveliness token"]
+Role = Literal["mapper", "viewer", "operator", "recorder", "driver", "robot"]
+Direction = Literal["in", "out", "out, by the recorder", "out, by the follower", "liveliness token"]
 SizeClass = Literal["large", "pose", "json", "token"]
 Priority = Literal[
     "real_time",
@@ -128,7 +128,7 @@ class Topic:
             return "token"
         if not self.schemas:
             return "json"
-        return "pose" if self.schemas == POSE_SCHEMAS else "large"
+        return "pose" if self.schemas in (POSE_SCHEMAS, TWIST_SCHEMAS) else "large"
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,7 +51,7 @@ POSE = Topic(
     direction="in",
     when="the robot has a new pose in the frame of the map",
     speaker="mapper",
-    listeners=("robot", "recorder"),
+    listeners=("robot", "recorder", "driver"),
     schemas=schemas.POSE_SCHEMAS,
     qos=Qos("interactive_low", express=True, why="the next pose is better than one sent again"),
     queues=Queues(daemon=1024, recorder=NEWEST, watch=NEWEST),
@@ -71,6 +71,17 @@ PATH = Topic(
     ),
     queues=Queues(recorder=EVERY, watch=64),
     limits=("max_path_poses", "max_coordinate_m"),
+)
+CMD_VEL = Topic(
+    name="cmd_vel",
+    direction="out, by the follower",
+    when="20 times a second while the follower drives, and for a second after it has stopped",
+    speaker="driver",
+    listeners=("viewer",),
+    schemas=schemas.TWIST_SCHEMAS,
+    qos=Qos(
+        "interactive_high", express=True, why="the next velocity is better than one sent again"
+    ),
 )
 COVERAGE = Topic(
     name="coverage",
@@ -199,6 +210,7 @@ TOPICS = (
     *(MAP, MAP_UPDATE, POSE),
     *(PATH, COVERAGE, FLOOR, PHEROMONE, DIRECTIONS, STATUS, COMMAND, TURNS, ALIVE, CLAIM),
     *(RECORDER, RECORDER_ALIVE),
+    CMD_VEL,
 )
 QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}
 
@@ -248,6 +260,7 @@ _ROS_ROWS = (
     RosRow("tf_static", TF_STATIC, "in", TF, latched=True, depth=TF_DEPTH),
     RosRow("coverage_path", "path", "out", PATH.schemas, latched=True, depth=1),
     RosRow("coverage_grid", "coverage", "out", COVERAGE.schemas, latched=True, depth=1),
+    RosRow("cmd_vel", "cmd_vel", "out", CMD_VEL.schemas, latched=False, depth=1),
 )
 ROS_TOPICS = {row.name: row for row in _ROS_ROWS}
 """By their key under ``ros2.topics`` of the configuration."""

@@ -77,6 +77,13 @@ def test_a_mission_is_commanded_by_operators_and_routers_alone():
     assert asks == {"operator", "router"}
 
 
+def test_the_robot_is_driven_by_drivers_and_routers_alone():
+    everybody = {role: [role] for role in access.ROLES}
+    rules = control(**everybody)
+    drives = {role for role in everybody if "cmd_vel" in granted(rules, role, "put", "ingress")}
+    assert drives == {"driver", "router"}
+
+
 def test_nobody_may_delete():
     rules = control(**{role: [role] for role in access.ROLES})["rules"]
     assert not any("delete" in rule["messages"] for rule in rules)

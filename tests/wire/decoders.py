@@ -10,7 +10,8 @@ from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
 from fasaco_edge.wire.poses import Transform, decode_pose, decode_transforms
-from fasaco_edge.wire.schemas import POSE_SCHEMAS
+from fasaco_edge.wire.schemas import POSE_SCHEMAS, TWIST_SCHEMAS
+from fasaco_edge.wire.twists import decode_velocity
 
 
 def decode_and_look(payload: bytes) -> tuple[Transform, ...]:
@@ -28,4 +29,5 @@ DECODERS: dict[str, Callable[[bytes], object]] = {
     schemas.PHEROMONE_GRID: decode_pheromone,
     schemas.TF_MESSAGE: decode_and_look,
     **{schema: partial(decode_pose, schema=schema) for schema in POSE_SCHEMAS},
+    **{schema: partial(decode_velocity, schema=schema) for schema in TWIST_SCHEMAS},
 }

@@ -6,6 +6,7 @@ A type that is only ever read may be missing here; its decoder is then judged al
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from fasaco_edge.grid.geometry import Window
@@ -15,6 +16,8 @@ from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
 from fasaco_edge.wire.paths import PathMessage, encode_path
 from fasaco_edge.wire.pheromone import PheromoneMessage, encode_pheromone
 from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.schemas import TWIST_SCHEMAS
+from fasaco_edge.wire.twists import encode_velocity
 from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 
 
@@ -45,4 +48,5 @@ ENCODERS: dict[str, Callable[[Any], bytes]] = {
     schemas.POSE_STAMPED: encode_pose_stamped,
     schemas.POSE_WITH_COVARIANCE_STAMPED: encode_pose_with_covariance_stamped,
     schemas.ODOMETRY: encode_odometry,
+    **{schema: partial(encode_velocity, schema=schema) for schema in TWIST_SCHEMAS},
 }

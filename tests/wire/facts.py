@@ -8,6 +8,7 @@ from fasaco_edge.grid.geometry import GridGeometry, StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
+from fasaco_edge.wire.twists import Velocity
 
 
 def placed(geometry: GridGeometry) -> dict[str, Any]:
@@ -40,6 +41,8 @@ def facts_of(message: Any) -> dict[str, Any]:
             facts |= {**corner, "cells": message.cells.tolist()}
         case StampedPose():
             facts["pose"] = [message.pose.x, message.pose.y, message.pose.yaw]
+        case Velocity():
+            facts["twist"] = [message.speed_m_s, message.turn_rad_s]
         case PathMessage():
             facts |= {"xy": message.xy.tolist(), "yaw": message.yaw.tolist()}
         case PheromoneMessage():

@@ -32,6 +32,7 @@ def hostile_vectors() -> list[Vector]:
         *_hostile_frames(),
         *_hostile_grids(),
         *_hostile_poses(),
+        *_hostile_twists(),
         *_hostile_tf(),
         *_hostile_others(),
     ]
@@ -190,6 +191,32 @@ def _hostile_poses() -> list[Vector]:
     return [
         _hostile(name, schema, _at(good, POSE_AT + 8 * index, _float64(value)), why, field)
         for name, index, value, why, field in cases
+    ]
+
+
+def _hostile_twists() -> list[Vector]:
+    plain = oracle.to_bytes(schemas.TWIST, oracle.twist(FLOATS[:6]))
+    stamped = oracle.twist_stamped("base", STAMP_NS, FLOATS[:6])
+    payload = oracle.to_bytes(schemas.TWIST_STAMPED, stamped)
+    cases = [
+        ("twist_speed_nan", schemas.TWIST, 4, plain, np.nan, "not a number", "linear.x"),
+        ("twist_turn_infinite", schemas.TWIST, 44, plain, np.inf, "infinite", "angular.z"),
+        (
+            "twist_stamped_turn_nan",
+            schemas.TWIST_STAMPED,
+            len(payload) - 8,
+            payload,
+            np.nan,
+            "not a number",
+            "twist.angular.z",
+        ),
+    ]
+    return [
+        *(
+            _hostile(name, schema, _at(good, at, _float64(value)), why, field)
+            for name, schema, at, good, value, why, field in cases
+        ),
+        _hostile("twist_trailing", schemas.TWIST, plain + b"junk", "bytes after it", "payload"),
     ]
 
 

@@ -117,12 +117,22 @@ def pose_with_covariance_stamped(frame: str, stamp_ns: int, where: Any, covarian
     )
 
 
-def odometry(
-    frame: str, stamp_ns: int, child: str, where: Any, covariance: Any, twist: Any, spread: Any
-) -> Any:
-    """Return a nav_msgs/Odometry; ``twist`` is linear x, y, z, angular x, y, z."""
+def twist(numbers: Any) -> Any:
+    """Return a geometry_msgs/Twist of linear x, y, z, angular x, y, z."""
+    x, y, z, roll, pitch, yaw = (float(value) for value in numbers)
     vector = partial(make, "geometry_msgs/msg/Vector3")
-    x, y, z, roll, pitch, yaw = (float(value) for value in twist)
+    return make(schemas.TWIST, linear=vector(x=x, y=y, z=z), angular=vector(x=roll, y=pitch, z=yaw))
+
+
+def twist_stamped(frame: str, stamp_ns: int, numbers: Any) -> Any:
+    """Return a geometry_msgs/TwistStamped."""
+    return make(schemas.TWIST_STAMPED, header=header(frame, stamp_ns), twist=twist(numbers))
+
+
+def odometry(
+    frame: str, stamp_ns: int, child: str, where: Any, covariance: Any, numbers: Any, spread: Any
+) -> Any:
+    """Return a nav_msgs/Odometry; ``numbers`` are those of its twist."""
     return make(
         schemas.ODOMETRY,
         header=header(frame, stamp_ns),
@@ -130,11 +140,7 @@ def odometry(
         pose=pose_with_covariance(where, covariance),
         twist=make(
             "geometry_msgs/msg/TwistWithCovariance",
-            twist=make(
-                "geometry_msgs/msg/Twist",
-                linear=vector(x=x, y=y, z=z),
-                angular=vector(x=roll, y=pitch, z=yaw),
-            ),
+            twist=twist(numbers),
             covariance=spread,
         ),
     )

@@ -45,6 +45,7 @@ def test_topics_are_those_of_the_table() -> None:
         *by_pose.inputs.values(),
         *(config.inputs["pose"], config.inputs["tf_static"]),
         *config.outputs.values(),
+        config.velocities(schemas.TWIST),
     ]
     shown = re.findall(r"^\| `(/\w+)` \| (in|out).* \| (.*) \| (.*) \|$", README, re.MULTILINE)
     for topic, entry, row in zip(ours, TABLE["topics"], shown, strict=True):

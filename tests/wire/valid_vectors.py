@@ -35,7 +35,14 @@ class Vector:
 
 def valid_vectors() -> list[Vector]:
     """Return payloads every decoder must read, with the values in them."""
-    return [*_valid_grids(), *_valid_poses(), *_valid_paths(), *_valid_tf(), *_valid_pheromone()]
+    return [
+        *_valid_grids(),
+        *_valid_poses(),
+        *_valid_twists(),
+        *_valid_paths(),
+        *_valid_tf(),
+        *_valid_pheromone(),
+    ]
 
 
 def _stamped(frame: str = "map") -> dict[str, Any]:
@@ -88,6 +95,23 @@ def _valid_poses() -> list[Vector]:
         payload = oracle.to_bytes(schemas.ODOMETRY, message)
         cases.append(Vector(name, schemas.ODOMETRY, payload, facts))
     return cases
+
+
+def _valid_twists() -> list[Vector]:
+    numbers = [0.25, 0.0, 0.0, 0.0, 0.0, -1.5]
+    plain = oracle.to_bytes(schemas.TWIST, oracle.twist(numbers))
+    stamped = oracle.twist_stamped("base_link", STAMP_NS, numbers)
+    payload = oracle.to_bytes(schemas.TWIST_STAMPED, stamped)
+    facts = {"frame": "", "stamp_ns": 0, "twist": [0.25, -1.5]}
+    return [
+        Vector("twist", schemas.TWIST, plain, facts),
+        Vector(
+            "twist_stamped",
+            schemas.TWIST_STAMPED,
+            payload,
+            {**facts, "frame": "base_link", "stamp_ns": STAMP_NS},
+        ),
+    ]
 
 
 def _valid_paths() -> list[Vector]:

@@ -285,6 +285,39 @@ static const int8_t *read_occupancy(reader *r, uint32_t rows, uint32_t cols)
     return cells;
 }
 
+/* Reads the six numbers of a twist, the last fields; names begin with ``before``. */
+static bool read_twist(reader *r, const char *before, fasaco_twist *twist)
+{
+    static const char *const NAMES[] = {"linear.x",  "linear.y",  "linear.z",
+                                        "angular.x", "angular.y", "angular.z"};
+    const uint8_t *at = take(r, 8, 48, "twist");
+    if (!end(r))
+        return false;
+    for (int i = 0; i < 6; i++)
+        if (!isfinite(number(at + 8 * i)))
+            refuse(r, "%s%s must be a finite number, got %g", before, NAMES[i],
+                   number(at + 8 * i));
+    twist->speed = number(at);
+    twist->turn_rate = number(at + 40);
+    return r->ok;
+}
+
+bool fasaco_read_twist(const uint8_t *payload, size_t size, fasaco_twist *twist,
+                       fasaco_error *error)
+{
+    reader r = begin(payload, size, error);
+    twist->header = (fasaco_header){0};
+    return read_twist(&r, "", twist);
+}
+
+bool fasaco_read_twist_stamped(const uint8_t *payload, size_t size, fasaco_twist *twist,
+                               fasaco_error *error)
+{
+    reader r = begin(payload, size, error);
+    twist->header = read_header(&r, "header");
+    return read_twist(&r, "twist.", twist);
+}
+
 bool fasaco_read_pose_stamped(const uint8_t *payload, size_t size, fasaco_pose_stamped *pose,
                               fasaco_error *error)
 {

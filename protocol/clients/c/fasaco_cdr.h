@@ -52,6 +52,13 @@ typedef struct {
     fasaco_pose pose;
 } fasaco_pose_stamped;
 
+/* geometry_msgs/Twist and TwistStamped; the header of the former is empty. */
+typedef struct {
+    fasaco_header header;
+    double speed;     /* linear x [m/s] */
+    double turn_rate; /* angular z [rad/s], counter-clockwise */
+} fasaco_twist;
+
 /* Placement of a grid: origin is the outer corner of cell (0, 0), resolution [m]. */
 typedef struct {
     uint32_t rows, cols;
@@ -114,6 +121,10 @@ bool fasaco_read_pose_with_covariance_stamped(const uint8_t *payload, size_t siz
                                               fasaco_pose_stamped *pose, fasaco_error *error);
 bool fasaco_read_odometry(const uint8_t *payload, size_t size, fasaco_pose_stamped *pose,
                           fasaco_error *error);
+bool fasaco_read_twist(const uint8_t *payload, size_t size, fasaco_twist *twist,
+                       fasaco_error *error);
+bool fasaco_read_twist_stamped(const uint8_t *payload, size_t size, fasaco_twist *twist,
+                               fasaco_error *error);
 bool fasaco_read_grid(const uint8_t *payload, size_t size, fasaco_grid *grid,
                       fasaco_error *error);
 bool fasaco_read_grid_update(const uint8_t *payload, size_t size, fasaco_grid_update *update,

@@ -101,6 +101,25 @@ static bool show_odometry(const uint8_t *payload, size_t size, fasaco_error *err
     return fasaco_read_odometry(payload, size, &pose, error) && print_pose(&pose);
 }
 
+static bool print_twist(const fasaco_twist *twist)
+{
+    print_header(&twist->header);
+    printf(", \"twist\": [%.17g, %.17g]", twist->speed, twist->turn_rate);
+    return true;
+}
+
+static bool show_twist(const uint8_t *payload, size_t size, fasaco_error *error)
+{
+    fasaco_twist twist;
+    return fasaco_read_twist(payload, size, &twist, error) && print_twist(&twist);
+}
+
+static bool show_twist_stamped(const uint8_t *payload, size_t size, fasaco_error *error)
+{
+    fasaco_twist twist;
+    return fasaco_read_twist_stamped(payload, size, &twist, error) && print_twist(&twist);
+}
+
 static bool show_grid(const uint8_t *payload, size_t size, fasaco_error *error)
 {
     fasaco_grid grid;
@@ -191,6 +210,8 @@ static const struct {
     {"geometry_msgs/msg/PoseStamped", show_pose_stamped},
     {"geometry_msgs/msg/PoseWithCovarianceStamped", show_pose_with_covariance},
     {"nav_msgs/msg/Odometry", show_odometry},
+    {"geometry_msgs/msg/Twist", show_twist},
+    {"geometry_msgs/msg/TwistStamped", show_twist_stamped},
     {"nav_msgs/msg/OccupancyGrid", show_grid},
     {"map_msgs/msg/OccupancyGridUpdate", show_grid_update},
     {"nav_msgs/msg/Path", show_path},
