@@ -16,7 +16,9 @@ from fasaco_edge.grid.floor import Floor, StandLattice, straightened
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.kernels.floor import line as kernel
 from fasaco_edge.kernels.floor.anneal import anneal
-from fasaco_edge.kernels.floor.capsule import (
+from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
+from fasaco_edge.kernels.floor.polish import polish
+from fasaco_edge.kernels.floor.sweeps import (
     BLOCK,
     COLUMNS,
     NEVER,
@@ -25,8 +27,6 @@ from fasaco_edge.kernels.floor.capsule import (
     count_left,
     sweep_edges,
 )
-from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
-from fasaco_edge.kernels.floor.polish import polish
 from fasaco_edge.kernels.floor.turning import Turning, proportional_turning
 
 # What is left further from an edge is no reason for a detour of that edge [m].

@@ -8,7 +8,6 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.floor.capsule import NEVER, Sweeps
 from fasaco_edge.kernels.floor.driven import (
     CAUSE,
     CAUSE_SHIFT,
@@ -19,6 +18,7 @@ from fasaco_edge.kernels.floor.driven import (
     set_causes,
     set_open,
 )
+from fasaco_edge.kernels.floor.sweeps import NEVER, Sweeps
 from tests.kernels.test_floor import SIDE, distances, scratch
 
 # The way may begin and end outside of the raster.

@@ -10,22 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.floor.bits import any_between, is_marked, packed, spread, unpacked
-from fasaco_edge.kernels.floor.capsule import (
+from fasaco_edge.kernels.floor.capsule import is_clear, is_clear_but, is_near
+from fasaco_edge.kernels.floor.line import MOST_CAPSULES
+from fasaco_edge.kernels.floor.places import connected, disc_rows, places_of, within
+from fasaco_edge.kernels.floor.seconds import turn_between
+from fasaco_edge.kernels.floor.sweeps import (
     COLUMNS,
     NEVER,
     Scratch,
     Sweeps,
     exchange,
-    is_clear,
-    is_clear_but,
-    is_near,
     prepare,
     sweep,
     swept_more,
 )
-from fasaco_edge.kernels.floor.line import MOST_CAPSULES
-from fasaco_edge.kernels.floor.places import connected, disc_rows, places_of, within
-from fasaco_edge.kernels.floor.seconds import turn_between
 
 SIDE = 40
 COORDINATES = st.floats(8.0, 31.0)

@@ -10,9 +10,9 @@ import pytest
 from fasaco_edge.kernels.floor import line as kernel
 from fasaco_edge.kernels.floor.anneal import anneal
 from fasaco_edge.kernels.floor.bits import packed
-from fasaco_edge.kernels.floor.capsule import NEVER, Sweeps, sweep
 from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
 from fasaco_edge.kernels.floor.polish import polish
+from fasaco_edge.kernels.floor.sweeps import NEVER, Sweeps, sweep
 from fasaco_edge.kernels.floor.turning import (
     Turning,
     limited_turning,

@@ -14,8 +14,8 @@ from fasaco_edge.daemon.loop.status import floor_report
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
-from fasaco_edge.kernels.floor.capsule import NEVER
 from fasaco_edge.kernels.floor.driven import DRIVEN, OPEN, WANTED
+from fasaco_edge.kernels.floor.sweeps import NEVER
 from fasaco_edge.mission.config import MissionConfig, Sweeping
 from fasaco_edge.mission.core.events import (
     CommandReceived,

@@ -12,7 +12,6 @@ No function of the mathematical library takes part, so no machine rounds otherwi
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.floor.capsule import BLOCK
 from fasaco_edge.kernels.floor.detour import middle_left, nearest_place
 from fasaco_edge.kernels.floor.line import (
     NONE,
@@ -26,6 +25,7 @@ from fasaco_edge.kernels.floor.line import (
     replace_points,
 )
 from fasaco_edge.kernels.floor.polish import slide
+from fasaco_edge.kernels.floor.sweeps import BLOCK
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 from fasaco_edge.kernels.random import draw
 

@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.floor.bits import is_marked
-from fasaco_edge.kernels.floor.capsule import BLOCK, Sweeps
 from fasaco_edge.kernels.floor.line import (
     NONE,
     TRIED,
@@ -17,6 +16,7 @@ from fasaco_edge.kernels.floor.line import (
     has_room,
     replace_points,
 )
+from fasaco_edge.kernels.floor.sweeps import BLOCK, Sweeps
 from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
 
 # A detour leaves its edge so far before, and joins it so far behind [pixels].

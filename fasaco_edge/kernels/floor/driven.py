@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.floor.capsule import (
+from fasaco_edge.kernels.floor.sweeps import (
     BLOCK,
     NEVER,
     Scratch,

@@ -10,17 +10,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.floor.capsule import (
+from fasaco_edge.kernels.floor.capsule import is_clear
+from fasaco_edge.kernels.floor.seconds import chain_s
+from fasaco_edge.kernels.floor.sweeps import (
     BLOCK,
     Scratch,
     Sweeps,
     exchange,
-    is_clear,
     prepare,
     sweep,
     swept_more,
 )
-from fasaco_edge.kernels.floor.seconds import chain_s
 from fasaco_edge.kernels.floor.turning import Turning
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.kernels.floor.capsule import NEVER, Scratch, Sweeps, sweep_edges
 from fasaco_edge.kernels.floor.driven import (
     CAUSE,
     CAUSE_SHIFT,
@@ -23,6 +22,7 @@ from fasaco_edge.kernels.floor.driven import (
     set_causes,
     set_open,
 )
+from fasaco_edge.kernels.floor.sweeps import NEVER, Scratch, Sweeps, sweep_edges
 from fasaco_edge.mission.line.out_of_reach import Cause
 from fasaco_edge.planners.line import blocks_of, count_blocks, memory_for_moves
 
