@@ -247,6 +247,7 @@ def try_scripts(campaign: Campaign) -> None:
     place, shown = campaign.folder / "lab", "/srv/trap"
     place.mkdir()
     with bare_robot(place, folders) as robot:
+        installed.warm(robot)
         # In the lab's own folder: what is bound into it is read-only.
         trap = Trap(Path(f"{robot.root}{shown}"), own_folder())
         inside = {

@@ -60,6 +60,7 @@ def test_an_installation_is_there_or_not(tmp_path_factory):
         for version in versions
     }
     with bare_robot(tmp_path_factory.mktemp("lab"), folders) as robot:
+        installed.warm(robot)
         for version in versions:
             words = ("env", "SETTLE_S=1", *STRACE, CALLS, "-o", LOG, f"/srv/{version}/install.sh")
             robot.run(*words, timeout_s=600.0)

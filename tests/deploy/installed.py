@@ -18,6 +18,7 @@ from tests.support.processes import PROGRAM
 HOME = "/opt/fasaco-edge"
 PYTHON = Path("/usr/bin/python3")
 CHECKOUT = Path(__file__).parents[2]
+LIBRARIES = [path for path in map(Path, sys.path) if path.name == "site-packages"]
 PACKAGES = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
 SOURCE = f"{HOME}/source"
 SCRIPT = f"""\
@@ -43,8 +44,7 @@ def binds(folder: Path) -> dict[str, Path]:
     # An installer compiles the sources to byte code; nobody can inside, where they are read-only.
     subprocess.run([sys.executable, "-m", "compileall", "-q", CHECKOUT / "fasaco_edge"], check=True)
     shown = {SOURCE: CHECKOUT}
-    libraries = [path for path in map(Path, sys.path) if path.name == "site-packages"]
-    shown |= {f"{HOME}/packages/{number}": path for number, path in enumerate(libraries)}
+    shown |= {f"{HOME}/packages/{number}": path for number, path in enumerate(LIBRARIES)}
     current = folder / "current"
     (current / "bin").mkdir(parents=True)
     (current / PACKAGES).mkdir(parents=True)
@@ -59,17 +59,24 @@ def binds(folder: Path) -> dict[str, Path]:
     return shown | {f"{HOME}/current": current}
 
 
-def warm(lab: Lab, cache: str = "/var/cache/fasaco-edge/numba") -> None:
-    """Give the service the kernels that were compiled for this checkout."""
+def warm(lab: Lab) -> None:
+    """Give the service, and root, the kernels that were compiled for this checkout: all of them."""
     here = cache_folder()
     assert here is not None
     if missing_from(here):
         subprocess.run([*PROGRAM, "warmup"], check=True, capture_output=True)
     # The folder's name tells the patch level of Python, of which the code in it is independent.
     tell = "from fasaco_edge.kernels.cache import code_digest; print(f'kernels-{code_digest()}')"
-    name = lab.run(f"{HOME}/current/bin/python3", "-c", tell).stdout.strip()
-    # For root, who runs robots and asks questions, they are kept elsewhere.
-    for home in (cache, str(Path("~root").expanduser() / ".cache/fasaco-edge")):
-        shutil.copytree(here, lab.root / home.lstrip("/") / name, dirs_exist_ok=True)
-    # Finds all of them, and notes that the cache is complete.
-    lab.run("env", f"NUMBA_CACHE_DIR={cache}", "fasaco-edge", "warmup")
+    path = ":".join(map(str, (CHECKOUT, *LIBRARIES)))
+    told = subprocess.run(
+        [str(PYTHON), "-c", tell],
+        env={"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    # Root runs robots and asks questions.
+    roots = Path("~root").expanduser() / ".cache/fasaco-edge"
+    for home in ("/var/cache/fasaco-edge/numba", str(roots)):
+        place = lab.root / home.lstrip("/") / told.stdout.strip()
+        shutil.copytree(here, place, dirs_exist_ok=True)

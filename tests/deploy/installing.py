@@ -28,8 +28,14 @@ class Robot(Lab):
 
     def install(self, version: str, *words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
         """Run a release's installer; its exit code has to be ``code``."""
-        script = f"/srv/{version}/install.sh"
-        told = ("env", "SETTLE_S=1", f"HOME={HOME}", script, *words)
+        return self._run_installer(f"/srv/{version}/install.sh", *words, code=code)
+
+    def roll_back(self) -> None:
+        """Go back to the version before."""
+        self._run_installer(f"{PREFIX}/current/deploy/install.sh", "--rollback", code=0)
+
+    def _run_installer(self, *words: str, code: int) -> subprocess.CompletedProcess[str]:
+        told = ("env", "SETTLE_S=1", f"HOME={HOME}", *words)
         done = self.run(*told, check=False, timeout_s=600.0)
         assert done.returncode == code, f"{done.returncode}\n{done.stdout}{done.stderr}"
         return done
@@ -63,9 +69,9 @@ class Robot(Lab):
 
 @contextmanager
 def bare_robot(folder: Path, folders: Mapping[str, Path]) -> Iterator[Robot]:
-    """Boot a lab that shows release folders; the kernels run as plain Python there.
+    """Boot a lab that shows release folders.
 
-    What is tried is how it is installed, not how fast it is.
+    Kernels are compiled by what is installed there, unless ``installed.warm`` brings them.
     """
     shown = {f"/srv/{version}": release for version, release in folders.items()}
     with booted(folder, shown | releases.binds()) as lab:
@@ -73,5 +79,4 @@ def bare_robot(folder: Path, folders: Mapping[str, Path]) -> Iterator[Robot]:
         # What this machine has of it already would be taken for ours.
         robot.run("rm", "-rf", "/etc/fasaco-edge")
         robot.run("mkdir", HOME)
-        robot.run("systemctl", "set-environment", "NUMBA_DISABLE_JIT=1")
         yield robot

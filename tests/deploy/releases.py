@@ -17,13 +17,12 @@ from pip._vendor.packaging.requirements import Requirement
 from pip._vendor.packaging.utils import canonicalize_name
 
 from fasaco_edge import __version__
-from tests.deploy.installed import CHECKOUT
+from tests.deploy.installed import CHECKOUT, LIBRARIES
 from tests.deploy.wheels import write_wheel
 from wheelhouse.closure import Target
 from wheelhouse.release import fill_release
 
 SHOWN = "/srv/packages"
-LIBRARIES = [path for path in map(Path, sys.path) if path.name == "site-packages"]
 THIS = Target(platform.machine(), f"{sys.version_info.major}.{sys.version_info.minor}")
 SHARED = ("maps", "protocol")
 

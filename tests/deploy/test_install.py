@@ -57,12 +57,14 @@ def robot(
     """A robot on which the first version was installed."""
     with bare_robot(tmp_path_factory.mktemp("lab"), folders) as running:
         untouched |= running.files()
+        installed.warm(running)
         running.install(FIRST)
         yield running
 
 
 def test_a_first_version_that_does_not_come_up_leaves_no_service_behind(folders, tmp_path):
     with bare_robot(tmp_path, folders) as bare:
+        installed.warm(bare)
         done = bare.install(DYING, code=5)
         assert "a screw is loose" in done.stderr
         assert bare.run("systemctl", "is-active", "fasaco-edge", check=False).stdout != "active\n"
@@ -78,6 +80,7 @@ def test_without_recording_and_without_a_start(folders, tmp_path):
         assert bare.run("systemctl", "is-enabled", "fasaco-edge").stdout == "enabled\n"
         assert not (bare.root / "etc/systemd/system/fasaco-edge-recorder.service").exists()
         assert not list((bare.root / f"opt/fasaco-edge/{FIRST}").glob("lib/*/*/rerun_sdk*"))
+        installed.warm(bare)
         bare.run("systemctl", "start", "fasaco-edge")
         assert bare.answers(FIRST)
 
@@ -130,7 +133,7 @@ def test_an_upgrade_keeps_the_configuration_and_the_version_before(robot):
     assert robot.version() == SECOND
     assert robot.run("cat", CONFIG).stdout == MINE
     assert SECOND in robot.run("fasaco-edge", "ask", "version", "--robot", "maja").stdout
-    robot.run(f"{PREFIX}/current/deploy/install.sh", "--rollback")
+    robot.roll_back()
     assert (robot.version(), robot.version("previous")) == (FIRST, SECOND)
     assert FIRST in robot.run("fasaco-edge", "ask", "version", "--robot", "maja").stdout
 
@@ -147,7 +150,7 @@ def test_another_build_of_the_same_version_stands_beside_it(robot):
     robot.install(OTHER)
     assert robot.version().startswith(f"{FIRST}-")
     assert robot.version("previous") == FIRST
-    robot.run(f"{PREFIX}/current/deploy/install.sh", "--rollback")
+    robot.roll_back()
     assert robot.version() == FIRST
 
 
