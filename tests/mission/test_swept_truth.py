@@ -30,11 +30,11 @@ LINE = MissionConfig(
 
 
 def flat():
-    """Return two rooms with a table each, 6 m x 4 m."""
-    pixels = np.zeros((80, 120), np.int8)
+    """Return two rooms with a table each, 4.5 m x 3 m."""
+    pixels = np.zeros((60, 90), np.int8)
     pixels[:2] = pixels[-2:] = pixels[:, :2] = pixels[:, -2:] = 100
-    pixels[:50, 66:69] = 100
-    pixels[28:40, 24:44] = pixels[20:34, 90:98] = 100
+    pixels[:36, 48:51] = 100
+    pixels[24:34, 18:32] = pixels[14:26, 68:74] = 100
     return OccupancyGrid(GridGeometry(*pixels.shape, 0.05, Pose2D(0.0, 0.0)), pixels)
 
 
