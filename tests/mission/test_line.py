@@ -433,6 +433,27 @@ def test_a_line_on_a_map_that_grows_becomes_better_and_never_worse():
     assert costs[-1] < costs[0] - 1.0
 
 
+def test_the_robot_is_told_of_another_line_when_it_comes_near_it():
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(room(6.0, 3.0)))
+    for _ in range(100):
+        robot.tell()
+    told, ahead = len(robot.reasons), robot.mission._line._ahead
+    for _ in range(100):
+        robot.tell()
+    # It stands: random moves go on further ahead, and are not its concern yet.
+    assert len(robot.reasons) == told
+    assert not np.isin(ahead.xy()[1:], robot.line).all()
+    driven_m = 0.0
+    while robot.mission.state is not State.DONE:
+        robot.drive()
+        driven_m += STEP_M
+        if len(ahead.line) > 1:
+            near = ahead.xy()[1:][ahead.lengths()[1:] < 1.0]
+            assert np.isin(near, np.array([robot.at, *robot.line])).all()
+    assert robot.reasons.count("line polished") < driven_m / 3.0
+
+
 @pytest.mark.parametrize("yaw", [0.0, 0.5])
 def test_a_map_on_another_raster_costs_the_polish_alone(yaw):
     grid = room(3.0, 2.4, yaw)

@@ -37,7 +37,7 @@ ANNEALED_M, ANNEALED_PIECE_M, ANNEALED_PIECES = 2.0, 4.0, 2
 # Moves for each of them, and the share of the temperature that the farthest is annealed at, where
 # the map is known.
 ANNEAL_MOVES, HOTTEST = 300, 0.3
-# The robot is told of what is annealed no sooner than this [m].
+# The robot is told of what is polished further on once it is so near to it [m].
 TOLD_M = 1.5
 # Most moves before the loop continues.
 MOST_MOVES = 3000
@@ -58,9 +58,9 @@ class Polisher:
     def polish(self, ahead: LineAhead, floor: FloorMap, *, is_settled: bool) -> bool:
         """Polish what is due of the line; return whether the robot is to be told.
 
-        It is told of what is near, and once all points are moved. On a map that still grows
-        (``is_settled`` is False) random moves are taken as well, but only those that lose nothing:
-        what a detour or a lane was there for may be swept by another lane since.
+        It is told once all points are moved, and of what changed later when it comes near. On a
+        map that still grows (``is_settled`` is False) random moves are taken as well, but only those
+        that lose nothing: what a detour or a lane was there for may be swept by another lane since.
         """
         if self._config.price_s_m2 == 0.0 or len(ahead.line) < 3 or ahead.is_cut:
             return False
@@ -84,11 +84,9 @@ class Polisher:
             return self._is_due(ahead)
         first, last = _piece(lengths, begin, PIECE_M)
         farthest = FARTHEST_M / ahead.tally.unit_m
-        before = ahead.line.points
         end = self._polish(ahead, floor, first, last, lengths, farthest)
-        is_other = ahead.line.points is not before
         ahead.note(min(begin, first), max(end, begin + 1), POLISHED)
-        return is_other
+        return self._is_due(ahead)
 
     def _is_due(self, ahead: LineAhead) -> bool:
         """Tell whether the robot is so near to what it does not know that it is to be told."""
