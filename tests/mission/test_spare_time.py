@@ -69,6 +69,17 @@ def test_a_poor_path_is_made_better_further_on():
     assert verdict.complete
 
 
+def test_another_line_along_the_same_cells_leaves_the_attempt_as_it_is():
+    drive = driving()
+    poor = drive.updates[-1]
+    request, drive.request = drive.request, None
+    polished = drive.mission.route.publish_line("line polished", 0.0)
+    assert polished.revision == poor.revision + 1
+    assert np.array_equal(polished.cells, poor.cells)
+    drive.tell(PlanReady(request.number, NearOptimal().plan(request.problem, never), 0.05))
+    assert drive.updates[-1].reason == BETTER
+
+
 def test_all_figures_of_a_path_are_of_one_problem():
     """Over a whole mission with a poor first path: what is published of each path fits together."""
     drive, notes = driving(share=1.0), []

@@ -47,6 +47,8 @@ class Route:
         # The path over a map that has moved since, until a pose tells where to.
         self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
+        # Counts the published paths over other cells than the one before.
+        self._walks = 0
         self.plans = self.attempts = 0
         self.unchanged = self.outdated = 0
         self.wanted = ""
@@ -178,7 +180,7 @@ class Route:
         """Request a better path; None without spare time, or where too little of it is left."""
         if not self._spare.is_available(now):
             return None
-        self._attempt = Attempt.at(self.path, self.revision, self._orders, self.attempts + 1)
+        self._attempt = Attempt.at(self.path, self._walks, self._orders, self.attempts + 1)
         if self._attempt is None:
             self._spare.skip(now)
             return None
@@ -215,7 +217,7 @@ class Route:
     def accept(self, event: PlanReady, now: float) -> PathUpdate | None:
         """Publish a plan that was requested, unless it no longer holds."""
         if self.is_improving:
-            self._spare.spend(event.seconds, now, self.revision)
+            self._spare.spend(event.seconds, now, self._walks)
         request, attempt, area = self.pending, self._attempt, self._map.area
         if request is None or request.number != event.number:
             return None
@@ -252,7 +254,7 @@ class Route:
         self, attempt: Attempt, event: PlanReady, area: ReachableArea, now: float
     ) -> PathUpdate | None:
         """Publish the path with a better rest; None where that saves too little."""
-        if attempt.revision != self.revision:
+        if attempt.walk != self._walks:
             return None
         cells = attempt.joined(self.path, event.path.cells)
         if cells is None or area.drivable_prefix(cells) < len(cells):
@@ -283,10 +285,17 @@ class Route:
     ) -> PathUpdate:
         """Publish a path in place of the one before."""
         self.revision += 1
+        self._walks += 1
         self.published_at = now
         self.path, self._kept = PathProgress(cells), PathProgress(NO_CELLS)
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
         return PathUpdate(self.revision, cells, reason, plan, seconds, changed)
+
+    def publish_line(self, reason: str, now: float) -> PathUpdate:
+        """Publish another line along the same cells; an attempt at better ones still holds."""
+        self.revision += 1
+        self.published_at = now
+        return PathUpdate(self.revision, self.path.ahead, reason)
 
     def follow(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> None:
         """Note that the robot is in ``cell``, see ``PathProgress.driven_to``."""

@@ -33,17 +33,17 @@ class SpareTime:
     def __init__(self, share: float) -> None:
         self._share = share
         self._resting_until = 0.0
-        # The path of the last attempt, and how many attempts at it came to nothing.
-        self._revision = self._vain = 0
+        # The walk of the last attempt, and how many attempts at it came to nothing.
+        self._walk = self._vain = 0
 
     def is_available(self, now: float) -> bool:
         """Tell whether another attempt may begin at ``now`` [s]."""
         return self._share > 0.0 and now >= self._resting_until
 
-    def spend(self, seconds: float, now: float, revision: int) -> None:
-        """Note that an attempt at path ``revision`` took ``seconds`` and ended at ``now`` [s]."""
-        self._vain = min(self._vain + 1, MOST_VAIN) if revision == self._revision else 0
-        self._revision = revision
+    def spend(self, seconds: float, now: float, walk: int) -> None:
+        """Note that an attempt at walk ``walk`` took ``seconds`` and ended at ``now`` [s]."""
+        self._vain = min(self._vain + 1, MOST_VAIN) if walk == self._walk else 0
+        self._walk = walk
         share = self._share / 2**self._vain
         self._resting_until = now + seconds * (1.0 / share - 1.0)
 
@@ -61,20 +61,20 @@ class Attempt:
     """An attempt at a better path from one of its cells on.
 
     Attributes:
-        revision: of the path.
+        walk: number of the path, counting those over other cells.
         index: where on it the robot is.
         joint: index of that cell.
         problem: that the rest of the path solves, the end of the one that is left.
     """
 
-    revision: int
+    walk: int
     index: int
     joint: int
     problem: CoverageProblem
 
     @classmethod
     def at(
-        cls, path: PathProgress, revision: int, orders: Sequencer, number: int
+        cls, path: PathProgress, walk: int, orders: Sequencer, number: int
     ) -> Attempt | None:
         """Return attempt ``number`` at a path; None where too little of it is left."""
         # The next cells ahead of the robot stay as they are; a shorter rest is not worth a search.
@@ -86,7 +86,7 @@ class Attempt:
             problem = orders.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
         except FasacoError:
             return None  # the map has changed: a repair is due
-        return cls(revision, path.index, joint, problem)
+        return cls(walk, path.index, joint, problem)
 
     def joined(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
         """Return the cells ahead on a better path, int32 (n, 2); None if it saves too little."""

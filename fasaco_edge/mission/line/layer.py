@@ -128,7 +128,8 @@ class LineLayer:
             ahead.lay(update.cells, stamped.pose)
         elif self._is_dropped or (is_further and touched is not None):
             ahead.lay(path.ahead, stamped.pose)
-            reason = "map on another raster" if self._is_dropped else "robot further on its path"
+            why = "map on another raster" if self._is_dropped else "robot further on its path"
+            update = self._route.publish(path.ahead, why, now) if len(path.ahead) else None
         self._is_dropped = False
         if touched is not None and ahead.check(touched):
             reason = "line blocked"
@@ -141,8 +142,7 @@ class LineLayer:
             if self._polisher.polish(ahead, self._map.floor, is_settled=self._is_settled):
                 reason = "line polished"
         if update is None and reason and len(path.ahead):
-            ahead.rebase()
-            update = self._route.publish(path.ahead, reason, now)
+            update = self._route.publish_line(reason, now)
         if update is None:
             return None
         ahead.note_told()

@@ -233,12 +233,6 @@ class LineAhead:
                 break
         return at
 
-    def rebase(self) -> None:
-        """Number the walk's cells from where the robot is."""
-        self._walk = self._walk[self.cell :]
-        self.line = self.line.renumbered(-self.cell)
-        self.cell = 0
-
     @property
     def is_followed(self) -> bool:
         """Whether the robot is on the line, within half the tool."""
