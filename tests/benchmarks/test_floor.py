@@ -1,13 +1,21 @@
-"""Lines over the floor of the smallest building, planned and driven, and what is said of them."""
+"""Lines over the floor of a small building, planned and driven, and what is said of them."""
 
 import json
 
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from maps.map_writer import write_map
 from tests.benchmarks.__main__ import main
 from tests.benchmarks.floor import CASES, CENTRES, ONLINE, THOROUGH
+from tests.support.rooms import RESOLUTION_M, WALL, fill, two_rooms
 
 
-def test_a_line_sweeps_more_than_the_centres_and_touches_nothing(capsys):
-    main(["floor", "--maps", "office", "--json"])
+def test_a_line_sweeps_more_than_the_centres_and_touches_nothing(capsys, tmp_path):
+    file, pixels = tmp_path / "rooms.yaml", fill(two_rooms(door=True), 1.2, 1.6, 1.8, 2.1, WALL)
+    write_map(
+        OccupancyGrid(GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0)), pixels), file
+    )
+    main(["floor", "--maps", str(file), "--json"])
     document = json.loads(capsys.readouterr().out)
     runs = {run["case"]: run for run in document["floors"]}
     assert tuple(runs) == CASES

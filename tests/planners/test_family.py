@@ -34,7 +34,7 @@ def assert_answers(problem, path):
 
 
 @pytest.mark.parametrize("name", PLANNER_NAMES)
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=400, deadline=None)
 @given(
     ground=problems(),
     end=ENDS,
