@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from fasaco_edge.cli import main
 from fasaco_edge.wire.topics import RPC_NAMES
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, fasaco_edge
@@ -35,31 +36,41 @@ def endpoint(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", RPC_NAMES)
-def test_every_question_has_an_answer_people_can_read(endpoint, name):
-    ended = fasaco_edge("ask", name, "--connect", endpoint)
-    assert ended.code == 0, ended.err
-    assert SAID[name] in ended.out
+def test_every_question_has_an_answer_people_can_read(endpoint, capsys, name):
+    assert main(["ask", name, "--connect", endpoint]) == 0
+    told = capsys.readouterr()
+    assert SAID[name] in told.out
+    assert told.err == ""
 
 
-def test_a_program_gets_json(endpoint):
-    path, trail, version = (
-        json.loads(fasaco_edge("ask", *words, "--json", "--connect", endpoint).out)
-        for words in (("path",), ("pheromone", "--param", "cohort=0"), ("version",))
-    )
+def test_a_process_answers_as_well(endpoint):
+    ended = fasaco_edge("ask", "version", "--connect", endpoint)
+    assert (ended.code, ended.err) == (0, "")
+    assert SAID["version"] in ended.out
+
+
+def test_a_program_gets_json(endpoint, capsys):
+    def told(*words):
+        assert main(["ask", *words, "--json", "--connect", endpoint]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    path, version = told("path"), told("version")
+    trail = told("pheromone", "--param", "cohort=0")
     assert path["poses"] == path["steps"] + 1
     assert path["length_m"] == pytest.approx(0.3 * path["steps"])
     assert (trail["cohort"], trail["rows"] * trail["cols"]) == (0, 100)
     assert version["package"] == "fasaco-edge"
 
 
-def test_what_is_wrong_is_told(endpoint):
-    ended = fasaco_edge("ask", "pheromone", "--param", "cohort=77", "--json", "--connect", endpoint)
-    assert ended.code == 1
-    assert json.loads(ended.out)["code"] == "not_yet"
-    assert "no trail of cohort 77" in ended.err
-    assert "\n  hint: ask for newest, 0, or leave cohort out" in ended.err
-    ended = fasaco_edge("ask", "status", "--robot", "other", "--connect", endpoint)
-    assert ended.code == 1
-    assert "there are robot: give one as --robot" in ended.err
+def test_what_is_wrong_is_told(endpoint, capsys):
+    words = ("pheromone", "--param", "cohort=77", "--json")
+    assert main(["ask", *words, "--connect", endpoint]) == 1
+    told = capsys.readouterr()
+    assert json.loads(told.out)["code"] == "not_yet"
+    assert "no trail of cohort 77" in told.err
+    assert "\n  hint: ask for newest, 0, or leave cohort out" in told.err
+    assert main(["ask", "status", "--robot", "other", "--connect", endpoint]) == 1
+    assert "there are robot: give one as --robot" in capsys.readouterr().err
     for words in (("ask", "colour"), ("ask", "path", "--param", "colour"), ("ask",)):
-        assert fasaco_edge(*words).code == 2
+        with pytest.raises(SystemExit, match="2"):
+            main([*words])

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from fasaco_edge.cli import main
 from tests.daemon.test_mission import about, planned
 from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process, fasaco_edge
@@ -295,14 +296,14 @@ def begin_idle(outsider: Outsider) -> None:
         (("status",), "Unable to connect to any of"),
     ],
 )
-def test_mistakes_are_told_without_a_daemon(tmp_path: Path, monkeypatch, words, said):
+def test_mistakes_are_told_without_a_daemon(tmp_path: Path, monkeypatch, capsys, words, said):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "order.yaml").write_text("zones: [{name: a}]")
     (tmp_path / "order.json").write_text("{")
-    ended = fasaco_edge("mission", *words, "--connect", "tcp/127.0.0.1:1")
-    assert ended.code == 1
-    assert said in ended.err
-    assert "\n  hint: " in ended.err
+    assert main(["mission", *words, "--connect", "tcp/127.0.0.1:1"]) == 1
+    told = capsys.readouterr().err
+    assert said in told
+    assert "\n  hint: " in told
 
 
 @pytest.mark.parametrize(
@@ -317,7 +318,7 @@ def test_mistakes_are_told_without_a_daemon(tmp_path: Path, monkeypatch, words, 
         (("pause", "--passes", "2"), "unrecognized arguments"),
     ],
 )
-def test_words_nobody_understands_are_named(words, said):
-    ended = fasaco_edge("mission", *words)
-    assert ended.code == 2
-    assert said in ended.err
+def test_words_nobody_understands_are_named(capsys, words, said):
+    with pytest.raises(SystemExit, match="2"):
+        main(["mission", *words])
+    assert said in capsys.readouterr().err
