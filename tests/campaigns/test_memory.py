@@ -48,7 +48,7 @@ def test_a_daemon_takes_no_more_than_it_says(tmp_path, flood, outcome, error):
     ids=["twenty", "fine", "updates"],
 )
 def test_a_daemon_lives_under_its_units_limit(tmp_path, flood):
-    (row,) = run_floods([flood], tmp_path, 3.0, unit_limit())
+    (row,) = run_floods([flood], tmp_path, 2.0, unit_limit())
     assert row.broken == ""
 
 
@@ -82,7 +82,7 @@ def test_a_recorder_lives_under_its_units_limit(tmp_path, kind):
             told.wait(lambda heard: heard.json()["state"] == "recording")
             outsider.put("map", map_bytes(room(8.0, 6.0)))
             outsider.put("pose", pose_bytes(0.75, 0.75))
-            pour(Flood(kind, 5000, 0.03, 20.0), daemon, outsider, 3.0)
+            pour(Flood(kind, 5000, 0.03, 20.0), daemon, outsider, 2.0)
             told.wait(lambda heard: True, len(told.heard) + 2)  # it still speaks
             assert recorder.poll() is None
             assert group.kills == 0
