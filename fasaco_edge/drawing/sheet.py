@@ -71,8 +71,8 @@ class Sheet:
     def around(self, plot: Image.Image) -> Image.Image:
         """Return the finished picture, RGB, with ``plot`` in its middle."""
         inner = max(plot.width, MIN_WIDTH)
-        title = _wrapped([self.title], TITLE_PX, inner)
-        caption = _wrapped(self.lines, TEXT_PX, inner)
+        title = wrapped([self.title], TITLE_PX, inner)
+        caption = wrapped(self.lines, TEXT_PX, inner)
         key_rows = _flowed(self.key, inner)
         head = len(title) * (LINE_PX + 10) + len(caption) * LINE_PX + 8
         foot = FOOT_PX + 8 + len(key_rows) * (LINE_PX + 4)
@@ -82,10 +82,10 @@ class Sheet:
         draw = ImageDraw.Draw(sheet)
         y = MARGIN
         for line in title:
-            draw.text((MARGIN, y - 4), line, palette.INK, _font(TITLE_PX))
+            draw.text((MARGIN, y - 4), line, palette.INK, font_of(TITLE_PX))
             y += LINE_PX + 10
         for line in caption:
-            draw.text((MARGIN, y), line, palette.FAINT_INK, _font(TEXT_PX))
+            draw.text((MARGIN, y), line, palette.FAINT_INK, font_of(TEXT_PX))
             y += LINE_PX
         x, y = MARGIN + (inner - plot.width) // 2, MARGIN + head
         sheet.paste(plot, (x, y))
@@ -99,7 +99,7 @@ class Sheet:
                 place = (MARGIN + left, y + FOOT_PX + row * (LINE_PX + 4))
                 sheet.paste(_symbol(entry), place)
                 after = (place[0] + SYMBOL_PX + 8, place[1] + SYMBOL_PX // 2)
-                draw.text(after, entry.label, palette.INK, _font(TEXT_PX), anchor="lm")
+                draw.text(after, entry.label, palette.INK, font_of(TEXT_PX), anchor="lm")
         return sheet
 
     def _scale_bar(self, draw: ImageDraw.ImageDraw, x: int, y: int, plot_width: int) -> None:
@@ -112,13 +112,17 @@ class Sheet:
         ):
             draw.rectangle((left_end, upper, right_end, lower), palette.INK)
         draw.text(
-            (right + 10, y + 5), f"{length:g} {self.unit}", palette.INK, _font(TEXT_PX), anchor="lm"
+            (right + 10, y + 5),
+            f"{length:g} {self.unit}",
+            palette.INK,
+            font_of(TEXT_PX),
+            anchor="lm",
         )
 
     def _colour_bar(
         self, sheet: Image.Image, draw: ImageDraw.ImageDraw, right: int, y: int
     ) -> None:
-        font = _font(TEXT_PX)
+        font = font_of(TEXT_PX)
         before, after = self.bar
         draw.text((right, y + 5), after, palette.INK, font, anchor="rm")
         end = right - math.ceil(font.getlength(after)) - 10
@@ -128,20 +132,9 @@ class Sheet:
         draw.text((end - width - 10, y + 5), before, palette.INK, font, anchor="rm")
 
 
-def headed(plot: Image.Image, label: str, caption: str) -> Image.Image:
-    """Return ``plot``, RGB, with a label and a caption over it: one of several on a sheet."""
-    lines = [(line, palette.INK) for line in _wrapped([label], TEXT_PX, plot.width)]
-    lines += [(line, palette.FAINT_INK) for line in _wrapped([caption], TEXT_PX, plot.width)]
-    panel = Image.new("RGB", (plot.width, plot.height + len(lines) * LINE_PX), palette.PAPER)
-    draw = ImageDraw.Draw(panel)
-    for row, (line, colour) in enumerate(lines):
-        draw.text((0, row * LINE_PX), line, colour, _font(TEXT_PX))
-    panel.paste(plot, (0, panel.height - plot.height))
-    return panel
-
-
 @functools.cache
-def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+def font_of(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """Return the font of all text, ``size`` pixels high."""
     return ImageFont.load_default(size)
 
 
@@ -158,18 +151,19 @@ def _drawable(text: str) -> str:
     )
 
 
-def _wrapped(lines: Sequence[str], size: int, width: int) -> list[str]:
-    font, wrapped = _font(size), []
+def wrapped(lines: Sequence[str], size: int, width: int) -> list[str]:
+    """Return ``lines`` in letters the font has, broken where they are wider than ``width`` [px]."""
+    font, broken = font_of(size), []
     for line in map(_drawable, lines):
         current = ""
         for word in line.split():
             longer = f"{current} {word}".strip()
             if current and font.getlength(longer) > width:
-                wrapped.append(current)
+                broken.append(current)
                 longer = word
             current = longer
-        wrapped.append(current)
-    return [line for line in wrapped if line]
+        broken.append(current)
+    return [line for line in broken if line]
 
 
 def _flowed(entries: Sequence[KeyEntry], width: int) -> list[list[tuple[int, KeyEntry]]]:
@@ -177,7 +171,7 @@ def _flowed(entries: Sequence[KeyEntry], width: int) -> list[list[tuple[int, Key
     rows: list[list[tuple[int, KeyEntry]]] = []
     left = width
     for entry in entries:
-        wide = SYMBOL_PX + 8 + math.ceil(_font(TEXT_PX).getlength(entry.label)) + 26
+        wide = SYMBOL_PX + 8 + math.ceil(font_of(TEXT_PX).getlength(entry.label)) + 26
         if not rows or left + wide > width:
             rows.append([])
             left = 0

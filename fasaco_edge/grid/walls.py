@@ -61,10 +61,6 @@ NEAR_DEG = 0.3
 # A smaller turn gains nothing. One of 1 degree leaves a seventh of the patches, at the same pace;
 # from 2 degrees on it saves time, too [deg].
 LEAST_TURN_DEG = 0.5
-# From here on an angle holds good when more of the building is seen: in eleven buildings at four
-# angles, revealed by scans of 3.5 m from 176 starts, it then was 0.2 degrees off in the median, 0.8
-# in one of ten, 1.3 at worst; with 8 m of wall 0.3, 1.0 and 1.9.
-CERTAIN_SHARE, CERTAIN_WALL_M = 0.45, 12.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,16 +79,6 @@ class WallDirection:
     share: float
     wall_m: float
     is_of_rim: bool = False
-
-    @property
-    def is_certain(self) -> bool:
-        """Whether the angle may be fixed for good, though more of the building is to be seen.
-
-        It then is 0.2 degrees off in the median, 1.3 at worst, see ``CERTAIN_WALL_M``. Until it
-        is, what there is of the rim may be the edge of what was seen.
-        """
-        is_much = self.wall_m >= CERTAIN_WALL_M and self.share >= CERTAIN_SHARE
-        return is_much and not self.is_of_rim
 
     @property
     def turn_deg(self) -> float:

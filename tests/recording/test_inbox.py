@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.recording.write.inbox import (
+    BASE_BYTES,
     BEHIND_SAMPLES,
+    COPIES,
     LEAST_QUEUE_BYTES,
     QUEUE_BYTES,
     Inbox,
     RunClock,
     afforded_bytes,
-    needed_bytes,
 )
 from tests.support.service_manager import UNIT, unit_limit
 
@@ -105,7 +106,7 @@ def test_a_waiting_reader_wakes():
 def test_the_unit_has_what_the_recorder_needs():
     unit = UNIT.with_name("fasaco-edge-recorder.service")
     high, most = unit_limit("MemoryHigh", unit), unit_limit("MemoryMax", unit)
-    assert needed_bytes() <= high <= most / 1.07
+    assert BASE_BYTES + COPIES * QUEUE_BYTES <= high <= most / 1.07
     assert afforded_bytes(most) == QUEUE_BYTES == afforded_bytes(None)
 
 
@@ -113,4 +114,4 @@ def test_the_unit_has_what_the_recorder_needs():
 def test_what_waits_fits_into_the_limit(limit):
     capacity = afforded_bytes(limit)
     assert LEAST_QUEUE_BYTES <= capacity <= QUEUE_BYTES
-    assert needed_bytes(capacity) <= max(limit, needed_bytes(LEAST_QUEUE_BYTES))
+    assert capacity == LEAST_QUEUE_BYTES or BASE_BYTES + COPIES * capacity <= limit

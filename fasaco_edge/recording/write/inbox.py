@@ -49,11 +49,6 @@ QUEUE_BYTES = 32 * MB
 LEAST_QUEUE_BYTES = 4 * MB
 
 
-def needed_bytes(capacity_bytes: int = QUEUE_BYTES) -> int:
-    """Return the most memory that a recorder takes in whose queue so much may wait [bytes]."""
-    return BASE_BYTES + COPIES * capacity_bytes
-
-
 def afforded_bytes(limit: int | None) -> int:
     """Return how much may wait under a memory limit [bytes]; None is no limit."""
     if limit is None:

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.pictures import plot_walk
 from fasaco_edge.drawing.plot import Plot, View
-from fasaco_edge.drawing.sheet import KeyEntry, Sheet, headed
+from fasaco_edge.drawing.sheet import LINE_PX, TEXT_PX, KeyEntry, Sheet, font_of, wrapped
 from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.planner import ColonySnapshot
@@ -69,7 +69,19 @@ def _panel(view: View, lattice: CoverageLattice, walk: LabelledWalk) -> Image.Im
     plot = Plot(view)
     plot.ground(lattice)
     plot_walk(plot, lattice, walk.cells)
-    return headed(plot.finished(), walk.label, walk.caption)
+    return _headed(plot.finished(), walk.label, walk.caption)
+
+
+def _headed(plot: Image.Image, label: str, caption: str) -> Image.Image:
+    """Return ``plot``, RGB, with a label and a caption over it: one of several on a sheet."""
+    lines = [(line, palette.INK) for line in wrapped([label], TEXT_PX, plot.width)]
+    lines += [(line, palette.FAINT_INK) for line in wrapped([caption], TEXT_PX, plot.width)]
+    panel = Image.new("RGB", (plot.width, plot.height + len(lines) * LINE_PX), palette.PAPER)
+    draw = ImageDraw.Draw(panel)
+    for row, (line, colour) in enumerate(lines):
+        draw.text((0, row * LINE_PX), line, colour, font_of(TEXT_PX))
+    panel.paste(plot, (0, panel.height - plot.height))
+    return panel
 
 
 def _arranged(panels: Sequence[Image.Image]) -> Image.Image:
