@@ -21,8 +21,10 @@ from fasaco_edge.bus.publisher import encoding_of
 
 # Of a flood of tokens no more are remembered.
 MOST_TOKENS = 16_384
-# So long routers may take to answer [s]; what does not come in time changes nothing.
+# So long routers may take to answer [s]. What does not come in time changes nothing, and a
+# question that is not even ended by then is asked again after twice as long [s].
 ANSWER_S = 2.0
+LOST_S = 2 * ANSWER_S
 
 
 def ask_for_tokens(
@@ -74,17 +76,23 @@ class Roll:
         """Ask who is there, if that was asked so long ago [s]; the roll follows the answer."""
         now = time.monotonic()
         with self._lock:
-            if self._is_asking or now - self._asked_at < period_s:
+            if now - self._asked_at < (LOST_S if self._is_asking else period_s):
                 return
             self._is_asking, self._asked_at = True, now
-        ask_for_tokens(self._session, self._key, MOST_TOKENS, self._take)
+        if not ask_for_tokens(self._session, self._key, MOST_TOKENS, self._take):
+            with self._lock:
+                self._is_asking = False
 
     def _take(self, found: list[str], is_whole: bool) -> None:
         with self._lock:
             self._is_asking = False
-            # The first counts as it is: waiting for a frozen one may never end.
-            if is_whole or not self.version:
-                self._there = frozenset(found)
+            # What an answer in part names is there; what it lacks may be, too. The first counts as
+            # it is: waiting for a frozen one may never end.
+            there = frozenset(found)
+            if not is_whole and len(there | self._there) <= MOST_TOKENS:
+                there |= self._there
+            if is_whole or not self.version or there != self._there:
+                self._there = there
                 self.version += 1
 
 

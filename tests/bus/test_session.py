@@ -329,6 +329,34 @@ def test_a_roll_never_misses_who_is_there(bus, endpoint):
             other.withdraw(passing)
 
 
+def test_a_roll_asks_again_where_no_answer_comes(bus, monkeypatch):
+    bus.token(f"{KEY}/here")
+    roll = bus.roll(f"{KEY}/*")
+    ask = roll_module.ask_for_tokens
+    for is_asked in (False, True):
+        monkeypatch.setattr(roll_module, "ask_for_tokens", lambda *_, said=is_asked: said)
+        monkeypatch.setattr(roll_module, "LOST_S", 0.05)
+        roll.ask(0.0)
+        monkeypatch.setattr(roll_module, "ask_for_tokens", ask)
+        version = roll.version
+        until(lambda version=version: roll.ask(0.0) or roll.version > version)
+    assert roll.there() == {f"{KEY}/here"}
+
+
+def test_a_roll_believes_whom_an_answer_in_part_names(bus, monkeypatch):
+    token = bus.token(f"{KEY}/here")
+    roll = bus.roll(f"{KEY}/*")
+    until(lambda: roll.ask(0.0) or roll.version)
+    with monkeypatch.context() as patched:
+        patched.setattr(
+            roll_module, "ask_for_tokens", lambda *asked: asked[3]([f"{KEY}/new"], False) or True
+        )
+        roll.ask(0.0)
+        assert roll.there() == {f"{KEY}/here", f"{KEY}/new"}
+    until(lambda: roll.ask(0.0) or roll.there() == {f"{KEY}/here"})
+    bus.withdraw(token)
+
+
 def test_a_roll_has_a_bound(bus, endpoint, monkeypatch):
     monkeypatch.setattr(roll_module, "MOST_TOKENS", 100)
     roll = bus.roll(f"{KEY}/*")
