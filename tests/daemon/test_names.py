@@ -222,6 +222,8 @@ def test_where_a_network_grows_together_one_goes_on(tmp_path, robot_at):
             robot.wait_path()
         heard = [len(robot.paths.heard) for robot in robots]
         bridge = {"mode": "router", "connect": {"endpoints": [one, other]}}
+        # By default it listens on 7447, which another test may have taken.
+        bridge["listen"] = {"endpoints": [free_endpoint()]}
         bridge["scouting"] = {"multicast": {"enabled": False}}
         with zenoh.open(zenoh.Config.from_json5(json.dumps(bridge))):
             for robot, before in zip(robots, heard, strict=True):
