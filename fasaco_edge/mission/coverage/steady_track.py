@@ -90,12 +90,16 @@ class SteadyTrack:
     def _place(self, index: int) -> Place:
         poses, sigma_m = self._poses, self._scatter.sigma_m
         here, reach_m = poses[index], self._reach_m + SURE * sigma_m
-        most, beside = min(self._beside, index, len(poses) - 1 - index), 0
-        while beside < most and all(
-            math.hypot(there.x - here.x, there.y - here.y) <= reach_m
-            for there in (poses[index - beside - 1], poses[index + beside + 1])
-        ):
-            beside += 1
+        beside = min(self._beside, index, len(poses) - 1 - index)
+        for away in range(1, beside + 1):
+            before, after = poses[index - away], poses[index + away]
+            if (
+                math.hypot(before.x - here.x, before.y - here.y) > reach_m
+                or math.hypot(after.x - here.x, after.y - here.y) > reach_m
+            ):
+                beside = away - 1
+                break
         around = poses[index - beside : index + beside + 1]
-        x, y = (sum(each) / len(around) for each in zip(*((p.x, p.y) for p in around), strict=True))
-        return Place(x, y, SURE * sigma_m / math.sqrt(len(around)))
+        count = len(around)
+        x, y = sum([pose.x for pose in around]) / count, sum([pose.y for pose in around]) / count
+        return Place(x, y, SURE * sigma_m / math.sqrt(count))

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Self
 
@@ -49,6 +50,8 @@ DROPPED_FLOOR_TILES = MOST_FLOOR_TILES // 16
 NOWHERE = Window(0, 0, 0, 0)
 # The most pixels around what is not kept yet.
 MOST_AHEAD = 1 << 22
+# Ways and pixels that are looked at in one go; with more of them arrays would take much memory.
+MOST_TOGETHER = 1 << 16
 # So many of the last changes are remembered by where they were.
 REMEMBERED = 64
 ANYWHERE = Window(-(2**40), -(2**40), 2**40, 2**40)
@@ -56,6 +59,9 @@ ANYWHERE = Window(-(2**40), -(2**40), 2**40, 2**40)
 TOUCH_M = 1e-9
 # Grids are looked up in blocks of so many of these pixels by so many, of coarser ones in smaller.
 BLOCK = 256
+
+# From one place to the next.
+Way = tuple[Place, Place]
 
 
 class SweptFloor:
@@ -205,8 +211,9 @@ class SweptFloor:
 
     def _keep(self, places: list[Place]) -> None:
         for place in places:
-            window, under = self._under(self._kept_to or place, place)
-            self._mark(window, np.packbits(under, axis=1))
+            way = self._kept_to or place, place
+            window = self._around(way)
+            self._mark(window, np.packbits(self._under([way], window), axis=1))
             self._kept_to = place
 
     def _begin_ahead(self) -> None:
@@ -230,38 +237,50 @@ class SweptFloor:
     def _swept_ahead(self) -> tuple[Window, Mask]:
         """Return what seems to be swept beyond what is kept, and where."""
         if self._ahead is None:
-            start, parts = self._kept_to, list[tuple[Window, Mask]]()
-            for place in self._track.ahead():
-                parts.append(self._under(start or place, place))
-                start = place
-            whole = Window.around(*(window for window, _ in parts)) or NOWHERE
+            places = self._track.ahead()
+            ways = list(pairwise([self._kept_to or places[0], *places])) if places else []
+            windows = [self._around(way) for way in ways]
+            whole = Window.around(*windows) or NOWHERE
             if whole.rows * whole.cols > MOST_AHEAD:
                 # Poses that scatter so widely are no drive, and a mask would take much memory.
-                whole, parts = NOWHERE, []
-            ahead = np.zeros((whole.rows, whole.cols), np.bool_)
-            for window, under in parts:
-                ahead[window.slices_in(whole)] |= under
+                whole, ways = NOWHERE, []
+            if len(ways) * whole.rows * whole.cols <= MOST_TOGETHER:
+                ahead = self._under(ways, whole)
+            else:
+                ahead = np.zeros((whole.rows, whole.cols), np.bool_)
+                for way, window in zip(ways, windows, strict=True):
+                    ahead[window.slices_in(whole)] |= self._under([way], window)
             self._ahead = whole, ahead
         return self._ahead
 
-    def _under(self, start: Place, end: Place) -> tuple[Window, Mask]:
-        """Return the pixels whose centre came under the tool for sure, and where.
-
-        The columns of the window are whole bytes.
-        """
-        reach = max(0.5 * self._tool_m - end.error_m, 0.25 * self._tool_m)
+    def _around(self, way: Way) -> Window:
+        """Return the window, whose columns are whole bytes, of what comes under the tool."""
+        start, end = way
+        reach = self._reach(end)
         row0, row1 = _span(start.y, end.y, reach, 1)
         col0, col1 = _span(start.x, end.x, reach, 8)
-        # Relative to the start: far from 0 rounding would swamp differences.
-        up = ((np.arange(row0, row1) + 0.5) * PIXEL_M - start.y)[:, np.newaxis]
-        right = (np.arange(col0, col1) + 0.5) * PIXEL_M - start.x
-        dx, dy = end.x - start.x, end.y - start.y
-        length2 = dx * dx + dy * dy
-        if length2:
-            along = np.clip((right * dx + up * dy) / length2, 0.0, 1.0)
-            right, up = right - along * dx, up - along * dy
-        under = right * right + up * up <= (reach + TOUCH_M) ** 2
-        return Window(row0, col0, row1, col1), under
+        return Window(row0, col0, row1, col1)
+
+    def _reach(self, end: Place) -> float:
+        """Return how far from its middle the tool swept for sure [m]."""
+        return max(0.5 * self._tool_m - end.error_m, 0.25 * self._tool_m)
+
+    def _under(self, ways: Sequence[Way], window: Window) -> Mask:
+        """Return which pixels of a window have a centre that came under the tool for sure."""
+        values = []
+        for start, end in ways:
+            # Relative to each start: far from 0 rounding would swamp differences.
+            far_y, far_x = end.y - start.y, end.x - start.x
+            length2 = far_x * far_x + far_y * far_y or 1.0
+            reach2 = (self._reach(end) + TOUCH_M) ** 2
+            values.append((start.y, start.x, far_y, far_x, length2, reach2))
+        y, x, dy, dx, lengths2, reaches2 = np.array(values).reshape(-1, 6, 1, 1).swapaxes(0, 1)
+        up = ((np.arange(window.row0, window.row1) + 0.5) * PIXEL_M)[:, np.newaxis] - y
+        right = (np.arange(window.col0, window.col1) + 0.5) * PIXEL_M - x
+        along = np.minimum(np.maximum((right * dx + up * dy) / lengths2, 0.0), 1.0)
+        right, up = right - along * dx, up - along * dy
+        under: Mask = (right * right + up * up <= reaches2).any(axis=0)
+        return under
 
     def _mark(self, window: Window, bits: Bits) -> None:
         """Mark pixels of a window whose columns begin and end with whole bytes."""
