@@ -73,9 +73,7 @@ class Attempt:
     problem: CoverageProblem
 
     @classmethod
-    def at(
-        cls, path: PathProgress, walk: int, orders: Sequencer, number: int
-    ) -> Attempt | None:
+    def at(cls, path: PathProgress, walk: int, orders: Sequencer, number: int) -> Attempt | None:
         """Return attempt ``number`` at a path; None where too little of it is left."""
         # The next cells ahead of the robot stay as they are; a shorter rest is not worth a search.
         joint = path.index + HELD_CELLS

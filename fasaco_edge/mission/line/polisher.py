@@ -58,8 +58,8 @@ class Polisher:
     def polish(self, ahead: LineAhead, floor: FloorMap, *, is_settled: bool) -> bool:
         """Polish what is due of the line; return whether the robot is to be told.
 
-        It is told once all points are moved, and of what changed later when it comes near. On a
-        map that still grows (``is_settled`` is False) random moves are taken as well, but only those
+        It is told once all points are moved, and of what changed later when it comes near. On a map
+        that still grows (``is_settled`` is False) random moves are taken as well, but only those
         that lose nothing: what a detour or a lane was there for may be swept by another lane since.
         """
         if self._config.price_s_m2 == 0.0 or len(ahead.line) < 3 or ahead.is_cut:
