@@ -25,6 +25,7 @@ COMMANDS = {
     "demo": "watch a simulated robot map and cover a building",
     "plan": "plan a coverage path offline",
     "run": "run the daemon: maps come in over Zenoh, paths go out",
+    "follow": "drive a robot's base along the path: velocities, 20 times a second",
     "mission": "command a running daemon: start, pause, resume, cancel, replan, reset, status",
     "ask": "query a running daemon: status, path, coverage, pheromone, config, replan ...",
     "watch": "watch a robot's mission live in this terminal",

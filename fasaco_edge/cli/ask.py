@@ -19,7 +19,7 @@ from fasaco_edge.cli.console.arguments import (
     Exit,
     add_json,
     add_robot_on_bus,
-    client_settings,
+    robot_on_bus,
     seconds,
 )
 from fasaco_edge.cli.console.streams import print_json
@@ -29,7 +29,6 @@ from fasaco_edge.text import one_line
 from fasaco_edge.watch import phrases
 from fasaco_edge.wire import replies, schemas
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
-from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
@@ -128,12 +127,12 @@ def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: byte
     """
     from fasaco_edge.bus.session import open_bus
 
-    keys = Keys(args.robot, args.base)
+    keys, settings, _ = robot_on_bus(args)
     selector = keys.rpc(name) + (f"?{parameters}" if parameters else "")
-    with open_bus(client_settings(args)) as bus:
+    with open_bus(settings) as bus:
         found = bus.get(selector, args.timeout, payload)
         if not found:
-            alive = bus.alive(f"{args.base}/@v1/*/alive")
+            alive = bus.alive(f"{keys.base}/@v1/*/alive")
             raise nobody_answers(keys.prefix, {key.split("/")[-2] for key in alive})
     reply = found[0]
     if reply.is_error:

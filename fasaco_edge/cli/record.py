@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 
 from fasaco_edge.bus.session import BusSettings
-from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, client_settings
+from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, robot_on_bus
 from fasaco_edge.config.config import (
     BusConfig,
     DaemonConfig,
@@ -20,7 +20,6 @@ from fasaco_edge.config.config import (
     load_config,
 )
 from fasaco_edge.config.ros import RosConfig
-from fasaco_edge.config.security import from_here
 from fasaco_edge.wire.schemas import POSE_SCHEMAS, POSE_STAMPED
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
@@ -59,7 +58,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="also serve live viewers: `rerun rerun+http://HOST:PORT/proxy`; anybody who can "
         f"connect to the port may watch (default: {DEFAULT_HOST}:{DEFAULT_PORT})",
     )
-    add_robot_on_bus(parser)
+    add_robot_on_bus(parser, config=False)
 
 
 def ros_config(text: str) -> RosConfig:
@@ -120,17 +119,18 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.recording.write.recorder import run_recorder
 
     if args.config is None:
-        config, bus = config_of_options(args), client_settings(args)
+        config, bus = config_of_options(args)
     else:
         config, bus = read_config(args.config)
     return run_recorder(config, bus, args.out, budget_of(config), args.serve)
 
 
-def config_of_options(args: argparse.Namespace) -> DaemonConfig:
-    """Return the configuration that the options state; the bus is in ``client_settings``."""
-    return DaemonConfig(
-        robot=RobotConfig(name=args.robot),
-        bus=BusConfig(base=args.base),
+def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettings]:
+    """Return the configuration that the options state, and how to join the bus."""
+    keys, bus, _ = robot_on_bus(args)
+    config = DaemonConfig(
+        robot=RobotConfig(name=keys.robot),
+        bus=BusConfig(base=keys.base),
         pose=PoseConfig(schema=args.pose_schema),
         recording=RecordingConfig(
             part_mb=args.part_mb,
@@ -140,6 +140,7 @@ def config_of_options(args: argparse.Namespace) -> DaemonConfig:
         ),
         ros2=args.ros2 or msgspec.UNSET,
     )
+    return config, bus
 
 
 def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
@@ -150,10 +151,7 @@ def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
     """
     on_input = str(file) == "-"
     config = decode_config(sys.stdin.buffer.read()) if on_input else load_config(file)
-    bus = config.bus
-    bus.security.warn_of_clock()
-    endpoints = tuple(map(from_here, bus.listen or bus.connect))
-    return config, BusSettings("client", endpoints, secured=bus.security.of_client())
+    return config, config.bus.of_client()
 
 
 COMMAND = Command(

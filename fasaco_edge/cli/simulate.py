@@ -13,14 +13,13 @@ from fasaco_edge.cli.console.arguments import (
     Command,
     add_robot_on_bus,
     check_output,
-    client_settings,
     pair_of_floats,
+    robot_on_bus,
     writing,
 )
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map
-from fasaco_edge.wire.keys import Keys
 
 if TYPE_CHECKING:
     from fasaco_edge.simulation.node import Progress
@@ -30,6 +29,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("map", metavar="MAP", help="map_server YAML, or a name from `maps`")
     parser.add_argument(
         "--speed", type=float, default=1.0, metavar="X", help="simulated seconds per second"
+    )
+    parser.add_argument(
+        "--driver",
+        choices=("ideal", "follow"),
+        default="ideal",
+        help="ideal: it follows paths by itself; follow: `fasaco-edge follow` drives it "
+        "(default: %(default)s)",
     )
     parser.add_argument(
         "--start-xy", type=pair_of_floats, metavar="X,Y", help="where the robot starts [m]"
@@ -64,8 +70,9 @@ def run(args: argparse.Namespace) -> int:
     truth = read_map(path)
     x, y = args.start_xy or start_point(path, truth, args.robot_radius)
     world = World(truth, Pose2D(x, y), config)
+    here = robot_on_bus(args)
     result = run_simulation(
-        world, Keys(args.robot, args.base), client_settings(args), speed=args.speed, report=_report
+        world, here.keys, here.bus, speed=args.speed, driver=args.driver, report=_report
     )
     if args.trail_out is not None:
         with writing(args.trail_out):

@@ -14,7 +14,7 @@ from fasaco_edge.cli.console.arguments import (
     Command,
     Exit,
     add_robot_on_bus,
-    client_settings,
+    robot_on_bus,
     seconds,
 )
 from fasaco_edge.cli.console.logs import say_why
@@ -25,7 +25,6 @@ from fasaco_edge.watch.feed import Feed
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.phrases import steady_now
 from fasaco_edge.watch.robot_view import RobotView
-from fasaco_edge.wire.keys import Keys
 
 EPILOG = """\
 examples:
@@ -59,11 +58,12 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Watch until a signal."""
-    keys, console, view = Keys(args.robot, args.base), out(), RobotView(args.robot)
-    with Feed(client_settings(args), keys) as feed:
+    keys, bus, _ = robot_on_bus(args)
+    console, view = out(), RobotView(keys.robot)
+    with Feed(bus, keys) as feed:
         try:
             if args.once:
-                _once(args, feed, view, console)
+                _once(args, keys.prefix, feed, view, console)
             elif args.json:
                 live.watch_as_json(feed, view)
             elif sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in ("dumb", "unknown"):
@@ -91,11 +91,13 @@ def _leave(code: int) -> NoReturn:
     os._exit(code)
 
 
-def _once(args: argparse.Namespace, feed: Feed, view: RobotView, console: Console) -> None:
+def _once(
+    args: argparse.Namespace, prefix: str, feed: Feed, view: RobotView, console: Console
+) -> None:
     if not live.look_once(feed, view, args.timeout):
         if view.trouble:
             raise BusUnavailable(view.trouble)
-        raise nobody_answers(f"{args.base}/@v1/{args.robot}", view.robots)
+        raise nobody_answers(prefix, view.robots)
     if args.json:
         live.print_json(view.document)
         return

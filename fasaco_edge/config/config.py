@@ -23,7 +23,7 @@ from fasaco_edge.config.reading import (
     with_credentials,
 )
 from fasaco_edge.config.ros import RosConfig
-from fasaco_edge.config.security import SecurityConfig, security_faults
+from fasaco_edge.config.security import SecurityConfig, from_here, security_faults
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.kernels.floor.turning import (
     Turning,
@@ -80,6 +80,22 @@ class RobotConfig(Section, frozen=True):
         quarter_turn_s = turn_seconds(self.turning(), 0.5 * math.pi)
         return CoverageCost.for_robot(step_m, self.speed_m_s, quarter_turn_s)
 
+    def turning_deg_s(self) -> float:
+        """Return the rate of turning on the spot [deg/s].
+
+        Without ``turn_deg_s`` that by which a quarter-turn takes ``quarter_turn_s``, braking before
+        and starting after it left out.
+        """
+        if self.turn_deg_s is not None:
+            return self.turn_deg_s
+        seconds = self.quarter_turn_s - self.speed_m_s / self.acceleration_m_s2
+        # 90 = rate (seconds - rate / acceleration); where that cannot be, as fast as it goes.
+        half = 0.5 * seconds * self.turn_deg_s2
+        square = half * half - 90.0 * self.turn_deg_s2
+        if seconds <= 0.0 or square <= 0.0:
+            return math.sqrt(90.0 * self.turn_deg_s2)
+        return half - math.sqrt(square)
+
     def turning(self) -> Turning:
         """Return what turns on the spot take."""
         if self.turn_deg_s is None:
@@ -119,6 +135,16 @@ class BusConfig(Section, frozen=True):
         if self.open_to_everyone:
             part |= self.security.thinned(prefix)
         return BusSettings(self.mode, self.connect, self.listen, part)
+
+    def of_client(self) -> BusSettings:
+        """Return the settings of another program's session, on the same computer.
+
+        Raises:
+            BadConfiguration: a file of ``security`` cannot be read.
+        """
+        self.security.warn_of_clock()
+        endpoints = tuple(map(from_here, self.listen or self.connect))
+        return BusSettings("client", endpoints, secured=self.security.of_client())
 
 
 class MapConfig(Section, frozen=True):

@@ -7,19 +7,17 @@ changes keys, attachments and tokens alone.
 
 from __future__ import annotations
 
-import time
 from typing import Literal
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.bus.publisher import Publisher
-from fasaco_edge.bus.queries import Shared
+from fasaco_edge.bus.ros_publisher import RosPublisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.daemon.loop.inbox import poster
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.ros_keys import RosNode, RosTopic, attachment, gid_of
+from fasaco_edge.wire.ros_keys import RosNode, RosTopic, gid_of
 from fasaco_edge.wire.topic_types import VOLATILE, Topic
 
 
@@ -75,22 +73,3 @@ class RosBridge:
         token = self._node.endpoint_token(self._endpoints, kind, topic)
         self._bus.token(token)
         return token
-
-
-class RosPublisher:
-    """Publishes one topic; with ``gid``, what rmw_zenoh demands goes with each sample."""
-
-    def __init__(self, publisher: Publisher, gid: bytes = b"") -> None:
-        self._publisher = publisher
-        self._gid = gid
-        self._count = 0
-
-    def forget(self) -> None:
-        """Drop the sample kept for late joiners."""
-        self._publisher.forget()
-
-    def put(self, said: Shared) -> None:
-        """Send a message."""
-        self._count += 1
-        beside = attachment(self._count, time.time_ns(), self._gid) if self._gid else b""
-        self._publisher.put(said.payload, beside)

@@ -1,4 +1,4 @@
-"""The simulated robot on the bus: map and pose go out, paths come in, as with a real one."""
+"""The simulated robot on the bus: map and pose go out, paths or velocities come in."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
@@ -19,8 +20,11 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import encode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.twists import decode_velocity
 
 log = logging.getLogger(__name__)
+
+Driver = Literal["ideal", "follow"]
 
 # A cycle of the loop runs ticks for this long at most, before it looks for a new path [s].
 CYCLE_S = 0.02
@@ -66,7 +70,7 @@ class Progress:
         activity: what it is doing.
         distance_m: distance driven [m].
         collisions: how often a path led into an obstacle.
-        refused_paths: how many paths were malformed or in another frame.
+        refused: how many paths or velocities were malformed, or in another frame.
         speed: simulated seconds per second, achieved since the report before.
     """
 
@@ -75,7 +79,7 @@ class Progress:
     activity: Activity
     distance_m: float
     collisions: int
-    refused_paths: int
+    refused: int
     speed: float
 
 
@@ -85,13 +89,15 @@ def run_simulation(
     settings: BusSettings,
     *,
     speed: float = 1.0,
+    driver: Driver = "ideal",
     should_stop: Callable[[], bool] = lambda: False,
     report: Callable[[Progress], None] = lambda _progress: None,
 ) -> Progress:
     """Run the robot of ``world`` on the bus until it has to stop.
 
     It publishes its map (latched) and its pose with simulated time as the stamp, and
-    drives along the newest path. In the main thread, SIGINT and SIGTERM end it too.
+    drives along the newest path, or as it is told. In the main thread, SIGINT and SIGTERM
+    end it too.
     Its last map and pose are published before it returns its last progress.
 
     Args:
@@ -100,6 +106,7 @@ def run_simulation(
         settings: how to join the bus.
         speed: simulated seconds per second, above 0; a machine that cannot keep up
             runs slower.
+        driver: ideal: it follows paths itself; follow: velocities drive it.
         should_stop: asked some fifty times a second.
         report: called about twice a second, and at the end.
 
@@ -110,7 +117,7 @@ def run_simulation(
     if not speed > 0.0:
         raise BadConfiguration(f"speed must be above 0, got {speed}")
     with open_bus(settings) as bus, stop_event() as stop:
-        robot = RobotOnBus(world, keys, bus)
+        robot = RobotOnBus(world, keys, bus, driver)
         robot.drive(speed, lambda: stop.is_set() or should_stop(), report)
         robot.publish(world.emission())
         report(last := robot.progress(time.monotonic()))
@@ -118,17 +125,19 @@ def run_simulation(
 
 
 class RobotOnBus:
-    """The robot of a world on a bus: publishes what it emits, and follows the newest path."""
+    """The robot of a world on a bus: publishes what it emits, and follows the newest path, or
+    the newest velocity."""
 
-    def __init__(self, world: World, keys: Keys, bus: Bus) -> None:
+    def __init__(self, world: World, keys: Keys, bus: Bus, driver: Driver = "ideal") -> None:
         self._world = world
         self._reported_s = time.monotonic()
         self._reported_sim_s = world.stamp_ns * 1e-9
-        self._refused_paths = 0
+        self._refused = 0
         self._map = bus.advertise(keys, topics.MAP)
         self._pose = bus.advertise(keys, topics.POSE)
-        self._newest_path: LatestSlot[Sample] = LatestSlot()
-        bus.listen(keys, topics.PATH, self._newest_path.put)
+        self._newest: LatestSlot[Sample] = LatestSlot()
+        self._take = self._follow if driver == "ideal" else self._move
+        bus.listen(keys, topics.PATH if driver == "ideal" else topics.CMD_VEL, self._newest.put)
 
     def drive(
         self,
@@ -141,7 +150,7 @@ class RobotOnBus:
         pace = Pace(speed, world.config.tick_s, time.monotonic())
         while not should_stop():
             behind_s = pace.behind_s(time.monotonic())
-            self._take_path(0.0 if behind_s >= 0.0 else min(max(-behind_s, WAIT_S), CYCLE_S))
+            self._take_newest(0.0 if behind_s >= 0.0 else min(max(-behind_s, WAIT_S), CYCLE_S))
             cycle_ends_s = time.monotonic() + CYCLE_S
             while pace.behind_s(now_s := time.monotonic()) >= 0.0 and now_s < cycle_ends_s:
                 self.publish(world.tick())
@@ -157,19 +166,26 @@ class RobotOnBus:
         if emission.pose is not None:
             self._pose.put(encode_pose_stamped(emission.pose))
 
-    def _take_path(self, timeout_s: float) -> None:
-        """Wait for a path and follow it; one that cannot be followed costs only itself."""
-        sample = self._newest_path.take(timeout_s)
+    def _take_newest(self, timeout_s: float) -> None:
+        """Wait for what drives the robot; what cannot do that costs only itself."""
+        sample = self._newest.take(timeout_s)
         if sample is None:
             return
         try:
-            path = decode_path(sample.payload)
-            if path.frame != self._world.frame:
-                raise WrongFrame(f"path in frame {path.frame!r}, map in {self._world.frame!r}")
-            self._world.follow(path.xy)
+            self._take(sample)
         except (MalformedMessage, WrongFrame) as error:
-            self._refused_paths += 1
-            log.warning("path refused: %s", error)
+            self._refused += 1
+            log.warning("refused: %s", error)
+
+    def _follow(self, sample: Sample) -> None:
+        path = decode_path(sample.payload)
+        if path.frame != self._world.frame:
+            raise WrongFrame(f"path in frame {path.frame!r}, map in {self._world.frame!r}")
+        self._world.follow(path.xy)
+
+    def _move(self, sample: Sample) -> None:
+        told = decode_velocity(sample.payload, sample.schema)
+        self._world.move(told.speed_m_s, told.turn_rad_s)
 
     def progress(self, now_s: float) -> Progress:
         """Return the progress, with the speed achieved since it was asked for before."""
@@ -183,6 +199,6 @@ class RobotOnBus:
             world.activity,
             world.distance_m,
             world.collisions,
-            self._refused_paths,
+            self._refused,
             speed,
         )

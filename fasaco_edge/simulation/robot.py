@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.motion import limited, stopping_rate
 
 Point = tuple[float, float]
 
@@ -140,14 +141,31 @@ def driven(state: DriveState, goal: Point | None, config: SimulationConfig) -> D
         error = wrapped(math.atan2(ahead_y, ahead_x) - pose.yaw)
         if abs(error) <= (MISALIGNED_RAD if state.speed > 0.0 else ALIGNED_RAD):
             distance = math.hypot(ahead_x, ahead_y)
-            speed_goal = _stopping_rate(distance, config.acceleration_m_s2, dt)
+            speed_goal = stopping_rate(distance, config.acceleration_m_s2, dt)
         if state.speed == 0.0 or speed_goal > 0.0:
-            rate = _stopping_rate(abs(error), config.turn_acceleration_rad_s2, dt)
+            rate = stopping_rate(abs(error), config.turn_acceleration_rad_s2, dt)
             turn_goal = math.copysign(min(rate, config.turn_rad_s), error)
-    speed = _limited(state.speed, min(speed_goal, config.speed_m_s), config.acceleration_m_s2 * dt)
-    turn_rate = _limited(state.turn_rate, turn_goal, config.turn_acceleration_rad_s2 * dt)
+    speed = limited(state.speed, min(speed_goal, config.speed_m_s), config.acceleration_m_s2 * dt)
+    turn_rate = limited(state.turn_rate, turn_goal, config.turn_acceleration_rad_s2 * dt)
     yaw = wrapped(pose.yaw + turn_rate * dt)
     moved = Pose2D(pose.x + speed * dt * math.cos(yaw), pose.y + speed * dt * math.sin(yaw), yaw)
+    return DriveState(moved, speed, turn_rate)
+
+
+def moved_by(
+    state: DriveState, speed_m_s: float, turn_rad_s: float, config: SimulationConfig
+) -> DriveState:
+    """Return the state a tick later, of a base that is told how to move and does what it can."""
+    dt = config.tick_s
+    goal = min(max(speed_m_s, 0.0), config.speed_m_s)
+    turn_goal = min(max(turn_rad_s, -config.turn_rad_s), config.turn_rad_s)
+    speed = limited(state.speed, goal, config.acceleration_m_s2 * dt)
+    turn_rate = limited(state.turn_rate, turn_goal, config.turn_acceleration_rad_s2 * dt)
+    pose = state.pose
+    heading = pose.yaw + 0.5 * turn_rate * dt
+    way = speed * dt
+    yaw = wrapped(pose.yaw + turn_rate * dt)
+    moved = Pose2D(pose.x + way * math.cos(heading), pose.y + way * math.sin(heading), yaw)
     return DriveState(moved, speed, turn_rate)
 
 
@@ -194,20 +212,6 @@ def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
         (np.abs(across) > STRAIGHT_RAD) | (along < 0.0) | (across**2 > (CUT_M / shorter) ** 2)
     )
     return points[bend]
-
-
-def _stopping_rate(remaining: float, acceleration: float, dt: float) -> float:
-    """Return the highest rate from which equal steps down come to rest within ``remaining``.
-
-    The sum of v dt, (v - a dt) dt, ... is v^2 / 2a + v dt / 2; below one step, v dt is all.
-    """
-    half_step = 0.5 * acceleration * dt
-    braking = math.sqrt(half_step**2 + 2.0 * acceleration * remaining) - half_step
-    return min(braking, remaining / dt)
-
-
-def _limited(rate: float, goal: float, step: float) -> float:
-    return min(max(goal, rate - step), rate + step)
 
 
 def joined(

@@ -24,6 +24,7 @@ from fasaco_edge.simulation.robot import (
     SimulationConfig,
     driven,
     joined,
+    moved_by,
     stopping_point,
 )
 
@@ -31,6 +32,8 @@ from fasaco_edge.simulation.robot import (
 TRACK_SPACING_M = 0.02
 # About two metres of it show which part of a new path is driven already.
 RECENT_TRACK_POINTS = 100
+# A base that hears no velocity for so long stops by itself [s].
+DEAF_S = 0.5
 
 
 def rays_for(reach_px: float) -> int:
@@ -167,6 +170,8 @@ class World:
         self._mapper = Mapper(truth, config)
         self._path: NDArray[np.float64] | None = None
         self._corners: list[Point] = []
+        # Where others drive it: speed [m/s], turn rate [rad/s], and the tick it was told.
+        self._told: tuple[float, float, int] | None = None
         self._track = [(start.x, start.y)]
         self._ticks = 0
         self.activity = Activity.IDLE
@@ -210,6 +215,11 @@ class World:
         self._path = path
         self._join()
 
+    def move(self, speed_m_s: float, turn_rad_s: float) -> None:
+        """Move so from the next tick on, for ``DEAF_S`` at most; paths are nothing to it then."""
+        self._told = speed_m_s, turn_rad_s, self._ticks
+        self._path, self._corners = None, []
+
     def tick(self) -> Emission:
         """Let one time step pass; return what is published after it."""
         self._move()
@@ -242,6 +252,9 @@ class World:
         return np.vstack((behind, np.linspace(here, rest, points)))
 
     def _move(self) -> None:
+        if self._told is not None:
+            self._move_as_told(*self._told)
+            return
         here = (self.pose.x, self.pose.y)
         while self._corners and math.dist(here, self._corners[-1]) < ARRIVED_M:
             self._corners.pop()
@@ -250,7 +263,18 @@ class World:
                 self.activity = Activity.IDLE
             if not self._drive.moving:
                 return
-        ahead = driven(self._drive, self._corners[-1] if self._corners else None, self.config)
+        self._go_on(driven(self._drive, self._corners[-1] if self._corners else None, self.config))
+
+    def _move_as_told(self, speed_m_s: float, turn_rad_s: float, tick: int) -> None:
+        if (self._ticks - tick) * self.config.tick_s > DEAF_S:
+            speed_m_s = turn_rad_s = 0.0
+        ahead = moved_by(self._drive, speed_m_s, turn_rad_s, self.config)
+        self.activity = Activity.DRIVING if ahead.moving else Activity.IDLE
+        if ahead.moving or self._drive.moving:
+            self._go_on(ahead)
+
+    def _go_on(self, ahead: DriveState) -> None:
+        """Come into a state that may be in a wall."""
         if not _fits(self._truth, ahead.pose, self.config):
             self._collide()
             return
@@ -259,10 +283,11 @@ class World:
         self._drive = ahead
 
     def _collide(self) -> None:
+        # One that is told to push on stands in the wall, and has run into it once.
+        self.collisions += self._told is None or self._drive.moving
         self._drive = DriveState(self.pose)
         self._path, self._corners = None, []
         self.activity = Activity.COLLIDED
-        self.collisions += 1
 
     def _extend_track(self, ahead: DriveState) -> None:
         """Add the place the robot is about to leave, if the track so far misses it."""

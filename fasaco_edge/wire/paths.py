@@ -22,13 +22,11 @@ from fasaco_edge.wire.fields import (
     write_header,
 )
 from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_PATH_POSES, QUATERNION_TOLERANCE
+from fasaco_edge.wire.path_points import read_path_pose, read_pose_count
 from fasaco_edge.wire.schemas import PATH
 
 # So many poses are worked out at a time.
 BLOCK_POSES = 16_384
-
-LEAST_POSE_BYTES = 72
-"""Of a PoseStamped with an empty frame: stamp 8, length 4, NUL 1, padding 3, floats 56."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,7 +66,8 @@ def encode_path(
     writer = CdrWriter(PATH)
     if xy.ndim != 2 or xy.shape[1] != 2 or yaw.shape != (len(xy),):
         refuse(writer.message, "poses", "points (n, 2), yaws (n,)", f"{xy.shape}, {yaw.shape}")
-    _check_count(len(xy), MAX_PATH_POSES)
+    if len(xy) > MAX_PATH_POSES:
+        refuse(PATH, "length of poses", f"at most {MAX_PATH_POSES}", len(xy))
     write_header(writer, frame, stamp_ns)
     writer.uint32(len(xy), "length of poses")
     text = encoded_string(frame, writer.message, "header.frame_id")
@@ -96,8 +95,7 @@ def decode_path(payload: bytes, max_poses: int = MAX_PATH_POSES) -> PathMessage:
     """
     reader = CdrReader(payload, PATH)
     frame, stamp_ns = read_header(reader)
-    count = reader.length("poses", LEAST_POSE_BYTES)
-    _check_count(count, max_poses)
+    count = read_pose_count(reader, max_poses)
     poses = _read_records(reader, frame, count)
     if poses is None:
         poses = _read_one_by_one(reader, frame, count)
@@ -132,13 +130,7 @@ def _read_records(reader: CdrReader, frame: str, count: int) -> NDArray[np.float
 def _read_one_by_one(reader: CdrReader, frame: str, count: int) -> NDArray[np.float64]:
     poses = np.empty((count, 7))
     for index in range(count):
-        field = f"poses[{index}].header"
-        named, _ = read_header(reader, field)
-        if named not in ("", frame):
-            refuse(
-                reader.message, f"{field}.frame_id", f"{frame!r}, as the path's, or ''", repr(named)
-            )
-        poses[index] = reader.doubles(POSE, _pose_field(index))
+        poses[index] = read_path_pose(reader, frame, index)
     return poses
 
 
@@ -195,8 +187,3 @@ def _record(start: int, frame_size: int) -> np.dtype[np.void]:
 
 def _pose_field(index: int, first: int = 0) -> str:
     return f"poses[{first + index}].pose"
-
-
-def _check_count(count: int, max_poses: int) -> None:
-    if count > max_poses:
-        refuse(PATH, "length of poses", f"at most {max_poses}", count)

@@ -136,7 +136,7 @@ def test_bad_paths_cost_only_themselves(planner):
     )
 
     def refused(count):
-        return bool(reports) and reports[-1].refused_paths == count
+        return bool(reports) and reports[-1].refused == count
 
     stage = [next(stages)]
     ends = time.monotonic() + 120
@@ -157,7 +157,7 @@ def test_bad_paths_cost_only_themselves(planner):
         report=reports.append,
     )
     assert stage[0] is None
-    assert reports[-1].refused_paths == 2
+    assert reports[-1].refused == 2
     assert world.track[-1] == pytest.approx(centres((2, 5))[0], abs=2e-3)
     assert result.distance_m == pytest.approx(reports[-1].distance_m)
     assert all(0.0 < report.speed < 40.0 for report in reports[1:])

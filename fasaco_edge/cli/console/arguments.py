@@ -13,16 +13,20 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.errors import BadConfiguration
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.session import BusSettings
+    from fasaco_edge.config.config import DaemonConfig
+    from fasaco_edge.wire.keys import Keys
 
 DEFAULT_CELL_M = 0.3
 DEFAULT_RADIUS_M = 0.18
+# Of the environment, for who gives the same options all day.
+ROBOT, CONNECT = "FASACO_ROBOT", "FASACO_CONNECT"
 
 
 class Exit(IntEnum):
@@ -127,15 +131,29 @@ def with_negative_pairs(words: Sequence[str]) -> list[str]:
     return joined
 
 
-def add_robot_on_bus(parser: argparse.ArgumentParser) -> None:
-    """Add what names a robot on the bus and how to get there."""
-    parser.add_argument("--robot", default="robot", metavar="NAME", help="name of the robot")
-    parser.add_argument("--base", default="fasaco", metavar="KEY", help="prefix of all keys")
+def add_robot_on_bus(parser: argparse.ArgumentParser, *, config: bool = True) -> None:
+    """Add what names a robot on the bus and how to get there; read it by ``robot_on_bus``.
+
+    ``config``: also ``--config``, where a command has none of its own.
+    """
+    if config:
+        parser.add_argument(
+            "--config",
+            type=Path,
+            metavar="FILE",
+            help="the daemon's YAML configuration: robot, bus and credentials come from it, where "
+            "no option says otherwise",
+        )
+    parser.add_argument(
+        "--robot", metavar="NAME", help=f"name of the robot (default: ${ROBOT}, else robot)"
+    )
+    parser.add_argument("--base", metavar="KEY", help="prefix of all keys (default: fasaco)")
     parser.add_argument(
         "--connect",
         action="append",
         metavar="ENDPOINT",
-        help=f"Zenoh endpoint to connect to; may be repeated (default: {DEFAULT_ENDPOINT})",
+        help="Zenoh endpoint to connect to; may be repeated "
+        f"(default: ${CONNECT}, several apart by commas, else {DEFAULT_ENDPOINT})",
     )
     parser.add_argument(
         "--security",
@@ -146,20 +164,54 @@ def add_robot_on_bus(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def client_settings(args: argparse.Namespace) -> BusSettings:
-    """Return the session settings of a process that joins a daemon or router.
+class RobotOnBus(NamedTuple):
+    """A robot on the bus, and the session that a client of it opens.
+
+    Attributes:
+        keys: the robot's keys.
+        bus: how to join its bus.
+        config: of ``--config``; None without.
+    """
+
+    keys: Keys
+    bus: BusSettings
+    config: DaemonConfig | None = None
+
+
+def robot_on_bus(args: argparse.Namespace) -> RobotOnBus:
+    """Return what the options of ``add_robot_on_bus`` say; else ``--config``, the environment,
+    the defaults, in this order.
 
     Raises:
-        BadConfiguration: what shows who this is cannot be read.
+        BadConfiguration: a name is none, or the configuration or what shows who this is cannot be
+            read.
     """
+    from fasaco_edge.wire.keys import Keys
+
+    file = getattr(args, "config", None)
+    if file is not None:
+        from fasaco_edge.config.config import load_config
+
+        config = load_config(file)
+        keys = Keys(args.robot or config.robot.name, args.base or config.bus.base)
+        bus = config.bus.of_client()
+        if args.connect or args.security:
+            bus = _client(tuple(args.connect or bus.connect), args.security)
+        return RobotOnBus(keys, bus, config)
+    keys = Keys(args.robot or os.environ.get(ROBOT) or "robot", args.base or "fasaco")
+    told = [one.strip() for one in os.environ.get(CONNECT, "").split(",") if one.strip()]
+    connect = tuple(args.connect or told or (DEFAULT_ENDPOINT,))
+    return RobotOnBus(keys, _client(connect, args.security))
+
+
+def _client(connect: tuple[str, ...], security_file: str | None) -> BusSettings:
     from fasaco_edge.bus.session import BusSettings
 
-    connect = tuple(args.connect or (DEFAULT_ENDPOINT,))
-    if args.security is None:
+    if security_file is None:
         return BusSettings("client", connect)
     from fasaco_edge.config.security import read_client_security
 
-    security = read_client_security(args.security, connect)
+    security = read_client_security(security_file, connect)
     security.warn_of_clock()
     return BusSettings("client", connect, secured=security.of_client())
 

@@ -42,6 +42,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "it sweeps "
         "(default: %(default)s)",
     )
+    parser.add_argument(
+        "--driver",
+        choices=("ideal", "follow"),
+        default="ideal",
+        help="what drives the robot: a driver without delay, or `fasaco-edge follow`, a process of "
+        "its own as on a real one (default: %(default)s)",
+    )
     parser.add_argument("--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="[m]")
     parser.add_argument(
         "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="[m]"

@@ -149,9 +149,11 @@ class DemoMission:
         self._bus.listen(self._keys, topics.STATUS, self._newest.put)
         robot = ["--speed", str(self._args.speed), "--robot-radius", str(self._args.robot_radius)]
         trail = ["--trail-out", str(self._out / "trail.csv")]
-        self._spawn(
-            "robot", ["simulate", str(self._map), "--connect", self._endpoint, *robot, *trail]
-        )
+        driver = ["--connect", self._endpoint, "--driver", self._args.driver]
+        self._spawn("robot", ["simulate", str(self._map), *driver, *robot, *trail])
+        if self._args.driver == "follow":
+            speed = ["--speed", str(self._args.speed)]
+            self._spawn("follower", ["follow", "--config", str(config), *speed])
 
     def _config(self) -> dict[str, object]:
         simulated = SimulationConfig()

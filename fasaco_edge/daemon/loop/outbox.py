@@ -96,7 +96,7 @@ class Outbox:
         self._last.keep("path", path)
         self._path.put(path.payload, attachment)
         if self._ros is not None:
-            self._ros.path.put(path)
+            self._ros.path.put(path.payload)
 
     def forget(self) -> None:
         """Drop what is cached for late joiners: another daemon publishes it."""
@@ -131,7 +131,7 @@ class Outbox:
         self._last.keep("coverage", coverage)
         self._coverage.put(coverage.payload)
         if self._ros is not None:
-            self._ros.coverage.put(coverage)
+            self._ros.coverage.put(coverage.payload)
 
     @property
     def shows_floor(self) -> bool:

@@ -1,0 +1,186 @@
+"""``fasaco-edge follow``: drive the robot's base along the path.
+
+The configuration takes more memory to read than the robot to drive: once it is read, the process
+becomes a small one, which gets its settings through a pipe.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from typing import TYPE_CHECKING, NoReturn
+
+from fasaco_edge.cli.console.arguments import Command, Exit, add_robot_on_bus, robot_on_bus
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.processes import python_program, stop_event
+
+if TYPE_CHECKING:
+    from fasaco_edge.config.ros import RosConfig
+    from fasaco_edge.follow.settings import FollowSettings, PoseSource
+
+EPILOG = """\
+Speeds and accelerations are those of the configuration: robot.speed_m_s, acceleration_m_s2,
+turn_deg_s, turn_deg_s2 and steered_deg. Where the configuration has a block ros2, poses come from
+its topics and velocities go to ros2.topics.cmd_vel; else by the keys `pose` and `cmd_vel`.
+
+The robot is told to stand, within 0.2 s, while
+  the newest pose is older than --pose-age, or is none, or has jumped
+  the path is empty (mission pause, cancel; done), is driven, or is none
+  it is further than 0.3 m off the path
+  no daemon plans for it, or the daemon has said nothing for 2.5 s
+and when this program ends. It drives on by itself when that is over. Zeros are sent for a second
+after a stop, then nothing. A base has to stop by itself where nothing comes for 0.5 s: nobody else
+can, if this program or its computer dies.
+
+examples:
+  fasaco-edge follow --config /etc/fasaco-edge/config.yaml --dry-run
+  fasaco-edge follow --config /etc/fasaco-edge/config.yaml --stamped
+
+exit codes: 0 ended by a signal; 78 wrong configuration
+"""
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--dry-run", action="store_true", help="say what would be sent, and send nothing"
+    )
+    parser.add_argument(
+        "--stamped",
+        action="store_true",
+        help="send geometry_msgs/TwistStamped in place of geometry_msgs/Twist",
+    )
+    parser.add_argument(
+        "--pose-age",
+        type=_age,
+        default=0.5,
+        metavar="S",
+        help="stop for a newest pose that is older, by its arrival [s] (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--speed",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="simulated seconds per second, for a simulated robot (default: %(default)g)",
+    )
+    add_robot_on_bus(parser)
+    parser.add_argument("--given", action="store_true", help=argparse.SUPPRESS)
+
+
+def _age(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    # A negated comparison, so that NaN is caught too.
+    if not 0.05 <= value <= 10.0:
+        raise argparse.ArgumentTypeError(f"must be in 0.05..10 s, got {text!r}")
+    return value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Drive until a signal."""
+    return _drive() if args.given else _become_small(args)
+
+
+def _become_small(args: argparse.Namespace) -> NoReturn:
+    """Read the settings, and go on as a process that has never read a configuration."""
+    if not 0.0 < args.speed <= 100.0:
+        raise BadConfiguration(f"--speed must be above 0 and at most 100, got {args.speed}")
+    document = settings_of(args).encode()
+    # Not by its command line, which others can read: it may hold a password.
+    reading, writing = os.pipe()
+    os.write(writing, document)
+    os.close(writing)
+    os.dup2(reading, sys.stdin.fileno())
+    words = ["follow", "--given", "--log-level", args.log_level]
+    if args.with_parent is not None:
+        words += ["--with-parent", str(args.with_parent)]
+    program = python_program("fasaco_edge", *words)
+    os.execv(program[0], program)
+
+
+def _drive() -> int:
+    """Drive, in the small process."""
+    from fasaco_edge.follow.node import native_out, run_follower
+    from fasaco_edge.follow.settings import FollowSettings
+
+    settings = FollowSettings.decode(sys.stdin.buffer.read())
+    out_of = native_out
+    if settings.ros:
+        from fasaco_edge.follow.ros import ros_out as out_of
+    with stop_event() as stop:
+        run_follower(settings, stop, out_of, lambda line: print(line, flush=True))
+    return Exit.OK
+
+
+def settings_of(args: argparse.Namespace) -> FollowSettings:
+    """Return the settings that options, configuration and environment state.
+
+    Raises:
+        BadConfiguration: one of them is wrong.
+    """
+    from fasaco_edge.config.config import DaemonConfig
+    from fasaco_edge.follow.settings import FollowSettings, PoseSource
+    from fasaco_edge.wire import schemas, topics
+
+    here = robot_on_bus(args)
+    config = here.config or DaemonConfig()
+    robot, ros = config.robot, config.ros2 or None
+    schema = schemas.TWIST_STAMPED if args.stamped else schemas.TWIST
+    poses = (PoseSource(here.keys.of(topics.POSE)),)
+    return FollowSettings(
+        robot=here.keys.robot,
+        base=here.keys.base,
+        connect=here.bus.connect,
+        secured=here.bus.secured,
+        speed_m_s=robot.speed_m_s,
+        acceleration_m_s2=robot.acceleration_m_s2,
+        turn_deg_s=robot.turning_deg_s(),
+        turn_deg_s2=robot.turn_deg_s2,
+        steered_deg=robot.steered_deg,
+        pose_schema=config.pose.schema,
+        pose_age_s=args.pose_age,
+        poses=_ros_poses(ros) if ros else poses,
+        frames=(ros.frames.map, ros.frames.robot) if ros and ros.pose == "tf" else None,
+        schema=schema,
+        frame=ros.frames.robot if ros else "base_link",
+        cmd_key=ros.output_key(ros.velocities(schema)) if ros else here.keys.of(topics.CMD_VEL),
+        ros=_ros_node(ros, schema) if ros else {},
+        pace=args.speed,
+        dry_run=args.dry_run,
+    )
+
+
+def _ros_poses(ros: RosConfig) -> tuple[PoseSource, ...]:
+    from fasaco_edge.follow.settings import PoseSource
+    from fasaco_edge.wire.topics import TF_STATIC
+
+    return tuple(
+        PoseSource(
+            ros.input_key(topic), topic.schema, topic.latched, topic.depth, name == TF_STATIC
+        )
+        for name, topic in ros.inputs.items()
+        if name in ("pose", TF_STATIC)
+    )
+
+
+def _ros_node(ros: RosConfig, schema: str) -> dict[str, object]:
+    return {
+        "kind": ros.kind,
+        "domain": ros.domain,
+        "namespace": ros.namespace,
+        "node": f"{ros.node}_follow",
+        "topic": ros.velocities(schema).name,
+    }
+
+
+COMMAND = Command(
+    description="Drive a robot's base along the path of its daemon: subscribe to path and pose, "
+    "publish velocities (geometry_msgs/Twist) 20 times a second, until SIGTERM or SIGINT. For "
+    "robots whose base takes velocities and that have nothing else to follow a path with.",
+    run=run,
+    add_options=_add_options,
+    epilog=EPILOG,
+)

@@ -1,0 +1,108 @@
+"""Velocities along a route: regulated pure pursuit on its legs, turns on the spot at its corners.
+
+Source: R. C. Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01:
+the robot steers the arc through a point of the path some way ahead, of curvature 2 y / L^2. The
+speed is regulated as by S. Macenski et al., Regulated Pure Pursuit for Robot Path Tracking (2023),
+but by what the base can do: it brakes for each stop so as to come to rest there, and never turns
+faster than it may. Deviations: past a stop the point lies straight on, so that no corner is cut,
+and a robot that points elsewhere comes to rest and turns on the spot.
+"""
+
+from __future__ import annotations
+
+import math
+
+from fasaco_edge.follow.estimate import STAND, Command, Limits
+from fasaco_edge.follow.route import Route
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.motion import limited, stopping_rate
+
+# The point ahead is as far off as the robot drives in the first figure [s], but at least [m].
+LOOKAHEAD_S, LOOKAHEAD_M = 0.8, 0.2
+# A stop is reached within this [m].
+ARRIVED_M = 0.005
+# A run begins within this heading error; from the second on the robot turns on the spot [rad].
+ALIGNED_RAD, MISALIGNED_RAD = 0.03, 0.2
+# About to turn back, the robot keeps turning to the side it turns to [rad].
+BACK_RAD = 2.8
+
+
+class Pursuit:
+    """Drives along routes, from one command to the next.
+
+    Args:
+        limits: of the base.
+        period: from one command to the next [s].
+    """
+
+    def __init__(self, limits: Limits, period: float) -> None:
+        self._limits = limits
+        self._period = period
+        self._is_turning = True
+        self.last = STAND
+
+    def stand(self) -> None:
+        """Note that the robot was told to stop at once."""
+        self._is_turning, self.last = True, STAND
+
+    def brake(self) -> Command:
+        """Return the next command on the way to rest."""
+        speed = max(self.last.speed - self._limits.acceleration * self._period, 0.0)
+        self._is_turning, self.last = True, Command(speed, self._toward(0.0))
+        return self.last
+
+    def steer(self, pose: Pose2D, route: Route) -> Command:
+        """Return the next command; ``STAND`` once the route is driven."""
+        limits, period = self._limits, self._period
+        here = (pose.x, pose.y)
+        route.pass_bends(here)
+        while (leg := route.leg) is not None:
+            along, _ = leg.placed(here)
+            horizon = limits.speed**2 / limits.acceleration + limits.speed
+            to_stop = route.to_stop(along, horizon)
+            rests = self.last.speed <= limits.acceleration * period
+            if to_stop > ARRIVED_M or not rests:
+                break
+            route.next_leg()
+            self._is_turning = True
+        if leg is None:
+            self.stand()
+            return STAND
+        ahead = max(LOOKAHEAD_S * self.last.speed, LOOKAHEAD_M)
+        x, y = route.carrot(max(along, 0.0), ahead)
+        error = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.yaw, math.tau)
+        if abs(error) > MISALIGNED_RAD:
+            self._is_turning = True
+        elif abs(error) <= ALIGNED_RAD:
+            self._is_turning = False
+        if self._is_turning:
+            self.last = self._turned(error)
+        else:
+            self.last = self._driven(error, math.dist(here, (x, y)), to_stop)
+        return self.last
+
+    def _turned(self, error: float) -> Command:
+        """Turn on the spot, once at rest."""
+        limits, period = self._limits, self._period
+        speed = max(self.last.speed - limits.acceleration * period, 0.0)
+        goal = 0.0
+        if speed == 0.0:
+            rate = min(
+                stopping_rate(abs(error), limits.turn_acceleration, period), limits.turn_rate
+            )
+            side = self.last.turn_rate if abs(error) > BACK_RAD and self.last.turn_rate else error
+            goal = math.copysign(rate, side)
+        return Command(speed, self._toward(goal))
+
+    def _driven(self, error: float, ahead: float, to_stop: float) -> Command:
+        limits, period = self._limits, self._period
+        curvature = 2.0 * math.sin(error) / max(ahead, LOOKAHEAD_M)
+        most = min(limits.speed, limits.turn_rate / max(abs(curvature), 1e-9))
+        goal = min(most, stopping_rate(max(to_stop, 0.0), limits.acceleration, period))
+        speed = limited(self.last.speed, goal, limits.acceleration * period)
+        return Command(speed, self._toward(speed * curvature))
+
+    def _toward(self, turn_rate: float) -> float:
+        return limited(
+            self.last.turn_rate, turn_rate, self._limits.turn_acceleration * self._period
+        )

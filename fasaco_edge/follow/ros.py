@@ -1,0 +1,23 @@
+"""The follower in a ROS 2 graph: its velocities under the key that ROS has for their topic."""
+
+from __future__ import annotations
+
+from fasaco_edge.bus.ros_publisher import RosPublisher
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.follow.settings import FollowSettings
+from fasaco_edge.wire import topics
+from fasaco_edge.wire.ros_keys import RosNode, RosTopic, gid_of
+from fasaco_edge.wire.topic_types import VOLATILE
+
+
+def ros_out(bus: Bus, settings: FollowSettings) -> RosPublisher:
+    """Return what sends velocities to ROS; to rmw_zenoh it shows itself as a node."""
+    ros, gid = settings.ros, b""
+    if ros["kind"] == "rmw_zenoh":
+        node = RosNode(ros["domain"], bus.id, ros["namespace"], ros["node"])
+        token = node.endpoint_token(1, "MP", RosTopic(ros["topic"], settings.schema))
+        bus.token(node.token)
+        bus.token(token)
+        gid = gid_of(token)
+    qos = topics.CMD_VEL.qos
+    return RosPublisher(bus.publisher(settings.cmd_key, settings.schema, qos or VOLATILE), gid)

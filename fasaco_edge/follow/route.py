@@ -1,0 +1,241 @@
+"""The way along a path: legs, the corners to stop at, and how far the robot is.
+
+A coverage path crosses and touches itself, so that where the robot is says nothing about how far
+along it is. The robot is always on one leg; it comes to the next one by driving this one to its
+end, never by being near it.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fasaco_edge.grid.geometry import Point
+
+# Points are read as they are needed, so many at a time.
+CHUNK = 500
+# Shorter legs have no direction of their own [m].
+LEAST_LEG_M = 1e-3
+# A new path is joined where it passes the robot within this of its beginning [m], and no further
+# on: the stretch that was driven while it was under way.
+JOIN_WITHIN_M = 0.3
+# It passes the robot, if it does so by this [m], within this of where it points [rad]. From
+# further off the robot comes to rest, and drives to the nearest point, or to the beginning, where
+# one of them is so near [m].
+BESIDE_M, ALONG_RAD = 0.02, 0.1
+NEAREST_M, BEGINNING_M = 0.15, 0.6
+# A path that begins so far ahead on the one before, at least and at most, is still one from here
+# [m].
+LEAST_LEAD_M, LEAD_M = 0.15, 2.0
+# A corner of the new path is that of the old one, if it is as near as this [m].
+SAME_M = 1e-3
+
+
+class Joining(enum.Enum):
+    """How a new path can be joined."""
+
+    JOINED = "it is"
+    AT_REST = "once the robot stands"
+    ELSEWHERE = "not from here"
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A straight part of the path.
+
+    Attributes:
+        start, end: [m].
+        ux, uy: its direction, of length 1.
+        length: [m].
+        stops: whether the robot has to come to rest at its end.
+    """
+
+    start: Point
+    end: Point
+    ux: float
+    uy: float
+    length: float
+    stops: bool
+
+    def placed(self, point: Point) -> tuple[float, float]:
+        """Return how far along the leg's line a point is, and how far to its left [m]."""
+        dx, dy = point[0] - self.start[0], point[1] - self.start[1]
+        return dx * self.ux + dy * self.uy, self.ux * dy - self.uy * dx
+
+    def distance(self, point: Point) -> float:
+        """Return how far a point is from the leg [m]."""
+        along, aside = self.placed(point)
+        beyond = max(-along, along - self.length, 0.0)
+        return math.hypot(beyond, aside)
+
+    def at(self, along: float) -> Point:
+        """Return the point so far along its line [m]."""
+        return self.start[0] + along * self.ux, self.start[1] + along * self.uy
+
+
+class Route:
+    """A path, and the leg of it that the robot is on.
+
+    Args:
+        take: returns the next points of the path [m], at most as many as asked for.
+        steered_rad: the largest bend that is steered while driving.
+    """
+
+    def __init__(self, take: Callable[[int], list[Point]], steered_rad: float) -> None:
+        self._take = take
+        self._steered_rad = steered_rad
+        # The first leg is the one that the robot is on; of the last its end may be unknown yet.
+        self._legs: list[Leg] = []
+        self._ahead: list[Point] = []
+        self._is_read = False
+
+    @property
+    def leg(self) -> Leg | None:
+        """The leg that the robot is on; None once the path is driven."""
+        self._fill(1)
+        return self._legs[0] if self._legs else None
+
+    def next_leg(self) -> None:
+        """Go on to the next leg."""
+        self._fill(1)
+        del self._legs[:1]
+
+    def pass_bends(self, here: Point) -> None:
+        """Go on to the leg that ``here`` is on, past bends that are steered."""
+        while (leg := self.leg) and not leg.stops and leg.placed(here)[0] >= leg.length:
+            self.next_leg()
+
+    def to_stop(self, along: float, horizon: float) -> float:
+        """Return how far it is from ``along`` the leg to the next stop [m]; no more than
+        ``horizon`` is looked at."""
+        left, index = -along, 0
+        while leg := self._leg(index):
+            left += leg.length
+            if leg.stops or left > horizon:
+                return left
+            index += 1
+        return left
+
+    def carrot(self, along: float, ahead: float) -> Point:
+        """Return the point ``ahead`` of ``along`` the leg [m]; past a stop, straight on."""
+        index, to = 0, along + ahead
+        leg = self._leg(0)
+        assert leg is not None
+        while to > leg.length and not leg.stops and (after := self._leg(index + 1)):
+            to -= leg.length
+            leg, index = after, index + 1
+        return leg.at(to)
+
+    def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
+        """Find the leg that passes the robot, near the beginning of a new path.
+
+        That is the one to the corner that the robot was driving to, where the path has it. Else
+        it is where the distance to the robot stops becoming less. Where the path begins further
+        on along the one before, that one is driven until there.
+
+        Args:
+            here: where the robot is.
+            heading: where it drives to [rad]; None at rest.
+            before: what it has driven along; None for nothing.
+
+        Returns:
+            how it can be joined; if it is, the robot is on its first leg.
+        """
+        target = before._legs[0].end if before is not None and before._legs else None
+        kept = self._leg_to(target) if target else None
+        index = self._nearest(here) if kept is None else kept
+        leg = self._leg(index)
+        if leg is None:
+            return Joining.JOINED
+        aside = leg.distance(here)
+        turn = math.atan2(leg.uy, leg.ux) - (heading or 0.0)
+        is_along = heading is None or abs(math.remainder(turn, math.tau)) <= ALONG_RAD
+        if aside <= BESIDE_M and is_along:
+            del self._legs[:index]
+            return Joining.JOINED
+        begin = self._legs[0].start
+        if lead := before._lead_to(begin, here) if before is not None else []:
+            self._legs[:0] = lead
+            return Joining.JOINED
+        if heading is not None:
+            return Joining.AT_REST
+        if aside <= NEAREST_M:
+            del self._legs[:index]
+            begin = leg.at(min(max(leg.placed(here)[0], 0.0), leg.length))
+            rest = math.dist(begin, leg.end)
+            self._legs[:1] = [_leg(begin, leg.end, leg.stops)] if rest >= LEAST_LEG_M else []
+        elif math.dist(here, begin) > BEGINNING_M:
+            return Joining.ELSEWHERE
+        self._legs.insert(0, _leg(here, begin, True))
+        return Joining.JOINED
+
+    def _lead_to(self, point: Point, here: Point) -> list[Leg]:
+        """Return the legs as far as a point that they lead over soon; none where they do not."""
+        leg = self.leg
+        way, index = -leg.placed(here)[0] if leg is not None else 0.0, 0
+        while way <= LEAD_M and (leg := self._leg(index)):
+            along, aside = leg.placed(point)
+            # Nearer, the robot may not come to rest there.
+            is_ahead = 0.0 < along <= leg.length and LEAST_LEAD_M <= way + along <= LEAD_M
+            if is_ahead and abs(aside) <= BESIDE_M:
+                return [*self._legs[:index], _leg(leg.start, leg.at(along), True)]
+            way += leg.length
+            index += 1
+        return []
+
+    def _leg_to(self, target: Point) -> int | None:
+        """Return which of the first legs ends at ``target``."""
+        way, index = 0.0, 0
+        while way <= JOIN_WITHIN_M and (leg := self._leg(index)):
+            if math.dist(leg.end, target) <= SAME_M:
+                return index
+            way += leg.length
+            index += 1
+        return None
+
+    def _nearest(self, here: Point) -> int:
+        """Return the leg at which the distance to ``here`` stops becoming less."""
+        way, index = 0.0, 0
+        while (leg := self._leg(index)) and (after := self._leg(index + 1)):
+            way += leg.length
+            is_past = leg.placed(here)[0] >= leg.length
+            if way > JOIN_WITHIN_M or not is_past or after.distance(here) > leg.distance(here):
+                break
+            index += 1
+        return index
+
+    def _leg(self, index: int) -> Leg | None:
+        self._fill(index + 1)
+        return self._legs[index] if index < len(self._legs) else None
+
+    def _fill(self, count: int) -> None:
+        """Have ``count`` legs, if the path has them."""
+        while len(self._legs) < count and self._read():
+            start, end = self._ahead[:2]
+            stops = len(self._ahead) == 2 or self._bend(*self._ahead[:3]) > self._steered_rad
+            self._legs.append(_leg(start, end, stops))
+            del self._ahead[0]
+
+    def _read(self) -> bool:
+        """Have the next two points and the one behind them, if there is one."""
+        while len(self._ahead) < 3 and not self._is_read:
+            points = self._take(CHUNK)
+            self._is_read = len(points) < CHUNK
+            for point in points:
+                if not self._ahead or math.dist(point, self._ahead[-1]) >= LEAST_LEG_M:
+                    self._ahead.append(point)
+        return len(self._ahead) >= 2
+
+    @staticmethod
+    def _bend(a: Point, b: Point, c: Point) -> float:
+        turn = math.atan2(c[1] - b[1], c[0] - b[0]) - math.atan2(b[1] - a[1], b[0] - a[0])
+        return abs(math.remainder(turn, math.tau))
+
+
+def _leg(start: Point, end: Point, stops: bool) -> Leg:
+    length = math.dist(start, end)
+    return Leg(
+        start, end, (end[0] - start[0]) / length, (end[1] - start[1]) / length, length, stops
+    )

@@ -1,0 +1,84 @@
+"""Settings of the follower, as one process hands them to another: plain JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from fasaco_edge.wire.schemas import TWIST
+
+
+@dataclass(frozen=True, slots=True)
+class PoseSource:
+    """A key that poses come by.
+
+    Attributes:
+        key: key expression to subscribe to.
+        schema: type of what comes without one; "" for whatever the sample says.
+        latched, depth: whether late joiners get the newest samples, and how many.
+        is_static: whether these are static transforms.
+    """
+
+    key: str
+    schema: str = ""
+    latched: bool = False
+    depth: int = 1
+    is_static: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FollowSettings:
+    """What the follower needs to know.
+
+    Attributes:
+        robot, base: name of the robot, and what its keys begin with.
+        connect: endpoints of the bus.
+        secured: what shows who this is, a part of Zenoh's configuration.
+        speed_m_s, acceleration_m_s2: of driving.
+        turn_deg_s, turn_deg_s2, steered_deg: of turning; the largest bend that is steered.
+        pose_schema: type of a pose that comes without one.
+        pose_age_s: how old the newest pose may be.
+        poses: where poses come from.
+        frames: the map's and the robot's under ROS 2, where poses come as transforms.
+        schema: type of what is sent, one of ``TWIST_SCHEMAS``.
+        frame: of a TwistStamped, the robot's own.
+        cmd_key: what it is sent on.
+        ros: kind, domain, namespace, name of the node and topic, where ``cmd_key`` is ROS 2's.
+        pace: simulated seconds in a second.
+        dry_run: say what would be sent, and send nothing.
+    """
+
+    robot: str
+    base: str
+    connect: tuple[str, ...]
+    speed_m_s: float
+    acceleration_m_s2: float
+    turn_deg_s: float
+    turn_deg_s2: float
+    steered_deg: float
+    pose_schema: str
+    poses: tuple[PoseSource, ...]
+    cmd_key: str
+    pose_age_s: float = 0.5
+    frames: tuple[str, str] | None = None
+    schema: str = TWIST
+    frame: str = "base_link"
+    ros: Mapping[str, Any] = field(default_factory=dict)
+    secured: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    pace: float = 1.0
+    dry_run: bool = False
+
+    def encode(self) -> bytes:
+        """Return it as JSON."""
+        return json.dumps(asdict(self)).encode()
+
+    @classmethod
+    def decode(cls, document: bytes) -> FollowSettings:
+        """Return what ``encode`` made."""
+        members = json.loads(document)
+        members["poses"] = tuple(PoseSource(**source) for source in members["poses"])
+        members["connect"] = tuple(members["connect"])
+        members["frames"] = tuple(members["frames"]) if members["frames"] else None
+        return cls(**members)

@@ -1,0 +1,68 @@
+"""A nav_msgs/Path read point by point, as far as it is needed.
+
+For a program that stays small and must not stop: reading a path of half a million poses would take
+seconds, and nobody drives that far before the next one comes.
+"""
+
+from __future__ import annotations
+
+from fasaco_edge.grid.geometry import Point
+from fasaco_edge.wire.cdr import CdrReader, refuse
+from fasaco_edge.wire.fields import POSE, check_pose, read_header
+from fasaco_edge.wire.limits import MAX_PATH_POSES
+from fasaco_edge.wire.schemas import PATH
+
+LEAST_POSE_BYTES = 72
+"""Of a PoseStamped with an empty frame: stamp 8, length 4, NUL 1, padding 3, floats 56."""
+
+
+class PathPoints:
+    """The points of a path, in order.
+
+    Attributes:
+        frame: name of the frame of all poses.
+        left: how many points were not read yet.
+
+    Raises:
+        MalformedMessage: the payload does not begin as a path does, or is too short for its poses.
+    """
+
+    def __init__(self, payload: bytes) -> None:
+        self._reader = CdrReader(payload, PATH)
+        self.frame, _ = read_header(self._reader)
+        self.left = self._count = read_pose_count(self._reader, MAX_PATH_POSES)
+        if not self.left:
+            self._reader.end()
+
+    def take(self, most: int) -> list[Point]:
+        """Return the next points [m], ``most`` of them or what is left.
+
+        Raises:
+            MalformedMessage: a pose is none, or in another frame; or more follows the last one.
+        """
+        points = []
+        for index in range(self._count - self.left, self._count)[:most]:
+            pose = read_path_pose(self._reader, self.frame, index)
+            check_pose(pose, PATH, f"poses[{index}].pose")
+            points.append((pose[0], pose[1]))
+            self.left -= 1
+        if not self.left and points:
+            self._reader.end()
+        return points
+
+
+def read_pose_count(reader: CdrReader, max_poses: int) -> int:
+    """Read how many poses a path has."""
+    count = reader.length("poses", LEAST_POSE_BYTES)
+    if count > max_poses:
+        refuse(PATH, "length of poses", f"at most {max_poses}", count)
+    return count
+
+
+def read_path_pose(reader: CdrReader, frame: str, index: int) -> tuple[float, ...]:
+    """Read a pose of a path in ``frame``: position x, y, z and quaternion x, y, z, w, unchecked."""
+    field = f"poses[{index}].header"
+    named, _ = read_header(reader, field)
+    if named not in ("", frame):
+        refuse(PATH, f"{field}.frame_id", f"{frame!r}, as the path's, or ''", repr(named))
+    return reader.doubles(POSE, f"poses[{index}].pose")

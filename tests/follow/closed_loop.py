@@ -1,0 +1,102 @@
+"""The follower and the simulated base in one process, in simulated time, with delays."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+
+import numpy as np
+
+from fasaco_edge.follow.estimate import Limits
+from fasaco_edge.follow.follower import Follower, State
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.simulation.robot import SimulationConfig
+from fasaco_edge.simulation.world import Activity, World
+from fasaco_edge.wire.paths import encode_path
+
+CONFIG = SimulationConfig()
+LIMITS = Limits(
+    CONFIG.speed_m_s,
+    CONFIG.acceleration_m_s2,
+    CONFIG.turn_rad_s,
+    CONFIG.turn_acceleration_rad_s2,
+    math.radians(1.0),
+)
+PERIOD_S = 0.05
+
+
+def path_message(xy, frame="map"):
+    """A path through points (x, y) [m]."""
+    points = np.array(xy, np.float64).reshape(-1, 2)
+    return encode_path(points, np.zeros(len(points)), frame, 1)
+
+
+class ClosedLoop:
+    """A follower drives a world; poses and commands take a while."""
+
+    def __init__(self, truth: OccupancyGrid, start: Pose2D, *, delay_s=0.02, jitter_s=0.0,
+                 noise=0.0, turn_gain=1.0, pose_hz=10.0, seed=0):  # fmt: skip
+        self.world = World(truth, start, CONFIG)
+        self.follower = Follower(LIMITS)
+        self.follower.take_planner("a1", 0.0)
+        self.now = 0.0
+        self.states: Counter[State] = Counter()
+        self.truth_at: list[Pose2D] = []
+        self._delay_s, self._jitter_s, self._noise = delay_s, jitter_s, noise
+        self._turn_gain = turn_gain
+        self._rng = np.random.default_rng(seed)
+        self._poses, self._commands = deque(), deque()
+        self._tick, self._pose_ticks = 0, CONFIG.period_ticks(pose_hz)
+        self._due = 0.0
+
+    def send(self, xy):
+        """Publish a path."""
+        self.follower.take_path(path_message(xy))
+
+    def run(self, until, most_s=600.0):
+        """Let time pass until ``until()`` holds; return the seconds that took."""
+        begun = self.now
+        while not until():
+            assert self.now - begun < most_s, (self.follower.state, self.follower.detail)
+            self._step()
+        return self.now - begun
+
+    def _step(self):
+        while self._commands and self._commands[0][0] <= self.now:
+            _, command = self._commands.popleft()
+            self.world.move(command.speed, command.turn_rate * self._turn_gain)
+        self.world.tick()
+        self._tick += 1
+        self.now = self._tick * CONFIG.tick_s
+        pose = self.world.pose
+        self.truth_at.append(pose)
+        if self._tick % self._pose_ticks == 0:
+            dx, dy, turn = self._rng.normal(0.0, self._noise, 3) if self._noise else (0, 0, 0)
+            told = Pose2D(pose.x + dx, pose.y + dy, pose.yaw + turn)
+            self._poses.append((self.now + self._late(), StampedPose(told)))
+        while self._poses and self._poses[0][0] <= self.now:
+            at, stamped = self._poses.popleft()
+            self.follower.take_pose(stamped, at)
+        if self.now >= self._due:
+            self._due += PERIOD_S
+            self.follower.heard_status(self.now)
+            command = self.follower.step(self.now)
+            self.states[self.follower.state] += 1
+            if command is not None:
+                self._commands.append((self.now + self._late(), command))
+
+    def _late(self):
+        return self._delay_s + self._rng.uniform(0.0, self._jitter_s)
+
+
+def ideal_seconds(truth, start, xy):
+    """How long the ideal driver takes [s]."""
+    world = World(truth, start, CONFIG)
+    world.tick()
+    world.follow(np.array(xy, np.float64))
+    ticks = 1
+    while world.activity is not Activity.IDLE:
+        world.tick()
+        ticks += 1
+    return ticks * CONFIG.tick_s

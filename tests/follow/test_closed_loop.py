@@ -1,0 +1,128 @@
+"""The follower drives paths as they are meant, whatever delays, noise and slip there are."""
+
+import numpy as np
+import pytest
+
+from fasaco_edge.follow.follower import State
+from fasaco_edge.grid.geometry import Pose2D
+from tests.follow.closed_loop import ClosedLoop, ideal_seconds
+from tests.simulation.rooms import building, distances_to, serpentine
+
+ROOM = building(6.0, 5.0)
+LANES = serpentine(range(2, 9), range(2, 12))
+START = Pose2D(*LANES[0])
+
+
+def trail(loop):
+    points = np.array([(pose.x, pose.y) for pose in loop.truth_at])
+    return points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-9)]
+
+
+def driven(loop):
+    return loop.run(lambda: loop.follower.state is State.DRIVEN)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "off_m"),
+    [
+        ({"delay_s": 0.0}, 0.01),
+        ({"delay_s": 0.05, "jitter_s": 0.02}, 0.01),
+        ({"delay_s": 0.1, "jitter_s": 0.05}, 0.02),
+        ({"noise": 0.01}, 0.025),
+        ({"turn_gain": 0.93}, 0.02),
+        ({"pose_hz": 50.0}, 0.01),
+        ({"pose_hz": 5.0}, 0.01),
+    ],
+    ids=str,
+)
+def test_it_stays_on_the_path_and_takes_no_longer_than_the_ideal_driver(conditions, off_m):
+    loop = ClosedLoop(ROOM, START, **conditions)
+    loop.send(LANES)
+    seconds = driven(loop)
+    assert loop.world.collisions == 0
+    assert distances_to(LANES, trail(loop)).max() < off_m
+    # And all of it was driven.
+    assert distances_to(trail(loop)[::5], LANES).max() < off_m + 0.01
+    assert seconds < 1.05 * ideal_seconds(ROOM, START, LANES)
+
+
+def test_a_path_that_crosses_and_touches_itself_is_driven_in_its_order():
+    """Each stretch is driven once, in the order of the path: nowhere is it left for another."""
+    path = np.array(
+        [(1, 1), (4, 1), (4, 3), (2, 3), (2, 0.6), (2.05, 0.6), (2.05, 3), (4, 3.02), (4, 1.02),
+         (1, 1.02), (1, 1)]
+    )  # fmt: skip
+    loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05, jitter_s=0.02)
+    loop.send(path)
+    driven(loop)
+    assert loop.world.distance_m == pytest.approx(
+        np.hypot(*np.diff(path, axis=0).T).sum(), abs=0.15
+    )
+    reached = [int(np.hypot(*(trail(loop) - corner).T).argmin()) for corner in path[[2, 4, 6]]]
+    assert reached == sorted(reached)
+
+
+def test_a_path_that_begins_like_the_one_before_is_joined_without_stopping():
+    loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05)
+    loop.send([(1, 1), (5, 1), (5, 4)])
+    loop.run(lambda: loop.world.pose.x > 2.0)
+    for further in (2.0, 3.0, 4.0):
+        pose = loop.world.pose
+        loop.send([(pose.x - 0.05, 1), (5, 1), (5, further)])
+        before = len(loop.truth_at)
+        loop.run(lambda until=before + 100: len(loop.truth_at) > until)
+        x = [pose.x for pose in loop.truth_at[before:]]
+        assert min(np.diff(x)) > 0.95 * 0.25 * 0.02
+    driven(loop)
+    assert np.hypot(*(trail(loop)[-1] - (5.0, 4.0))) < 0.01
+
+
+def test_a_path_that_goes_elsewhere_is_joined_from_rest():
+    loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05)
+    loop.send([(1, 1), (5, 1)])
+    loop.run(lambda: loop.world.pose.x > 2.0)
+    here = loop.world.pose
+    path = np.array([(here.x, 1.0), (here.x, 4.0)])
+    loop.send(path)
+    driven(loop)
+    # It comes to rest beside the new path, and drives to it on the shortest way.
+    assert trail(loop)[:, 0].max() < here.x + 0.1
+    assert (
+        distances_to(np.vstack(([(1, 1)], [(here.x + 0.1, 1.0)], path)), trail(loop)).max() < 0.02
+    )
+    assert np.hypot(*(trail(loop)[-1] - path[-1])) < 0.01
+
+
+def test_a_path_that_begins_further_on_along_the_one_before_is_joined_there():
+    loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05)
+    loop.send([(1, 1), (5, 1), (5, 4)])
+    loop.run(lambda: loop.world.pose.x > 4.0)
+    path = np.array([(5, 1.5), (5, 3), (2, 3)])
+    loop.send(path)
+    driven(loop)
+    way = np.vstack(([(1, 1), (5, 1)], path))
+    assert distances_to(way, trail(loop)).max() < 0.02
+    assert distances_to(trail(loop), way).max() < 0.02
+
+
+def test_a_path_that_begins_far_away_is_not_driven_to():
+    loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0))
+    loop.send([(3, 3), (4, 3)])
+    loop.run(lambda: loop.now > 2.0)
+    assert loop.follower.state is State.PATH_ELSEWHERE
+    assert loop.world.distance_m == 0.0
+    loop.send([(1.3, 1), (4, 1)])
+    driven(loop)
+
+
+def test_it_stands_once_it_is_off_the_path():
+    loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0))
+    loop.send([(1, 1), (5, 1)])
+    loop.run(lambda: loop.world.pose.x > 2.0)
+    # Somebody carries it away, a little at a time.
+    for _ in range(20):
+        drive = loop.world._drive
+        loop.world._drive = type(drive)(Pose2D(drive.pose.x, drive.pose.y + 0.05, drive.pose.yaw))
+        loop.run(lambda until=loop.now + 0.3: loop.now > until)
+    assert loop.follower.state in (State.OFF_PATH, State.POSE_JUMPED)
+    assert loop.world.activity.value == "idle"

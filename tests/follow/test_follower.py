@@ -1,0 +1,212 @@
+"""Why the robot stands: each thing that the follower takes has to be there."""
+
+import math
+
+import pytest
+
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.follow.estimate import STAND, moved
+from fasaco_edge.follow.follower import ZEROS_S, Follower, Patience, State
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from tests.follow.closed_loop import LIMITS, PERIOD_S, path_message
+
+AHEAD = [(0.0, 0.0), (5.0, 0.0), (5.0, 5.0)]
+
+
+class Told:
+    """A follower that drives ahead, and time that passes."""
+
+    def __init__(self):
+        self.now = 10.0
+        self.follower = Follower(LIMITS)
+        self.follower.take_planner("a1", self.now)
+        self.follower.take_path(path_message(AHEAD))
+        self.x = 0.0
+        self.drive(1.0)
+        assert self.follower.state is State.DRIVING
+
+    def pose(self, x=None, y=0.0, yaw=0.0, frame="map"):
+        where = Pose2D(self.x if x is None else x, y, yaw)
+        self.follower.take_pose(StampedPose(where, frame), self.now)
+
+    def step(self, *, status=True):
+        self.now += PERIOD_S
+        if status:
+            self.follower.heard_status(self.now)
+        return self.follower.step(self.now)
+
+    def drive(self, seconds):
+        for _ in range(round(seconds / PERIOD_S)):
+            self.pose()
+            command = self.step()
+            self.x += (command or STAND).speed * PERIOD_S
+
+
+@pytest.fixture
+def told():
+    return Told()
+
+
+def test_it_drives_as_fast_as_it_may(told):
+    told.drive(1.0)
+    command = told.step()
+    assert command.speed == LIMITS.speed
+    assert abs(command.turn_rate) < 1e-6
+
+
+def test_an_empty_path_stops_it_at_once(told):
+    told.follower.take_path(path_message([]))
+    assert told.step() == STAND
+    assert told.follower.state is State.EMPTY_PATH
+
+
+def test_zeros_are_sent_for_a_second_and_then_nothing(told):
+    told.follower.take_path(path_message([]))
+    zeros = 0
+    while told.step() == STAND:
+        zeros += 1
+    assert zeros * PERIOD_S == pytest.approx(ZEROS_S, abs=1.5 * PERIOD_S)
+    assert told.step() is None
+
+
+@pytest.mark.parametrize(
+    ("payload", "words"),
+    [
+        (b"", "encapsulation header"),
+        (path_message(AHEAD)[:-1], "poses"),
+        (path_message(AHEAD) + b"junk", "payload"),
+        (path_message(AHEAD)[:-8] + bytes.fromhex("000000000000f87f"), "orientation"),
+    ],
+)
+def test_a_path_that_is_none_stops_it(told, payload, words):
+    told.follower.take_path(payload)
+    assert told.step() == STAND
+    assert told.follower.state is State.BAD_PATH
+    assert words in told.follower.detail
+    told.follower.take_path(path_message([(told.x, 0.0), (5.0, 0.0)]))
+    told.drive(0.5)
+    assert told.follower.state is State.DRIVING
+
+
+def test_a_pose_that_is_too_old_stops_it_until_the_next(told):
+    limit = Patience().pose_s
+    since = told.now
+    while told.step() != STAND:
+        assert told.now - since <= limit + 1e-9
+    assert told.now - since < limit + 1.5 * PERIOD_S
+    assert told.follower.state is State.OLD_POSE
+    told.pose()
+    assert told.step().speed > 0.0
+
+
+def test_a_pose_that_is_none_stops_it(told):
+    told.follower.refuse_pose(MalformedMessage("pose.position.x must be ..., got nan"))
+    assert told.step() == STAND
+    assert told.follower.state is State.BAD_POSE
+    assert "nan" in told.follower.detail
+
+
+def test_a_pose_that_jumps_stops_it_and_is_believed_if_it_stays(told):
+    told.pose(x=told.x, y=2.0)
+    assert told.step() == STAND
+    assert told.follower.state is State.POSE_JUMPED
+    # Back again: a localiser that erred once.
+    told.pose()
+    assert told.step().speed > 0.0
+    for _ in range(10):
+        told.pose(y=2.0)
+        assert told.step() == STAND
+    # It is there now: beside the path, where the robot stands.
+    assert told.follower.state is State.OFF_PATH
+
+
+def test_a_pose_that_jumps_along_the_path_does_not_count_as_driven(told):
+    """On the second leg, say, which is 5 m away: the first one is not driven yet."""
+    for _ in range(10):
+        told.pose(x=5.0, y=2.0, yaw=math.pi / 2)
+        assert told.step() == STAND
+    assert told.follower.state is State.OFF_PATH
+
+
+def test_a_pose_in_another_frame_stops_it(told):
+    told.pose(frame="odom")
+    assert told.step() == STAND
+    assert told.follower.state is State.WRONG_FRAME
+    assert "'odom'" in told.follower.detail
+
+
+def test_without_a_daemon_it_stands_and_goes_on_with_the_same_one(told):
+    told.follower.take_planner("", told.now)
+    told.pose()
+    assert told.step() == STAND
+    assert told.follower.state is State.NO_DAEMON
+    told.follower.take_planner("a1", told.now)
+    told.pose()
+    assert told.step().speed > 0.0
+
+
+def test_the_path_of_one_daemon_is_none_of_another(told):
+    told.follower.take_planner("", told.now)
+    told.follower.take_planner("b2", told.now)
+    told.pose()
+    assert told.step() == STAND
+    assert told.follower.state is State.NO_PATH
+    told.follower.take_path(path_message([(told.x, 0.0), (5.0, 0.0)]))
+    told.pose()
+    assert told.step().speed > 0.0
+
+
+def test_a_daemon_that_says_nothing_stops_it(told):
+    since = told.now
+    while told.follower.state is State.DRIVING:
+        told.pose()
+        command = told.step(status=False)
+        told.x += (command or STAND).speed * PERIOD_S
+    assert told.follower.state is State.SILENT_DAEMON
+    assert told.now - since == pytest.approx(Patience().status_s, abs=2 * PERIOD_S)
+    told.pose()
+    assert told.step().speed > 0.0
+
+
+def test_a_robot_that_does_not_move_is_left_alone_for_a_while(told):
+    """Against a wall, or with its wheels off the ground."""
+    states = []
+    for _ in range(200):
+        told.pose()
+        told.step()
+        states.append(told.follower.state)
+    assert {*states} == {State.DRIVING, State.NOT_MOVING}
+    pushes = states.count(State.DRIVING) * PERIOD_S
+    assert pushes < 0.7 * len(states) * PERIOD_S
+    told.drive(5.0)
+    assert told.follower.state is State.DRIVING
+
+
+def test_it_stands_before_anything_has_come():
+    follower = Follower(LIMITS)
+    assert follower.step(0.0) is None
+    assert follower.state is State.NO_DAEMON
+    follower.take_planner("a1", 0.0)
+    assert follower.step(0.1) is None
+    assert follower.state is State.NO_PATH
+    follower.take_path(path_message(AHEAD))
+    assert follower.step(0.2) is None
+    assert follower.state is State.NO_POSE
+
+
+def test_commands_keep_the_limits(told):
+    """Through a path of many corners, speeds and their changes are within what the base can do."""
+    corners = [(told.x, 0.0), (told.x + 1.0, 0.0), (told.x, 0.3), (told.x + 1.0, 0.6)]
+    told.follower.take_path(path_message(corners))
+    last, where = told.step(), Pose2D(told.x, 0.0)
+    while told.follower.state is State.DRIVING:
+        told.pose(where.x, where.y, where.yaw)
+        command = told.step() or STAND
+        assert 0.0 <= command.speed <= LIMITS.speed
+        assert abs(command.turn_rate) <= LIMITS.turn_rate + 1e-9
+        if told.follower.state is State.DRIVING:
+            assert abs(command.speed - last.speed) <= LIMITS.acceleration * PERIOD_S + 1e-9
+            change = abs(command.turn_rate - last.turn_rate)
+            assert change <= LIMITS.turn_acceleration * PERIOD_S + 1e-9
+        last, where = command, moved(where, command, PERIOD_S)
+    assert told.follower.state is State.DRIVEN

@@ -1,0 +1,163 @@
+"""A base and its daemon's side of the bus, for a follower in a process of its own.
+
+The base moves as the velocities say, publishes its pose, and notes when each velocity came.
+``python -m tests.support.driven_base ENDPOINT`` is a daemon that plans, and does nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.follow.estimate import Command, moved
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.wire import topics
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.paths import encode_path
+from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.twists import decode_velocity
+from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
+
+POSE_S = 0.05
+
+
+class DrivenBase:
+    """A base without inertia, beside a token and a status as of a daemon that plans."""
+
+    def __init__(self) -> None:
+        self.endpoint = free_endpoint()
+        self.keys = Keys()
+        self.bus = open_bus(BusSettings(mode="router", connect=(), listen=(self.endpoint,)))
+        # When each velocity came [s, monotonic], and what it was.
+        self.heard: list[tuple[float, Command]] = []
+        self.pose = Pose2D(0.0, 0.0)
+        self.frame = "map"
+        self.says_poses = self.says_status = True
+        self.last_pose_at = 0.0
+        self._path = self.bus.advertise(self.keys, topics.PATH)
+        self._pose = self.bus.advertise(self.keys, topics.POSE)
+        self._status = self.bus.advertise(self.keys, topics.STATUS)
+        self._token: object | None = None
+        self._stop = threading.Event()
+        self.bus.listen(self.keys, topics.CMD_VEL, self._hear)
+        self._thread = threading.Thread(target=self._move)
+        self._thread.start()
+
+    def plans(self, yes: bool = True, name: str = "a1") -> None:
+        """Have the token of a daemon that plans, or not."""
+        if self._token is not None:
+            self.bus.withdraw(self._token)
+            self._token = None
+        if yes:
+            self._token = self.bus.token(self.keys.claim(name, "plans"))
+
+    def send_path(self, *points: tuple[float, float], frame: str = "map") -> float:
+        """Publish a path; return when."""
+        xy = np.array(points, np.float64).reshape(-1, 2)
+        self._path.put(encode_path(xy, np.zeros(len(xy)), frame, 1))
+        return time.monotonic()
+
+    def send_raw_path(self, payload: bytes) -> float:
+        """Publish bytes as a path; return when."""
+        self._path.put(payload)
+        return time.monotonic()
+
+    def send_raw_pose(self, payload: bytes) -> float:
+        """Publish bytes as a pose; return when."""
+        self._pose.put(payload)
+        return time.monotonic()
+
+    def newest(self) -> Command | None:
+        """Return the newest velocity of the last 0.2 s."""
+        if self.heard and time.monotonic() - self.heard[-1][0] < 0.2:
+            return self.heard[-1][1]
+        return None
+
+    def wait_until_it_moves(self, timeout_s: float = 30.0) -> None:
+        """Wait for a velocity that is none of standing."""
+        ends = time.monotonic() + timeout_s
+        while (newest := self.newest()) is None or newest.speed < 0.1:
+            assert time.monotonic() < ends, f"it does not move; {self.heard[-1:]}"
+            time.sleep(0.005)
+
+    def stopped_after(self, since: float, watch_s: float = 0.4) -> float:
+        """Return how long after ``since`` the base was told to stand, for good [s]."""
+        time.sleep(max(since + watch_s - time.monotonic(), 0.0))
+        later = [(at, command) for at, command in list(self.heard) if at >= since]
+        stands = [at for at, command in later if command == Command()]
+        if not stands or any(command != Command() for at, command in later if at > stands[0]):
+            return math.inf
+        return stands[0] - since
+
+    def close(self) -> None:
+        """End."""
+        self._stop.set()
+        self._thread.join()
+        self.bus.close()
+
+    def _hear(self, sample: Sample) -> None:
+        velocity = decode_velocity(sample.payload, sample.schema)
+        self.heard.append((time.monotonic(), Command(velocity.speed_m_s, velocity.turn_rad_s)))
+
+    def _move(self) -> None:
+        told = 0.0
+        while not self._stop.wait(POSE_S):
+            newest = self.newest()
+            self.pose = moved(self.pose, newest or Command(), POSE_S)
+            now = time.monotonic()
+            if self.says_poses:
+                self._pose.put(encode_pose_stamped(StampedPose(self.pose, self.frame, 1)))
+                self.last_pose_at = now
+            if self.says_status and self._token is not None and now - told > 0.5:
+                told = now
+                self._status.put(b"{}")
+
+
+@contextmanager
+def follower_process(
+    endpoint: str, log: Path, *words: str, out: int | None = None
+) -> Iterator[subprocess.Popen[bytes]]:
+    """Run a follower; end it."""
+    command: Sequence[str] = [*PROGRAM, "follow", "--connect", endpoint, *words]
+    with log.open("wb") as stderr:
+        process = subprocess.Popen(command, stderr=stderr, stdout=out, env=ENVIRONMENT)
+    try:
+        yield process
+    finally:
+        with suppress(ProcessLookupError):
+            process.terminate()
+        process.wait(30)
+
+
+def daemon_that_only_plans(endpoint: str) -> Bus:
+    """Return a session with the token of a daemon, which has said something."""
+    bus = open_bus(BusSettings("client", (endpoint,)))
+    keys = Keys()
+    status = bus.advertise(keys, topics.STATUS)
+    bus.token(keys.claim("b2", "plans"))
+    status.put(b"{}")
+    return bus
+
+
+def main() -> None:
+    """Be a daemon until killed; say "plans" once it does."""
+    bus = daemon_that_only_plans(sys.argv[1])
+    status = bus.advertise(Keys(), topics.STATUS)
+    print("plans", flush=True)
+    while True:
+        time.sleep(0.5)
+        status.put(b"{}")
+
+
+if __name__ == "__main__":
+    main()
