@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import signal
 from pathlib import Path
@@ -38,10 +40,12 @@ def ask(outsider: Outsider, payload: bytes | None) -> dict[str, Any]:
 
 
 def told(daemon: Daemon, *words: str) -> Any:
-    """Run ``fasaco-edge mission``; it has to succeed. Return its JSON."""
-    ended = fasaco_edge("mission", *words, "--connect", daemon.endpoint, "--json")
-    assert ended.code == 0, ended.err
-    return json.loads(ended.out)
+    """Run ``fasaco-edge mission`` here; it has to succeed. Return its JSON."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main(["mission", *words, "--connect", daemon.endpoint, "--json"])
+    assert code == 0, err.getvalue()
+    return json.loads(out.getvalue())
 
 
 @pytest.mark.parametrize(
