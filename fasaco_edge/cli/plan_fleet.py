@@ -15,66 +15,72 @@ from numpy.typing import NDArray
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Exit, writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.plan_line import line_through, read_lattice
-from fasaco_edge.cli.plan_options import ANYWHERE, CELLS, HOME
 from fasaco_edge.cli.plan_progress import watching
-from fasaco_edge.cli.plan_turning import turning_limits
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import ctrl_c_asks
-from fasaco_edge.planners.cost import CoverageCost, count_turns
+from fasaco_edge.offline.figures import driving
+from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME
+from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
 
 if TYPE_CHECKING:
+    from fasaco_edge.config.config import RobotConfig
     from fasaco_edge.grid.lattice import Cell, CoverageLattice
     from fasaco_edge.grid.occupancy import OccupancyGrid
+    from fasaco_edge.offline.settings import Search
     from fasaco_edge.planners.fleet.division import Division
 
 MOST_ROBOTS = 32
 
 
-def plan_fleet(args: argparse.Namespace, file: Path) -> int:
+def plan_fleet(args: argparse.Namespace, robot: RobotConfig, search: Search) -> int:
     """Plan, print the figures, write what was asked for."""
-    _check(args)
+    _check(args, search)
     compile_kernels()
-    # After that, as it imports the compiler.
+    # After that, as they import the compiler.
+    from fasaco_edge.offline.maps import load_map
     from fasaco_edge.planners.fleet.division import divide
     from fasaco_edge.planners.fleet.sharing import Fleet
 
-    grid, lattice = read_lattice(args, file)
+    map = load_map(args.map)
+    lattice = map.lattice(robot)
     starts = args.robots or [lattice.cell_at(*xy) for xy in args.robots_xy]
     _check_apart(starts)
-    cost = CoverageCost.for_robot(lattice.cell_m, args.speed_m_s, args.turn_s)
-    fleet = Fleet(starts, cost, args.end == HOME, args.seed, args.threads)
+    fleet = Fleet(starts, robot.cost(lattice.cell_m), args.end == HOME, args.seed, args.threads)
     asked = Interrupt()
     began, cpu = time.perf_counter(), time.process_time()
-    with ctrl_c_asks(asked.asked.set), watching(args.budget) as show:
-        is_over = TimeBudget(args.budget)
+    with ctrl_c_asks(asked.asked.set), watching(search.most_s) as show:
+        assert search.most_s is not None
+        is_over = TimeBudget(search.most_s)
 
-        def stop(search: SearchProgress) -> bool:
-            show(search)
-            return asked(search) or is_over(search)
+        def stop(progress: SearchProgress) -> bool:
+            show(progress)
+            return asked(progress) or is_over(progress)
 
         division = divide(lattice, fleet, stop)
     figures = _figures(args, lattice, division) | {
+        **driving(robot),
+        "budget_s": search.most_s,
+        "threads": args.threads,
         "wall_s": round(time.perf_counter() - began, 6),
         "cpu_s": round(time.process_time() - cpu, 6),
     }
     robots = [_robot(lattice, walk) for walk in division.walks]
-    for robot, cost_s in zip(robots, division.costs_s, strict=True):
-        robot["cost_s"] = cost_s
-    _write(args, lattice, grid, division, figures)
+    for one, cost_s in zip(robots, division.costs_s, strict=True):
+        one["cost_s"] = cost_s
+    _write(args, lattice, map.grid, division, figures)
     _print(args, figures, robots)
     return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
 
 
-def _check(args: argparse.Namespace) -> None:
+def _check(args: argparse.Namespace, search: Search) -> None:
     if args.end not in (ANYWHERE, HOME):
         raise BadConfiguration(
             f"--end {args.end[0]},{args.end[1]}: several robots cannot end in one cell",
             hint="choose --end anywhere or --end home",
         )
-    if not args.local_search or args.planner != "fasaco":
+    if not search.has_local_search or args.planner != "fasaco":
         raise BadConfiguration(
             "several robots are planned for by fasaco with local search",
             hint="leave --planner and --no-local-search out",
@@ -132,11 +138,6 @@ def _figures(
         "revisits": sum(len(walk) for walk in division.walks) - int(np.count_nonzero(passed)),
         "unreachable_cells": int(np.count_nonzero(lattice.coverable & (passed == 0))),
         "rounds": division.rounds,
-        "speed_m_s": args.speed_m_s,
-        "turn_s": args.turn_s,
-        **turning_limits(args),
-        "budget_s": args.budget,
-        "threads": args.threads,
     }
 
 
@@ -165,6 +166,8 @@ def _write(
         with writing(args.path_out):
             _write_rows(args.path_out, "robot,row,col", "%d", division.walks)
     if args.xy_out is not None:
+        from fasaco_edge.offline.ground import line_through
+
         lines = [line_through(lattice, walk) for walk in division.walks]
         with writing(args.xy_out):
             _write_rows(args.xy_out, "robot,x_m,y_m", ("%d", "%.6f", "%.6f"), lines)

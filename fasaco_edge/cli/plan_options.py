@@ -13,13 +13,25 @@ from fasaco_edge.cli.console.arguments import (
     pair_of_floats,
     pair_of_ints,
 )
-from fasaco_edge.cli.plan_turning import add_turning, settle_turning
-from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.cli.plan_turning import LIMITS, add_turning, settle_turning
+from fasaco_edge.config.config import RobotConfig
+from fasaco_edge.offline.settings import (
+    ANYWHERE,
+    AXES,
+    BUDGET_S,
+    CELLS,
+    HOME,
+    PAPER_Q0,
+    PAPER_VISIBILITY,
+    SEARCH_Q0,
+    SEARCH_VISIBILITY,
+    WALLS,
+    Search,
+    require,
+)
 from fasaco_edge.planners.colony import VISIBILITIES
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
 from fasaco_edge.simulation.robot import SimulationConfig
-
-ANYWHERE, HOME = "anywhere", "home"
 
 EPILOG = """\
 examples:
@@ -60,19 +72,8 @@ from walks of the colony's ants (up to 8,000 cells; larger maps have local searc
 takes all but the velocities, the other planners none.
 """
 
-# The search's default budget, and the colony's settings that serve local search best. The
-# colony alone is the paper's, and walks to its end.
-BUDGET_S = 1.0
-SEARCH_Q0, PAPER_Q0 = 0.98, 0.7
-SEARCH_VISIBILITY, PAPER_VISIBILITY = "fewest-open", "neighbour"
-# The line through the cells' centres; the others are in ``planners.line``.
-CELLS = "cells"
-OVERLAP, MOST_OVERLAP = 0.08, 0.5
-# What the cells of a line over the floor lie along; or an angle [deg].
-WALLS, AXES = "walls", "axes"
 MOST_ANGLE_DEG = 360.0
-# Default of a quarter-turn on the spot, of a line over the floor [s].
-TURN_S = 1.5
+ROBOT = RobotConfig()
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -88,46 +89,51 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     _add_output(parser.add_argument_group("output"))
 
 
-def check(args: argparse.Namespace) -> None:
-    """Check the numbers that nothing below checks by the option's name.
+def robot_of(args: argparse.Namespace) -> RobotConfig:
+    """Return the robot that the options describe.
 
     Raises:
-        BadConfiguration: one is impossible.
+        BadConfiguration: a value is impossible; the error names the option.
     """
+    settle_turning(args, 0.0 if args.line == CELLS else ROBOT.quarter_turn_s)
+    overlap = ROBOT.overlap if args.overlap is None else args.overlap
     for option, value in (("--cell", args.cell), ("--robot-radius", args.robot_radius)):
-        _require(0.0 < value <= 10.0, option, "be in (0, 10] m", value)
-    _require(0.0 < args.speed_m_s <= 10.0, "--speed-m-s", "be in (0, 10] m/s", args.speed_m_s)
-    most = "be in [0, 0.5], of the tool's width"
-    _require(0.0 <= args.overlap <= MOST_OVERLAP, "--overlap", most, args.overlap)
-    if args.line == CELLS and args.align != AXES:
-        raise BadConfiguration(
-            f"--align {args.align}: the centres of cells lie along the axes of the map frame",
-            hint="ask for --line quick or --line thorough too",
-        )
-    _require(0.0 <= args.turn_s <= 3600.0, "--turn-s", "be in [0, 3600] s", args.turn_s)
-    _require(1 <= args.threads <= 64, "--threads", "be in 1..64", args.threads)
-    if args.budget is not None:
-        possible = math.isfinite(args.budget) and args.budget > 0.0
-        _require(possible, "--budget", "be finite and above 0 s", args.budget)
-    if args.target_gap is not None:
-        _require(0.0 <= args.target_gap <= 10.0, "--target-gap", "be in [0, 10]", args.target_gap)
+        require(0.0 < value <= 10.0, option, "be in (0, 10] m", value)
+    require(0.0 < args.speed_m_s <= 10.0, "--speed-m-s", "be in (0, 10] m/s", args.speed_m_s)
+    require(0.0 <= overlap <= 0.5, "--overlap", "be in [0, 0.5], of the tool's width", overlap)
+    if args.turn_deg_s is None:
+        require(0.0 <= args.turn_s <= 600.0, "--turn-s", "be in [0, 600] s", args.turn_s)
+        turning = {"quarter_turn_s": args.turn_s}
+    else:
+        turning = {name: getattr(args, name) for name in LIMITS}
+    return RobotConfig(
+        radius_m=args.robot_radius,
+        tool_width_m=args.cell,
+        speed_m_s=args.speed_m_s,
+        overlap=overlap,
+        **turning,
+    )
 
 
-def settle(args: argparse.Namespace) -> None:
-    """Fill in the defaults that depend on whether local search is used."""
-    has_local_search = bool(PLANNERS[args.planner].with_local_search)
-    args.local_search = has_local_search and not args.no_local_search
-    if args.q0 is None:
-        args.q0 = SEARCH_Q0 if args.local_search else PAPER_Q0
-    if args.visibility is None:
-        args.visibility = SEARCH_VISIBILITY if args.local_search else PAPER_VISIBILITY
-    settle_turning(args, 0.0 if args.line == CELLS else TURN_S)
-    if args.overlap is None:
-        args.overlap = OVERLAP
-    if args.align is None:
-        args.align = AXES if args.line == CELLS else WALLS
-    if args.budget is None and args.local_search:
-        args.budget = BUDGET_S
+def search_of(args: argparse.Namespace) -> Search:
+    """Return how to search.
+
+    Raises:
+        BadConfiguration: a value is impossible.
+    """
+    return Search(
+        planner=args.planner,
+        local_search=not args.no_local_search,
+        ants=args.ants,
+        velocities=args.velocities,
+        q0=args.q0,
+        visibility=args.visibility,
+        beta=args.beta,
+        seed=args.seed,
+        threads=args.threads,
+        budget_s=args.budget,
+        target_gap=args.target_gap,
+    )
 
 
 def _add_problem(group: argparse._ArgumentGroup) -> None:
@@ -196,7 +202,7 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
     add_turning(
         group,
         turn_s_help="time of a quarter-turn on the spot [s]; 0 minimises steps, as the paper does "
-        f"(default: 0; {TURN_S:g} for a line over the floor)",
+        f"(default: 0; {ROBOT.quarter_turn_s:g} for a line over the floor)",
     )
 
 
@@ -216,7 +222,7 @@ def _add_line(group: argparse._ArgumentGroup) -> None:
         metavar="SHARE",
         help="overlap of neighbouring cells of a line over the floor, as a share of the tool's "
         "width "
-        f"(default: {OVERLAP:g})",
+        f"(default: {ROBOT.overlap:g})",
     )
 
     group.add_argument(
@@ -332,8 +338,3 @@ def _alignment(text: str) -> str | float:
             f"must be {WALLS}, {AXES} or an angle up to {MOST_ANGLE_DEG:g} degrees, got {text!r}"
         )
     return angle_deg
-
-
-def _require(condition: bool, option: str, expectation: str, value: object) -> None:
-    if not condition:
-        raise BadConfiguration(f"{option} must {expectation}, got {value}")

@@ -3,16 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import math
 
 from fasaco_edge.config.config import RobotConfig
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.kernels.floor.turning import (
-    Turning,
-    limited_turning,
-    proportional_turning,
-    turn_seconds,
-)
 
 # By the name of a limit: its metavar, the least and most that ``RobotConfig`` allows, their unit,
 # and what it is.
@@ -37,7 +30,7 @@ def add_turning(group: argparse._ArgumentGroup, turn_s_help: str) -> None:
 
 
 def settle_turning(args: argparse.Namespace, turn_s: float) -> None:
-    """Fill in defaults and the time of a quarter-turn; ``turn_s`` where nothing is said [s].
+    """Fill in defaults; a quarter-turn takes ``turn_s`` where nothing is said [s].
 
     Raises:
         BadConfiguration: a limit is impossible, or of no use with the other options.
@@ -60,25 +53,6 @@ def settle_turning(args: argparse.Namespace, turn_s: float) -> None:
         if not least <= value <= most:
             allowed = f"[{least:g}, {most:g}] {unit}"
             raise BadConfiguration(f"{_option(name)} must be in {allowed}, got {value!r}")
-    args.turn_s = turn_seconds(turning(args), 0.5 * math.pi)
-
-
-def turning(args: argparse.Namespace) -> Turning:
-    """Return what turns on the spot take, by settled options."""
-    if args.turn_deg_s is None:
-        return proportional_turning(args.turn_s)
-    return limited_turning(
-        args.turn_deg_s,
-        args.turn_deg_s2,
-        args.speed_m_s,
-        args.acceleration_m_s2,
-        args.steered_deg,
-    )
-
-
-def turning_limits(args: argparse.Namespace) -> dict[str, float | None]:
-    """Return the limits as JSON values; None where turns are counted by their angle."""
-    return {name: getattr(args, name) for name in LIMITS}
 
 
 def _option(name: str) -> str:

@@ -291,7 +291,7 @@ def test_cells_lie_along_walls_or_axes_or_at_an_angle(capsys, align):
 @pytest.mark.parametrize("align", ["walls", "30"])
 def test_the_centres_of_cells_lie_along_the_axes(capsys, align):
     assert main(["plan", "office", "--align", align]) == Exit.CONFIG
-    assert "--line thorough" in capsys.readouterr().err
+    assert "line over the floor" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("overlap", ["0.9", "-0.1", "nan"])
@@ -302,7 +302,7 @@ def test_an_overlap_is_a_share_of_the_tool(capsys, overlap):
 
 def test_a_coverage_grid_has_no_floor(grid_file, capsys):
     assert main(["plan", str(grid_file), "--line", "thorough"]) == Exit.CONFIG
-    assert "--line thorough" in capsys.readouterr().err
+    assert "line thorough: grid.npy is a coverage grid" in capsys.readouterr().err
 
 
 def test_a_start_may_be_negative(plan, tmp_path):

@@ -1,0 +1,73 @@
+"""Maps to plan on: a map_server file, a built-in map, or a coverage grid of True and False."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.config.config import RobotConfig
+from fasaco_edge.errors import MapFileError
+from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
+from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.planners.grids import start_cell
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Map:
+    """What to plan on.
+
+    Attributes:
+        name: of the file, or what the array is called.
+        grid: the occupancy grid; None for a coverage grid.
+        free: bool (rows, cols), True = coverable, row 0 first; None for an occupancy grid.
+        file: where it was read; None for an array.
+    """
+
+    name: str
+    grid: OccupancyGrid | None = None
+    free: NDArray[np.bool_] | None = None
+    file: Path | None = None
+
+    def lattice(self, robot: RobotConfig) -> CoverageLattice:
+        """Return the cells as wide as the robot's tool.
+
+        Raises:
+            MapTooLarge, MapTooFar: there are too many, or they lie too far from the origin.
+        """
+        if self.grid is not None:
+            footprint = Footprint(robot.tool_width_m, robot.radius_m)
+            return CoverageLattice.from_map(self.grid, footprint)
+        assert self.free is not None
+        return CoverageLattice.from_free(self.free, robot.tool_width_m)
+
+    def start(self, lattice: CoverageLattice) -> Cell:
+        """Return where to start if nothing is said, see ``planners.grids.start_cell``."""
+        return start_cell(lattice, self.file or Path(self.name))
+
+
+def load_map(source: str | Path | NDArray[np.bool_]) -> Map:
+    """Return a map.
+
+    Args:
+        source: a map_server YAML file, the name of a built-in map (``fasaco-edge maps``), a
+            coverage grid in a .npy file, or one as an array, bool (rows, cols), True = coverable.
+
+    Raises:
+        MapFileError: it is none of these, or cannot be read.
+    """
+    if isinstance(source, np.ndarray):
+        if source.dtype != np.bool_ or source.ndim != 2 or not source.size:
+            raise MapFileError(
+                f"a coverage grid is bool (rows, cols), got {source.dtype} {source.shape}"
+            )
+        free = source.copy()
+        free.setflags(write=False)
+        return Map("array", free=free)
+    file = find_map(source)
+    if file.suffix == ".npy":
+        return Map(file.name, free=read_coverage_grid(file), file=file)
+    return Map(file.name, read_map(file), file=file)

@@ -1,0 +1,257 @@
+"""A plan: a walk over the cells of a map, the line to be driven, and how good both are."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from fasaco_edge.bench.floor import JudgedFloor
+from fasaco_edge.config.config import RobotConfig
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.offline.figures import figures_of
+from fasaco_edge.offline.floor import PlannedFloor, judged_floor
+from fasaco_edge.offline.ground import Ground, Line
+from fasaco_edge.offline.maps import Map
+from fasaco_edge.offline.picture import picture_of
+from fasaco_edge.offline.settings import ANYWHERE, AXES, CELLS, HOME, WALLS, Search, require
+from fasaco_edge.planners.bound import lower_bound_of
+from fasaco_edge.planners.line import LINES
+from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import (
+    GapReached,
+    SearchProgress,
+    StoppingCriterion,
+    TimeBudget,
+    ignore,
+)
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.registry import planner_of
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A walk over a map, and the line along it.
+
+    Attributes:
+        map: what it is on.
+        robot: for which.
+        line: through the centres of ``cells``, or over the floor, ``quick`` or ``thorough``.
+        search: how the walk was searched.
+        ground: the cells, and where the robot stands in them.
+        problem: what was to be covered, from where.
+        path: the walk, with its cost and bound.
+        xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, to be driven straight from
+            one to the next.
+        ended_by: what ended the search.
+        wall_s, cpu_s: what the search took [s].
+    """
+
+    map: Map
+    robot: RobotConfig
+    line: str
+    search: Search
+    ground: Ground
+    problem: CoverageProblem
+    path: CoveragePath
+    xy: Line
+    ended_by: str
+    wall_s: float
+    cpu_s: float
+
+    @property
+    def cells(self) -> NDArray[np.int32]:
+        """The walk, int32 (n, 2): cells (row, col), the start first."""
+        return self.path.cells
+
+    @property
+    def steps(self) -> int:
+        """Steps from cell to cell."""
+        return self.path.steps
+
+    @property
+    def cost_s(self) -> float:
+        """Seconds that the robot drives and turns along the cells."""
+        return self.path.cost_s
+
+    @property
+    def gap(self) -> float | None:
+        """How far ``cost_s`` may be above the least there can be, a share; None if not known."""
+        return self.path.gap
+
+    @cached_property
+    def judged(self) -> JudgedFloor | None:
+        """The floor that the line sweeps and leaves; None for a coverage grid."""
+        return judged_floor(self.map.grid, self.xy, self.robot)
+
+    @property
+    def floor(self) -> PlannedFloor | None:
+        """Figures of the floor; None for a coverage grid."""
+        return None if self.judged is None else PlannedFloor.of(self.judged.figures)
+
+    @property
+    def swept_share(self) -> float | None:
+        """The share of the reachable floor that the line sweeps; None for a coverage grid."""
+        return None if self.floor is None else self.floor.swept_share
+
+    @property
+    def figures(self) -> dict[str, object]:
+        """All figures, as values that JSON has too: those of ``fasaco-edge plan --json``."""
+        return figures_of(self)
+
+    def plot(self, file: str | Path | None = None) -> Image.Image:
+        """Return a picture, RGB, of the walk or the line over the map; as PNG, too."""
+        picture = picture_of(self)
+        if file is not None:
+            picture.save(file, "PNG")
+        return picture
+
+
+def plan(
+    map: Map,
+    robot: RobotConfig | None = None,
+    *,
+    start: Cell | None = None,
+    start_xy: tuple[float, float] | None = None,
+    end: str | Cell = ANYWHERE,
+    line: str | None = None,
+    align: str | float | None = None,
+    search: Search | None = None,
+    stop: StoppingCriterion | None = None,
+    watch: Callable[[SearchProgress], None] = lambda _: None,
+) -> Plan:
+    """Plan a walk over all cells of a map that the robot can reach, and the line along it.
+
+    The first call on a computer compiles kernels, for up to a minute or two.
+
+    Args:
+        map: what to cover.
+        robot: its size and what driving takes; None for the defaults of the configuration.
+        start: the cell (row, col) to start in, as wide as the tool, along the map frame's axes.
+        start_xy: or the point (x, y) [m]. Without either a built-in map names its own; else it
+            is in the largest area, near the map frame's origin.
+        end: "anywhere", "home", or a cell.
+        line: "cells", through their centres, as the paper's planners do; "quick" or "thorough":
+            over the floor, what a square metre is worth being 60 or 180 s. None for "thorough",
+            and for "cells" on a coverage grid.
+        align: what the rows of cells lie along, with a line over the floor: "walls", "axes" or an
+            angle [deg]; None for walls.
+        search: how to search; None for the defaults.
+        stop: ends the search early.
+        watch: is told how far the search is.
+
+    Raises:
+        BadConfiguration: a value is impossible.
+        StartOutsideMap, StartBlocked, EndBlocked: the robot cannot stand there.
+        NothingToCover: there is no cell for it.
+    """
+    if start is not None and start_xy is not None:
+        raise BadConfiguration("start and start_xy cannot both be given")
+    named = not isinstance(end, str) or end in (ANYWHERE, HOME)
+    require(named, "end", f"be {ANYWHERE}, {HOME} or a cell", end)
+    robot = checked(robot or RobotConfig())
+    search = search or Search()
+    line = line or (CELLS if map.grid is None else "thorough")
+    ground = _ground(map, robot, start, start_xy, line, align)
+    problem = _problem(ground, robot, end)
+    path, ended_by, wall_s, cpu_s = _search(problem, search, stop, watch)
+    xy = ground.line(path.cells, line, robot, ends=problem.end is not None)
+    return Plan(map, robot, line, search, ground, problem, path, xy, ended_by, wall_s, cpu_s)
+
+
+def checked(robot: RobotConfig) -> RobotConfig:
+    """Return a robot whose values are possible.
+
+    Raises:
+        BadConfiguration: one is not; the error names it.
+    """
+    try:
+        return msgspec.convert(msgspec.structs.asdict(robot), RobotConfig)
+    except msgspec.ValidationError as error:
+        raise BadConfiguration(f"robot: {error}") from error
+
+
+def _ground(
+    map: Map,
+    robot: RobotConfig,
+    start: Cell | None,
+    start_xy: tuple[float, float] | None,
+    line: str,
+    align: str | float | None,
+) -> Ground:
+    require(line in (CELLS, *LINES), "line", f"be one of {CELLS}, {', '.join(LINES)}", line)
+    if line != CELLS and map.grid is None:
+        raise BadConfiguration(
+            f"line {line}: {map.name} is a coverage grid, which lies in no map frame",
+            hint="plan on a map_server YAML file, or ask for the line through cells",
+        )
+    is_angle = isinstance(align, int | float) and math.isfinite(align)
+    allowed = is_angle or align in (WALLS, AXES, None)
+    require(allowed, "align", f"be {WALLS}, {AXES} or an angle in degrees", align)
+    if line == CELLS and align not in (AXES, None):
+        raise BadConfiguration(
+            f"align {align}: the centres of cells lie along the axes of the map frame",
+            hint="ask for a line over the floor, quick or thorough",
+        )
+    lattice = map.lattice(robot)
+    if start is None:
+        start = map.start(lattice) if start_xy is None else lattice.cell_at(*start_xy)
+    if line == CELLS or map.grid is None:
+        return Ground(lattice, map.grid, start)
+    if start_xy is None:
+        (xy,) = lattice.centres(np.array([start], np.int32)).tolist()
+        start_xy = xy[0], xy[1]
+    return Ground.of_floor(map.grid, robot, start_xy, WALLS if align is None else align)
+
+
+def _problem(ground: Ground, robot: RobotConfig, end: str | Cell) -> CoverageProblem:
+    cost = robot.cost(ground.lattice.cell_m)
+    to = ground.end(end, robot.tool_width_m)
+    return CoverageProblem.of(ground.lattice, ground.start, end=to, cost=cost)
+
+
+def _search(
+    problem: CoverageProblem,
+    search: Search,
+    stop: StoppingCriterion | None,
+    watch: Callable[[SearchProgress], None],
+) -> tuple[CoveragePath, str, float, float]:
+    """Search; return the path, what ended it, and the wall and processor time it took [s].
+
+    A planner that knows no lower bound is given one, for its path and for the target gap.
+    """
+    planner = planner_of(search.planner, search.colony(), search.threads, search.has_local_search)
+    bound = None if search.has_local_search else lower_bound_of(problem)
+    criteria: dict[str, StoppingCriterion] = {}
+    if stop is not None:
+        criteria["Ctrl-C"] = stop
+    if search.target_gap is not None:
+        criteria["target gap"] = GapReached(search.target_gap)
+    if search.most_s is not None:
+        criteria["budget"] = TimeBudget(search.most_s)
+    ended_by = "the search"
+
+    def is_over(progress: SearchProgress) -> bool:
+        nonlocal ended_by
+        if bound is not None:
+            progress = replace(progress, lower_bound_cost_s=bound.cost_s)
+        watch(progress)
+        over = [name for name, criterion in criteria.items() if criterion(progress)]
+        ended_by = over[0] if over else ended_by
+        return bool(over)
+
+    wall, cpu = time.perf_counter(), time.process_time()
+    path = planner.plan(problem, is_over, ignore)
+    wall_s, cpu_s = time.perf_counter() - wall, time.process_time() - cpu
+    if bound is not None:
+        path = replace(path, lower_bound_steps=bound.steps, lower_bound_cost_s=bound.cost_s)
+    return path, ended_by, wall_s, cpu_s

@@ -1,0 +1,131 @@
+"""Plans from Python: as the guide shows them, and what is wrong with others."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import fasaco_edge as fe
+from fasaco_edge.cli import main
+from fasaco_edge.errors import BadConfiguration, MapFileError, StartBlocked, StartOutsideMap
+from tests.benchmarks.judge import check_walk
+from tests.support.processes import ENVIRONMENT
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "fasaco_edge/README.md").read_text(), re.S)
+QUICK = fe.Search(budget_s=0.05)
+# Without local search no clock decides.
+COLONY = fe.Search(local_search=False, ants=64, seed=3)
+
+
+def test_each_example_of_the_guide_runs(tmp_path):
+    assert len(EXAMPLES) == 4
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", example],
+            cwd=tmp_path,
+            env=ENVIRONMENT,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=600,
+        ).stdout
+        for example in EXAMPLES
+    ]
+    assert re.fullmatch(r"9\d\.\d% of the floor, \d+ points, \d+ s\n", said[0])
+    with Image.open(tmp_path / "office.png") as picture:
+        assert picture.format == "PNG"
+    line = np.loadtxt(tmp_path / "line.csv", delimiter=",", skiprows=1)
+    assert np.hypot(*(line[0] - line[-1])) < 0.4
+    assert [row.split()[0] for row in said[2].splitlines()] == [
+        *("fasaco", "aco", "spiral-stc", "zigzag")
+    ]
+    assert said[3].count("gap") == 3
+
+
+def test_a_plan_is_that_of_the_command(tmp_path, capsys):
+    walk, line = tmp_path / "walk.csv", tmp_path / "line.csv"
+    words = ["--no-local-search", "--ants", "64", "--seed", "3", "--line", "quick", "--json"]
+    files = ["--path-out", str(walk), "--xy-out", str(line)]
+    assert main(["plan", "office", *words, *files]) == 0
+    told = json.loads(capsys.readouterr().out)
+    plan = fe.plan(fe.load_map("office"), line="quick", search=COLONY)
+    assert (plan.cells == np.loadtxt(walk, int, delimiter=",", skiprows=1)).all()
+    assert np.allclose(plan.xy, np.loadtxt(line, delimiter=",", skiprows=1), atol=1e-6)
+    figures = json.loads(json.dumps(plan.figures))
+    clocks = "wall_s", "cpu_s", "first_walk_ms", "map"
+    assert {name: figures[name] for name in figures if name not in clocks} == {
+        name: told[name] for name in told if name not in clocks
+    }
+    assert plan.swept_share == told["floor"]["swept_share"]
+
+
+def test_an_array_is_covered_from_where_it_is_asked():
+    free = np.ones((6, 8), bool)
+    free[2:4, 3:5] = False
+    plan = fe.plan(fe.load_map(free), start=(5, 7), end="home", search=QUICK)
+    lattice = plan.problem.lattice
+    verdict = check_walk(lattice.steps, lattice.coverable, plan.cells, (5, 7))
+    assert verdict.legal
+    assert verdict.complete
+    assert plan.cells[-1].tolist() == [5, 7]
+    assert plan.line == "cells"
+    assert plan.swept_share is None
+    assert plan.plot().size[0] > 100
+
+
+def test_a_map_does_not_follow_the_array_it_came_from():
+    free = np.ones((4, 4), bool)
+    map = fe.load_map(free)
+    free[:] = False
+    assert map.free.all()
+
+
+@pytest.mark.parametrize("budget_s", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_search_says_what_is_wrong_with_it(budget_s):
+    with pytest.raises(BadConfiguration, match="budget must be finite and above 0 s"):
+        fe.Search(budget_s=budget_s)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "said"),
+    [
+        ({"robot": fe.Robot(tool_width_m=-1.0)}, BadConfiguration, "tool_width_m"),
+        ({"robot": fe.Robot(speed_m_s=float("nan"))}, BadConfiguration, "speed_m_s"),
+        ({"line": "straight"}, BadConfiguration, "line must be one of cells, quick, thorough"),
+        ({"align": "north"}, BadConfiguration, "align must be walls, axes or an angle"),
+        ({"align": 30.0, "line": "cells"}, BadConfiguration, "along the axes of the map frame"),
+        ({"end": "there"}, BadConfiguration, "end must be anywhere, home or a cell"),
+        ({"start": (0, 0), "start_xy": (0.0, 0.0)}, BadConfiguration, "start and start_xy"),
+        ({"start": (-90, 0)}, StartOutsideMap, "is outside the map"),
+        ({"start_xy": (-3.5, -3.5)}, StartBlocked, "does not fit"),
+        ({"search": fe.Search(ants=0)}, BadConfiguration, "ants must be in"),
+    ],
+)
+def test_a_plan_says_what_is_wrong_with_it(options, error, said):
+    with pytest.raises(error, match=said):
+        fe.plan(fe.load_map("office"), **({"search": QUICK} | options))
+
+
+@pytest.mark.parametrize(
+    "array", [np.ones(4, bool), np.ones((3, 3)), np.empty((0, 3), bool)], ids=str
+)
+def test_an_array_is_a_grid_of_true_and_false(array):
+    with pytest.raises(MapFileError, match="bool"):
+        fe.load_map(array)
+
+
+def test_to_import_the_package_loads_no_planner():
+    code = "import sys, fasaco_edge; sys.exit('numpy' in sys.modules)"
+    assert (
+        subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, check=False).returncode == 0
+    )
+    with pytest.raises(AttributeError, match="no attribute 'plot'"):
+        _ = fe.plot
