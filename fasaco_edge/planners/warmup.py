@@ -184,7 +184,7 @@ _STAGES: dict[str, Callable[[_TinyRoom], object]] = {
     REACH: lambda room: room.problem,
     AREAS: _take_areas,
     WALKS: lambda room: walk_figures(room.lattice, np.array([[0, 0], [0, 1]], np.int32)),
-    BOUND: lambda room: lower_bound_of(room.costly),
+    BOUND: lambda room: lower_bound_of(room.costly).tighten_in_bands(16),
     LOCAL_SEARCH: _take_local_search,
     WINDOWS: _take_windows,
     SHARES: _take_shares,
