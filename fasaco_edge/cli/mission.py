@@ -49,6 +49,7 @@ COMMANDS = {
     "pause": "stop the robot; what it passes over still counts as covered",
     "resume": "continue a paused mission",
     "cancel": "stop and drop the order; what is covered is kept",
+    "stop": "the same as cancel; to go on later with the same order, pause it",
     "replan": "plan in full now, starting from the current path",
     "reset": "stop and drop the order and what is covered; the ledger's file is renamed",
     "status": "show state, progress, and what could not be reached",
@@ -96,7 +97,8 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Ask, and show the answer."""
-    asked: dict[str, object] = {"command": args.mission_command}
+    command = "cancel" if args.mission_command == "stop" else args.mission_command
+    asked: dict[str, object] = {"command": command}
     if args.mission_command == "start":
         asked["order"] = _order(args)
     reply = ask(args, "mission", payload=encode_json(asked))

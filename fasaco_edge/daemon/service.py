@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.session import Bus, BusSettings, open_bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.compiling import KernelCompiler
@@ -24,6 +24,7 @@ from fasaco_edge.daemon.notify import ServiceManager, Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
+from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.host.processes import call_on, memory_limit, return_soon
 from fasaco_edge.wire import topics
 
@@ -35,6 +36,8 @@ WORKER_STOP_S = 0.4
 # The ledger is written meanwhile: its disk gets this long in all, and at least the second figure
 # once they have ended.
 LEDGER_STOP_S, LEDGER_LEAST_S = 0.5, 0.2
+# A client tries so often whether its router is there [s].
+ROUTER_RETRY_S = 1.0
 
 
 def run_daemon(
@@ -78,12 +81,42 @@ def run_daemon(
         if compiler is not None:
             compiler.wait(stop)
         config.bus.security.warn_of_clock()
-        with open_bus(config.bus.settings(config.keys().prefix, config.ros2 or None)) as bus:
+        settings = config.bus.settings(config.keys().prefix, config.ros2 or None)
+        bus = _joined(settings, stop, manager)
+        if bus is None:
+            return
+        with bus:
             _serve(config, bus, ledger, record_to, stop, started, manager, reload)
     finally:
         if compiler is not None:
             compiler.close()
     LOG.info("stopped", extra={"event": "stopped"})
+
+
+def _joined(settings: BusSettings, stop: threading.Event, manager: ServiceManager) -> Bus | None:
+    """Open a session; a client waits for its router. None where it has to stop before.
+
+    Raises:
+        BusUnavailable: no session can be opened, and waiting does not help.
+    """
+    is_waiting = False
+    while True:
+        try:
+            return open_bus(settings)
+        except BusUnavailable as error:
+            # What is wrong with its own addresses or credentials does not mend itself.
+            if settings.mode != "client" or settings.secured:
+                raise
+            if not is_waiting:
+                there = ", ".join(settings.connect)
+                LOG.warning("waiting for a router at %s: %s", there, error, extra={"event": "bus"})
+                # A service that has not come up is ended after a while; it has, as far as it can.
+                manager.ready()
+                manager.status(f"waiting for a router at {there}")
+                is_waiting = True
+        manager.alive()
+        if stop.wait(ROUTER_RETRY_S):
+            return None
 
 
 def _afforded(config: DaemonConfig) -> DaemonConfig:

@@ -63,7 +63,7 @@ class Pursuit:
             rests = self.last.speed <= limits.acceleration * period
             if to_stop > ARRIVED_M or not rests:
                 break
-            route.next_leg()
+            route.next_leg(here)
             self._is_turning = True
         if leg is None:
             self.stand()

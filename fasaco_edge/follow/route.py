@@ -29,6 +29,8 @@ NEAREST_M, BEGINNING_M = 0.15, 0.6
 # A path that begins so far ahead on the one before, at least and at most, is still one from here
 # [m].
 LEAST_LEAD_M, LEAD_M = 0.15, 2.0
+# A corner was missed by this [m].
+MISSED_M = 0.03
 # A corner of the new path is that of the old one, if it is as near as this [m].
 SAME_M = 1e-3
 
@@ -97,10 +99,19 @@ class Route:
         self._fill(1)
         return self._legs[0] if self._legs else None
 
-    def next_leg(self) -> None:
-        """Go on to the next leg."""
-        self._fill(1)
+    def next_leg(self, here: Point | None = None) -> None:
+        """Go on to the next leg.
+
+        A robot that is ``here``, at rest, and has driven past the corner by more than ``MISSED_M``,
+        goes back to it first: the straight way to the next leg may be through a wall.
+        """
+        self._fill(2)
+        corner = self._legs[0].end if self._legs else None
         del self._legs[:1]
+        if here is None or corner is None or not self._legs:
+            return
+        if self._legs[0].distance(here) > MISSED_M:
+            self._legs.insert(0, _leg(here, corner, True))
 
     def pass_bends(self, here: Point) -> None:
         """Go on to the leg that ``here`` is on, past bends that are steered."""

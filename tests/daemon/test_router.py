@@ -10,7 +10,7 @@ import zenoh
 import zenoh.ext
 
 from tests.support.outsider import Ear, Outsider
-from tests.support.processes import daemon_process, free_endpoint
+from tests.support.processes import ENVIRONMENT, daemon_process, fasaco_edge, free_endpoint
 from tests.support.rooms import WALL, fill, map_bytes, pose_bytes, room
 from tests.support.router import router_process
 
@@ -125,3 +125,37 @@ class _Heard:
         pixels = fill(room(3.0, 3.0), 1.5, 0.0, 1.6, 0.5 + 0.3 * (self._maps % 4), WALL)
         for name, payload in (("map", map_bytes(pixels)), ("pose", pose_bytes(0.75, 0.75))):
             self._session.put(f"{PREFIX}/{name}", payload)
+
+
+def test_a_client_waits_for_its_router_and_says_so(tmp_path):
+    endpoint = free_endpoint()
+    bus = {"mode": "client", "listen": [], "connect": [endpoint]}
+    with daemon_process(tmp_path, bus=bus) as daemon:
+        until(lambda: f"waiting for a router at {endpoint}" in daemon.log_text())
+        with router_process(endpoint), Outsider(endpoint) as outsider:
+            assert outsider.ask_status()["state"] == "waiting for map"
+    assert "ready" in daemon.log_text()
+
+
+def test_a_client_that_waits_for_its_router_ends_when_it_is_told_to(tmp_path):
+    bus = {"mode": "client", "listen": [], "connect": [free_endpoint()]}
+    with daemon_process(tmp_path, bus=bus) as daemon:
+        until(lambda: "waiting for a router" in daemon.log_text())
+        assert daemon.stop() < 10.0
+
+
+def test_commands_know_from_the_configuration_or_the_environment_whom_to_ask(tmp_path, monkeypatch):
+    name = {"name": "maja"}
+    with daemon_process(tmp_path, robot=name) as daemon, Outsider(daemon.endpoint, "maja"):
+        file = tmp_path / "daemon0.yaml"
+        by_file = fasaco_edge("mission", "stop", "--config", file, "--json")
+        assert json.loads(by_file.out)["robot"] == "maja"
+        monkeypatch.setitem(ENVIRONMENT, "FASACO_CONNECT", daemon.endpoint)
+        monkeypatch.setitem(ENVIRONMENT, "FASACO_ROBOT", "maja")
+        told = fasaco_edge("mission", "status", "--json")
+        assert json.loads(told.out)["robot"] == "maja"
+        assert json.loads(told.out)["state"] == "idle"
+        # What is said here and now counts more.
+        wrong = fasaco_edge("mission", "status", "--robot", "moritz")
+        assert wrong.code == 1
+        assert "there are maja" in wrong.err

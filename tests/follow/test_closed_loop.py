@@ -77,6 +77,21 @@ def test_a_path_that_begins_like_the_one_before_is_joined_without_stopping():
     assert np.hypot(*(trail(loop)[-1] - (5.0, 4.0))) < 0.01
 
 
+def test_a_corner_that_was_missed_is_driven_back_to():
+    """A computer that was busy for half a second: the base drives on meanwhile."""
+    loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.02)
+    loop.send([(1, 1), (3, 1), (3, 3)])
+    loop.run(lambda: loop.world.pose.x > 2.9)
+    step, loop.follower.step = loop.follower.step, lambda now: None
+    loop.run(lambda until=loop.now + 0.6: loop.now > until)
+    loop.follower.step = step
+    driven(loop)
+    way = trail(loop)
+    assert way[:, 0].max() > 3.04
+    # Beside the overshoot nothing is left of the path by more than that.
+    assert distances_to(np.array([(1, 1), (3.2, 1), (3, 1), (3, 3)]), way).max() < 0.02
+
+
 def test_a_path_that_goes_elsewhere_is_joined_from_rest():
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05)
     loop.send([(1, 1), (5, 1)])

@@ -263,6 +263,26 @@ def test_maps_that_grow_and_change_on_the_way():
     assert judge_floor(truth, np.array(robot.trail), ROBOT).figures.swept_share > 0.95
 
 
+def test_a_robot_a_little_off_its_line_gets_lines_that_begin_where_it_is():
+    """Its disc may touch a wall then, by a pixel; the line begins beside it all the same."""
+    whole, off_m = with_obstacle(room(3.6, 3.0), 24, 30), 0.02
+    rng = np.random.default_rng(3)
+    robot = Robot(Mission(CONFIG))
+    seen = np.array((36, 40))
+    robot.tell(MapReceived(part_of(whole, 0, 0, *seen.tolist())))
+    for _ in range(60):
+        robot.drive(2)
+        on_line, turn = robot.at, rng.uniform(0.0, math.tau)
+        robot.at = (on_line[0] + off_m * math.cos(turn), on_line[1] + off_m * math.sin(turn))
+        seen = np.minimum(seen + rng.integers(0, 3, 2), whole.cells.shape)
+        told = len(robot.reasons)
+        robot.tell(MapReceived(part_of(whole, 0, 0, *seen.tolist())))
+        if len(robot.reasons) > told and robot.line:
+            assert math.dist(robot.line[0], robot.at) < 2 * off_m
+        robot.at = on_line
+    assert len(robot.reasons) > 20
+
+
 def assert_clear(robot, grid):
     """No point of the line comes nearer to what is not free than the robot's radius."""
     blocked = np.argwhere(grid.cells != 0) + 0.5

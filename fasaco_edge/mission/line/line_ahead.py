@@ -133,7 +133,8 @@ class LineAhead:
 
     def _join(self, pieces: list[Piece]) -> None:
         """Take the line that is put together of pieces of the one before."""
-        here = Line(self._here[None], np.array([self.cell]), np.array([POLISHED], np.uint8))
+        begin = self._begin()[None]
+        here = Line(begin, np.array([self.cell]), np.array([POLISHED], np.uint8))
         if not len(self._walk):
             self._take([])
             return
@@ -148,6 +149,19 @@ class LineAhead:
             is_swept=lambda cell: not tally.is_open(stands.stand(cell)),
         )
         self._take(joiner.joined(pieces))
+
+    def _begin(self) -> Points:
+        """Return where a new line begins: where the robot is.
+
+        Where its disc does not fit, as a real robot is a little off its line and poses err, it
+        is where the robot should be on the line before: from the other place no way would be
+        clear, and the line would begin where the first one is, metres away.
+        """
+        here = self._here
+        if self.is_followed and not self._is_clear(here, here):
+            a, b = self.line.points[:2]
+            here = a + self._along * (b - a)
+        return here
 
     @property
     def is_cut(self) -> bool:
