@@ -27,7 +27,7 @@ its topics and velocities go to ros2.topics.cmd_vel; else by the keys `pose` and
 The robot is told to stand, within 0.2 s, while
   the newest pose is older than --pose-age, or is none, or has jumped
   the path is empty (mission pause, cancel; done), is driven, or is none
-  it is further than 0.3 m off the path
+  it is further than 0.3 m off the path, or does not move as it is told
   no daemon plans for it, or the daemon has said nothing for 2.5 s
 and when this program ends. It drives on by itself when that is over. Zeros are sent for a second
 after a stop, then nothing. A base has to stop by itself where nothing comes for 0.5 s: nobody else
