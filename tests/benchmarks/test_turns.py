@@ -52,6 +52,8 @@ def test_walks_over_maps_have_a_certified_gap_at_each_price(capsys, tmp_path):
     ]
     for each in runs:
         assert each["cost_s"] == pytest.approx(each["bound_s"] * (1 + each["gap"]), rel=1e-4)
+        # Lanes back and forth along the longer side: no walk over a hall is better.
+        assert each["cost_s"] == each["simple_s"] == 47 + 10 * each["price"]
 
 
 def test_instances_that_are_none_are_named(tmp_path, capsys):

@@ -33,7 +33,10 @@ BOUND_GOAL = 0.95
 GAP_GOALS = {(1.25, 0.1): 0.045, (1.25, 1.0): 0.03, (5.0, 1.0): 0.04, (50.0, 1.0): 0.06}
 
 TOURS = ("budget [s]", "tours", "to best known", "median", "worst", "to approximation", "bound")
-WALKS = ("turn [steps]", "budget [s]", "walks", "certified gap, median", "worst", "wall [s]")
+WALKS = (
+    *("turn [steps]", "budget [s]", "walks", "certified gap, median", "worst"),
+    *("to a simple walk", "worst", "wall [s]"),
+)
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -131,6 +134,7 @@ def _walk_rows(walks: Sequence[TurnsRun]) -> Iterator[tuple[str, ...]]:
         yield (
             *(f"{price:g}", f"{budget_s:g}", str(len(runs))),
             *(f"{statistics.median(gaps):.2%}", f"{max(gaps):.2%}"),
+            *(f"{statistics.mean(_to_simple(runs)):.4f}", f"{max(_to_simple(runs)):.4f}"),
             f"{statistics.mean(run.wall_s for run in runs):.3f}",
         )
 
@@ -149,10 +153,16 @@ def _goals(tours: Sequence[TurnsRun], walks: Sequence[TurnsRun]) -> Iterator[Goa
         if key in GAP_GOALS:
             gap = statistics.median(run.gap for run in runs)
             yield Goal(f"certified gap at {key[0]:g} a turn, {key[1]:g} s", gap, GAP_GOALS[key])
+    if walks:
+        yield Goal("worst walk to a simple one", max(_to_simple(walks)), 1.0)
 
 
 def _ratios(runs: Sequence[TurnsRun]) -> list[float]:
     return [run.cost_s / run.best_s for run in runs if run.best_s]
+
+
+def _to_simple(runs: Sequence[TurnsRun]) -> list[float]:
+    return [run.cost_s / run.simple_s for run in runs if run.simple_s]
 
 
 def _bounds(runs: Sequence[TurnsRun]) -> list[float]:

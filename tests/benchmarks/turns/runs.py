@@ -27,6 +27,7 @@ from fasaco_edge.bench.benchmark import Say
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
+from fasaco_edge.planners.baselines import spiral_stc, stc, zigzag
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.grids import read_grid
 from fasaco_edge.planners.planner import SearchProgress
@@ -36,6 +37,8 @@ from tests.benchmarks.harness import WrongWalkError, grid_name, judged, planner_
 
 # Of the instances, in steps a quarter-turn.
 TOUR_PRICE = 50.0
+# Beside what is known of instances: the cheapest simple walk over a map.
+SIMPLE = "simple"
 # Sides that a visit passes straight between, as step masks.
 STRAIGHT = (1 << EAST | 1 << WEST, 1 << NORTH | 1 << SOUTH)
 # A first plan on a ground finds memory and caches cold: one that does not count.
@@ -86,6 +89,7 @@ class TurnsRun:
         gap: of the walk to that bound, as the search says.
         best_s, approximation_s: of an instance: the best known tour, and the authors' own
             approximation [s]; None where nobody knows.
+        simple_s: the cheapest of simple walks over a map, spirals and sweeps [s]; None for tours.
         first_walk_s, wall_s: time to the first walk and until the path was there [s].
     """
 
@@ -99,6 +103,7 @@ class TurnsRun:
     gap: float
     best_s: float | None
     approximation_s: float | None
+    simple_s: float | None
     first_walk_s: float
     wall_s: float
 
@@ -157,6 +162,7 @@ def _run(
         gap=path.gap or 0.0,
         best_s=best_s,
         approximation_s=known.get("tour_approximation"),
+        simple_s=known.get(SIMPLE),
         first_walk_s=path.first_walk_s,
         wall_s=wall_s,
     )
@@ -210,8 +216,9 @@ def _start(floor: NDArray[np.bool_]) -> tuple[int, int]:
 def _walks(plan: TurnsPlan) -> Iterator[tuple[str, CoverageProblem, dict[str, Any]]]:
     grids = [read_grid(name) for name in plan.grids]
     for grid, price in itertools.product(grids, plan.prices):
-        cost = CoverageCost(1.0, price)
-        yield grid_name(grid.name), CoverageProblem.of(grid.lattice, grid.start, cost=cost), {}
+        problem = CoverageProblem.of(grid.lattice, grid.start, cost=CoverageCost(1.0, price))
+        simple_s = min(planner.plan(problem).cost_s for planner in (stc(), spiral_stc(), zigzag()))
+        yield grid_name(grid.name), problem, {SIMPLE: simple_s}
 
 
 def _chosen(plan: TurnsPlan, folder: Path) -> list[str]:
