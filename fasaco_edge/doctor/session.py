@@ -20,6 +20,7 @@ from fasaco_edge.config.security import from_here, host_of, protocol_of
 from fasaco_edge.daemon.claim import claims_in
 from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 from fasaco_edge.errors import BadConfiguration, BusUnavailable, MalformedMessage
+from fasaco_edge.text import one_line
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_tolerant
 from fasaco_edge.wire.keys import VERSION
@@ -103,6 +104,10 @@ def _listening(port: int) -> set[str]:
 # Time to listen for maps and poses [s]; poses come ten times a second.
 LISTEN_S = 0.7
 ASK_S = 0.7
+# Of maps elsewhere no more are named.
+MOST_PLACES = 8
+# Where in a token of rmw_zenoh (``wire.ros_keys``) it says what it is of, and its topic's type.
+TOKEN_KIND, TOKEN_TYPE = 5, 10
 
 
 def session(context: CheckContext) -> Finding:
@@ -126,7 +131,9 @@ def session(context: CheckContext) -> Finding:
     silent = [endpoint for endpoint in bus.connect if answers(endpoint) is False]
     details += [f"{endpoint}: nobody answers" for endpoint in silent]
     if len(silent) == len(bus.connect) > 0:
-        make, then = (fail, "does not start") if bus.mode == "client" else (warn, "keeps trying")
+        # A client with credentials ends, as these may be what is wrong; a service starts it again.
+        ends = bus.mode == "client" and bus.security.kind != "none"
+        make, then = (fail, "does not start") if ends else (warn, "waits for it")
         found = f"nobody answers at {', '.join(silent)}: the daemon {then}"
         return make(found, "start the router there, or correct bus.connect", details)
     if not is_taken:
@@ -159,10 +166,12 @@ def _seen(context: CheckContext, bus: Bus) -> Finding:
         poses = [topic for name, topic in ros.inputs.items() if name in ("pose", "tf_static")]
         wanted["map"].append(ros.input_key(ros.inputs["map"]))
         wanted["pose"] += map(ros.input_key, poses)
+    elsewhere = MapsElsewhere(bus, wanted["map"])
     heard = _listen(bus, wanted)
     alive = bus.alive(f"{keys.base}/{VERSION}/*/alive", ASK_S)
     others = sorted(key.split("/")[-2] for key in alive if key != keys.of(topics.ALIVE))
     details = [f"other robots: {', '.join(others)}"] if others else []
+    details += [f"a map elsewhere: {place}" for place in elsewhere.places()]
     claims = claims_in(bus.alive(keys.of(topics.CLAIM), ASK_S))
     details += [f"daemon {own} {stand}" for own, stand in sorted(claims.items())]
     status = _status(bus, keys.rpc("status")) if keys.of(topics.ALIVE) in alive else None
@@ -184,8 +193,46 @@ def _seen(context: CheckContext, bus: Bus) -> Finding:
     if lacking:
         keys_lacking = ", ".join(key for kind in lacking for key in wanted[kind])
         found = f"{found}; it has no {' and '.join(lacking)}"
-        return warn(found, f"publish on {keys_lacking}", details)
+        to_do = f"publish on {keys_lacking}"
+        if "map" in lacking and elsewhere.places():
+            to_do += (
+                ", or take a map that is seen elsewhere: robot.name, bus.base, ros2.domain and "
+                "ros2.namespace say where this one looks"
+            )
+        return warn(found, to_do, details)
     return ok(found, details)
+
+
+class MapsElsewhere:
+    """Maps that are published under other names than this daemon's.
+
+    Args:
+        bus: where to look, from now on.
+        own: keys that the daemon's own map may have.
+    """
+
+    def __init__(self, bus: Bus, own: list[str]) -> None:
+        self._bus = bus
+        self._own = own
+        self._keys: set[str] = set()
+        # By the native key of any robot, and by that of a bridge in any namespace.
+        for key in (f"**/{VERSION}/*/{topics.MAP.suffix}", f"**/{topics.MAP.suffix}"):
+            bus.subscribe(key, lambda sample: self._keys.add(sample.key), latched=True)
+
+    def places(self) -> list[str]:
+        """Return where they are, at most ``MOST_PLACES``; those of rmw_zenoh by their tokens."""
+        found = {f"key {key}" for key in set(self._keys) if key not in self._own}
+        for token in self._bus.alive("@ros2_lv/**", ASK_S):
+            parts = token.split("/")
+            is_map = len(parts) > TOKEN_TYPE and "OccupancyGrid_" in parts[TOKEN_TYPE]
+            if not is_map or parts[TOKEN_KIND] != "MP":
+                continue
+            topic = parts[TOKEN_TYPE - 1].replace("%", "/")
+            is_own = any(key.startswith(f"{parts[1]}{topic}/") for key in self._own)
+            # Costmaps and our own coverage are grids, too.
+            if topic.endswith(f"/{topics.MAP.name}") and not is_own:
+                found.add(f"ROS_DOMAIN_ID {parts[1]}, topic {topic}")
+        return sorted(one_line(place) for place in found)[:MOST_PLACES]
 
 
 def _listen(bus: Bus, wanted: dict[str, list[str]]) -> dict[str, int]:

@@ -16,6 +16,8 @@ from fasaco_edge.config.config import BusConfig, DaemonConfig, MissionSettings, 
 from fasaco_edge.doctor import machine, report, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
 from fasaco_edge.kernels.sealed import write_sealed
+from fasaco_edge.wire import topics
+from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import QOS
 from tests.kernels.harm import HARMS
 from tests.kernels.installations import fill_with
@@ -243,14 +245,37 @@ def test_nobody_is_there():
     assert session.peers(alone).found.startswith("neither a daemon nor a router answers")
     away = session.session(at(endpoint, connect=("tcp/127.0.0.1:1",)))
     assert away.level is Level.WARN
-    assert "the daemon keeps trying" in away.found
-    assert session.session(at(connect=("tcp/127.0.0.1:1",), mode="client")).level is Level.FAIL
+    assert "the daemon waits for it" in away.found
+    client = session.session(at(connect=("tcp/127.0.0.1:1",), mode="client"))
+    assert client.level is Level.WARN
+    assert "the daemon waits for it" in client.found
 
 
 def test_an_address_that_is_not_this_computers():
     found = session.session(at("tcp/192.0.2.1:7447"))
     assert found.level is Level.FAIL
     assert "Cannot assign requested address" in found.found
+
+
+def test_maps_under_other_names_are_named(tmp_path):
+    """With the wrong robot, namespace or domain nothing is heard, though the map is there."""
+    token = "@ros2_lv/7/abc/0/3/MP/%/%robot1/slam/%robot1%map/{}/RIHS01_0/::,:,:,:,,"
+    with (
+        daemon_process(tmp_path) as daemon,
+        Outsider(daemon.endpoint),
+        open_bus(BusSettings("client", (daemon.endpoint,))) as bus,
+    ):
+        bus.advertise(Keys("moritz"), topics.MAP).put(map_bytes(pillared_room()))
+        bus.publisher("robot2/map", topics.MAP.schema, topics.MAP.qos).put(b"")
+        bus.token(token.format("nav_msgs::msg::dds_::OccupancyGrid_"))
+        bus.token(token.replace("%map", "%costmap").format("nav_msgs::msg::dds_::OccupancyGrid_"))
+        found = session.peers(at(daemon.endpoint))
+    assert [line for line in found.details if "elsewhere" in line] == [
+        "a map elsewhere: ROS_DOMAIN_ID 7, topic /robot1/map",
+        "a map elsewhere: key fasaco/@v1/moritz/map",
+        "a map elsewhere: key robot2/map",
+    ]
+    assert "ros2.namespace" in found.to_do
 
 
 def test_a_daemon_is_found_with_what_it_lacks(tmp_path):
