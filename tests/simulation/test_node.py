@@ -24,6 +24,7 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_occupancy_grid
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.twists import Velocity, encode_velocity
 from tests.simulation.rooms import building, centres, distances_to, serpentine
 
 ROBOT = """
@@ -161,6 +162,43 @@ def test_bad_paths_cost_only_themselves(planner):
     assert world.track[-1] == pytest.approx(centres((2, 5))[0], abs=2e-3)
     assert result.distance_m == pytest.approx(reports[-1].distance_m)
     assert all(0.0 < report.speed < 40.0 for report in reports[1:])
+
+
+def test_velocities_drive_it_and_it_stops_by_itself_without_them(planner):
+    config = SimulationConfig()
+    world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), config)
+    velocities = planner.bus.advertise(planner.keys, topics.CMD_VEL)
+    reports = []
+    fast = encode_velocity(Velocity(99.0, 0.0))
+
+    def driven():
+        # A path is nothing to it, nor is what is no velocity.
+        planner.send(centres((2, 2), (2, 5)))
+        velocities.put(b"rubbish")
+        velocities.put(fast)
+        return world.distance_m > 0.5
+
+    def drive(until):
+        return run_simulation(
+            world,
+            planner.keys,
+            planner.settings,
+            driver="follow",
+            should_stop=until,
+            report=reports.append,
+        )
+
+    ends = time.monotonic() + 60
+    result = drive(lambda: driven() or time.monotonic() > ends)
+    assert result.distance_m > 0.5
+    assert result.refused > 0
+    seconds = result.sim_s
+    # No faster than it can.
+    assert result.distance_m <= config.speed_m_s * seconds
+    still = drive(lambda: world.stamp_ns * 1e-9 > seconds + 2.0)
+    assert still.activity is Activity.IDLE
+    # Half a second at full speed, and the way to rest.
+    assert still.distance_m - result.distance_m < 0.25 * 0.55 + 0.25**2 / 1.0 + 0.01
 
 
 def test_it_runs_outside_the_main_thread_and_leaves_signals_alone(planner):
