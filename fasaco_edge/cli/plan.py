@@ -10,8 +10,9 @@ import numpy as np
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, check_output, writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.plan_options import EPILOG, add_options, robot_of, search_of
+from fasaco_edge.cli.plan_options import EPILOG, add_options
 from fasaco_edge.cli.plan_progress import watching
+from fasaco_edge.cli.plan_request import read_request
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map
@@ -24,14 +25,15 @@ if TYPE_CHECKING:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, print the figures, write what was asked for."""
-    robot, search = robot_of(args), search_of(args)
+    request = read_request(args)
+    robot, search = request.robot, request.search
     search.colony()  # what is wrong with it is said before kernels are compiled
     for output in (args.path_out, args.xy_out, args.png):
         check_output(output)
     if args.robots or args.robots_xy:
         from fasaco_edge.cli.plan_fleet import plan_fleet
 
-        return plan_fleet(args, robot, search)
+        return plan_fleet(args, request)
     find_map(args.map)
     compile_kernels()
     # After that, as they import the compiler.
@@ -54,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
             start=args.start,
             start_xy=args.start_xy,
             end=args.end,
-            line=args.line,
+            line=request.line,
             align=args.align,
             search=search,
             stop=asked,

@@ -25,18 +25,18 @@ from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
 
 if TYPE_CHECKING:
-    from fasaco_edge.config.config import RobotConfig
+    from fasaco_edge.cli.plan_request import PlanRequest
     from fasaco_edge.grid.lattice import Cell, CoverageLattice
     from fasaco_edge.grid.occupancy import OccupancyGrid
-    from fasaco_edge.offline.settings import Search
     from fasaco_edge.planners.fleet.division import Division
 
 MOST_ROBOTS = 32
 
 
-def plan_fleet(args: argparse.Namespace, robot: RobotConfig, search: Search) -> int:
+def plan_fleet(args: argparse.Namespace, request: PlanRequest) -> int:
     """Plan, print the figures, write what was asked for."""
-    _check(args, search)
+    robot, search = request.robot, request.search
+    _check(args, request)
     compile_kernels()
     # After that, as they import the compiler.
     from fasaco_edge.offline.maps import load_map
@@ -47,7 +47,7 @@ def plan_fleet(args: argparse.Namespace, robot: RobotConfig, search: Search) -> 
     lattice = map.lattice(robot)
     starts = args.robots or [lattice.cell_at(*xy) for xy in args.robots_xy]
     _check_apart(starts)
-    fleet = Fleet(starts, robot.cost(lattice.cell_m), args.end == HOME, args.seed, args.threads)
+    fleet = Fleet(starts, robot.cost(lattice.cell_m), args.end == HOME, search.seed, search.threads)
     asked = Interrupt()
     began, cpu = time.perf_counter(), time.process_time()
     with ctrl_c_asks(asked.asked.set), watching(search.most_s) as show:
@@ -59,10 +59,7 @@ def plan_fleet(args: argparse.Namespace, robot: RobotConfig, search: Search) -> 
             return asked(progress) or is_over(progress)
 
         division = divide(lattice, fleet, stop)
-    figures = _figures(args, lattice, division) | {
-        **driving(robot),
-        "budget_s": search.most_s,
-        "threads": args.threads,
+    figures = _figures(args, request, lattice, division) | {
         "wall_s": round(time.perf_counter() - began, 6),
         "cpu_s": round(time.process_time() - cpu, 6),
     }
@@ -74,23 +71,24 @@ def plan_fleet(args: argparse.Namespace, robot: RobotConfig, search: Search) -> 
     return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
 
 
-def _check(args: argparse.Namespace, search: Search) -> None:
+def _check(args: argparse.Namespace, request: PlanRequest) -> None:
+    search = request.search
     if args.end not in (ANYWHERE, HOME):
         raise BadConfiguration(
             f"--end {args.end[0]},{args.end[1]}: several robots cannot end in one cell",
             hint="choose --end anywhere or --end home",
         )
-    if not search.has_local_search or args.planner != "fasaco":
+    if not search.has_local_search or search.planner != "fasaco":
         raise BadConfiguration(
             "several robots are planned for by fasaco with local search",
             hint="leave --planner and --no-local-search out",
         )
-    if args.line != CELLS:
+    if request.line != CELLS:
         raise BadConfiguration(
-            f"--line {args.line}: a line over the floor is for one robot",
+            f"--line {request.line}: a line over the floor is for one robot",
             hint="leave --line out",
         )
-    if args.target_gap is not None:
+    if search.target_gap is not None:
         raise BadConfiguration(
             "--target-gap: how far several robots' walks are from the best is not known well",
             hint="choose --budget",
@@ -110,7 +108,7 @@ def _check_apart(starts: Sequence[Cell]) -> None:
 
 
 def _figures(
-    args: argparse.Namespace, lattice: CoverageLattice, division: Division
+    args: argparse.Namespace, request: PlanRequest, lattice: CoverageLattice, division: Division
 ) -> dict[str, object]:
     """Return the figures of all robots together, as JSON values."""
     steps = [len(walk) - 1 for walk in division.walks]
@@ -121,10 +119,10 @@ def _figures(
         rows, cols = np.unique(walk - (window.row0, window.col0), axis=0).T
         passed[rows, cols] += 1
     return {
-        "planner": args.planner,
-        "seed": args.seed,
+        "planner": request.search.planner,
+        "seed": request.search.seed,
         "map": str(args.map),
-        "tool_m": args.cell,
+        "tool_m": request.robot.tool_width_m,
         "cell_m": lattice.cell_m,
         "end": args.end,
         "cells": division.cells,
@@ -138,6 +136,9 @@ def _figures(
         "revisits": sum(len(walk) for walk in division.walks) - int(np.count_nonzero(passed)),
         "unreachable_cells": int(np.count_nonzero(lattice.coverable & (passed == 0))),
         "rounds": division.rounds,
+        **driving(request.robot),
+        "budget_s": request.search.most_s,
+        "threads": request.search.threads,
     }
 
 
@@ -180,7 +181,7 @@ def _write(
             f"{len(division.walks)} robots; longest walk {figures['makespan_steps']} steps{gap}; "
             f"{figures['swept_twice']} cells passed by two or more",
         ]
-        title = f"{args.planner}, {len(division.walks)} robots, seed {args.seed}"
+        title = f"{figures['planner']}, {len(division.walks)} robots, seed {figures['seed']}"
         with writing(args.png):
             draw_fleet(lattice, division.walks, grid=grid, title=title, lines=lines_below).save(
                 args.png, "PNG"

@@ -6,14 +6,8 @@ import argparse
 import math
 from pathlib import Path
 
-from fasaco_edge.cli.console.arguments import (
-    DEFAULT_CELL_M,
-    DEFAULT_RADIUS_M,
-    add_json,
-    pair_of_floats,
-    pair_of_ints,
-)
-from fasaco_edge.cli.plan_turning import LIMITS, add_turning, settle_turning
+from fasaco_edge.cli.console.arguments import add_json, pair_of_floats, pair_of_ints
+from fasaco_edge.cli.plan_turning import add_turning
 from fasaco_edge.config.config import RobotConfig
 from fasaco_edge.offline.settings import (
     ANYWHERE,
@@ -25,20 +19,21 @@ from fasaco_edge.offline.settings import (
     PAPER_VISIBILITY,
     SEARCH_Q0,
     SEARCH_VISIBILITY,
+    THOROUGH,
     WALLS,
     Search,
-    require,
 )
 from fasaco_edge.planners.colony import VISIBILITIES
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
-from fasaco_edge.simulation.robot import SimulationConfig
 
 EPILOG = """\
 examples:
   fasaco-edge plan basement --png basement.png
   fasaco-edge plan site.yaml --cell 0.35 --robot-radius 0.2 --start-xy 1.5,-2 --json
-  fasaco-edge plan site.yaml --line thorough --xy-out line.csv --png line.png
+  fasaco-edge plan site.yaml --xy-out line.csv --png line.png
   fasaco-edge plan site.yaml --line quick --align axes --xy-out line.csv
+  fasaco-edge plan site.yaml --line cells --path-out path.csv
+  fasaco-edge plan site.yaml --config robot.yaml --json
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
   fasaco-edge plan basement --no-local-search --seed 7
@@ -73,7 +68,7 @@ takes all but the velocities, the other planners none.
 """
 
 MOST_ANGLE_DEG = 360.0
-ROBOT = RobotConfig()
+ROBOT, SEARCH = RobotConfig(), Search()
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -83,57 +78,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="MAP",
         help="map_server YAML, a name from `maps`, or a coverage grid .npy (bool, True = free)",
     )
+    parser.add_argument(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="a daemon's configuration: plan for its robot, as it would; other options come first",
+    )
     _add_problem(parser.add_argument_group("problem"))
     _add_line(parser.add_argument_group("line"))
     _add_planner(parser.add_argument_group("planner"))
     _add_output(parser.add_argument_group("output"))
-
-
-def robot_of(args: argparse.Namespace) -> RobotConfig:
-    """Return the robot that the options describe.
-
-    Raises:
-        BadConfiguration: a value is impossible; the error names the option.
-    """
-    settle_turning(args, 0.0 if args.line == CELLS else ROBOT.quarter_turn_s)
-    overlap = ROBOT.overlap if args.overlap is None else args.overlap
-    for option, value in (("--cell", args.cell), ("--robot-radius", args.robot_radius)):
-        require(0.0 < value <= 10.0, option, "be in (0, 10] m", value)
-    require(0.0 < args.speed_m_s <= 10.0, "--speed-m-s", "be in (0, 10] m/s", args.speed_m_s)
-    require(0.0 <= overlap <= 0.5, "--overlap", "be in [0, 0.5], of the tool's width", overlap)
-    if args.turn_deg_s is None:
-        require(0.0 <= args.turn_s <= 600.0, "--turn-s", "be in [0, 600] s", args.turn_s)
-        turning = {"quarter_turn_s": args.turn_s}
-    else:
-        turning = {name: getattr(args, name) for name in LIMITS}
-    return RobotConfig(
-        radius_m=args.robot_radius,
-        tool_width_m=args.cell,
-        speed_m_s=args.speed_m_s,
-        overlap=overlap,
-        **turning,
-    )
-
-
-def search_of(args: argparse.Namespace) -> Search:
-    """Return how to search.
-
-    Raises:
-        BadConfiguration: a value is impossible.
-    """
-    return Search(
-        planner=args.planner,
-        local_search=not args.no_local_search,
-        ants=args.ants,
-        velocities=args.velocities,
-        q0=args.q0,
-        visibility=args.visibility,
-        beta=args.beta,
-        seed=args.seed,
-        threads=args.threads,
-        budget_s=args.budget,
-        target_gap=args.target_gap,
-    )
 
 
 def _add_problem(group: argparse._ArgumentGroup) -> None:
@@ -164,17 +118,15 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--cell",
         type=float,
-        default=DEFAULT_CELL_M,
         metavar="M",
         help="width of the tool [m]; cells are as wide, less the overlap of a line over the "
-        "floor (default: %(default)s)",
+        f"floor (default: {ROBOT.tool_width_m:g})",
     )
     group.add_argument(
         "--robot-radius",
         type=float,
-        default=DEFAULT_RADIUS_M,
         metavar="M",
-        help="radius of the robot [m]; ignored with a .npy grid (default: %(default)s)",
+        help=f"radius of the robot [m]; ignored with a .npy grid (default: {ROBOT.radius_m:g})",
     )
     end = group.add_mutually_exclusive_group()
     end.add_argument(
@@ -195,9 +147,8 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--speed-m-s",
         type=float,
-        default=SimulationConfig().speed_m_s,
         metavar="V",
-        help="speed of the robot [m/s] (default: %(default)s)",
+        help=f"speed of the robot [m/s] (default: {ROBOT.speed_m_s:g})",
     )
     add_turning(
         group,
@@ -209,12 +160,11 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
 def _add_line(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--line",
-        choices=(CELLS, "quick", "thorough"),
-        default=CELLS,
+        choices=(CELLS, "quick", THOROUGH),
         help="cells: through the centres of the cells, as the paper's planners do; quick, "
         "thorough: off the centres where walls require it, and optimised for the floor that it "
-        "sweeps, a square metre being worth 60 or 180 s; needs a YAML map "
-        "(default: %(default)s)",
+        "sweeps, a square metre being worth 60 or 180 s; needs a YAML map (default: thorough; "
+        "cells for .npy grids, several robots, and planners without local search)",
     )
     group.add_argument(
         "--overlap",
@@ -239,17 +189,15 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--planner",
         choices=PLANNER_NAMES,
-        default="fasaco",
         help="; ".join(f"{name}: {entry.about}" for name, entry in PLANNERS.items())
-        + " (default: %(default)s)",
+        + f" (default: {SEARCH.planner})",
     )
-    group.add_argument("--ants", type=int, default=1000, metavar="N", help="(default: %(default)s)")
+    group.add_argument("--ants", type=int, metavar="N", help=f"(default: {SEARCH.ants})")
     group.add_argument(
         "--velocities",
-        default="8:1",
         metavar="V",
         help="cohorts' velocities [cells/move]: 8:1 falling, 1:8 rising, 4 constant, 8,4,1 "
-        "(default: %(default)s)",
+        f"(default: {SEARCH.velocities})",
     )
     group.add_argument(
         "--q0",
@@ -264,17 +212,20 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         "neighbours "
         f"(default: {SEARCH_VISIBILITY}; {PAPER_VISIBILITY} without local search)",
     )
-    group.add_argument(
-        "--beta", type=float, default=2.0, help="weight of visibility (default: %(default)s)"
-    )
-    group.add_argument("--seed", type=int, default=0, metavar="N", help="(default: %(default)s)")
+    for name, what in (
+        ("beta", "weight of visibility"),
+        ("alpha", "weight of new pheromone, equations (7) and (8)"),
+        ("tau0", "pheromone that every move begins with, equation (7)"),
+    ):
+        told = f"{what} (default: {getattr(SEARCH, name):g})"
+        group.add_argument(f"--{name}", type=float, help=told)
+    group.add_argument("--seed", type=int, metavar="N", help=f"(default: {SEARCH.seed})")
     group.add_argument(
         "--threads",
         type=int,
-        default=1,
         metavar="N",
         help="threads that ants walk on; the path is the same for any number (default: "
-        "%(default)s)",
+        f"{SEARCH.threads})",
     )
     group.add_argument(
         "--no-local-search", action="store_true", help="the paper's colony alone, no time budget"

@@ -6,6 +6,7 @@ import argparse
 
 from fasaco_edge.config.config import RobotConfig
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.offline.settings import require
 
 # By the name of a limit: its metavar, the least and most that ``RobotConfig`` allows, their unit,
 # and what it is.
@@ -29,30 +30,28 @@ def add_turning(group: argparse._ArgumentGroup, turn_s_help: str) -> None:
         group.add_argument(_option(name), type=float, metavar=metavar, help=help_text)
 
 
-def settle_turning(args: argparse.Namespace, turn_s: float) -> None:
-    """Fill in defaults; a quarter-turn takes ``turn_s`` where nothing is said [s].
+def turning_of(args: argparse.Namespace, robot: RobotConfig) -> dict[str, float | None]:
+    """Return what the options change of a robot's turning.
 
     Raises:
         BadConfiguration: a limit is impossible, or of no use with the other options.
     """
-    if args.turn_deg_s is None:
-        for name in LIMITS:
-            if getattr(args, name) is not None:
-                raise BadConfiguration(
-                    f"{_option(name)} counts only with --turn-deg-s, which is missing"
-                )
-        args.turn_s = turn_s if args.turn_s is None else args.turn_s
-        return
-    if args.turn_s is not None:
+    limits = {name: getattr(args, name) for name in LIMITS if getattr(args, name) is not None}
+    has_rate = "turn_deg_s" in limits or (robot.turn_deg_s is not None and args.turn_s is None)
+    if limits and not has_rate:
+        name = next(iter(limits))
+        raise BadConfiguration(f"{_option(name)} counts only with --turn-deg-s, which is missing")
+    if limits and args.turn_s is not None:
         raise BadConfiguration("--turn-s and --turn-deg-s cannot both be given")
-    robot = RobotConfig()
-    for name, (_, least, most, unit, _) in LIMITS.items():
-        if getattr(args, name) is None:
-            setattr(args, name, getattr(robot, name))
-        value = getattr(args, name)
+    for name, value in limits.items():
+        _, least, most, unit, _ = LIMITS[name]
         if not least <= value <= most:
             allowed = f"[{least:g}, {most:g}] {unit}"
             raise BadConfiguration(f"{_option(name)} must be in {allowed}, got {value!r}")
+    if args.turn_s is not None:
+        require(0.0 <= args.turn_s <= 600.0, "--turn-s", "be in [0, 600] s", args.turn_s)
+        return {"quarter_turn_s": args.turn_s, "turn_deg_s": None}
+    return limits
 
 
 def _option(name: str) -> str:

@@ -23,7 +23,16 @@ from fasaco_edge.offline.floor import PlannedFloor, judged_floor
 from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.picture import picture_of
-from fasaco_edge.offline.settings import ANYWHERE, AXES, CELLS, HOME, WALLS, Search, require
+from fasaco_edge.offline.settings import (
+    ANYWHERE,
+    AXES,
+    CELLS,
+    HOME,
+    WALLS,
+    Search,
+    default_line,
+    require,
+)
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.path import CoveragePath
@@ -142,7 +151,7 @@ def plan(
         end: "anywhere", "home", or a cell.
         line: "cells", through their centres, as the paper's planners do; "quick" or "thorough":
             over the floor, what a square metre is worth being 60 or 180 s. None for "thorough",
-            and for "cells" on a coverage grid.
+            and for "cells" on a coverage grid or without local search.
         align: what the rows of cells lie along, with a line over the floor: "walls", "axes" or an
             angle [deg]; None for walls.
         search: how to search; None for the defaults.
@@ -160,7 +169,7 @@ def plan(
     require(named, "end", f"be {ANYWHERE}, {HOME} or a cell", end)
     robot = checked(robot or RobotConfig())
     search = search or Search()
-    line = line or (CELLS if map.grid is None else "thorough")
+    line = line or default_line(search, has_floor=map.grid is not None)
     ground = _ground(map, robot, start, start_xy, line, align)
     problem = _problem(ground, robot, end)
     path, ended_by, wall_s, cpu_s = _search(problem, search, stop, watch)

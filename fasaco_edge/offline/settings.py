@@ -12,7 +12,7 @@ from fasaco_edge.planners.registry import PLANNERS
 # Where a walk ends, other than in a cell.
 ANYWHERE, HOME = "anywhere", "home"
 # The line through the cells' centres; the others are in ``planners.line``.
-CELLS = "cells"
+CELLS, THOROUGH = "cells", "thorough"
 # What the cells of a line over the floor lie along; or an angle [deg].
 WALLS, AXES = "walls", "axes"
 # The search's default budget [s], and the colony's settings that serve local search best. The
@@ -30,8 +30,8 @@ class Search:
         planner: one of ``planners.registry``.
         local_search: whether a planner that can do so improves its walks; the paper's
             colony alone where False.
-        ants, velocities, beta, seed: of the colony, see ``ColonyConfig``; velocities as text, like
-            8:1.
+        ants, velocities, beta, alpha, tau0, seed: of the colony, see ``ColonyConfig``; velocities
+            as text, like 8:1.
         q0, visibility: the same; None for what serves best with local search, or without.
         threads: that ants walk on; the walk is the same for any number.
         budget_s: time after which the search ends with its best walk [s]; None for 1 s with local
@@ -50,6 +50,8 @@ class Search:
     q0: float | None = None
     visibility: str | None = None
     beta: float = 2.0
+    alpha: float = 0.1
+    tau0: float = 0.1
     seed: int = 0
     threads: int = 1
     budget_s: float | None = None
@@ -94,7 +96,17 @@ class Search:
             seed=self.seed,
             visibility=self.visibility or visibility,
             beta=self.beta,
+            alpha=self.alpha,
+            tau0=self.tau0,
         )
+
+
+def default_line(search: Search, *, has_floor: bool) -> str:
+    """Return which line is made where none is asked for.
+
+    The paper's planners drive through the centres of cells, and a coverage grid has no floor.
+    """
+    return THOROUGH if has_floor and search.has_local_search else CELLS
 
 
 def require(condition: bool, name: str, expectation: str, value: object) -> None:

@@ -162,7 +162,7 @@ def test_the_figures_of_a_map_are_right(plan, tmp_path):
     pixels = pillared_room()
     geometry = GridGeometry(*pixels.shape, 0.05, Pose2D(0.0, 0.0))
     write_map(OccupancyGrid(geometry, pixels), tmp_path / "room.yaml")
-    options = ("--cell", 0.3, "--robot-radius", 0.18, "--ants", 40)
+    options = ("--line", "cells", "--cell", 0.3, "--robot-radius", 0.18, "--ants", 40)
     figures, walk = plan(tmp_path / "room.yaml", *options, "--start-xy", "0.75,0.45")
     check(figures, walk, coverable_cells(pixels), (1, 2))
     # A room of 3.9 x 2.9 m with a pillar, but for corners. Cells lie off its walls.
@@ -187,7 +187,7 @@ def test_the_line_to_be_driven_is_written_in_the_map_frame(plan, tmp_path, origi
     pixels = pillared_room()
     file, csv = tmp_path / "room.yaml", tmp_path / "line.csv"
     write_map(OccupancyGrid(GridGeometry(*pixels.shape, 0.05, origin), pixels), file)
-    _, walk = plan(file, "--cell", 0.3, "--xy-out", csv)
+    _, walk = plan(file, "--line", "cells", "--cell", 0.3, "--xy-out", csv)
     header, *rows = csv.read_text().splitlines()
     line = [tuple(float(part) for part in row.split(",")) for row in rows]
     assert header == "x_m,y_m"
@@ -290,8 +290,42 @@ def test_cells_lie_along_walls_or_axes_or_at_an_angle(capsys, align):
 
 @pytest.mark.parametrize("align", ["walls", "30"])
 def test_the_centres_of_cells_lie_along_the_axes(capsys, align):
-    assert main(["plan", "office", "--align", align]) == Exit.CONFIG
+    assert main(["plan", "office", "--line", "cells", "--align", align]) == Exit.CONFIG
     assert "line over the floor" in capsys.readouterr().err
+
+
+def test_a_map_gets_a_line_over_its_floor_unless_the_paper_s_planners_walk(plan, grid_file):
+    lines = {
+        words: plan(*words)[0]["line"]
+        for words in (
+            ("office",),
+            ("office", "--no-local-search", "--ants", "8"),
+            ("office", "--planner", "zigzag"),
+            (str(grid_file),),
+        )
+    }
+    assert list(lines.values()) == ["thorough", "cells", "cells", "cells"]
+    figures, _ = plan("office")
+    assert figures["floor"]["swept_share"] > 0.96
+    assert figures["turn_s"] == RobotConfig().quarter_turn_s
+
+
+def test_a_plan_is_for_the_robot_of_a_configuration(plan, tmp_path):
+    file = tmp_path / "robot.yaml"
+    file.write_text(
+        "robot: {tool_width_m: 0.36, radius_m: 0.2, speed_m_s: 0.4, turn_deg_s: 60, overlap: 0.1}\n"
+        "planner: {line: quick, name: fasaco, ants: 50, seed: 9, tau0: 0.2}\n"
+    )
+    figures, _ = plan("office", "--config", file)
+    assert (figures["line"], figures["seed"], figures["budget_s"]) == ("quick", 9, 0.05)
+    assert (figures["tool_m"], figures["cell_m"]) == (0.36, pytest.approx(0.324))
+    assert (figures["speed_m_s"], figures["turn_deg_s"]) == (0.4, 60.0)
+    changed, _ = plan("office", "--config", file, "--turn-s", 2, "--cell", 0.3, "--seed", 0)
+    assert (changed["turn_s"], changed["turn_deg_s"], changed["tool_m"]) == (2.0, None, 0.3)
+    assert changed["seed"] == 0
+    # The paper's lattice, as the daemon with `planner.line: cells` counts.
+    cells, _ = plan("office", "--config", file, "--line", "cells")
+    assert (cells["cell_m"], cells["turn_deg_s"]) == (0.36, 60.0)
 
 
 @pytest.mark.parametrize("overlap", ["0.9", "-0.1", "nan"])
@@ -310,7 +344,7 @@ def test_a_start_may_be_negative(plan, tmp_path):
     geometry = GridGeometry(*pixels.shape, 0.05, Pose2D(-3.0, -3.0))
     write_map(OccupancyGrid(geometry, pixels), tmp_path / "room.yaml")
     for option, value in (("--start", "-9,-8"), ("--start-xy", "-2.25,-2.55")):
-        figures, walk = plan(tmp_path / "room.yaml", option, value, "--ants", 8)
+        figures, walk = plan(tmp_path / "room.yaml", option, value, "--ants", 8, "--line", "cells")
         assert tuple(figures["start"]) == walk[0] == (-9, -8)
 
 

@@ -1,0 +1,86 @@
+"""What the options of ``fasaco-edge plan`` ask for: a robot, a search, a line."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from fasaco_edge.cli.plan_turning import turning_of
+from fasaco_edge.config.config import DaemonConfig, RobotConfig, load_config
+from fasaco_edge.offline.settings import CELLS, Search, default_line, require
+
+# Members of ``RobotConfig`` and ``Search`` by the options for them.
+ROBOT_OPTIONS = {
+    "cell": "tool_width_m",
+    "robot_radius": "radius_m",
+    "speed_m_s": "speed_m_s",
+    "overlap": "overlap",
+}
+SEARCH_OPTIONS = {
+    **{name: name for name in ("planner", "ants", "velocities", "q0", "visibility", "beta")},
+    **{name: name for name in ("alpha", "tau0", "seed", "threads", "target_gap")},
+    "budget": "budget_s",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """What the options ask for.
+
+    Attributes:
+        robot: its size, and what driving takes.
+        search: how to search.
+        line: which line is made.
+    """
+
+    robot: RobotConfig
+    search: Search
+    line: str
+
+
+def read_request(args: argparse.Namespace) -> PlanRequest:
+    """Return what the options ask for; what they leave open is as in ``--config``, if given.
+
+    Raises:
+        BadConfiguration: a value is impossible; the error names it.
+    """
+    config = None if args.config is None else load_config(args.config)
+    search = replace(_search(config), **_given(args, SEARCH_OPTIONS))
+    if args.no_local_search:
+        search = replace(search, local_search=False)
+    has_floor = not (args.robots or args.robots_xy) and Path(args.map).suffix != ".npy"
+    line = args.line or default_line(search, has_floor=has_floor)
+    if args.line is None and config is not None and line != CELLS:
+        line = config.planner.line
+    robot = config.robot if config else RobotConfig()
+    if config is None and line == CELLS:
+        robot = msgspec.structs.replace(robot, quarter_turn_s=0.0)  # as the paper counts
+    for option in ("--cell", "--robot-radius", "--speed-m-s"):
+        value, unit = getattr(args, option[2:].replace("-", "_")), option == "--speed-m-s"
+        if value is not None:
+            require(0.0 < value <= 10.0, option, f"be in (0, 10] m{'/s' * unit}", value)
+    if args.overlap is not None:
+        allowed = 0.0 <= args.overlap <= 0.5
+        require(allowed, "--overlap", "be in [0, 0.5], of the tool's width", args.overlap)
+    changes = _given(args, ROBOT_OPTIONS) | turning_of(args, robot)
+    return PlanRequest(msgspec.structs.replace(robot, **changes), search, line)
+
+
+def _search(config: DaemonConfig | None) -> Search:
+    """Return how the daemon of a configuration searches; how ``plan`` does, without one."""
+    if config is None:
+        return Search()
+    planner = msgspec.structs.asdict(config.planner)
+    names = {field.name for field in fields(Search)} & planner.keys()
+    return Search(planner=planner["name"], **{name: planner[name] for name in names})
+
+
+def _given(args: argparse.Namespace, members: Mapping[str, str]) -> dict[str, Any]:
+    """Return the values of the options that are given, by the member each is for."""
+    values = {member: getattr(args, option) for option, member in members.items()}
+    return {member: value for member, value in values.items() if value is not None}
