@@ -38,8 +38,11 @@ if TYPE_CHECKING:
 
 MAX_PIXELS = 64_000_000
 
-# nav2's three recommended formats; PPM is Pillow's name for the PGM family.
-FORMATS = ("PPM", "PNG", "BMP")
+# nav2's three recommended formats, and the one that published maps come in; PPM is Pillow's name
+# for the PGM family. What JPEG does to sharp edges may turn unknown pixels beside walls free.
+FORMATS = ("PPM", "PNG", "BMP", "JPEG")
+# What ROS 1's map_saver writes; grey of 205, which it writes for unknown, is not free by that.
+FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 
 MODES = ("trinary", "scale", "raw")
 
@@ -48,7 +51,8 @@ def read_map(path: str | Path) -> OccupancyGrid:
     """Return the map described by a map_server YAML file.
 
     Args:
-        path: the YAML file; its ``image`` is sought from the YAML's own folder.
+        path: the YAML file; its ``image`` is sought from the YAML's own folder. Thresholds that
+            it lacks are ``FREE_THRESH`` and ``OCCUPIED_THRESH``.
 
     Raises:
         MapFileError: a file is missing, is not what it should be or too large; a key is
@@ -56,6 +60,8 @@ def read_map(path: str | Path) -> OccupancyGrid:
     """
     path = Path(path)
     keys = _YamlKeys(path, _load_yaml(path))
+    keys.values.setdefault("free_thresh", FREE_THRESH)
+    keys.values.setdefault("occupied_thresh", OCCUPIED_THRESH)
     thresholds = keys.number("free_thresh", 0, 1), keys.number("occupied_thresh", 0, 1)
     if thresholds[0] >= thresholds[1]:
         raise keys.error("free_thresh", f"less than occupied_thresh, {thresholds[1]}")
@@ -236,7 +242,7 @@ class _Image:
 
 
 def _read_image(path: Path) -> _Image:
-    """Return the pixels of a PGM, PNG or BMP file.
+    """Return the pixels of a PGM, PNG, BMP or JPEG file.
 
     Raises:
         MapFileError: it is missing, no such image, damaged, empty or too large.
@@ -255,7 +261,7 @@ def _read_image(path: Path) -> _Image:
     except Image.DecompressionBombError as error:
         raise MapFileError(f"{path}: more than {MAX_PIXELS} pixels: {error}") from error
     except UnidentifiedImageError as error:
-        raise MapFileError(f"{path}: not an image (PGM, PNG or BMP)") from error
+        raise MapFileError(f"{path}: not an image (PGM, PNG, BMP or JPEG)") from error
     except (OSError, ValueError, SyntaxError) as error:
         raise MapFileError(f"{path}: not readable as an image: {error}") from error
 

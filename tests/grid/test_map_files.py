@@ -113,6 +113,21 @@ def test_other_formats(tmp_path, name):
     assert read_map(_naming(tmp_path, name)).cells.tolist() == [[0, -1], [100, 0]]
 
 
+def test_a_jpeg_is_a_map_too(tmp_path):
+    sharp = np.full((16, 16), 254, np.uint8)
+    sharp[:, :8] = 0
+    Image.fromarray(sharp).save(tmp_path / "map.jpg", quality=95)
+    cells = read_map(_naming(tmp_path, "map.jpg")).cells
+    assert (cells[:, :8] == 100).all()
+    assert (cells[:, 8:] == 0).all()
+
+
+def test_thresholds_that_are_missing_are_those_of_map_saver(tmp_path):
+    image = grey([0, 254, 205, 100, 80])
+    path = described(tmp_path, image, drop=("free_thresh", "occupied_thresh"))
+    assert read_map(path).cells.tolist() == [[100, 0, -1, -1, 100]]
+
+
 def _naming(folder, name):
     path = described(folder)
     path.write_text(path.read_text().replace("map.png", name))
@@ -201,7 +216,7 @@ def test_impossible_values_are_named(tmp_path, changes, expected):
     assert expected in str(caught.value)
 
 
-@pytest.mark.parametrize("key", DESCRIPTION)
+@pytest.mark.parametrize("key", ["image", "resolution", "origin", "negate"])
 def test_missing_keys_are_named(tmp_path, key):
     path = described(tmp_path, grey([0]), drop=[key])
     with pytest.raises(MapFileError, match=f"{key} must be .*the key is missing"):
