@@ -82,7 +82,8 @@ class PoseEstimate:
         limits: of the base, which does what is sent as fast as it can.
 
     Attributes:
-        jump: how far the newest pose is from where the robot should be [m]; 0 where it is believed.
+        jump: how far the newest pose is from where the robot should be [m], and how far turned
+            [rad]; None where it is believed.
         pose_at: when the newest pose that is believed came [s]; None before there is one.
         measured: the newest pose as it came.
         delay: between a command and its effect on a pose that comes [s].
@@ -90,7 +91,7 @@ class PoseEstimate:
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
-        self.jump = 0.0
+        self.jump: tuple[float, float] | None = None
         self.pose_at: float | None = None
         self.delay = FIRST_DELAY_S
         self._unlike = [0.0] * len(DELAYS_S)
@@ -110,7 +111,7 @@ class PoseEstimate:
             share = 1.0 - math.exp((self.pose_at - now) / BLEND_S)
             self._believe(_between_poses(here, pose, share), now, pose)
             return
-        self.jump = math.hypot(pose.x - here.x, pose.y - here.y)
+        self.jump = _apart(pose, here)
         agrees = self._doubted is not None and _is_near(pose, self._doubted)
         self._agreeing = self._agreeing + 1 if agrees else 1
         self._doubted = pose
@@ -176,7 +177,7 @@ class PoseEstimate:
         self._measure_delay(measured, now)
         self.measured = measured
         self._pose, self.pose_at = pose, now
-        self.jump, self._doubted, self._agreeing = 0.0, None, 0
+        self.jump, self._doubted, self._agreeing = None, None, 0
 
 
 def moved(pose: Pose2D, command: Command, seconds: float) -> Pose2D:
@@ -202,6 +203,11 @@ def _between_poses(pose: Pose2D, other: Pose2D, share: float) -> Pose2D:
 
 
 def _is_near(pose: Pose2D, other: Pose2D) -> bool:
-    far = math.hypot(pose.x - other.x, pose.y - other.y)
-    turned = abs(math.remainder(pose.yaw - other.yaw, math.tau))
+    far, turned = _apart(pose, other)
     return far <= JUMP_M and turned <= JUMP_RAD
+
+
+def _apart(pose: Pose2D, other: Pose2D) -> tuple[float, float]:
+    """Return how far two poses are from each other, and how far turned [m, rad]."""
+    far = math.hypot(pose.x - other.x, pose.y - other.y)
+    return far, abs(math.remainder(pose.yaw - other.yaw, math.tau))

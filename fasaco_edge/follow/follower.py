@@ -6,6 +6,7 @@ No clock, no session: who calls tells the time, by a clock that never steps.
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 
 from fasaco_edge.errors import FasacoError, MalformedMessage
@@ -106,17 +107,17 @@ class Follower:
 
     def take_path(self, payload: bytes) -> None:
         """Follow another path from now on; an empty one, or one that is none, stops the robot."""
-        if not self._is_new:
-            self._before = self._route
-        self._route, self._path_detail, self._path_of = None, "", self._planner
+        self._path_of = self._planner
         try:
             points = PathPoints(payload)
         except MalformedMessage as error:
-            self._path_state, self._path_detail = State.BAD_PATH, str(error)
+            self._have_none(State.BAD_PATH, str(error))
             return
         if not points.left:
-            self._path_state = State.EMPTY_PATH
+            self._have_none(State.EMPTY_PATH)
             return
+        if not self._is_new:
+            self._before = self._route
         self._path_frame = points.frame
         self._route = Route(points.take, self._limits.steered)
         self._is_new = True
@@ -127,7 +128,8 @@ class Follower:
             return
         self._planner, self._status_at = planner, now
         if planner and self._path_of and planner != self._path_of:
-            self._route, self._path_state, self._path_of = None, State.NO_PATH, ""
+            self._have_none(State.NO_PATH)
+            self._path_of = ""
         elif planner and not self._path_of:
             self._path_of = planner
 
@@ -142,7 +144,7 @@ class Follower:
             command = self._steer(now) if self.state is State.DRIVING else None
         except MalformedMessage as error:
             # Further on the path is none.
-            self._route, self._path_state, self._path_detail = None, State.BAD_PATH, str(error)
+            self._have_none(State.BAD_PATH, str(error))
             self.state, self.detail, command = State.BAD_PATH, str(error), None
         if command is None:
             self._pursuit.stand()
@@ -154,6 +156,11 @@ class Follower:
         if command is None and now - self._driven_at <= ZEROS_S:
             return STAND
         return command
+
+    def _have_none(self, state: State, detail: str = "") -> None:
+        """Have no path; the one before is withdrawn, too."""
+        self._route, self._before, self._is_new = None, None, False
+        self._path_state, self._path_detail = state, detail
 
     def _trouble(self, now: float) -> tuple[State, str]:
         """Return why the robot has to stand, and figures; or that it may drive."""
@@ -171,8 +178,9 @@ class Follower:
         estimate = self._estimate
         if estimate.pose_at is None:
             return State.NO_POSE, "none has come"
-        if estimate.jump:
-            return State.POSE_JUMPED, f"by {estimate.jump:.1f} m"
+        if estimate.jump is not None:
+            far, turned = estimate.jump
+            return State.POSE_JUMPED, f"by {far:.1f} m and {math.degrees(turned):.0f} deg"
         if (age_s := now - estimate.pose_at) > self._patience.pose_s:
             return State.OLD_POSE, f"{age_s:.2f} s"
         if self._frame != self._path_frame:

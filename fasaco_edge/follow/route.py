@@ -179,7 +179,8 @@ class Route:
             self._legs[:1] = [_leg(begin, leg.end, leg.stops)] if rest >= LEAST_LEG_M else []
         elif math.dist(here, begin) > BEGINNING_M:
             return Joining.ELSEWHERE
-        self._legs.insert(0, _leg(here, begin, True))
+        if math.dist(here, begin) >= LEAST_LEG_M:
+            self._legs.insert(0, _leg(here, begin, True))
         return Joining.JOINED
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
@@ -189,7 +190,8 @@ class Route:
         while way <= LEAD_M and (leg := self._leg(index)):
             along, aside = leg.placed(point)
             # Nearer, the robot may not come to rest there.
-            is_ahead = 0.0 < along <= leg.length and LEAST_LEAD_M <= way + along <= LEAD_M
+            on_leg = LEAST_LEG_M <= along <= leg.length + LEAST_LEG_M
+            is_ahead = on_leg and LEAST_LEAD_M <= way + along <= LEAD_M
             if is_ahead and abs(aside) <= BESIDE_M:
                 return [*self._legs[:index], _leg(leg.start, leg.at(along), True)]
             way += leg.length

@@ -18,12 +18,17 @@ class Told:
 
     def __init__(self):
         self.now = 10.0
-        self.follower = Follower(LIMITS)
-        self.follower.take_planner("a1", self.now)
-        self.follower.take_path(path_message(AHEAD))
-        self.x = 0.0
+        self.begin_anew(AHEAD)
         self.drive(1.0)
         assert self.follower.state is State.DRIVING
+
+    def begin_anew(self, xy):
+        """Start the follower again, at 0, 0."""
+        self.x = 0.0
+        self.follower = Follower(LIMITS)
+        self.follower.take_planner("a1", self.now)
+        self.follower.take_path(path_message(xy))
+        self.pose()
 
     def pose(self, x=None, y=0.0, yaw=0.0, frame="map"):
         where = Pose2D(self.x if x is None else x, y, yaw)
@@ -67,6 +72,37 @@ def test_zeros_are_sent_for_a_second_and_then_nothing(told):
         zeros += 1
     assert zeros * PERIOD_S == pytest.approx(ZEROS_S, abs=1.5 * PERIOD_S)
     assert told.step() is None
+
+
+@pytest.mark.parametrize("how", ["empty", "refused", "another planner"])
+def test_a_path_that_was_withdrawn_is_not_driven_to_the_next_one(told, how):
+    """The robot was braking for a path beside it when both were withdrawn."""
+    told.drive(2.0)
+    told.follower.take_path(path_message([(told.x, 0.3), (told.x, 3.0)]))
+    told.drive(0.1)
+    assert told.follower.state is State.DRIVING
+    if how == "another planner":
+        told.follower.take_planner("b2", told.now)
+    else:
+        told.follower.take_path(path_message([]) if how == "empty" else b"")
+    told.drive(3.0)
+    x = told.x
+    told.follower.take_path(path_message([(x + 1.5, 0.0), (x + 1.5, 3.0)]))
+    told.drive(3.0)
+    assert told.follower.state is State.PATH_ELSEWHERE
+    assert told.x == x
+
+
+def test_a_path_may_begin_exactly_where_the_robot_stands(told):
+    """And have a corner, 0.25 m away, that the robot was driving to."""
+    told.begin_anew([(0.0, 0.0), (3.0, 0.25)])
+    told.step()
+    told.follower.take_path(path_message([(0.0, 0.0), (0.0, 0.25), (3.0, 0.25)]))
+    # So late nothing moves the pose on.
+    told.now += 3.0
+    told.pose()
+    assert told.step() is not None
+    assert told.follower.state is State.DRIVING
 
 
 @pytest.mark.parametrize(
@@ -118,6 +154,19 @@ def test_a_pose_that_jumps_stops_it_and_is_believed_if_it_stays(told):
         assert told.step() == STAND
     # It is there now: beside the path, where the robot stands.
     assert told.follower.state is State.OFF_PATH
+
+
+def test_a_pose_that_jumps_by_its_yaw_alone_stops_it_while_it_turns(told):
+    told.begin_anew([(0.0, 0.0), (0.0, 5.0)])
+    yaw = 0.0
+    for _ in range(10):
+        told.pose(yaw=yaw)
+        yaw += told.step().turn_rate * PERIOD_S
+    assert told.follower.state is State.DRIVING
+    told.pose(yaw=yaw + 2.5)
+    assert told.step() == STAND
+    assert told.follower.state is State.POSE_JUMPED
+    assert told.follower.detail.startswith("by 0.0 m and 14")
 
 
 def test_a_pose_that_jumps_along_the_path_does_not_count_as_driven(told):
