@@ -81,7 +81,8 @@ class Follower:
         self._estimate = PoseEstimate(limits)
         self._pursuit = Pursuit(limits, 1.0 / RATE_HZ)
         self._grip = Grip()
-        self._frame = ""
+        self._frame, self._stamp_ns = "", 0
+        self._repeats = False
         self._pose_fault: FasacoError | None = None
         self._route: Route | None = None
         self._path_frame = ""
@@ -96,9 +97,12 @@ class Follower:
         self._driven_at = -float("inf")
 
     def take_pose(self, stamped: StampedPose, now: float) -> None:
-        """Take a pose in, as it comes."""
+        """Take a pose in, as it comes; one with the stamp of the one before is no new one."""
+        self._repeats = stamped.stamp_ns != 0 and stamped.stamp_ns == self._stamp_ns
+        if self._repeats and stamped.frame == self._frame:
+            return
         self._pose_fault = None
-        self._frame = stamped.frame
+        self._frame, self._stamp_ns = stamped.frame, stamped.stamp_ns
         self._estimate.take(stamped.pose, now)
 
     def refuse_pose(self, error: FasacoError) -> None:
@@ -121,6 +125,7 @@ class Follower:
         self._path_frame = points.frame
         self._route = Route(points.take, self._limits.steered)
         self._is_new = True
+        self._grip.try_again()
 
     def take_planner(self, planner: str, now: float) -> None:
         """Note which daemon plans, "" for none; another one's path is not this one's."""
@@ -182,7 +187,8 @@ class Follower:
             far, turned = estimate.jump
             return State.POSE_JUMPED, f"by {far:.1f} m and {math.degrees(turned):.0f} deg"
         if (age_s := now - estimate.pose_at) > self._patience.pose_s:
-            return State.OLD_POSE, f"{age_s:.2f} s"
+            why = ", and comes again and again by its stamp" if self._repeats else ""
+            return State.OLD_POSE, f"{age_s:.2f} s{why}"
         if self._frame != self._path_frame:
             return State.WRONG_FRAME, f"pose in {self._frame!r}, path in {self._path_frame!r}"
         return None
@@ -190,7 +196,7 @@ class Follower:
     def _steer(self, now: float) -> Command | None:
         assert self._route is not None
         if self._grip.is_lost(self._estimate.measured, now):
-            self.state = State.NOT_MOVING
+            self.state, self.detail = State.NOT_MOVING, f"tried {self._grip.tries} times"
             return None
         pose = self._estimate.at(now)
         here = (pose.x, pose.y)

@@ -7,21 +7,29 @@ import math
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.grid.geometry import Pose2D
 
-# Looked at after so long [s]. Then the robot should have come so far [m], of which it has to have
-# come the share; a radian of turning counts as the third.
-LOOK_S = 2.0
+# Looked at once the robot should have come so far [m], of which it has to have come the share; a
+# radian of turning counts as the third. A fast one is looked at after so long [s]: poses are late.
 LEAST_WAY_M, LEAST_SHARE, WAY_M_RAD = 0.2, 0.15, 0.2
-# So long it is left alone before the next try [s].
+LOOK_S = 2.0
+# So long it is left alone before the next try [s], and after so many tries until its pose shows
+# that it came this far [m], or there is something else to do.
 REST_S = 2.0
+TRIES = 3
+FREED_M = 0.1
 
 
 class Grip:
-    """Compares what was sent with how far the poses came."""
+    """Compares what was sent with how far the poses came.
+
+    Attributes:
+        tries: in how many tries, one after the other, the robot did not move.
+    """
 
     def __init__(self) -> None:
-        self._since = -math.inf
+        self.tries = 0
         self._from = Pose2D(0.0, 0.0)
-        self._way = 0.0
+        # What it was told since then: how far, and for how long.
+        self._way, self._seconds = 0.0, 0.0
         self._rests_until = -math.inf
 
     def is_lost(self, pose: Pose2D, now: float) -> bool:
@@ -31,19 +39,35 @@ class Grip:
             pose: the newest one measured.
             now: the time [s].
         """
+        if self._seconds == 0.0 and self.tries < TRIES:
+            self._look_from(pose)
         if now < self._rests_until:
             return True
-        if now - self._since < LOOK_S:
-            return False
         came = math.hypot(pose.x - self._from.x, pose.y - self._from.y)
         came += WAY_M_RAD * abs(math.remainder(pose.yaw - self._from.yaw, math.tau))
-        is_lost = self._way >= LEAST_WAY_M and came < LEAST_SHARE * self._way
-        self._since, self._from, self._way = now, pose, 0.0
+        if self.tries >= TRIES:
+            if came < FREED_M:
+                return True
+            self.tries = 0
+            self._look_from(pose)
+        if self._seconds < LOOK_S or self._way < LEAST_WAY_M:
+            return False
+        is_lost = came < LEAST_SHARE * self._way
+        self._look_from(pose)
+        self.tries = self.tries + 1 if is_lost else 0
         if is_lost:
             self._rests_until = now + REST_S
-            self._since = self._rests_until
         return is_lost
+
+    def try_again(self) -> None:
+        """Let the robot try as often as at first: there is something else to do."""
+        self.tries = 0
 
     def sent(self, command: Command, seconds: float) -> None:
         """Note what is sent, for how long."""
-        self._way += seconds * (command.speed + WAY_M_RAD * abs(command.turn_rate))
+        if way := seconds * (command.speed + WAY_M_RAD * abs(command.turn_rate)):
+            self._way += way
+            self._seconds += seconds
+
+    def _look_from(self, pose: Pose2D) -> None:
+        self._from, self._way, self._seconds = pose, 0.0, 0.0

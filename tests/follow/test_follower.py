@@ -1,6 +1,7 @@
 """Why the robot stands: each thing that the follower takes has to be there."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -22,17 +23,26 @@ class Told:
         self.drive(1.0)
         assert self.follower.state is State.DRIVING
 
-    def begin_anew(self, xy):
+    def begin_anew(self, xy, limits=LIMITS):
         """Start the follower again, at 0, 0."""
         self.x = 0.0
-        self.follower = Follower(LIMITS)
+        self.follower = Follower(limits)
         self.follower.take_planner("a1", self.now)
         self.follower.take_path(path_message(xy))
         self.pose()
 
-    def pose(self, x=None, y=0.0, yaw=0.0, frame="map"):
+    def pose(self, x=None, y=0.0, yaw=0.0, frame="map", stamp_ns=0):
         where = Pose2D(self.x if x is None else x, y, yaw)
-        self.follower.take_pose(StampedPose(where, frame), self.now)
+        self.follower.take_pose(StampedPose(where, frame, stamp_ns), self.now)
+
+    def states_where_it_is(self, seconds):
+        """Return the state of each step while the pose stays as it is."""
+        states = []
+        for _ in range(round(seconds / PERIOD_S)):
+            self.pose()
+            self.step()
+            states.append(self.follower.state)
+        return states
 
     def step(self, *, status=True):
         self.now += PERIOD_S
@@ -219,16 +229,57 @@ def test_a_daemon_that_says_nothing_stops_it(told):
 
 def test_a_robot_that_does_not_move_is_left_alone_for_a_while(told):
     """Against a wall, or with its wheels off the ground."""
-    states = []
-    for _ in range(200):
-        told.pose()
-        told.step()
-        states.append(told.follower.state)
+    states = told.states_where_it_is(10.0)
     assert {*states} == {State.DRIVING, State.NOT_MOVING}
     pushes = states.count(State.DRIVING) * PERIOD_S
     assert pushes < 0.7 * len(states) * PERIOD_S
     told.drive(5.0)
     assert told.follower.state is State.DRIVING
+
+
+def test_after_a_few_tries_it_stands_until_it_is_moved_or_has_another_path(told):
+    """A localiser that says the same pose for ever must not make it drive blind for ever."""
+    for _ in range(2):
+        states = told.states_where_it_is(60.0)
+        assert {*states[-900:]} == {State.NOT_MOVING}
+        assert 2.0 < states.count(State.DRIVING) * PERIOD_S < 8.0
+        assert told.follower.detail == "tried 3 times"
+        told.follower.take_path(path_message([(told.x, 0.0), (5.0, 0.0)]))
+    assert {*told.states_where_it_is(60.0)[-900:]} == {State.NOT_MOVING}
+    told.x += 0.15
+    told.drive(5.0)
+    assert told.follower.state is State.DRIVING
+    assert told.x > 1.0
+
+
+@pytest.mark.parametrize(
+    ("speed", "turn_deg_s", "xy"),
+    [(0.09, 60.0, [(0.0, 0.0), (5.0, 0.0)]), (0.3, 25.0, [(0.0, 0.0), (0.0, 5.0)])],
+)
+def test_a_slow_robot_that_does_not_move_is_seen_too(told, speed, turn_deg_s, xy):
+    limits = replace(LIMITS, speed=speed, turn_rate=math.radians(turn_deg_s))
+    told.begin_anew(xy, limits)
+    assert State.NOT_MOVING in told.states_where_it_is(3.5)
+
+
+def test_a_robot_that_starts_late_after_a_rest_is_not_one_that_does_not_move(told):
+    """A fast one, whose poses come late: it should have come far before they can show it."""
+    told.begin_anew(AHEAD, replace(LIMITS, speed=2.0, acceleration=4.0))
+    told.follower.take_path(path_message([]))
+    told.states_where_it_is(30.0)
+    told.follower.take_path(path_message(AHEAD))
+    assert {*told.states_where_it_is(0.5)} == {State.DRIVING}
+
+
+def test_a_pose_whose_stamp_stays_is_no_new_one(told):
+    for _ in range(round(1.0 / PERIOD_S)):
+        told.pose(stamp_ns=7)
+        command = told.step()
+    assert command in (STAND, None)
+    assert told.follower.state is State.OLD_POSE
+    assert "by its stamp" in told.follower.detail
+    told.pose(stamp_ns=8)
+    assert told.step().speed > 0.0
 
 
 def test_it_stands_before_anything_has_come():

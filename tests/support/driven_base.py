@@ -116,7 +116,8 @@ class DrivenBase:
             self.pose = moved(self.pose, newest or Command(), POSE_S)
             now = time.monotonic()
             if self.says_poses:
-                self._pose.put(encode_pose_stamped(StampedPose(self.pose, self.frame, 1)))
+                stamped = StampedPose(self.pose, self.frame, time.time_ns())
+                self._pose.put(encode_pose_stamped(stamped))
                 self.last_pose_at = now
             if self.says_status and self._token is not None and now - told > 0.5:
                 told = now
