@@ -15,6 +15,7 @@ from fasaco_edge.offline.settings import (
     BUDGET_S,
     CELLS,
     HOME,
+    MOST_ANGLE_DEG,
     PAPER_Q0,
     PAPER_VISIBILITY,
     SEARCH_Q0,
@@ -37,7 +38,7 @@ examples:
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
   fasaco-edge plan basement --no-local-search --seed 7
-  fasaco-edge plan office --robots 3,3 12,30 5,18 --end home --png fleet.png
+  fasaco-edge plan office --robots 0,0 10,5 5,8 --end home --png fleet.png
 
 figures:
   revisits         steps + 1 - distinct cells
@@ -67,7 +68,6 @@ from walks of the colony's ants (up to 8,000 cells; larger maps have local searc
 takes all but the velocities, the other planners none.
 """
 
-MOST_ANGLE_DEG = 360.0
 ROBOT, SEARCH = RobotConfig(), Search()
 
 

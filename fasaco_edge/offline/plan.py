@@ -28,6 +28,7 @@ from fasaco_edge.offline.settings import (
     AXES,
     CELLS,
     HOME,
+    MOST_ANGLE_DEG,
     WALLS,
     Search,
     default_line,
@@ -45,6 +46,9 @@ from fasaco_edge.planners.planner import (
 )
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
+
+# Rows and columns of the farthest cells there are: arrays of cells are int32.
+MOST_INDEX = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -165,8 +169,13 @@ def plan(
     """
     if start is not None and start_xy is not None:
         raise BadConfiguration("start and start_xy cannot both be given")
-    named = not isinstance(end, str) or end in (ANYWHERE, HOME)
-    require(named, "end", f"be {ANYWHERE}, {HOME} or a cell", end)
+    named = end in (ANYWHERE, HOME) if isinstance(end, str) else _is_cell(end)
+    require(named, "end", f"be {ANYWHERE}, {HOME} or a cell (row, col)", end)
+    require(start is None or _is_cell(start), "start", "be a cell (row, col)", start)
+    is_point = start_xy is None or (
+        len(start_xy) == 2 and all(math.isfinite(at) for at in start_xy)
+    )
+    require(is_point, "start_xy", "be a point (x, y) [m]", start_xy)
     robot = checked(robot or RobotConfig())
     search = search or Search()
     line = line or default_line(search, has_floor=map.grid is not None)
@@ -175,6 +184,11 @@ def plan(
     path, ended_by, wall_s, cpu_s = _search(problem, search, stop, watch)
     xy = ground.line(path.cells, line, robot, ends=problem.end is not None)
     return Plan(map, robot, line, search, ground, problem, path, xy, ended_by, wall_s, cpu_s)
+
+
+def _is_cell(cell: Cell) -> bool:
+    """Tell whether it is two whole numbers that any map may have."""
+    return len(cell) == 2 and all(isinstance(at, int) and abs(at) <= MOST_INDEX for at in cell)
 
 
 def checked(robot: RobotConfig) -> RobotConfig:
@@ -203,7 +217,7 @@ def _ground(
             f"line {line}: {map.name} is a coverage grid, which lies in no map frame",
             hint="plan on a map_server YAML file, or ask for the line through cells",
         )
-    is_angle = isinstance(align, int | float) and math.isfinite(align)
+    is_angle = isinstance(align, int | float) and abs(align) <= MOST_ANGLE_DEG
     allowed = is_angle or align in (WALLS, AXES, None)
     require(allowed, "align", f"be {WALLS}, {AXES} or an angle in degrees", align)
     if line == CELLS and align not in (AXES, None):

@@ -15,6 +15,7 @@ ANYWHERE, HOME = "anywhere", "home"
 CELLS, THOROUGH = "cells", "thorough"
 # What the cells of a line over the floor lie along; or an angle [deg].
 WALLS, AXES = "walls", "axes"
+MOST_ANGLE_DEG = 360.0
 # The search's default budget [s], and the colony's settings that serve local search best. The
 # colony alone is the paper's, and walks to its end.
 BUDGET_S = 1.0

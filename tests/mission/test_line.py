@@ -339,6 +339,25 @@ def test_a_plan_goes_on_from_the_cell_that_the_robot_is_nearest_to():
         assert math.dist(stand, robot.at) < 0.65 * CELL_M
 
 
+def test_a_robot_that_stands_gets_its_line_again():
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(room(6.0, 3.0)))
+    for _ in range(20):
+        robot.tell()
+    robot.drive(20)
+    told, line = len(robot.reasons), robot.line
+    robot.line = []  # it ran into something, and gave up
+    for _ in range(100):
+        robot.now += 0.3
+        robot.tell()
+        if robot.line:
+            break
+    assert robot.reasons[told:] == ["robot stands"]
+    assert math.dist(robot.line[0], robot.at) < 0.05
+    assert robot.line[-1] == line[-1]
+    robot.finish()
+
+
 def test_a_pause_leaves_the_line_as_it_was():
     mission = Mission(CONFIG)
     robot = Robot(mission)

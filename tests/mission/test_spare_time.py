@@ -131,7 +131,7 @@ def test_attempts_take_their_share_of_the_time_and_less_in_vain():
             )
         else:
             drive.tell(after=0.05)
-    assert drive.revision == 1  # nothing was better
+    assert {update.reason for update in drive.updates[1:]} <= {"robot stands"}  # nothing was better
     gaps = np.diff(asked_at)
     shortest = [0.05 / SHARE * halved for halved in (1, 2, 4, 8, 16, 16)]
     assert len(gaps) >= len(shortest)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,6 +21,9 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 # A robot that left its path, or stands still at its end, gets a new one, but not
 # more often than this [s]: a flickering pose must not keep the planner busy.
 PATIENCE_S = 1.0
+# A robot that stands for so long on its path gets it again [s]: it may have lost it, or stopped for
+# something that is gone.
+STANDING_S, STANDING_M = 15.0, 0.1
 
 # The states of a robot that drives, or soon will.
 DRIVING = (State.PLANNING, State.COVERING, State.RETURNING)
@@ -41,6 +45,9 @@ class Executive:
     # The cell the robot is in, and since when.
     _cell: Cell | None = field(default=None, init=False)
     _entered_at: float = field(default=0.0, init=False)
+    # Where the robot has been since when, to STANDING_M.
+    _place: tuple[float, float] = field(default=(math.inf, math.inf), init=False)
+    _came_at: float = field(default=0.0, init=False)
 
     def status(self) -> tuple[State, str]:
         """Return the state and its reason as they are reported."""
@@ -81,6 +88,8 @@ class Executive:
         ):
             return self._settle(update)
         self._report_driving()
+        if self._stands_on_path() and update is None:
+            update = route.publish(route.path.ahead, "robot stands", now)
         is_free = self._state is State.COVERING and route.pending is None and not route.wanted
         return Decision(path=update, plan=route.request_improvement(now) if is_free else None)
 
@@ -156,6 +165,15 @@ class Executive:
         if self._cell != last or last == tuple(self.route.path.ahead[0].tolist()):
             return False
         return self._has_waited() and self._now - self._entered_at >= PATIENCE_S
+
+    def _stands_on_path(self) -> bool:
+        """Tell whether the robot has long been in one place, with a path to drive."""
+        assert self.map.pose is not None
+        here = self.map.pose.pose.x, self.map.pose.pose.y
+        if math.dist(here, self._place) > STANDING_M:
+            self._place, self._came_at = here, self._now
+        since = max(self._came_at, self.route.published_at)
+        return len(self.route.path.ahead) > 1 and self._now - since >= STANDING_S
 
     def _request(self, cell: Cell, update: PathUpdate | None) -> Decision:
         """Request the plan that is wanted; where nothing is to be covered, go on."""

@@ -47,8 +47,8 @@ class Route:
         # The path over a map that has moved since, until a pose tells where to.
         self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
-        # Counts the published paths over other cells than the one before.
-        self._walks = 0
+        # Counts the paths whose cells are numbered anew, and those of them over other cells.
+        self._numberings = self._walks = 0
         self.plans = self.attempts = 0
         self.unchanged = self.outdated = 0
         self.wanted = ""
@@ -180,7 +180,7 @@ class Route:
         """Request a better path; None without spare time, or where too little of it is left."""
         if not self._spare.is_available(now):
             return None
-        self._attempt = Attempt.at(self.path, self._walks, self._orders, self.attempts + 1)
+        self._attempt = Attempt.at(self.path, self._numberings, self._orders, self.attempts + 1)
         if self._attempt is None:
             self._spare.skip(now)
             return None
@@ -254,7 +254,7 @@ class Route:
         self, attempt: Attempt, event: PlanReady, area: ReachableArea, now: float
     ) -> PathUpdate | None:
         """Publish the path with a better rest; None where that saves too little."""
-        if attempt.walk != self._walks:
+        if attempt.numbering != self._numberings:
             return None
         cells = attempt.joined(self.path, event.path.cells)
         if cells is None or area.drivable_prefix(cells) < len(cells):
@@ -285,7 +285,8 @@ class Route:
     ) -> PathUpdate:
         """Publish a path in place of the one before."""
         self.revision += 1
-        self._walks += 1
+        self._numberings += 1
+        self._walks += not np.array_equal(cells, self.path.ahead)
         self.published_at = now
         self.path, self._kept = PathProgress(cells), PathProgress(NO_CELLS)
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)

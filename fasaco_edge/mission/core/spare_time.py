@@ -61,19 +61,21 @@ class Attempt:
     """An attempt at a better path from one of its cells on.
 
     Attributes:
-        walk: number of the path, counting those over other cells.
+        numbering: of the path's cells, which ``index`` and ``joint`` count by.
         index: where on it the robot is.
         joint: index of that cell.
         problem: that the rest of the path solves, the end of the one that is left.
     """
 
-    walk: int
+    numbering: int
     index: int
     joint: int
     problem: CoverageProblem
 
     @classmethod
-    def at(cls, path: PathProgress, walk: int, orders: Sequencer, number: int) -> Attempt | None:
+    def at(
+        cls, path: PathProgress, numbering: int, orders: Sequencer, number: int
+    ) -> Attempt | None:
         """Return attempt ``number`` at a path; None where too little of it is left."""
         # The next cells ahead of the robot stay as they are; a shorter rest is not worth a search.
         joint = path.index + HELD_CELLS
@@ -84,7 +86,7 @@ class Attempt:
             problem = orders.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
         except FasacoError:
             return None  # the map has changed: a repair is due
-        return cls(walk, path.index, joint, problem)
+        return cls(numbering, path.index, joint, problem)
 
     def joined(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
         """Return the cells ahead on a better path, int32 (n, 2); None if it saves too little."""

@@ -76,7 +76,7 @@ class Polisher:
             ahead.note(min(begin, first), max(end, begin + 1), MOVED)
             is_all = ahead.first_below(MOVED) == len(ahead.line)
             if is_all or begins_m > NEAR_M:
-                return is_all
+                return is_all or self._is_due(ahead)
             lengths = ahead.lengths()
         begin = ahead.first_below(POLISHED)
         if begin >= len(ahead.line) - 1 or lengths[begin] > AHEAD_M:
