@@ -25,7 +25,8 @@ turn_deg_s, turn_deg_s2 and steered_deg. Where the configuration has a block ros
 its topics and velocities go to ros2.topics.cmd_vel; else by the keys `pose` and `cmd_vel`.
 
 The robot is told to stand, within 0.2 s, while
-  the newest pose is older than --pose-age, or is none, or has jumped
+  the newest pose is older than --pose-age, or is none, or has jumped; of poses from tf, odometry
+    is older than --pose-age, or the localiser's transform older than 2 s (or --pose-age, if longer)
   the path is empty (mission pause, cancel; done), is driven, or is none
   it is further than 0.3 m off the path, or does not move as it is told
   no daemon plans for it, or the daemon has said nothing for 2.5 s

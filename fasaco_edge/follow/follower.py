@@ -16,6 +16,7 @@ from fasaco_edge.follow.pursuit import Pursuit
 from fasaco_edge.follow.route import Joining, Route
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.wire.path_points import PathPoints
+from fasaco_edge.wire.poses import Link
 
 # Commands a second.
 RATE_HZ = 20.0
@@ -23,6 +24,8 @@ RATE_HZ = 20.0
 ZEROS_S = 1.0
 # Further than this from its leg the robot is not on the path any more [m].
 OFF_PATH_M = 0.3
+# Links of poses that are transforms may be older than poses [s].
+LINK_S = 2.0
 
 
 class State(enum.Enum):
@@ -51,10 +54,13 @@ class Patience:
 
     Attributes:
         pose_s: the newest pose, by its arrival [s].
+        link_s: each other transform between map and robot, by its arrival [s]: localisers say where
+            odometry began less often than odometry comes.
         status_s: the newest sign of a daemon that is there [s].
     """
 
     pose_s: float = 0.5
+    link_s: float = LINK_S
     status_s: float = 2.5
 
 
@@ -83,6 +89,7 @@ class Follower:
         self._grip = Grip()
         self._frame, self._stamp_ns = "", 0
         self._repeats = False
+        self._link: Link | None = None
         self._pose_fault: FasacoError | None = None
         self._route: Route | None = None
         self._path_frame = ""
@@ -104,6 +111,10 @@ class Follower:
         self._pose_fault = None
         self._frame, self._stamp_ns = stamped.frame, stamped.stamp_ns
         self._estimate.take(stamped.pose, now)
+
+    def heard_link(self, link: Link) -> None:
+        """Note which transform between map and robot came longest ago."""
+        self._link = link
 
     def refuse_pose(self, error: FasacoError) -> None:
         """Stop for a pose that is none, until the next one."""
@@ -186,12 +197,21 @@ class Follower:
         if estimate.jump is not None:
             far, turned = estimate.jump
             return State.POSE_JUMPED, f"by {far:.1f} m and {math.degrees(turned):.0f} deg"
-        if (age_s := now - estimate.pose_at) > self._patience.pose_s:
-            why = ", and comes again and again by its stamp" if self._repeats else ""
-            return State.OLD_POSE, f"{age_s:.2f} s{why}"
+        if age := self._age(estimate.pose_at, now):
+            return State.OLD_POSE, age
         if self._frame != self._path_frame:
             return State.WRONG_FRAME, f"pose in {self._frame!r}, path in {self._path_frame!r}"
         return None
+
+    def _age(self, pose_at: float, now: float) -> str:
+        """Return how old pose or link is, where that is too old; else ""."""
+        if (age_s := now - pose_at) > self._patience.pose_s:
+            why = ", and comes again and again by its stamp" if self._repeats else ""
+            return f"{age_s:.2f} s{why}"
+        if self._link and (age_s := now - self._link.came_at) > self._patience.link_s:
+            transform = self._link.transform
+            return f"{age_s:.2f} s: transform of {transform.child!r} in {transform.frame!r}"
+        return ""
 
     def _steer(self, now: float) -> Command | None:
         assert self._route is not None

@@ -15,7 +15,7 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, BusSettings, open_bus
 from fasaco_edge.errors import BusUnavailable, FasacoError
 from fasaco_edge.follow.estimate import STAND, Command, Limits
-from fasaco_edge.follow.follower import RATE_HZ, Follower, Patience, State
+from fasaco_edge.follow.follower import LINK_S, RATE_HZ, Follower, Patience, State
 from fasaco_edge.follow.settings import FollowSettings, PoseSource
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
@@ -103,7 +103,11 @@ class FollowerNode:
                 math.radians(settings.turn_deg_s2),
                 math.radians(settings.steered_deg),
             ),
-            Patience(settings.pose_age_s, Patience().status_s * settings.pace),
+            Patience(
+                settings.pose_age_s,
+                max(settings.pose_age_s, LINK_S),
+                Patience().status_s * settings.pace,
+            ),
             moves=not settings.dry_run,
         )
         self._decoder = PoseDecoder(settings.pose_schema, settings.frames)
@@ -166,13 +170,18 @@ class FollowerNode:
             sample, source, at = self._poses.popleft()
             try:
                 pose = self._decoder.decode(
-                    sample.payload, source.schema or sample.schema, is_static=source.is_static
+                    sample.payload,
+                    source.schema or sample.schema,
+                    is_static=source.is_static,
+                    came_at=at,
                 )
             except FasacoError as error:
                 follower.refuse_pose(error)
                 continue
             if pose is not None:
                 follower.take_pose(pose, at)
+            if (link := self._decoder.oldest_link) is not None:
+                follower.heard_link(link)
         if (path := self._path.take(0.0)) is not None:
             follower.take_path(path.payload)
 

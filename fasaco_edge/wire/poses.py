@@ -145,6 +145,21 @@ def _read_transform(reader: CdrReader, field: str) -> Transform:
     return Transform(frame, child, stamp_ns, reader.doubles(POSE, f"{field}.transform"))
 
 
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A transform as the newest between two frames.
+
+    Attributes:
+        transform: it.
+        is_static: whether it holds for ever.
+        came_at: when it came [s]; one with the stamp of the one before is no new one.
+    """
+
+    transform: Transform
+    is_static: bool
+    came_at: float
+
+
 class TransformTree:
     """Remembers of each frame where it lies, and follows the robot's up to the map's.
 
@@ -154,20 +169,27 @@ class TransformTree:
     Args:
         map_frame: the frame poses are wanted in.
         robot_frame: the robot's own.
+
+    Attributes:
+        oldest: of the links between map and robot that move the one that came longest ago; None
+            where none moves, or one is missing.
     """
 
     def __init__(self, map_frame: str, robot_frame: str) -> None:
         self._map_frame = map_frame
         self._robot_frame = robot_frame
-        # By child frame; whether it is static.
-        self._links: dict[str, tuple[Transform, bool]] = {}
+        self.oldest: Link | None = None
+        # By child frame.
+        self._links: dict[str, Link] = {}
         self._told: StampedPose | None = None
 
     def follow(self, map_frame: str, robot_frame: str) -> None:
         """Want poses between other frames from now on; what is known of all of them stays."""
         self._map_frame, self._robot_frame = map_frame, robot_frame
 
-    def take(self, transforms: Iterable[Transform], *, is_static: bool) -> StampedPose | None:
+    def take(
+        self, transforms: Iterable[Transform], *, is_static: bool, came_at: float = 0.0
+    ) -> StampedPose | None:
         """Take transforms in; return the robot's pose if it is known and another than before.
 
         Its stamp is that of the link nearest to the robot that moves: of odometry.
@@ -175,6 +197,7 @@ class TransformTree:
         Args:
             transforms: as they came.
             is_static: whether they are static.
+            came_at: when they came [s].
 
         Raises:
             TransformLoop: the frames hang on each other; their links are forgotten.
@@ -184,19 +207,27 @@ class TransformTree:
         for transform in transforms:
             if transform.child not in self._links and len(self._links) >= MAX_TRANSFORMS:
                 refuse(TF_MESSAGE, "number of frames", f"at most {MAX_TRANSFORMS}", "one more")
-            self._links[transform.child] = transform, is_static
+            self._links[transform.child] = self._link(transform, is_static, came_at)
         chain = self._chain()
+        moving = [link for link in chain if not link.is_static]
+        self.oldest = min(moving, key=lambda link: link.came_at, default=None)
         if not chain:
             return None
         pose = Pose2D(0.0, 0.0)
-        for transform, _ in chain:
-            pose = _placed(self._planar(transform), pose)
-        moving = next((link for link, for_ever in chain if not for_ever), chain[0][0])
-        stamped = StampedPose(pose, self._map_frame, moving.stamp_ns)
+        for link in chain:
+            pose = _placed(self._planar(link.transform), pose)
+        nearest = (moving or chain)[0].transform
+        stamped = StampedPose(pose, self._map_frame, nearest.stamp_ns)
         if stamped == self._told:
             return None
         self._told = stamped
         return stamped
+
+    def _link(self, transform: Transform, is_static: bool, came_at: float) -> Link:
+        before = self._links.get(transform.child)
+        if before is not None and transform.stamp_ns == before.transform.stamp_ns != 0:
+            came_at = before.came_at
+        return Link(transform, is_static, came_at)
 
     def _planar(self, transform: Transform) -> Pose2D:
         try:
@@ -205,9 +236,9 @@ class TransformTree:
             del self._links[transform.child]  # else each message from now on would be refused
             raise
 
-    def _chain(self) -> list[tuple[Transform, bool]]:
+    def _chain(self) -> list[Link]:
         """Return the links from the robot's frame up to the map's; none where one is missing."""
-        chain: list[tuple[Transform, bool]] = []
+        chain: list[Link] = []
         frame = self._robot_frame
         while frame != self._map_frame:
             link = self._links.get(frame)
@@ -216,7 +247,7 @@ class TransformTree:
             chain.append(link)
             if len(chain) > len(self._links):
                 raise self._loop(frame)
-            frame = link[0].frame
+            frame = link.transform.frame
         return chain
 
     def _loop(self, frame: str) -> TransformLoop:
@@ -224,7 +255,7 @@ class TransformTree:
         names = []
         while (link := self._links.pop(frame, None)) is not None:
             names.append(frame)
-            frame = link[0].frame
+            frame = link.transform.frame
         looped = ", ".join(names[:8])
         return TransformLoop(f"tf: the transforms of these frames form a loop: {looped}")
 
@@ -263,8 +294,21 @@ class PoseDecoder:
             self._transforms = TransformTree(*frames)
         self._transforms.follow(*frames)
 
-    def decode(self, payload: bytes, schema: str, *, is_static: bool = False) -> StampedPose | None:
+    @property
+    def oldest_link(self) -> Link | None:
+        """What ``TransformTree.oldest`` is; None where poses are no transforms."""
+        return self._transforms.oldest if self._transforms else None
+
+    def decode(
+        self, payload: bytes, schema: str, *, is_static: bool = False, came_at: float = 0.0
+    ) -> StampedPose | None:
         """Return the pose; None for transforms that tell no new one.
+
+        Args:
+            payload: the message.
+            schema: its type; "" where it came without one.
+            is_static: whether its transforms are static.
+            came_at: when it came [s], for ``oldest_link``.
 
         Raises:
             MalformedMessage: it is none of these.
@@ -273,4 +317,5 @@ class PoseDecoder:
         schema = schema or self.schema
         if self._transforms is None or schema != TF_MESSAGE:
             return decode_pose(payload, schema)
-        return self._transforms.take(decode_transforms(payload), is_static=is_static)
+        transforms = decode_transforms(payload)
+        return self._transforms.take(transforms, is_static=is_static, came_at=came_at)

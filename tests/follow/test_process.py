@@ -14,6 +14,7 @@ from fasaco_edge.follow.estimate import Command
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.twists import decode_velocity
 from tests.campaigns import stop_tries
+from tests.campaigns.raw_messages import transform
 from tests.support.driven_base import DrivenBase, follower_process
 from tests.support.processes import ENVIRONMENT, PROGRAM, resident_mb
 
@@ -135,6 +136,43 @@ def test_limits_names_and_topics_come_from_the_configuration(base, tmp_path):
     assert len(heard[0].attachment) == 33
     assert {"NN", "MP"} <= {part for token in tokens for part in token.split("/")}
     assert base.heard == []
+
+
+@pytest.mark.parametrize(
+    ("silent", "most_s", "said"),
+    [("odom", 2.5, "transform of 'odom' in 'map'"), ("base_link", 1.0, "pose too old")],
+)
+def test_a_robot_whose_localiser_or_odometry_is_silent_stands(base, tmp_path, silent, most_s, said):
+    """Poses from transforms: the other one goes on, and what it says changes."""
+    config, log = tmp_path / "config.yaml", tmp_path / "log"
+    sections = {
+        "robot": {"name": "robot", "speed_m_s": 0.05},
+        "ros2": {"kind": "rmw_zenoh", "domain": 7, "pose": "tf"},
+    }
+    config.write_text(yaml.safe_dump(sections))
+    tf = base.bus.publisher("7/tf/tf2_msgs::msg::dds_::TFMessage_/RIHS01_0", "")
+    heard = []
+    base.bus.subscribe("7/cmd_vel/**", heard.append)
+    links = {"odom": "map", "base_link": "odom"}
+
+    def drives(and_says):
+        count = len(heard)
+        for child in and_says:
+            shift = 0.001 * (count % 2)
+            event = {"frame": links[child], "child": child, "stamp": time.time_ns()}
+            tf.put(transform(event | {"x": shift, "y": 0.0, "yaw": 0.0}))
+        time.sleep(0.05)
+        speeds = [decode_velocity(one.payload, schemas.TWIST).speed_m_s for one in heard[count:]]
+        return any(speed > 0.0 for speed in speeds)
+
+    base.plans()
+    base.send_path(*AHEAD)
+    with follower_process(base.endpoint, log, "--config", str(config)):
+        until(lambda: drives(links))
+        begun = time.monotonic()
+        until(lambda: not drives(links.keys() - {silent}) and said in log.read_text(), 10.0)
+        assert time.monotonic() - begun < most_s + 0.5
+        until(lambda: drives(links))
 
 
 def velocity(sample):

@@ -76,6 +76,25 @@ def test_what_tells_nothing_new_is_no_pose(tree):
     assert told(tree, link("odom", "base_link", stamp_ns=2)).stamp_ns == 2
 
 
+def test_the_oldest_link_that_moves_is_known(tree):
+    """What comes again with its stamp is not new, and what is static is never old."""
+
+    def oldest(came_at, *transforms, is_static=False):
+        tree.take(transforms, is_static=is_static, came_at=came_at)
+        return (tree.oldest.transform.child, tree.oldest.came_at) if tree.oldest else None
+
+    assert oldest(1.0, link("base_footprint", "base_link"), is_static=True) is None
+    assert oldest(2.0, link("map", "odom", stamp_ns=1)) is None
+    assert oldest(3.0, link("odom", "base_footprint", stamp_ns=1)) == ("odom", 2.0)
+    assert oldest(4.0, link("odom", "base_footprint", stamp_ns=2)) == ("odom", 2.0)
+    assert oldest(5.0, link("map", "odom", stamp_ns=1)) == ("odom", 2.0)
+    assert oldest(6.0, link("map", "odom", stamp_ns=2)) == ("base_footprint", 4.0)
+    # No stamp is none that stays.
+    assert oldest(7.0, link("odom", "base_footprint", stamp_ns=0)) == ("odom", 6.0)
+    assert oldest(8.0, link("map", "odom", stamp_ns=3)) == ("base_footprint", 7.0)
+    assert oldest(9.0, link("odom", "base_footprint", stamp_ns=0)) == ("odom", 8.0)
+
+
 def test_what_lies_beside_the_chain_may_be_anything(tree):
     wheel = Transform("base_link", "wheel", 1, (math.nan,) * 7)
     camera = Transform("base_link", "camera", 1, (0.0, 0.0, 0.0, 0.5, 0.5, 0.5, 0.5))
