@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from fasaco_edge.config.ros import RosConfig
     from fasaco_edge.follow.settings import FollowSettings, PoseSource
 
+# Descriptor of standard input; it may be closed, and sys.stdin None.
+STDIN = 0
 EPILOG = """\
 Speeds and accelerations are those of the configuration: robot.speed_m_s, acceleration_m_s2,
 turn_deg_s, turn_deg_s2 and steered_deg. Where the configuration has a block ros2, poses come from
@@ -28,11 +30,12 @@ The robot is told to stand, within 0.2 s, while
   the newest pose is older than --pose-age, or is none, or has jumped; of poses from tf, odometry
     is older than --pose-age, or the localiser's transform older than 2 s (or --pose-age, if longer)
   the path is empty (mission pause, cancel; done), is driven, or is none
-  it is further than 0.3 m off the path, or does not move as it is told
+  it is further than 0.3 m off the path, or does not move as it is told (three tries, 2 s apart)
   no daemon plans for it, or the daemon has said nothing for 2.5 s
-and when this program ends. It drives on by itself when that is over. Zeros are sent for a second
-after a stop, then nothing. A base has to stop by itself where nothing comes for 0.5 s: nobody else
-can, if this program or its computer dies.
+and when this program ends. It drives on by itself when that is over: after the third try once the
+pose has moved by 0.1 m, or another path comes. A pose with the stamp of the one before is no new
+one. Zeros are sent for a second after a stop, then nothing. A base has to stop by itself where
+nothing comes for 0.5 s: nobody else can, if this program or its computer dies.
 
 examples:
   fasaco-edge follow --config /etc/fasaco-edge/config.yaml --dry-run
@@ -94,7 +97,9 @@ def _become_small(args: argparse.Namespace) -> NoReturn:
     reading, writing = os.pipe()
     os.write(writing, document)
     os.close(writing)
-    os.dup2(reading, sys.stdin.fileno())
+    os.dup2(reading, STDIN)
+    # Where nothing was open there, the pipe itself may be, which ends with this program otherwise.
+    os.set_inheritable(STDIN, True)
     words = ["follow", "--given", "--log-level", args.log_level]
     if args.with_parent is not None:
         words += ["--with-parent", str(args.with_parent)]

@@ -53,11 +53,11 @@ def run_follower(
         stop: ends it.
         out_of: makes what commands are sent by.
         report: is told each second what would be sent, in a dry run.
-
-    Raises:
-        BusUnavailable: an address is wrong.
     """
-    with _joined(settings, stop) as bus:
+    bus = _joined(settings, stop)
+    if bus is None:
+        return
+    with bus:
         node = FollowerNode(settings, bus, out_of(bus, settings), report)
         try:
             node.run(stop)
@@ -70,19 +70,18 @@ def native_out(bus: Bus, settings: FollowSettings) -> Out:
     return bus.publisher(settings.cmd_key, settings.schema, topics.CMD_VEL.qos or VOLATILE)
 
 
-def _joined(settings: FollowSettings, stop: threading.Event) -> Bus:
-    """Join the bus, once somebody listens there."""
+def _joined(settings: FollowSettings, stop: threading.Event) -> Bus | None:
+    """Join the bus, once somebody listens there; None where ``stop`` is set before."""
     told = False
-    while True:
+    while not stop.is_set():
         try:
             return open_bus(BusSettings("client", settings.connect, secured=settings.secured))
         except BusUnavailable as error:
-            if stop.is_set():
-                raise
             if not told:
                 log.warning("waiting for the bus at %s: %s", ", ".join(settings.connect), error)
                 told = True
             stop.wait(RETRY_S)
+    return None
 
 
 class FollowerNode:

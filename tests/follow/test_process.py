@@ -16,7 +16,7 @@ from fasaco_edge.wire.twists import decode_velocity
 from tests.campaigns import stop_tries
 from tests.campaigns.raw_messages import transform
 from tests.support.driven_base import DrivenBase, follower_process
-from tests.support.processes import ENVIRONMENT, PROGRAM, resident_mb
+from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint, resident_mb
 
 AHEAD = ((0.0, 0.0), (3.0, 0.0), (3.0, 3.0))
 
@@ -106,6 +106,29 @@ def test_it_waits_for_the_bus_and_says_so(tmp_path):
             process.terminate()
             process.wait(30)
             bus.close()
+
+
+def test_a_signal_while_it_waits_for_the_bus_ends_it_quietly(tmp_path):
+    log = tmp_path / "log"
+    with follower_process(free_endpoint(), log) as process:
+        until(lambda: "waiting for the bus" in log.read_text())
+    assert process.returncode == 0
+    assert len(log.read_text().splitlines()) == 1
+
+
+def test_it_starts_without_standard_input(tmp_path):
+    log = tmp_path / "log"
+    words = ["sh", "-c", 'exec "$@" <&-', "sh", *PROGRAM, "follow", "--connect", free_endpoint()]
+    with (
+        log.open("wb") as stderr,
+        subprocess.Popen(words, stderr=stderr, env=ENVIRONMENT) as process,
+    ):
+        try:
+            until(lambda: process.poll() is not None or "waiting for the bus" in log.read_text())
+        finally:
+            process.terminate()
+    assert "waiting for the bus" in log.read_text()
+    assert process.returncode == 0
 
 
 def test_limits_names_and_topics_come_from_the_configuration(base, tmp_path):
