@@ -19,5 +19,5 @@ def ros_out(bus: Bus, settings: FollowSettings) -> RosPublisher:
         bus.token(node.token)
         bus.token(token)
         gid = gid_of(token)
-    qos = topics.CMD_VEL.qos
-    return RosPublisher(bus.publisher(settings.cmd_key, settings.schema, qos or VOLATILE), gid)
+    out = bus.publisher(settings.cmd_key, settings.schema, topics.CMD_VEL.qos or VOLATILE)
+    return RosPublisher(out, gid)
