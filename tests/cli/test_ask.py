@@ -13,7 +13,7 @@ from tests.support.processes import daemon_process, fasaco_edge
 from tests.support.rooms import map_bytes, pose_bytes, room
 
 SAID = {
-    "path": "first plan",
+    "path": "poses ",
     "status": "covering",
     "coverage": "to_cover",
     "pheromone": "best_steps",

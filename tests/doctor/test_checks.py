@@ -297,7 +297,7 @@ def test_a_daemon_is_found_with_what_it_lacks(tmp_path):
         outsider.put("pose", pose_bytes(1.0, 1.0))
         outsider.wait_status(lambda status: status["state"] == "covering")
         assert session.peers(context).level is Level.OK
-        assert session.peers(context).found.startswith("the daemon runs: covering, path 1")
+        assert session.peers(context).found.startswith("the daemon runs: covering, path ")
 
 
 def test_who_publishes_is_heard_without_a_daemon(tmp_path):

@@ -347,7 +347,7 @@ def test_a_robot_that_stands_gets_its_line_again():
     robot.drive(20)
     told, line = len(robot.reasons), robot.line
     robot.line = []  # it ran into something, and gave up
-    for _ in range(100):
+    for _ in range(150):
         robot.now += 0.3
         robot.tell()
         if robot.line:

@@ -23,7 +23,7 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 PATIENCE_S = 1.0
 # A robot that stands for so long on its path gets it again [s]: it may have lost it, or stopped for
 # something that is gone.
-STANDING_S, STANDING_M = 15.0, 0.1
+STANDING_S, STANDING_M = 30.0, 0.1
 
 # The states of a robot that drives, or soon will.
 DRIVING = (State.PLANNING, State.COVERING, State.RETURNING)
