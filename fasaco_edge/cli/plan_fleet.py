@@ -93,6 +93,12 @@ def _check(args: argparse.Namespace, request: PlanRequest) -> None:
             "--target-gap: how far several robots' walks are from the best is not known well",
             hint="choose --budget",
         )
+    for option, value in (("--align", args.align), ("--overlap", args.overlap)):
+        if value is not None:
+            raise BadConfiguration(
+                f"{option}: is of a line over the floor, which is for one robot",
+                hint=f"leave {option} out",
+            )
     count = len(args.robots or args.robots_xy)
     if count > MOST_ROBOTS:
         raise BadConfiguration(f"at most {MOST_ROBOTS} robots share a floor, got {count}")

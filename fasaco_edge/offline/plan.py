@@ -144,7 +144,7 @@ def plan(
 ) -> Plan:
     """Plan a walk over all cells of a map that the robot can reach, and the line along it.
 
-    The first call on a computer compiles kernels, for up to a minute or two.
+    The first call on a computer compiles kernels, for two to four minutes.
 
     Args:
         map: what to cover.
