@@ -29,3 +29,25 @@ BEGUN_FIRST = ("tests/replay/test_replay.py", "tests/test_taint.py", "tests/watc
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with some files; the order of the rest stays as it is."""
     items.sort(key=lambda item: item.nodeid.partition("::")[0] not in BEGUN_FIRST)
+
+
+FAILED = pytest.StashKey[bool]()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item):
+    """Note whether the phase that ended failed."""
+    report = yield
+    item.stash[FAILED] = report.failed
+    return report
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> None:
+    """Tear all fixtures down after a test that failed, not its own alone.
+
+    `make test` repeats it once. Of a recorded mission that a busy machine held up, a fixture of
+    the module, it would fail again.
+    """
+    if item.stash[FAILED]:
+        item.session._setupstate.teardown_exact(None)

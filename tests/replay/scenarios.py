@@ -113,6 +113,16 @@ def left(mission: Mission) -> set[Cell]:
     return {(row + window.row0, col + window.col0) for row, col in found} - visited(mission)
 
 
+def stands_on_unknown(mission: Mission) -> bool:
+    """Tell whether the map does not know part of the ground around the robot's cell."""
+    pose, grid, cell_m = mission.pose.pose, mission.grid, mission.lattice.cell_m
+    x, y = ((math.floor(at / cell_m) + 0.5) * cell_m for at in (pose.x, pose.y))
+    col0, row0 = grid.geometry.to_pixels(x - 0.5 * cell_m, y - 0.5 * cell_m)
+    col1, row1 = grid.geometry.to_pixels(x + 0.5 * cell_m, y + 0.5 * cell_m)
+    around = grid.cells[math.floor(row0) : math.ceil(row1), math.floor(col0) : math.ceil(col1)]
+    return bool(np.any(around == UNKNOWN))
+
+
 def driven_m(samples: Samples, poses: Sequence[int]) -> float:
     """Return how far the robot drives over some of its poses [m]."""
     way = [decode_pose(samples[index].sample.payload, POSE_STAMPED).pose for index in poses]
