@@ -17,10 +17,10 @@ from fasaco_edge.bench.benchmark import (
     seconds,
     seconds_above_zero,
 )
-from fasaco_edge.bench.processes import DaemonProcess, cpu_seconds, warm_kernels
+from fasaco_edge.bench.processes import DaemonProcess, warm_kernels
 from fasaco_edge.bench.robot import MapSource, building, robot_pose, with_crate
 from fasaco_edge.drawing.spread import Spread, document, median, text
-from fasaco_edge.host.processes import has_loaded, resident_mb
+from fasaco_edge.host.processes import cpu_seconds, has_loaded, resident_mb
 from fasaco_edge.host.processes import peak_mb as peak_mb_of
 
 MEASURES = (

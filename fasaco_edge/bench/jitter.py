@@ -19,11 +19,11 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds_above_zero,
 )
-from fasaco_edge.bench.processes import DaemonProcess, cpu_seconds, place, warm_kernels, weighed
+from fasaco_edge.bench.processes import DaemonProcess, place, warm_kernels, weighed
 from fasaco_edge.bench.robot import CoveringRobot, robot_beside
 from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.errors import ProcessEnded
-from fasaco_edge.host.processes import python_program
+from fasaco_edge.host.processes import cpu_seconds, python_program
 
 # As the daemon's unit has it.
 NICENESS, WEIGHT = 10, 20

@@ -171,12 +171,6 @@ def _last_lines(log: Path) -> str:
     return "".join(f"\n  {line}" for line in lines)
 
 
-def cpu_seconds(pid: int) -> float:
-    """Return how long a process and its threads have run [s], those that ended included."""
-    # clock_getcpuclockid(3): the clock of a process is made of its id.
-    return time.clock_gettime((~pid << 3) | 2)
-
-
 def place(pid: int, cores: Set[int], niceness: int) -> None:
     """Let all threads of a process run on these cores, and as nicely.
 

@@ -30,8 +30,9 @@ from fasaco_edge.wire import topics
 
 LOG = logging.getLogger(__name__)
 
-# SIGTERM to exit takes at most two seconds; the recorder's footer comes first.
-RECORDER_STOP_S = 1.2
+# SIGTERM to exit takes at most two seconds; the recorder's footer comes first. A recorder that
+# still works, on a slow computer, gets what ``TimeoutStopSec=`` of the unit leaves.
+RECORDER_STOP_S, RECORDER_LONGEST_S = 1.2, 6.0
 WORKER_STOP_S = 0.4
 # The ledger is written meanwhile: its disk gets this long in all, and at least the second figure
 # once they have ended.
@@ -177,5 +178,5 @@ def _serve(
         stopped = time.monotonic()
         loop.close(WORKER_STOP_S)
         if recorder is not None:
-            recorder.close(RECORDER_STOP_S)
+            recorder.close(RECORDER_STOP_S, RECORDER_LONGEST_S)
         ledger.close(max(stopped + LEDGER_STOP_S - time.monotonic(), LEDGER_LEAST_S))

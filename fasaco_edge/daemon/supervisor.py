@@ -16,7 +16,7 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.host.processes import python_program
+from fasaco_edge.host.processes import cpu_seconds, python_program
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import decode_tolerant
 from fasaco_edge.wire.status import Recorder, SupervisedRecorder
@@ -29,6 +29,8 @@ LONGEST_PAUSE_S = 30.0
 SILENT_AFTER_S = 10.0
 # Its first report may take longer: slow computers load its libraries for half a minute.
 START_WITHIN_S = 120.0
+# One that hangs at its end uses less processor time than this, each time that is waited for it [s].
+WORKS_S = 0.01
 
 
 class RecorderSupervisor:
@@ -80,17 +82,29 @@ class RecorderSupervisor:
         except OSError as error:
             self._process, self._death = None, f"could not be started: {error.strerror}"
 
-    def close(self, timeout_s: float) -> None:
-        """End the recorder; kill it where its footer is not written in ``timeout_s`` [s]."""
-        if self._process is None:
+    def close(self, timeout_s: float, longest_s: float) -> None:
+        """End the recorder; kill it where its footer is not written in ``timeout_s`` [s].
+
+        One that works, on a slow or busy computer, gets up to ``longest_s`` [s]: what it heard
+        last is written then.
+        """
+        if self._process is None or self._process.poll() is not None:
             return
+        asked, pid = time.monotonic(), self._process.pid
+        worked_s = cpu_seconds(pid)
         self._process.terminate()
-        try:
-            self._process.wait(timeout_s)
-        except subprocess.TimeoutExpired:
-            LOG.warning("recorder did not end in %.1f s: killed", timeout_s)
-            self._process.kill()
-            self._process.wait()
+        while True:
+            try:
+                self._process.wait(timeout_s)
+                return
+            except subprocess.TimeoutExpired:
+                before, worked_s = worked_s, cpu_seconds(pid)
+            waited_s = time.monotonic() - asked
+            if worked_s - before < WORKS_S or waited_s + timeout_s > longest_s:
+                break
+        LOG.warning("recorder did not end in %.1f s: killed", waited_s)
+        self._process.kill()
+        self._process.wait()
 
     def _take_report(self, now: float) -> None:
         sample = self._reports.take(timeout_s=0.0)

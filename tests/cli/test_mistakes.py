@@ -10,8 +10,8 @@ import time
 import numpy as np
 import pytest
 
-from fasaco_edge.bench import processes as placement
 from fasaco_edge.cli import main
+from fasaco_edge.host.processes import cpu_seconds
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge, free_endpoint
 
 NOBODY = "tcp/127.0.0.1:1"
@@ -177,7 +177,7 @@ def test_ctrl_c_ends_a_plan_with_the_best_walk_so_far(folder):
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT
     ) as process:
         # Not before it is at work: Python's own start cannot be interrupted in order.
-        while placement.cpu_seconds(process.pid) < 4.0:
+        while cpu_seconds(process.pid) < 4.0:
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
         printed, said = process.communicate(timeout=120)

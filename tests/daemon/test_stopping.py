@@ -10,6 +10,8 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
+from fasaco_edge.host.processes import cpu_seconds
+from fasaco_edge.recording.read.repair import scan_recording
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, is_running
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, room
@@ -112,3 +114,22 @@ def test_a_recorder_that_hangs_does_not_hold_the_end_up(tmp_path):
         os.kill(recorder, signal.SIGSTOP)
         print(f"ended after {1e3 * running.stop():.0f} ms")
         assert not is_running(recorder)
+
+
+def test_a_slow_recorder_gets_the_time_that_it_needs(tmp_path):
+    """As on a busy computer: it runs for a moment now and then."""
+    with recording_into(tmp_path) as (running, recorder):
+        running.process.send_signal(signal.SIGTERM)
+        deadline = time.monotonic() + 3.0
+        while time.monotonic() < deadline:
+            os.kill(recorder, signal.SIGSTOP)
+            time.sleep(0.8)
+            used_s = cpu_seconds(recorder)
+            os.kill(recorder, signal.SIGCONT)
+            while is_running(recorder) and cpu_seconds(recorder) < used_s + 0.02:
+                time.sleep(0.001)
+        assert running.process.wait(60.0) == 0
+        assert "killed" not in running.log_text()
+    (path,) = tmp_path.glob("*.rrd")
+    with path.open("rb") as recording:
+        assert scan_recording(recording).has_footer

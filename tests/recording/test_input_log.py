@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,23 +13,28 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.bus.arrival import Arrival, Sample
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
-from fasaco_edge.recording.write import input_log
+from fasaco_edge.recording.write import input_log, recorder
 from fasaco_edge.recording.write.input_log import InputLog
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter, WriterState
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.path_digest import DIGEST_BYTES, PATH_DIGEST, digest
 from fasaco_edge.wire.paths import encode_path
 from fasaco_edge.wire.poses import decode_pose, encode_pose_stamped
 from fasaco_edge.wire.schemas import POSE_STAMPED
+from tests.support.recordings import TEXT, bus_on_free_port, read_column, read_summary
 
 SECOND_NS = 1_000_000_000
 BEGAN_NS = 1_700_000_000 * SECOND_NS
@@ -156,6 +162,27 @@ def test_of_a_path_there_is_a_digest_and_of_a_status_what_is_new(tmp_path):
     assert path.sample.payload == digest(xy.tobytes())
     assert len(path.sample.payload) == DIGEST_BYTES
     assert [one.sample for one in statuses] == [desk.told[1].sample, desk.told[3].sample]
+
+
+def test_what_waits_at_the_end_is_an_input_and_drawn_as_far_as_there_is_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(recorder, "LAST_DRAWN_NS", 0)
+    with bus_on_free_port() as (bus, _):
+        one = recorder.Recorder(DaemonConfig(), bus, tmp_path, DiskBudget(10**9, 0), None)
+        one.listen()
+        publisher = bus.advertise(Keys(), topics.POSE)
+        poses = [encode_pose_stamped(StampedPose(Pose2D(x, 0.0), "map", x)) for x in range(300)]
+        for pose in poses:
+            publisher.put(pose)
+        while len(one._inbox._waiting) < len(poses):
+            time.sleep(0.01)
+        assert one.end()
+    (path,) = parts(tmp_path)
+    samples = RecordedSamples([path])
+    assert [each.sample.payload for each in samples if each.topic == "pose"] == poses
+    assert samples.missing == 0
+    assert entities.ROBOT not in read_summary(path).rows
+    said = [line for (line,) in read_column(path, entities.RECORDER_LOG, TEXT).values]
+    assert "300 messages that came last are not drawn: there was no time" in said
 
 
 def test_a_recording_without_samples_is_named(tmp_path):

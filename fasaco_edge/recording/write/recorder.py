@@ -44,8 +44,8 @@ TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000
 # The daemon publishes a status once a second.
 SILENCE_NS = 3_500_000_000
-# How long the samples that wait at the end may take to be written [ns].
-LAST_SAMPLES_NS = 300_000_000
+# How long drawing the samples that wait at the end may take [ns].
+LAST_DRAWN_NS = 300_000_000
 EXIT_STALLED = 1
 
 
@@ -172,12 +172,16 @@ class Recorder:
 
     def end(self) -> bool:
         """Write what waits and the footer; False where the disk does not take them."""
-        deadline_ns = time.monotonic_ns() + LAST_SAMPLES_NS
+        deadline_ns, undrawn = time.monotonic_ns() + LAST_DRAWN_NS, 0
         for arrival in self._inbox.take(0.0):
-            if time.monotonic_ns() < deadline_ns:
-                self._write(arrival)
+            is_late = time.monotonic_ns() >= deadline_ns
+            self._write(arrival, is_drawn=not is_late)
+            undrawn += is_late
+        self._inputs.note_lost(self._inbox.lost)
         self._writer.at(self._clock.now_ns())
         self._inputs.finish()
+        if undrawn:
+            self.note(f"{undrawn} messages that came last are not drawn: there was no time")
         self._report_state("stopping", "asked to end")
         self._scene.finish()
         return self._writer.close()
@@ -205,7 +209,8 @@ class Recorder:
         self._inputs.write_if_due(now_ns)
         self._writer.sync(now_ns)
 
-    def _write(self, arrival: Arrival) -> None:
+    def _write(self, arrival: Arrival, *, is_drawn: bool = True) -> None:
+        """Write a sample; one that is not drawn is an input for a replay all the same."""
         self._messages += 1
         self._writer.message(arrival.wall_ns)
         if arrival.topic == "status" and _is_rival(arrival.sample.payload):
@@ -213,6 +218,8 @@ class Recorder:
             self._scene.add_line(entities.BUS_LOG, line, "WARN")
             return
         self._inputs.add(arrival)
+        if not is_drawn:
+            return
         try:
             # What has no drawer, as the turn log, is an input for a replay alone.
             if (draw := self._drawers.get(arrival.topic)) is not None:
