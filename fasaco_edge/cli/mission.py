@@ -20,6 +20,7 @@ examples:
   fasaco-edge mission start                         everything the robot can reach
   fasaco-edge mission start --passes 2 --return-home
   fasaco-edge mission start --zone "kitchen:0,0;4,0;4,3;0,3" --zone "hall:4,0;6,0;6,9;4,9"
+  fasaco-edge mission start --zone kitchen          a zone of the daemon's configuration
   fasaco-edge mission start --keep-out "1,1;2,1;2,2;1,2"
   fasaco-edge mission start --order evening.yaml
   fasaco-edge mission pause && fasaco-edge mission resume
@@ -29,9 +30,8 @@ evening.yaml, or the same as JSON; all lengths in metres in the frame of the map
     - name: kitchen
       polygon: [[0, 0], [4, 0], [4, 3], [0, 3]]
       passes: 2
-    - name: hall
-      polygon: [[4, 0], [6, 0], [6, 9], [4, 9]]
-  keep_out:                   # the robot must not touch these
+    - name: hall              # without a polygon: mission.zones of the configuration has it
+  keep_out:                   # the robot must not touch these, nor mission.keep_out
     - [[1, 1], [2, 1], [2, 2], [1, 2]]
   passes: 1                   # of zones without passes, and of everything
   return_home: true           # at the end, to where the mission began
@@ -76,15 +76,17 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
         "--zone",
         type=_zone,
         action="append",
-        metavar="NAME:X,Y;X,Y;...",
-        help="area to cover, by its corners [m]; may be repeated, they are covered in this order",
+        metavar="NAME[:X,Y;X,Y;...]",
+        help="area to cover, by its corners [m], or a zone of the daemon's configuration by its "
+        "name; may be repeated, they are covered in this order",
     )
     parser.add_argument(
         "--keep-out",
         type=_polygon,
         action="append",
         metavar="X,Y;X,Y;...",
-        help="area the robot must not touch; may be repeated",
+        help="area the robot must not touch, beside those of the daemon's configuration; may be "
+        "repeated",
     )
     parser.add_argument("--passes", type=int, metavar="N", help="how often to cover (default: 1)")
     parser.add_argument(
@@ -148,9 +150,9 @@ def _read(path: Path) -> object:
 
 def _zone(text: str) -> dict[str, object]:
     name, colon, corners = text.partition(":")
-    if not colon or not name:
-        raise argparse.ArgumentTypeError(f"must be NAME:x,y;x,y;..., got {text!r}")
-    return {"name": name, "polygon": _polygon(corners)}
+    if not name or (not colon and ";" in name):  # corners, the name forgotten
+        raise argparse.ArgumentTypeError(f"must be NAME or NAME:x,y;x,y;..., got {text!r}")
+    return {"name": name, "polygon": _polygon(corners)} if colon else {"name": name}
 
 
 def _polygon(text: str) -> list[list[float]]:

@@ -6,10 +6,13 @@ import argparse
 import logging
 import os
 import sys
-from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console.arguments import Command, Exit
+
+if TYPE_CHECKING:
+    from fasaco_edge.config.config import DaemonConfig
 
 EPILOG = """\
 Without a file the daemon listens at tcp/127.0.0.1:7447 (or joins the router that already
@@ -25,7 +28,8 @@ wait for one (mission.autostart: false). Order and coverage are kept on disk: af
 mission continues where it stopped.
 As a service (deploy/) it notifies systemd when it is ready, feeds the watchdog, and reloads its
 configuration at SIGHUP: settings that can change at run time (planner, map, the robot's speeds,
-the mission's timeouts) are applied, others are listed; a faulty file is rejected as a whole.
+the mission's timeouts and zones) are applied, others are listed; a faulty file is rejected as a
+whole.
 """
 
 
@@ -50,10 +54,12 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve."""
-    from fasaco_edge.config.config import load_config
+    from fasaco_edge.config.config import load_config, with_mask
     from fasaco_edge.daemon.service import run_daemon
 
-    read = partial(load_config, args.config)
+    def read() -> DaemonConfig:
+        return with_mask(load_config(args.config), args.config)
+
     run_daemon(read(), args.record, args.state, fresh=args.fresh, read=read)
     # All is closed. What is left is the interpreter's own end, in which it was seen to wait for
     # ever, now and then, where Zenoh's threads had been at work: a service must not.

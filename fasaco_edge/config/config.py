@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
-from msgspec import Meta
+from msgspec import Meta, structs
 
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.bus.session import BusSettings
@@ -24,7 +24,7 @@ from fasaco_edge.config.reading import (
 )
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import SecurityConfig, from_here, security_faults
-from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.errors import BadConfiguration, OrderError
 from fasaco_edge.kernels.floor.turning import (
     Turning,
     limited_turning,
@@ -32,6 +32,8 @@ from fasaco_edge.kernels.floor.turning import (
     turn_seconds,
 )
 from fasaco_edge.mission.config import MissionPolicy
+from fasaco_edge.mission.orders.mask import INLINE, inline_mask, mask_polygons
+from fasaco_edge.mission.orders.order import OrderDocument, ZoneDocument, order_of
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.registry import PLANNER_NAMES
@@ -222,6 +224,21 @@ class MissionSettings(Section, MissionPolicy, frozen=True, kw_only=True):
 
     state_dir: str = ""
 
+    def check_zones(self) -> None:
+        """Check the standing zones as those of an order.
+
+        Raises:
+            BadConfiguration: one is wrong, two have one name, or a mask that is inline is none.
+        """
+        if self.keep_out_mask.startswith(INLINE):
+            mask_polygons(self.keep_out_mask)
+        zones = [ZoneDocument(name=zone.name, polygon=zone.polygon) for zone in self.zones]
+        keep_out = [list(polygon) for polygon in self.keep_out]
+        try:
+            order_of(OrderDocument(zones=zones, keep_out=keep_out))
+        except OrderError as error:
+            raise BadConfiguration(f"mission.{error}") from error
+
     def state_folder(self, environ: Mapping[str, str] = os.environ) -> Path:
         """Return the folder of the coverage ledger.
 
@@ -313,6 +330,24 @@ def load_config(path: Path | None) -> DaemonConfig:
     raise type(first.error)(f"{where}: {first.error}", hint=hint) from first.error
 
 
+def with_mask(config: DaemonConfig, file: Path | None) -> DaemonConfig:
+    """Return a configuration that holds its keep-out mask itself.
+
+    Args:
+        config: with the name of a file, sought from the configuration's own folder.
+        file: of the configuration.
+
+    Raises:
+        BadConfiguration: the mask cannot be read.
+    """
+    mission = config.mission
+    if not mission.keep_out_mask or mission.keep_out_mask.startswith(INLINE):
+        return config
+    path = (file or Path()).parent / mission.keep_out_mask
+    mask = inline_mask(path, config.map.occupied_at_least)
+    return structs.replace(config, mission=structs.replace(mission, keep_out_mask=mask))
+
+
 def decode_config(document: bytes) -> DaemonConfig:
     """Return a configuration from the JSON that another process of the package has encoded.
 
@@ -383,6 +418,7 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
     yield from _refused("robot.name: ", lambda: Keys(robot=config.robot.name))
     yield from _refused("robot: ", config.robot.cost)
     yield from _refused("planner.", config.planner.colony)
+    yield from _refused("", config.mission.check_zones)
 
 
 def _refused(before: str, make: Callable[[], object]) -> Iterator[BadConfiguration]:

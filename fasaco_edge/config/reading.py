@@ -90,9 +90,10 @@ def _value_fault(kind: object, value: object, key: str) -> Fault | None:
         match = re.fullmatch(r"(?P<what>.*?)(?: - at `\$(?P<at>[^`]*)`)?", str(error), re.DOTALL)
         assert match is not None
         at = match["at"] or ""
-        for index in re.findall(r"\[(\d+)\]", at):
-            assert isinstance(value, list)
-            value = value[int(index)]
+        part: Any = value
+        for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", at):
+            part = part[name] if name else part[int(index)]
+        value = part
         what = match["what"].replace("`", "")
         expected = _choices(kind) or what[0].lower() + what[1:].partition(", got")[0]
         if expected == "expected str":

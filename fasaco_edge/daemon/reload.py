@@ -31,6 +31,9 @@ CHANGEABLE = frozenset(
         "mission.retry_s",
         "mission.lost_pose_s",
         "mission.stale_map_s",
+        "mission.zones",
+        "mission.keep_out",
+        "mission.keep_out_mask",
     }
 )
 # Of a section that can change: the ledger's cells follow from it.

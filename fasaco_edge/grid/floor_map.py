@@ -238,12 +238,20 @@ class FloorMap:
         """Return which pixels of a part of the raster any polygon touches, bool (rows, cols)."""
         kept_out = np.zeros((part.rows, part.cols), np.bool_)
         for polygon in self._keep_out:
-            kept_out |= self._touched_by(polygon, part)
+            corners = np.array([self.geometry.to_pixels(x, y) for x, y in polygon])
+            (x0, y0), (x1, y1) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+            # With the pixels that the border only touches.
+            low, high = (math.floor(y0) - 1, math.floor(x0) - 1), (math.ceil(y1), math.ceil(x1))
+            around = Window(*low, high[0] + 1, high[1] + 1)
+            if box := around.intersection(part):
+                kept_out[box.slices_in(part)] |= self._touched_by(corners, box)
         return kept_out
 
-    def _touched_by(self, polygon: Polygon, part: Window) -> NDArray[np.bool_]:
-        """Return which pixels of a part of the raster a polygon touches, bool (rows, cols)."""
-        corners = np.array([self.geometry.to_pixels(x, y) for x, y in polygon])
+    def _touched_by(self, corners: NDArray[np.float64], part: Window) -> NDArray[np.bool_]:
+        """Return which pixels of a part of the raster a polygon touches, bool (rows, cols).
+
+        ``corners`` are float64 (n, 2), column and row on the raster.
+        """
         starts = np.zeros((part.rows, part.cols + 1), np.int32)
         inside = np.zeros((part.rows, part.cols), np.bool_)
         add_near(corners, part.row0, part.col0, 1.0, 0.5, starts)

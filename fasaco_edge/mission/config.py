@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 from msgspec import Meta
 
-from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS
+from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Polygon
+from fasaco_edge.mission.orders.order import MOST_KEEP_OUT, MOST_ZONES, StandingZone
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.living_trail import PAPERS_RULES, TrailRules
 
@@ -21,7 +22,7 @@ Period = Annotated[float, Meta(ge=0, le=86_400)]
 
 
 class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
-    """Whether a mission starts without an order, and its timeouts.
+    """Whether a mission starts without an order, its timeouts, and what holds for every order.
 
     Attributes:
         autostart: whether everything is covered once without an order.
@@ -29,6 +30,9 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         retry_s: pause before each retry [s].
         lost_pose_s: the pose is lost after this time without one [s]; 0 for never.
         stale_map_s: the map is stale after this time without a map or an update [s]; 0 for never.
+        zones: which orders use by their names.
+        keep_out: polygons (x, y) [m] in the map frame that the robot never touches.
+        keep_out_mask: file of a mask of more, see ``orders.mask``; "" for none.
     """
 
     autostart: bool = True
@@ -36,6 +40,9 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
     retry_s: Period = 30.0
     lost_pose_s: Period = 3.0
     stale_map_s: Period = 0.0
+    zones: Annotated[tuple[StandingZone, ...], Meta(max_length=MOST_ZONES)] = ()
+    keep_out: Annotated[tuple[Polygon, ...], Meta(max_length=MOST_KEEP_OUT)] = ()
+    keep_out_mask: str = ""
 
 
 NO_PATIENCE = MissionPolicy(retries=0, lost_pose_s=0.0)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import Arrival
-from fasaco_edge.errors import FasacoError, MalformedMessage
+from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder, read_command
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
@@ -118,7 +120,7 @@ class RunData:
         commands: when each came, its name, and what a ``start`` was to start.
         plan_log: plans, by the turn log.
         grid: the map at the end, with all updates.
-        keep_out: polygons of the last order.
+        ordered_keep_out: polygons of the last order.
         config, version, robot: of the daemon, by its last status.
         undecodable: samples that could not be read, by topic.
         last_s: when the last sample came.
@@ -132,7 +134,7 @@ class RunData:
     commands: list[tuple[float, str, MissionOrder]] = field(default_factory=list)
     plan_log: PlanLog = field(default_factory=PlanLog)
     grid: OccupancyGrid | None = None
-    keep_out: tuple[Polygon, ...] = ()
+    ordered_keep_out: tuple[Polygon, ...] = ()
     config: Settings = field(default_factory=dict)
     version: str = ""
     robot: str = ""
@@ -149,6 +151,15 @@ class RunData:
         """The daemon's last report of the floor; None if there is none."""
         floors = (each.status.floor for each in reversed(self.statuses))
         return next((floor for floor in floors if floor is not None), None)
+
+    @property
+    def keep_out(self) -> tuple[Polygon, ...]:
+        """What the robot had to keep out of, at the end: by the last order and always."""
+        always = known_settings(self.config).mission
+        polygons = self.ordered_keep_out + always.keep_out
+        with suppress(BadConfiguration):
+            polygons += mask_polygons(always.keep_out_mask)
+        return polygons
 
     @property
     def footprint(self) -> Footprint | None:
@@ -259,7 +270,7 @@ class _SampleReader:
         name, order = read_command(decode_json(arrival.sample.payload))
         self.data.commands.append((self._now, name, order))
         if name == "start":
-            self.data.keep_out = order.keep_out
+            self.data.ordered_keep_out = order.keep_out
 
     def _status(self, arrival: Arrival) -> None:
         status, data = decode_tolerant(arrival.sample.payload, Status), self.data

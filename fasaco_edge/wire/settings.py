@@ -36,9 +36,11 @@ class PoseSettings(Document, frozen=True):
 
 
 class MissionSettings(Document, frozen=True):
-    """How long the mission continues without a pose [s]."""
+    """How long the mission continues without a pose [s]; what it always keeps out of."""
 
     lost_pose_s: float = 0.0
+    keep_out: tuple[tuple[tuple[float, float], ...], ...] = ()
+    keep_out_mask: str = ""
 
 
 class Frames(Document, frozen=True):

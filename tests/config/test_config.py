@@ -136,6 +136,28 @@ def test_every_section_is_read(load):
         ("mission: {state: /var}", "unknown key mission.state"),
         ("mission: {state_dir: 3}", "mission.state_dir: expected str, in quotes, got 3"),
         (r'mission: {state_dir: "a\0b"}', "mission.state_dir must be a path"),
+        (
+            "mission: {zones: [{name: hall}]}",
+            "mission.zones[0]: object missing required field polygon",
+        ),
+        (
+            "mission: {zones: [{name: hall, polygon: [[0, 0], [1, a], [1, 1]]}]}",
+            "mission.zones[0].polygon[1][1]: expected float, got 'a'",
+        ),
+        (
+            "mission: {zones: [{name: hall, polygon: [[0, 0], [1, 0], [1, 1]], floor: 3}]}",
+            "mission.zones[0]: object contains unknown field floor",
+        ),
+        (
+            "mission: {zones: [{name: a, polygon: [[0, 0], [1, 0], [1, 1]]}, "
+            "{name: a, polygon: [[0, 0], [2, 0], [1, 1]]}]}",
+            "mission.zones[1].name: there is a zone 'a' already",
+        ),
+        (
+            "mission: {keep_out: [[[0, 0], [1, 1], [1, 0], [0, 1]]]}",
+            "mission.keep_out[0] crosses or touches itself",
+        ),
+        ("mission: {keep_out_mask: 'mask:{}'}", "mission.keep_out_mask: not a mask"),
         ("[1, 2]", "the file: expected object, got [1, 2]"),
         ("robot: {1: 2}", "robot: expected str as key, got {1: 2}"),
         ("1: 2", "the file: expected str as key, got {1: 2}"),

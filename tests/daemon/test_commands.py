@@ -225,6 +225,27 @@ def test_an_order_that_cannot_be_read_moves_no_robot(tmp_path):
         assert command(outsider, "start", {"keep_covered": True})["state"] == "waiting for map"
 
 
+def test_zones_of_the_configuration(tmp_path):
+    zones = [{"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5], [0.3, 1.5]]}]
+    mission = {"autostart": False, "zones": zones, "keep_out": [[[2, 2], [2.4, 2], [2.4, 2.4]]]}
+    with (
+        daemon_process(tmp_path, mission=mission) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        # By name also before there is a map; the command is published as it came.
+        commands = outsider.listen("command")
+        told(running, "start", "--zone", "kitchen")
+        heard = commands.wait(lambda heard: True)
+        assert json.loads(heard.payload)["order"]["zones"] == [{"name": "kitchen", "passes": 1}]
+        begin_idle(outsider)
+        report = outsider.wait_status(lambda status: status["state"] == "covering")["mission"]
+        assert [zone["name"] for zone in report["zones"]] == ["kitchen"]
+        assert report["keep_out"] == 1
+        refused = fasaco_edge("mission", "start", "--zone", "hall", "--connect", running.endpoint)
+        assert refused.code == 1
+        assert "no zone 'hall' in mission.zones" in refused.err
+
+
 def test_poses_that_stop_are_a_state(tmp_path):
     patience = {"lost_pose_s": 0.5, "stale_map_s": 60.0}
     with (
@@ -291,7 +312,7 @@ def begin_idle(outsider: Outsider) -> None:
     ("words", "said"),
     [
         (("start", "--order", "missing.yaml"), "missing.yaml: No such file or directory"),
-        (("start", "--order", "order.yaml"), "order.yaml: zones[0]: missing member polygon"),
+        (("start", "--order", "order.yaml"), "order.yaml: zones[0]: missing member name"),
         (("start", "--order", "order.json"), "order.json: neither plain YAML nor JSON"),
         (("start", "--order", "order.yaml", "--passes", "2"), "--order says it all, got --passe"),
         (("start", "--passes", "0"), "passes: expected int >= 1, got 0"),
@@ -302,7 +323,7 @@ def begin_idle(outsider: Outsider) -> None:
 )
 def test_mistakes_are_told_without_a_daemon(tmp_path: Path, monkeypatch, capsys, words, said):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "order.yaml").write_text("zones: [{name: a}]")
+    (tmp_path / "order.yaml").write_text("zones: [{passes: 2}]")
     (tmp_path / "order.json").write_text("{")
     assert main(["mission", *words, "--connect", "tcp/127.0.0.1:1"]) == 1
     told = capsys.readouterr().err
@@ -315,7 +336,7 @@ def test_mistakes_are_told_without_a_daemon(tmp_path: Path, monkeypatch, capsys,
     [
         ((), "the following arguments are required: COMMAND"),
         (("dance",), "invalid choice: 'dance'"),
-        (("start", "--zone", "0,0;1,0;1,1"), "must be NAME:x,y;x,y;..., got"),
+        (("start", "--zone", "0,0;1,0;1,1"), "must be NAME or NAME:x,y;x,y;..., got"),
         (("start", "--zone", "a:0,0;1,0"), "must be x,y;x,y;x,y;... in metres, got '0,0;1,0'"),
         (("start", "--keep-out", "-1,0;1;1,1"), "must be x,y;x,y;x,y;... in metres, got"),
         (("status", "--timeout", "0"), "must be in (0, 3600] s, got '0'"),

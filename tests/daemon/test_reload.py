@@ -37,6 +37,7 @@ def reloaded(written: DaemonConfig) -> DaemonConfig:
         {"planner": {"ants": 50, "seed": 3}},
         {"map": {"free_at_most": 10}},
         {"mission": {"retries": 5, "retry_s": 1.0, "lost_pose_s": 9.0, "stale_map_s": 8.0}},
+        {"mission": {"keep_out": [[[0, 0], [1, 0], [1, 1]]], "keep_out_mask": "a.yaml"}},
         {"robot": {"speed_m_s": 1.0, "quarter_turn_s": 0.0}},
     ],
 )

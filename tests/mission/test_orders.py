@@ -58,7 +58,7 @@ def test_an_order_with_all_there_is():
     [
         ([], "the order: expected object, got []"),
         ({"zone": []}, "the order: unknown member zone"),
-        ({"zones": [{"name": "k"}]}, "zones[0]: missing member polygon"),
+        ({"zones": [{"passes": 1}]}, "zones[0]: missing member name"),
         ({"zones": [{**KITCHEN, "pass": 1}]}, "zones[0]: unknown member pass"),
         ({"zones": [{**KITCHEN, "name": 3}]}, "zones[0].name: expected str, got 3"),
         ({"zones": [{**KITCHEN, "name": ""}]}, "zones[0].name: expected str of length >= 1"),

@@ -32,7 +32,9 @@ def told(poses, *, keep_out=(), yaw=0.0, lost_pose_s=0.0, at_s=None, **changes):
         pose_s=[float(at) for at in at_s or range(len(poses))],
         poses=[(*turned(geometry, *pose), 0.0) for pose in poses],
         grid=OccupancyGrid(geometry, pixels),
-        keep_out=tuple(tuple(turned(geometry, *at) for at in polygon) for polygon in keep_out),
+        ordered_keep_out=tuple(
+            tuple(turned(geometry, *at) for at in polygon) for polygon in keep_out
+        ),
         config={"robot": {"tool_width_m": TOOL_M, "radius_m": RADIUS_M}},
         **changes,
     )

@@ -31,6 +31,7 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     in_runs,
 )
+from fasaco_edge.mission.orders.order import located
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 
 if TYPE_CHECKING:
@@ -191,7 +192,8 @@ class MissionRunner:
         try:
             if rival:
                 raise CommandError(rival, hint="command the one that plans")
-            self._keeper.order_state = self.order_state.commanded(asked.command, asked.order)
+            order = located(asked.order, self.config.mission.zones)
+            self._keeper.order_state = self.order_state.commanded(asked.command, order)
             if asked.command == "replan":
                 raise CommandError("nothing to plan: the first plan is still to come")
         except FasacoError as error:

@@ -80,6 +80,7 @@ class StatusBoard:
         """Show this configuration as the one in force."""
         self._shown_config = config_document(config)
         self._cost = config.robot.cost()
+        self._standing = len(config.mission.keep_out) + bool(config.mission.keep_out_mask)
 
     def due(self, runner: MissionRunner, now: float) -> Status | None:
         """Return the status if it changed or a second has passed, else None.
@@ -121,7 +122,7 @@ class StatusBoard:
             cpu_s=round(time.process_time(), 3),
             threads=thread_count(),
             config=self._shown_config,
-            mission=mission_report(mission, order_state),
+            mission=mission_report(mission, order_state, self._standing),
         )
 
     def reply(self, runner: MissionRunner) -> Reply:
@@ -133,7 +134,7 @@ class StatusBoard:
             reason=reason,
             coverage=_coverage(runner.mission),
             floor=floor_report(runner.mission),
-            mission=mission_report(runner.mission, runner.order_state),
+            mission=mission_report(runner.mission, runner.order_state, self._standing),
         )
 
     def _state(self, runner: MissionRunner) -> tuple[str, str]:
@@ -249,8 +250,10 @@ def _ms(seconds: float | None) -> float | None:
     return None if seconds is None else round(1e3 * seconds, 3)
 
 
-def mission_report(mission: Mission | None, order_state: OrderState) -> MissionReport:
-    """Return this part of the status."""
+def mission_report(
+    mission: Mission | None, order_state: OrderState, standing: int = 0
+) -> MissionReport:
+    """Return this part of the status; ``standing`` is how many keep-out zones hold for all."""
     order, zone = order_state.order, order_state.current_zone
     home = order_state.home
     lattice = mission.lattice if mission else None
@@ -262,7 +265,7 @@ def mission_report(mission: Mission | None, order_state: OrderState) -> MissionR
         pass_number=None if zone is None else order_state.pass_number,
         passes=None if zone is None else zone.passes,
         zones=_zones(mission, order_state),
-        keep_out=0 if order is None else len(order.keep_out),
+        keep_out=(0 if order is None else len(order.keep_out)) + standing,
         return_home=bool(order and order.return_home),
         home=None if home is None or lattice is None else Point(*_centre(home, lattice.cell_m)),
         tries=order_state.tries,

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from fasaco_edge.errors import CommandError, FasacoError, LedgerMismatchError
-from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.geometry import Polygon, StampedPose
+from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.events import (
     Answer,
     CommandReceived,
@@ -28,6 +29,8 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.orders.mask import mask_polygons
+from fasaco_edge.mission.orders.order import located
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
@@ -44,12 +47,18 @@ class EventHandler:
     line: LineLayer
     trail: TrailLayer
     drive: DriveMeter
+    policy: MissionPolicy
     _now: float = field(default=0.0, init=False)
     # What the events of a step lead to.
     _path: PathUpdate | None = field(default=None, init=False)
     _faults: list[FasacoError] = field(default_factory=list, init=False)
     _answers: list[Answer] = field(default_factory=list, init=False)
     _is_forgotten: bool = field(default=False, init=False)
+    # Polygons that the robot keeps out of, whatever the order.
+    _standing: tuple[Polygon, ...] = field(default=(), init=False)
+
+    def __post_init__(self) -> None:
+        self._standing = self.policy.keep_out + mask_polygons(self.policy.keep_out_mask)
 
     def handle(self, events: Iterable[Event], now: float) -> Decision:
         """Apply events at ``now`` [s]; return what they lead to at once.
@@ -74,7 +83,7 @@ class EventHandler:
     def begin_order(self, order: OrderState) -> None:
         """Begin with another order, or with none; ``update_area`` has to follow."""
         self.route.abandon()
-        self.map.keep_out(order.order.keep_out if order.order else ())
+        self.map.keep_out(self._standing + (order.order.keep_out if order.order else ()))
         self.line.note_map()
         self.orders.start(order)
 
@@ -211,9 +220,10 @@ class EventHandler:
         """Carry out a command; what is wrong with it is its answer."""
         before = self.orders.order_state
         try:
+            order = located(event.order, self.policy.zones)
             if event.command == "start":
-                self.map.check_zones(event.order)
-            after = before.commanded(event.command, event.order)
+                self.map.check_zones(order)
+            after = before.commanded(event.command, order)
             plan = self._replan() if event.command == "replan" else None
         except FasacoError as error:
             self._answers.append(Answer(event.number, error))

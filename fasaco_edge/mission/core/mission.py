@@ -54,7 +54,7 @@ class Mission:
         self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
         self._trail = TrailLayer(config, self._map, self.route)
         self._drive = DriveMeter()
-        self._handler = EventHandler(*owners, self._line, self._trail, self._drive)
+        self._handler = EventHandler(*owners, self._line, self._trail, self._drive, config.policy)
         self._executive = Executive(*owners, self._trail)
         self.restore_order(order or OrderState.autostart())
 

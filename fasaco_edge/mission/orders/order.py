@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
 import msgspec
@@ -33,7 +33,7 @@ class Zone:
     Attributes:
         name: unique in its order.
         polygon: its corners (x, y) [m] in the map frame, the last joined to the first; None for
-            everything the robot can reach.
+            everything the robot can reach; none for a standing zone of that name, see ``located``.
         passes: how often.
     """
 
@@ -77,11 +77,21 @@ class _Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """Unknown members are errors."""
 
 
-class ZoneDocument(_Document, frozen=True):
-    """An area to cover."""
+_Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
 
-    name: Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
+
+class StandingZone(_Document, frozen=True):
+    """A zone of the configuration, which orders use by its name."""
+
+    name: _Name
     polygon: _Polygon
+
+
+class ZoneDocument(_Document, frozen=True):
+    """An area to cover; without a polygon it is the standing zone of that name."""
+
+    name: _Name
+    polygon: _Polygon | None = None
     passes: _Passes | None = None
 
 
@@ -137,9 +147,33 @@ def order_document(order: MissionOrder) -> dict[str, object]:
     if first.polygon is None:
         return {"passes": first.passes, **rest}
     zones = [
-        {"name": zone.name, "polygon": zone.polygon, "passes": zone.passes} for zone in order.zones
+        {"name": zone.name, "passes": zone.passes}
+        | ({"polygon": zone.polygon} if zone.polygon else {})
+        for zone in order.zones
     ]
     return {"zones": zones, **rest}
+
+
+def located(order: MissionOrder, standing: tuple[StandingZone, ...]) -> MissionOrder:
+    """Return an order with the polygons of the standing zones that it names.
+
+    Raises:
+        OrderError: there is no zone of a name.
+    """
+    known = {zone.name: tuple(zone.polygon) for zone in standing}
+    for index, zone in enumerate(order.zones):
+        if zone.polygon == () and zone.name not in known:
+            there = f"there are {', '.join(known)}" if known else "it has none"
+            raise OrderError(
+                f"zones[{index}].name: no zone {zone.name!r} in mission.zones of the daemon's "
+                f"configuration; {there}",
+                hint="name one of those, or give the zone a polygon",
+            )
+    zones = (
+        replace(zone, polygon=known[zone.name]) if zone.polygon == () else zone
+        for zone in order.zones
+    )
+    return replace(order, zones=tuple(zones))
 
 
 def command_document(command: CommandName, order: MissionOrder) -> dict[str, object]:
@@ -156,7 +190,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
         OrderError: naming the member, what is wrong with it, and what is allowed.
     """
     zones = tuple(
-        Zone(zone.name, tuple(zone.polygon), zone.passes or document.passes)
+        Zone(zone.name, tuple(zone.polygon or ()), zone.passes or document.passes)
         for zone in document.zones
     )
     order = MissionOrder(
@@ -178,7 +212,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
     polygons = {
         f"zones[{index}].polygon": zone.polygon
         for index, zone in enumerate(order.zones)
-        if zone.polygon is not None
+        if zone.polygon
     } | {f"keep_out[{index}]": polygon for index, polygon in enumerate(order.keep_out)}
     points = sum(map(len, polygons.values()))
     if points > MOST_POINTS_IN_ALL:

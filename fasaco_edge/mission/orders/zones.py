@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Polygon, Window
+from fasaco_edge.grid.geometry import Polygon, Window, polygon_bounds
 from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
@@ -49,8 +49,18 @@ def kept_out(
 def cells_inside(polygon: Polygon, window: Window, cell_m: float) -> NDArray[np.bool_]:
     """Return which cells of ``window`` have their centre inside, bool (rows, cols)."""
     cells = np.zeros((window.rows, window.cols), bool)
-    turn_inside(np.array(polygon, np.float64), window.row0, window.col0, cell_m, cells)
+    _add_inside(polygon, window, cell_m, cells)
     return cells
+
+
+def _add_inside(polygon: Polygon, window: Window, cell_m: float, cells: NDArray[np.bool_]) -> None:
+    """Mark the cells with their centre inside, too; a small polygon costs what it covers."""
+    x0, y0, x1, y1 = (value / cell_m for value in polygon_bounds(polygon))
+    around = Window(math.floor(y0), math.floor(x0), math.ceil(y1), math.ceil(x1))
+    if box := around.intersection(window):
+        inside = np.zeros((box.rows, box.cols), bool)
+        turn_inside(np.array(polygon, np.float64), box.row0, box.col0, cell_m, inside)
+        cells[box.slices_in(window)] |= inside
 
 
 def without(lattice: CoverageLattice, cells: NDArray[np.bool_]) -> CoverageLattice:
@@ -79,7 +89,7 @@ def _everything(window: Window) -> NDArray[np.bool_]:
 def _inside_any(polygons: tuple[Polygon, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
     cells = np.zeros((window.rows, window.cols), bool)
     for polygon in polygons:
-        cells |= cells_inside(polygon, window, cell_m)
+        _add_inside(polygon, window, cell_m, cells)
     cells.flags.writeable = False
     return cells
 
@@ -105,7 +115,7 @@ def cells_near(
     for polygon in polygons:
         corners = np.array(polygon, np.float64)
         add_near(corners, window.row0, window.col0, cell_m, reach_m - TOUCH_TOLERANCE_M, starts)
-        inside |= cells_inside(polygon, window, cell_m)
+        _add_inside(polygon, window, cell_m, inside)
     cells: NDArray[np.bool_] = np.cumsum(starts, axis=1, out=starts)[:, :-1] > 0
     cells |= inside
     cells.flags.writeable = False
@@ -120,13 +130,9 @@ def with_kept_out(grid: OccupancyGrid, keep_out: tuple[Polygon, ...]) -> Occupan
     if not keep_out:
         return grid
     cells, whole = grid.cells.copy(), Window(0, 0, *grid.cells.shape)
+    inside = np.zeros(cells.shape, bool)
     for polygon in keep_out:
         corners = tuple(grid.geometry.to_pixels(x, y) for x, y in polygon)
-        cols, rows = zip(*corners, strict=True)
-        box = Window(
-            math.floor(min(rows)), math.floor(min(cols)), math.ceil(max(rows)), math.ceil(max(cols))
-        )
-        if common := box.intersection(whole):
-            inside = cells_inside(corners, common, 1.0)
-            cells[common.slices_in(whole)][inside] = OCCUPIED
+        _add_inside(corners, whole, 1.0, inside)
+    cells[inside] = OCCUPIED
     return OccupancyGrid(grid.geometry, cells, grid.frame, grid.stamp_ns)

@@ -1,0 +1,156 @@
+"""Standing zones of the configuration: orders name them, and every mission keeps out."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.mission.core.events import MapReceived
+from fasaco_edge.mission.orders.mask import inline_mask, mask_polygons
+from fasaco_edge.mission.orders.order import StandingZone, order_document, read_order
+from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.zones import cells_inside, with_kept_out
+from tests.mission.world import (
+    CELL,
+    CONFIG,
+    PIXELS,
+    Drive,
+    building,
+    pose_at,
+    rectangle,
+    with_policy,
+)
+
+ROOM = (".........",) * 6
+KITCHEN = StandingZone(name="kitchen", polygon=[tuple(at) for at in rectangle(0, 6, 3, 9)])
+COLUMN = tuple(tuple(at) for at in rectangle(2, 2, 4, 4))
+
+
+def drive_with(**policy):
+    events = MapReceived(building(*ROOM)), pose_at(0, 0)
+    config = with_policy(CONFIG, **policy)
+    return Drive((0, 0), *events, config=config, order_state=OrderState.idle("waits"))
+
+
+def cells_of(row0, col0, row1, col1):
+    return {(row, col) for row in range(row0, row1) for col in range(col0, col1)}
+
+
+def mask_file(folder, marked, resolution=CELL / PIXELS, origin=(0.0, 0.0, 0.0)):
+    """A map_server mask; ``marked`` are pixels from the smallest y up."""
+    Image.fromarray(np.where(marked[::-1], 0, 255).astype(np.uint8)).save(folder / "mask.png")
+    file = folder / "mask.yaml"
+    file.write_text(
+        f"image: mask.png\nresolution: {resolution}\norigin: {list(origin)}\nmode: scale\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    return file
+
+
+def test_an_order_covers_a_zone_by_its_name():
+    drive = drive_with(zones=(KITCHEN,))
+    drive.command("start", {"zones": [{"name": "kitchen"}]})
+    drive.finish()
+    kept = drive.mission.order_state.order
+    by_corners = read_order({"zones": [{"name": "kitchen", "polygon": KITCHEN.polygon}]})
+    assert kept == by_corners
+    assert cells_of(0, 6, 3, 9) <= drive.visited
+
+
+def test_a_name_that_is_not_there_is_refused_with_those_that_are():
+    drive = drive_with(zones=(KITCHEN,))
+    drive.command("start", {"zones": [{"name": "hall"}]})
+    assert drive.refused.code == "bad_order"
+    assert "zones[0].name: no zone 'hall'" in str(drive.refused)
+    assert "there are kitchen" in str(drive.refused)
+    assert drive.mission.state == "idle"
+    without = drive_with()
+    without.command("start", {"zones": [{"name": "kitchen"}]})
+    assert "it has none" in str(without.refused)
+
+
+def test_a_zone_by_name_is_written_as_it_was_read():
+    order = read_order({"zones": [{"name": "kitchen", "passes": 2}]})
+    document = order_document(order)
+    assert document["zones"] == [{"name": "kitchen", "passes": 2}]
+    assert read_order(document) == order
+
+
+def test_standing_keep_out_zones_hold_for_every_order():
+    drive = drive_with(keep_out=(COLUMN,))
+    drive.command("start")
+    drive.finish()
+    # The disc touches the zone in the cells around it as well.
+    assert not set(drive.driven) & cells_of(2, 2, 4, 4)
+    first = set(drive.driven)
+    other = [list(at) for at in rectangle(0, 5, 1, 6)]
+    drive.command("start", {"keep_out": [other]})
+    drive.finish()
+    again = set(drive.driven) - first
+    assert not again & (cells_of(2, 2, 4, 4) | cells_of(0, 5, 1, 6))
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4])
+def test_a_mask_keeps_out_of_the_pixels_that_it_shows(tmp_path, yaw):
+    marked = np.random.default_rng(5).random((23, 31)) < 0.4
+    file = mask_file(tmp_path, marked, 0.125, (-0.5, 0.25, yaw))
+    polygons = mask_polygons(inline_mask(file, 65))
+    # Each pixel's centre is in one of them just where it is marked.
+    grid = building(*("." * 40,) * 40, at=(-8, -8))
+    kept_out = with_kept_out(grid, polygons).cells == 100
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    for row, col in np.ndindex(*grid.cells.shape):
+        x, y = grid.geometry.to_map(col + 0.5, row + 0.5)
+        u, v = x + 0.5, y - 0.25
+        at = (cos * v - sin * u) / 0.125, (cos * u + sin * v) / 0.125
+        if min(abs(value - round(value)) for value in at) < 1e-6:
+            continue  # on the border between two
+        at_row, at_col = int(np.floor(at[0])), int(np.floor(at[1]))
+        inside = 0 <= at_row < 23 and 0 <= at_col < 31 and marked[at_row, at_col]
+        assert kept_out[row, col] == inside
+
+
+def test_a_mission_with_a_mask_drives_as_with_the_polygon(tmp_path):
+    marked = np.zeros((12, 18), bool)
+    marked[4:8, 4:8] = True
+    mask = inline_mask(mask_file(tmp_path, marked), 65)
+    assert len(mask_polygons(mask)) == 1
+    walks = []
+    for policy in ({"keep_out_mask": mask}, {"keep_out": (COLUMN,)}):
+        drive = drive_with(**policy)
+        drive.command("start")
+        drive.finish()
+        walks.append(drive.driven)
+    assert walks[0] == walks[1]
+
+
+def test_masks_that_are_none_are_refused(tmp_path):
+    with pytest.raises(BadConfiguration, match=r"mission\.keep_out_mask: .*mask\.yaml"):
+        inline_mask(tmp_path / "mask.yaml", 65)
+    stripes = np.indices((64, 200)).sum(axis=0) % 2 == 0
+    with pytest.raises(BadConfiguration, match="take 6400 rectangles, at most 2000"):
+        inline_mask(mask_file(tmp_path, stripes), 65)
+    for wrong in ("mask:", "mask:{}", 'mask:{"geometry":[9,9,1,0,0,0],"deflated":"!"}'):
+        with pytest.raises(BadConfiguration, match="not a mask"):
+            mask_polygons(wrong)
+
+
+def test_cells_inside_small_polygons_are_those_of_the_whole_window():
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        x, y = random.uniform(-1, 3, 2)
+        polygon = ((x, y), (x + 0.7, y + 0.1), (x + 0.3, y + 0.8))
+        drive = drive_with()
+        whole = drive.mission.lattice.window
+        inside = cells_inside(polygon, whole, CELL)
+        for row, col in np.ndindex(*inside.shape):
+            at = (col + whole.col0 + 0.5) * CELL, (row + whole.row0 + 0.5) * CELL
+            assert inside[row, col] == _is_inside(at, polygon)
+
+
+def _is_inside(at, polygon):
+    """Left of all edges of a convex polygon that goes round counter-clockwise."""
+    edges = zip(polygon, polygon[1:] + polygon[:1], strict=True)
+    return all(
+        (bx - ax) * (at[1] - ay) - (by - ay) * (at[0] - ax) > 0 for (ax, ay), (bx, by) in edges
+    )
