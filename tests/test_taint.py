@@ -262,9 +262,14 @@ class Page(HTMLParser):
 def test_a_recording_is_reviewed_without_harm(tmp_path):
     file = recorded(tmp_path)
     page, picture, folder = tmp_path / "p.html", tmp_path / "p.png", tmp_path / "files"
-    code, said = run("review", file, "--html", page, "--png", picture, "--export", folder)
+    code, said = run("review", file, "--long", "--html", page, "--png", picture, "--export", folder)
     assert code == 0
     assert "INJECTED" in said
+    assert run("review", file)[0] == 0
+    code, said = run("review", file, "--at", "0:03", "--point", "0.5,0.5")
+    assert code == 0
+    # A table cuts a word that is wider than its column.
+    assert "INJECT" in said
     text = page.read_text(encoding="utf-8")
     judge(text)
     assert "script" not in Page(text).names

@@ -14,8 +14,9 @@ from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.cli.console import terminal
-from fasaco_edge.cli.console.arguments import Command
+from fasaco_edge.cli.console.arguments import Command, pair_of_floats
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.review import rows
 from fasaco_edge.review.comparison import (
     compared_rows,
@@ -26,16 +27,35 @@ from fasaco_edge.review.comparison import (
 )
 from fasaco_edge.review.document import ReviewDocument, explanations
 from fasaco_edge.review.figures import document_of
+from fasaco_edge.review.spot import spots_left
 from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
 
 DESCRIPTION = """\
-Report what happened in a recorded mission: coverage over time, replans and their reasons, the
-worst moments, faults. Parts of one run are read together. Files are only read; of files that a
-crash cut short, the whole part is used.
+Report what happened in a recorded mission, on one screen; with --long all figures, orders,
+commands, replans, floor left and why, worst moments and faults. With --at and --point it answers a
+question: what was at a time, why a spot was not swept. Parts of one run are read together. Files
+are only read; of files that a crash cut short, the whole part is used.
 """
+
+
+def _time(text: str) -> float:
+    """Read ``H:MM:SS``, ``MM:SS`` or seconds."""
+    parts = text.split(":")
+    try:
+        if not 1 <= len(parts) <= 3:
+            raise ValueError
+        value = 0.0
+        for part in parts:
+            value = 60.0 * value + float(part)
+    except ValueError:
+        value = -1.0
+    # A negated comparison, so that NaN is caught too.
+    if not 0 <= value < 1e9:
+        raise argparse.ArgumentTypeError(f"must be MM:SS, H:MM:SS or seconds, got {text!r}")
+    return value
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -48,6 +68,24 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="the parts of another run to compare with",
+    )
+    parser.add_argument(
+        "--long", action="store_true", help="print all there is, and not only one screen of it"
+    )
+    parser.add_argument(
+        "--at",
+        type=_time,
+        metavar="MM:SS",
+        help="answer what was at this time since the recording began: robot, paths before and "
+        "after, what of the map changed, commands, trail; --png draws it",
+    )
+    parser.add_argument(
+        "--point",
+        type=pair_of_floats,
+        action="append",
+        metavar="X,Y",
+        help="answer why this spot [m] was not swept: never seen, too narrow, a keep-out zone, "
+        "missed and by how much, not worth it; may be repeated; --png draws it",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, described below")
     parser.add_argument(
@@ -72,6 +110,8 @@ def run(args: argparse.Namespace) -> int:
     for file in (args.png, args.html):
         check_output(file)
     review = _read(args.recordings, "recording")
+    if args.at is not None or args.point:
+        return _answer(args, review)
     other = _read(args.against, "the other one") if args.against else None
     document = document_of(review)
     if args.json:
@@ -82,7 +122,7 @@ def run(args: argparse.Namespace) -> int:
     elif other:
         print_comparison(document, document_of(other))
     else:
-        print_review(review, document)
+        print_review(review, document, full=args.long)
     if args.png:
         from fasaco_edge.review.pictures import draw_review
 
@@ -102,6 +142,42 @@ def run(args: argparse.Namespace) -> int:
         from fasaco_edge.recording.read.repair import view
 
         view([*args.recordings, *(args.against or ())])
+    return 0
+
+
+def _answer(args: argparse.Namespace, review: Review) -> int:
+    """Answer questions about a moment, and about spots."""
+    from fasaco_edge.cli.console.arguments import writing
+    from fasaco_edge.review.instant import instant_rows, scene_at
+    from fasaco_edge.review.pictures import draw_scene, draw_spots
+    from fasaco_edge.review.spot import explain, spot_rows
+
+    if args.at is not None and args.at > review.duration_s:
+        raise BadConfiguration(
+            f"--at: the recording is {rows.clock(review.duration_s)} long",
+            hint="times count from the beginning of the recording, as in its review",
+        )
+    console = terminal.out()
+    scene = None if args.at is None else scene_at(review, args.at)
+    spots = explain(review, args.point or ())
+    if args.json:
+        found = {"at": scene.instant if scene else None, "points": spots}
+        print_json(msgspec.to_builtins(found))
+    else:
+        if scene is not None:
+            console.print(f"at {rows.clock(args.at)}", style="bold")
+            console.print(terminal.figures(instant_rows(scene.instant)))
+        for spot in spots:
+            console.print(terminal.figures(spot_rows(spot)))
+    if args.png:
+        picture = draw_scene(review, scene) if scene else draw_spots(review, spots)
+        if picture is None:
+            raise BadConfiguration(
+                f"no picture: {review.no_lattice or 'there is no map yet'}",
+                hint="the answer is complete without --png",
+            )
+        with writing(args.png):
+            picture.save(args.png, "PNG")
     return 0
 
 
@@ -130,30 +206,62 @@ def _epilog() -> str:
     return "\n".join(lines)
 
 
-PLOT_WIDTH, PLOT_HEIGHT = 64, 6
-MOST_TROUBLES = 12
+PLOT_WIDTH, PLOT_HEIGHT, SCREEN_PLOT_HEIGHT = 64, 6, 4
+MOST_VERDICTS = 4
 
 
-def print_review(review: Review, document: ReviewDocument) -> None:
-    """Print all of a review, whose document is given, too."""
+def print_review(review: Review, document: ReviewDocument, *, full: bool) -> None:
+    """Print a review, whose document is given, too: in ``full``, or what fits on a screen."""
     console = terminal.out()
     colours = {True: "green", False: "red", None: "yellow"}
-    for complete, text in rows.verdicts(document):
+    verdicts = rows.verdicts(document)
+    for complete, text in verdicts if full else verdicts[:MOST_VERDICTS]:
         verdict = Text(one_line(text), colours[complete])
-        console.print(f"{document.recording}:", verdict, style="bold", soft_wrap=True)
+        if full:
+            console.print(f"{document.recording}:", verdict, style="bold", soft_wrap=True)
+        else:
+            console.print(_fitting(verdict, console.width))
+    if not full:
+        _print_screen(console, review, document, more=len(verdicts) - MOST_VERDICTS)
+        return
     console.print(terminal.figures(rows.card_rows(document)))
-    _print_curve(console, review)
+    _print_curve(console, review, PLOT_HEIGHT)
     console.print(terminal.figures(rows.figure_rows(document)))
+    _print_table(console, "Orders", rows.ORDERS, rows.order_rows(document))
+    if commands := rows.command_rows(document):
+        console.print("Commands", style="bold")
+        console.print(terminal.figures(commands))
+    _print_table(console, "Not reached", rows.UNREACHED, rows.unreached_rows(document))
+    _print_table(console, "Floor left", rows.LEFT, rows.left_rows(document, spots_left(review)))
     _print_table(console, "Reasons of replans", rows.REASONS, rows.reason_rows(document))
     _print_table(console, "The slowest replans", rows.REPLANS, rows.replan_rows(review))
+    _print_table(console, "Replans in order of time", rows.REPLANS, rows.replans_in_time(review))
     moments = rows.moment_rows(review)
     _print_table(console, "Worst moments", ("what", "how much", "at", "context"), moments)
     troubles = rows.trouble_rows(review.troubles)
-    _print_table(console, "Troubles", ("state", "at", "for", "reason"), troubles[:MOST_TROUBLES])
-    if len(troubles) > MOST_TROUBLES:
-        console.print(f"and {len(troubles) - MOST_TROUBLES} more; all are in the JSON document")
+    _print_table(console, "Troubles", ("state", "at", "for", "reason"), troubles)
     _print_table(console, "Refused messages", ("code", "messages"), rows.fault_rows(document))
     _print_remarks(console, document)
+
+
+def _print_screen(console: Console, review: Review, document: ReviewDocument, *, more: int) -> None:
+    """Print what matters most; with up to ``MOST_VERDICTS`` verdicts it takes 24 lines."""
+    if more > 0:
+        console.print(f"and {more} more orders")
+    _print_curve(console, review, SCREEN_PLOT_HEIGHT)
+    for name, text in rows.screen_rows(review, document):
+        line = Text.assemble((f"{name:<12}", "cyan"), one_line(text))
+        console.print(_fitting(line, console.width))
+    hint = "more: --long; a moment: --at MM:SS; a spot: --point X,Y; a page: --html FILE"
+    console.print(_fitting(Text(hint), console.width))
+
+
+def _fitting(text: Text, width: int) -> Text:
+    """Return a text that takes one line of the terminal."""
+    if text.cell_len > width:
+        text.truncate(width - 3)
+        text.append("...")
+    return text
 
 
 def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
@@ -173,15 +281,15 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
         _print_remarks(console, document)
 
 
-def _print_curve(console: Console, review: Review) -> None:
+def _print_curve(console: Console, review: Review, height: int) -> None:
     from fasaco_edge.review.panels import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
 
     at_s, shares = covered_share(review)
     if not len(at_s):
         return
     marks = EIGHTHS if console.encoding.startswith("utf") else PLAIN_EIGHTHS
-    lines = curve(at_s, shares, review.duration_s, PLOT_WIDTH, PLOT_HEIGHT, marks)
-    labels = ["100 %", *[""] * (PLOT_HEIGHT - 2), "0 %"]
+    lines = curve(at_s, shares, review.duration_s, PLOT_WIDTH, height, marks)
+    labels = ["100 %", *[""] * (height - 2), "0 %"]
     console.print(Text("Coverage over time", "bold"), "of the cells coverable at the end")
     for label, line in zip(labels, lines, strict=True):
         console.print(f"{label:>6}", Text(line, "cyan"))

@@ -12,6 +12,7 @@ from PIL import Image
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.plot import MAX_HEIGHT, MAX_WIDTH, MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
+from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.reach import reachable_from
@@ -29,6 +30,19 @@ def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
     plot.paint(unswept, palette.UNSWEPT)
     label = f"reachable floor not swept ({unswept.area_m2:,.1f} m2)"
     return [KeyEntry("tile", palette.UNSWEPT, label)] if unswept.mask.any() else []
+
+
+def draw_order(plot: Plot, zones: Sequence[Polygon], keep_out: Sequence[Polygon]) -> list[KeyEntry]:
+    """Outline the zones of an order and where it keeps out of; return what the colours mean."""
+    key = []
+    for polygons, colour, label in (
+        (zones, palette.BLUE, "zone to cover"),
+        (keep_out, palette.VERMILION, "keep-out zone"),
+    ):
+        for polygon in polygons:
+            plot.outline(polygon, colour)
+        key += [KeyEntry("tile", colour, label)] if polygons else []
+    return key
 
 
 _ENDS = (KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.END, "end"))
@@ -261,6 +275,8 @@ def draw_mission(
     jump_m: float = math.inf,
     swept: MapLayer | None = None,
     unswept: MapLayer | None = None,
+    zones: Sequence[Polygon] = (),
+    keep_out: Sequence[Polygon] = (),
 ) -> Image.Image:
     """Return a picture, RGB, of a mission's result.
 
@@ -275,6 +291,7 @@ def draw_mission(
         jump_m: two places further apart than this [m] are no drive, and not joined.
         swept: reachable floor that was swept, shown in place of the cells; None to show these.
         unswept: reachable floor that was not swept; None where that is not known.
+        zones, keep_out: polygons of the order [m].
     """
     plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m, *space))
     plot.ground(grid)
@@ -287,6 +304,7 @@ def draw_mission(
         key = [*_ENDS, KeyEntry("tile", palette.COVERED, label)]
     if unswept is not None:
         key += draw_unswept(plot, unswept)
+    key += draw_order(plot, zones, keep_out)
     lengths_m = np.hypot(*np.diff(driven_xy, axis=0).T)
     driven = lengths_m <= jump_m
     plot.track(driven_xy[:-1][driven], driven_xy[1:][driven], DRIVEN_WIDTH * lattice.cell_m)

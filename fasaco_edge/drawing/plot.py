@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from PIL import Image, ImageChops, ImageDraw
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.palette import Colour
-from fasaco_edge.grid.geometry import Bounds, GridGeometry, Window
+from fasaco_edge.grid.geometry import Bounds, GridGeometry, Point, Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
 
@@ -113,7 +114,7 @@ class MapLayer:
 # Below this many pixels a cell, lines between cells would be all there is to see.
 RULED_CELL_PX = 14
 HATCH_PX = 7
-LINE_PX = 1.2
+LINE_PX, OUTLINE_PX = 1.2, 2.5
 MARK_RADIUS_PX = 8.0
 
 
@@ -197,6 +198,16 @@ class Plot:
         for (x0, y0, x1, y1), colour in zip(lines, map(tuple, colours), strict=True):
             self._draw.line((x0, y0, x1, y1), colour, width)
             self._draw.ellipse((x1 - radius, y1 - radius, x1 + radius, y1 + radius), colour)
+
+    def line(self, points: NDArray[np.float64], colour: Colour, width_px: float) -> None:
+        """Draw a line, points (n, 2) [m], so wide on the finished picture."""
+        if len(points) > 1:
+            places = [*map(tuple, self.view.samples(points).tolist())]
+            self._draw.line(places, colour, round(width_px * self.view.oversampling), "curve")
+
+    def outline(self, polygon: Sequence[Point], colour: Colour) -> None:
+        """Draw the border of a polygon, its corners (x, y) [m]."""
+        self.line(np.array((*polygon, polygon[0]), np.float64), colour, OUTLINE_PX)
 
     def arrow(self, at: NDArray[np.float64], along: NDArray[np.float64], size_m: float) -> None:
         """Draw an arrow head, its middle at (x, y) [m], pointing ``along`` a unit vector."""

@@ -11,7 +11,8 @@ import msgspec
 
 if TYPE_CHECKING:
     from fasaco_edge.review.moments import Moment
-    from fasaco_edge.review.orders import OrderChapter
+    from fasaco_edge.review.orders import CommandThen, OrderChapter
+    from fasaco_edge.review.spot import LeftPatch
     from fasaco_edge.wire.path_documents import Rectangle
 
 
@@ -94,7 +95,10 @@ class ReviewDocument(msgspec.Struct):
         state: last state of the mission.
         orders: each order: ordered (`command`, or `itself` for one that began without a command),
             at_s, until_s, ended_by (`start` of another, `cancel`, `reset`; null for the end of the
-            recording), state, complete, covered_cells, coverable_cells.
+            recording), state, complete, covered_cells, coverable_cells, order (what it asked for;
+            null where that is not recorded), replans, paused_s, driven_m, and unreached: areas
+            that stayed uncovered at its end, with cells, m2, place (x, y) [m] and reason.
+        commands: each command that came: at_s, command (in words).
         complete: of the last order: whether the mission reached `done` with every reachable cell
             (of its zones) covered.
         covered_cells, coverable_cells: at the end: reachable cells, and covered ones of these.
@@ -104,6 +108,7 @@ class ReviewDocument(msgspec.Struct):
             disc touches wherever the robot's disc can be; the part that the tool passed over along
             the recorded poses [m2].
         patches_over_4_dm2, largest_patch_m2: connected patches of it that were not swept [m2].
+        left: the largest patches that were not swept: m2, and a place in the middle (x, y) [m].
         ledger_swept_m2: floor that the daemon counted as swept at the end, reachable or not [m2].
         left_by_reason: reachable floor not swept at the end, by the daemon's reasons [m2].
         out_of_reach_by_reason: free floor that the tool cannot reach, by reason [m2]; null if the
@@ -161,6 +166,7 @@ class ReviewDocument(msgspec.Struct):
     state: str | None = None
     complete: bool | None = None
     orders: list[OrderChapter] = []
+    commands: list[CommandThen] = []
     covered_cells: int | None = None
     coverable_cells: int | None = None
     recovered_cells: int | None = None
@@ -169,6 +175,7 @@ class ReviewDocument(msgspec.Struct):
     swept_m2: float | None = None
     patches_over_4_dm2: int | None = None
     largest_patch_m2: float | None = None
+    left: list[LeftPatch] = []
     ledger_swept_m2: float | None = None
     left_by_reason: dict[str, float] | None = None
     out_of_reach_by_reason: dict[str, float] | None = None

@@ -18,6 +18,8 @@ from fasaco_edge.review.document import (
     TimesTaken,
     Trouble,
 )
+from fasaco_edge.review.orders import commands_of
+from fasaco_edge.review.spot import left_patches
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
@@ -46,6 +48,7 @@ def document_of(review: Review) -> ReviewDocument:
             replace(order, at_s=round(order.at_s, 3), until_s=round(order.until_s, 3))
             for order in review.orders
         ],
+        commands=commands_of(data),
         paths=len(data.paths),
         replans=len(replans.later),
         replans_by_reason=replans.by_reason,
@@ -104,6 +107,7 @@ def _add_coverage(document: ReviewDocument, review: Review) -> None:
         document.swept_m2 = _rounded(figures.swept_m2)
         document.patches_over_4_dm2 = figures.patches_over_4_dm2
         document.largest_patch_m2 = _rounded(figures.largest_patch_m2)
+        document.left = left_patches(floor)
     if (ledger := review.data.ledger_floor) is not None:
         document.ledger_swept_m2 = ledger.swept_m2
         document.left_by_reason = _by_reason(ledger.left)

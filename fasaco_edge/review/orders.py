@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.mission.orders.order import MissionOrder
+from fasaco_edge.mission.orders.order import MissionOrder, OrderDocument, order_document
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.run_data import RunData, StatusSample
+from fasaco_edge.wire.replies import UnreachedArea
 
 # What comes so soon after a status [s] is still of the same step.
 SAME_STEP_S = 1.5
@@ -31,6 +33,11 @@ class OrderChapter:
         state: of the mission, the last one; None without any.
         covered_cells, coverable_cells: by the last status; None where that is outdated.
         complete: whether it came to ``done`` with nothing missing; None where that is not recorded.
+        order: what it asked for, as a command says it; None for one from before the recording.
+        replans: paths that a plan led to while it held.
+        paused_s: how long it was paused [s].
+        driven_m: what the robot drove meanwhile, without jumps [m].
+        unreached: what stayed uncovered, by its last status: place, area and reason of each.
     """
 
     ordered: str
@@ -41,6 +48,48 @@ class OrderChapter:
     complete: bool | None
     covered_cells: int | None
     coverable_cells: int | None
+    order: OrderDocument | None = None
+    replans: int = 0
+    paused_s: float = 0.0
+    driven_m: float = 0.0
+    unreached: list[UnreachedArea] = field(default_factory=list)
+
+
+class CommandThen(msgspec.Struct):
+    """A command: when it came [s], and what it said, in words."""
+
+    at_s: float
+    command: str
+
+
+def commands_of(data: RunData) -> list[CommandThen]:
+    """Return the commands of a recording, in order."""
+    return [
+        CommandThen(round(at_s, 3), command_words(name, order))
+        for at_s, name, order in data.commands
+    ]
+
+
+def command_words(name: str, order: MissionOrder) -> str:
+    """Return a command in words, with what it asked for."""
+    if name != "start":
+        return name
+    return f"start: {order_words(msgspec.convert(order_document(order), OrderDocument))}"
+
+
+def order_words(order: OrderDocument) -> str:
+    """Return what an order asks for, in words."""
+    asked = [
+        f"zone {zone.name}" + (f" {zone.passes} times" if (zone.passes or 1) > 1 else "")
+        for zone in order.zones
+    ] or ["everything" + (f" {order.passes} times" if order.passes > 1 else "")]
+    if order.keep_out:
+        corners = "; ".join(
+            " ".join(f"({x:g}, {y:g})" for x, y in polygon) for polygon in order.keep_out
+        )
+        asked.append(f"keep out of {corners}")
+    asked += ["return home"] * order.return_home + ["keep what is covered"] * order.keep_covered
+    return ", ".join(asked)
 
 
 def chapters(
@@ -55,8 +104,11 @@ def chapters(
         end_s: of the recording [s].
     """
     held = list(_held(data, states, end_s))
+    track = data.track[:, :2]
+    ways = np.hypot(*np.diff(track, axis=0).T) if len(track) > 1 else np.zeros(0)
+    ways[ways > data.jump_m] = 0.0
     return tuple(
-        _chapter(data, states, fractions, *one)
+        _chapter(data, states, fractions, ways, *one)
         for one in held
         # Before the first command there may have been nothing.
         if len(held) == 1 or one[0] == "command" or _has_begun(states, one[1], one[2])
@@ -75,8 +127,8 @@ def is_complete(state: str, sample: StatusSample | None, covered: int, coverable
 
 def _held(
     data: RunData, states: Sequence[Span], end_s: float
-) -> Iterator[tuple[str, float, float, str | None]]:
-    """Yield who gave each order, from when to when it held [s], and what ended it."""
+) -> Iterator[tuple[str, float, float, str | None, MissionOrder | None]]:
+    """Yield who gave each order, from when to when it held [s], what ended it, and the order."""
     ordered, began, order = "itself", 0.0, None
     is_open = True
     for at_s, name, given in data.commands:
@@ -84,10 +136,10 @@ def _held(
             continue
         if name == "start" or (name in ENDS and is_open):
             if is_open:
-                yield ordered, began, at_s, name
+                yield ordered, began, at_s, name, order
             ordered, began, order, is_open = "command", at_s, given, name == "start"
     if is_open:
-        yield ordered, began, end_s, None
+        yield ordered, began, end_s, None, order
 
 
 def _goes_on(order: MissionOrder | None, given: MissionOrder, state: str) -> bool:
@@ -111,10 +163,12 @@ def _chapter(
     data: RunData,
     states: Sequence[Span],
     fractions: NDArray[np.float64],
+    ways: NDArray[np.float64],
     ordered: str,
     begin_s: float,
     end_s: float,
     ended_by: str | None,
+    order: MissionOrder | None,
 ) -> OrderChapter:
     until = end_s if ended_by else float("inf")
     state = _state_at(states, until)
@@ -132,8 +186,28 @@ def _chapter(
         complete = False
     elif state and covered is not None and coverable is not None:
         complete = is_complete(state, last, covered, coverable)
+    times = data.times[1:]
+    reports = [each.status for each in data.statuses if begin_s <= each.at_s < until]
     return OrderChapter(
-        ordered, begin_s, end_s, ended_by, state or None, complete, covered, coverable
+        ordered,
+        begin_s,
+        end_s,
+        ended_by,
+        state or None,
+        complete,
+        covered,
+        coverable,
+        order=msgspec.convert(order_document(order), OrderDocument) if order else None,
+        replans=sum(
+            begin_s <= path.at_s < until for path in data.paths if path.about.planner is not None
+        ),
+        paused_s=sum(
+            max(min(span.end_s, end_s) - max(span.begin_s, begin_s), 0.0)
+            for span in states
+            if span.name == "paused"
+        ),
+        driven_m=round(float(ways[(times >= begin_s) & (times < until)].sum()), 2),
+        unreached=list(reports[-1].mission.unreached.areas) if reports else [],
     )
 
 

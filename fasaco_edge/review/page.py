@@ -34,6 +34,7 @@ from fasaco_edge.review.panels import (
 )
 from fasaco_edge.review.pictures import draw_fields, draw_map
 from fasaco_edge.review.review import Review
+from fasaco_edge.review.spot import spots_left
 from fasaco_edge.text import Html, element, html
 
 WIDTH = 640
@@ -146,6 +147,10 @@ def page_of(review: Review, other: Review | None = None) -> str:
             _fields(each, len(documents), figures.recording)
             for each, figures in zip(reviews, documents, strict=True)
         ),
+        *(
+            _orders(each, figures, len(documents))
+            for each, figures in zip(reviews, documents, strict=True)
+        ),
         _section("Over time", *_charts(reviews, documents)),
         _section("Figures", _figures(documents)),
         _section("Replans", *_reasons(reviews, documents)),
@@ -251,6 +256,19 @@ def _fields(review: Review, of: int, name: str) -> Html:
     return _section(title, element("p", words), element("div", *figures, class_="fields"))
 
 
+def _orders(review: Review, figures: ReviewDocument, of: int) -> Html:
+    """Return a chapter of each order, the commands, and what was left and why."""
+    parts = [_table(rows.ORDERS, rows.order_rows(figures), "notes")]
+    for title, names, cells in (
+        ("Commands", rows.COMMANDS, rows.command_rows(figures)),
+        ("Not reached", rows.UNREACHED, rows.unreached_rows(figures)),
+        ("Reachable floor left", rows.LEFT, rows.left_rows(figures, spots_left(review))),
+    ):
+        if cells:
+            parts += [element("h3", title), _table(names, cells, "notes")]
+    return _section("Orders" + (f" of {figures.recording}" if of > 1 else ""), *parts)
+
+
 def _charts(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> list[Html]:
     labels = [each.recording for each in documents]
     key = Html()
@@ -292,6 +310,11 @@ def _reasons(reviews: Sequence[Review], documents: Sequence[ReviewDocument]) -> 
             _table(("reason", *rows.REASONS[1:]), rows.reason_rows(documents[0])),
             element("p", "The slowest:"),
             _table(rows.REPLANS, rows.replan_rows(reviews[0]), "notes"),
+            element(
+                "details",
+                element("summary", "All of them, in order of time"),
+                _table(rows.REPLANS, rows.replans_in_time(reviews[0]), "notes"),
+            ),
         ]
     names = (each.recording for each in documents)
     return [_table(("reason", *names), [(kind, *map(str, n)) for kind, n in counts])]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
@@ -9,13 +12,15 @@ from PIL import Image
 from fasaco_edge.bench.floor import swept_words
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.chart import draw_panels
-from fasaco_edge.drawing.pictures import draw_mission
-from fasaco_edge.drawing.plot import MapLayer
+from fasaco_edge.drawing.pictures import draw_mission, draw_order, draw_unswept
+from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
+from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
+from fasaco_edge.review.instant import Scene, instant_rows
 from fasaco_edge.review.panels import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.rows import clock
+from fasaco_edge.review.spot import Spot, spot_rows
 
 # Fields on a page; the edge of the square that each has to fit into [px].
 FIELDS, FIELD_PX = 4, 440
@@ -48,6 +53,8 @@ SIZE = (1600, 900)
 # What title, caption and key take beside the map.
 AROUND = (56, 210)
 TRAIL_SPACING_M = 0.02
+# How wide a drive is drawn beside the lines of paths [m].
+DRIVE_M = 0.04
 DONE = {True: "complete", False: "not complete", None: "recorded in part"}
 
 
@@ -91,9 +98,80 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
         title=f"{review.record.recording_id}: {DONE[review.complete]}",
         lines=_caption(review),
         space=space,
-        jump_m=JUMP_CELLS * lattice.cell_m,
+        jump_m=review.data.jump_m,
         unswept=MapLayer(floor.geometry, floor.unswept) if floor else None,
+        zones=[zone.polygon for zone in review.data.zones if zone.polygon],
+        keep_out=review.data.keep_out,
     )
+
+
+# How much of the drive before and after a moment is drawn [s].
+AROUND_S = 10.0
+HEADING_M = 0.3
+
+
+def draw_scene(review: Review, scene: Scene) -> Image.Image | None:
+    """Return the map at one moment with paths before and after, drive and robot; None without it.
+
+    Args:
+        review: of what.
+        scene: the moment.
+    """
+    grid, lattice, instant, data = scene.grid, review.lattice, scene.instant, review.data
+    if grid is None or lattice is None:
+        return None
+    near = np.abs(data.times - instant.at_s) <= AROUND_S
+    drive = _thinned(data.track[near, :2])
+    plot = Plot(View.over(bounds_of(grid, lattice, drive), lattice.cell_m))
+    plot.ground(grid)
+    key = draw_order(plot, [zone.polygon for zone in data.zones if zone.polygon], data.keep_out)
+    for line, colour, width, label in (
+        (scene.before, palette.RULE, 4.0, "path before"),
+        (scene.line, palette.PURPLE, 3.0, "path in force"),
+        (scene.after, palette.SKY, 1.5, "path after"),
+    ):
+        if line is not None and len(line.xy):
+            plot.line(line.xy, colour, width)
+            key.append(KeyEntry("tile", colour, f"{label} ({line.revision})"))
+    if len(drive) > 1:
+        plot.track(drive[:-1], drive[1:], DRIVE_M)
+    if (changed := instant.map) is not None and (box := changed.around) is not None:
+        corners = [(box.x_min, box.y_min), (box.x_max, box.y_min)]
+        corners += [(box.x_max, box.y_max), (box.x_min, box.y_max)]
+        plot.outline(corners, palette.ORANGE)
+        key.append(KeyEntry("tile", palette.ORANGE, "map changed lately"))
+    if instant.x is not None and instant.y is not None and instant.yaw_deg is not None:
+        yaw = math.radians(instant.yaw_deg)
+        place, along = np.array([instant.x, instant.y]), np.array([math.cos(yaw), math.sin(yaw)])
+        plot.start_mark(place)
+        plot.line(np.array([place, place + HEADING_M * along]), palette.INK, 4.0)
+    lines = [f"{name}: {text}" for name, text in instant_rows(instant)]
+    bar = (f"{AROUND_S:.0f} s before", f"{AROUND_S:.0f} s after")
+    title = f"{review.record.recording_id} at {clock(instant.at_s)}"
+    return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
+
+
+def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
+    """Return the map at the end with some spots marked; None without a map or a drive."""
+    lattice, data = review.lattice, review.data
+    if data.grid is None or lattice is None or not spots:
+        return None
+    drive = _thinned(data.track[:, :2])
+    plot = Plot(View.over(bounds_of(data.grid, lattice, drive), lattice.cell_m))
+    plot.ground(data.grid)
+    key = []
+    if review.floor is not None:
+        key += draw_unswept(plot, MapLayer(review.floor.geometry, review.floor.unswept))
+    key += draw_order(plot, [zone.polygon for zone in data.zones if zone.polygon], data.keep_out)
+    if len(drive) > 1:
+        plot.track(drive[:-1], drive[1:], DRIVE_M)
+    for spot in spots:
+        plot.end_mark(np.array([spot.x, spot.y]))
+    key.append(KeyEntry("square", palette.END, "asked for"))
+    lines = [f"{name}: {text}" for spot in spots for name, text in spot_rows(spot)]
+    title = f"{review.record.recording_id}: one spot"
+    bar = ("0:00", clock(review.duration_s))
+    return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
 
 
 def _caption(review: Review) -> list[str]:

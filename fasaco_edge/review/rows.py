@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,10 +10,13 @@ from msgspec.structs import astuple
 
 from fasaco_edge.bench.floor import swept_words
 from fasaco_edge.review.document import MILESTONES, ReviewDocument
+from fasaco_edge.review.orders import order_words
 
 if TYPE_CHECKING:
     from fasaco_edge.review.moments import Span
     from fasaco_edge.review.review import Review
+    from fasaco_edge.review.run_data import PublishedPath
+    from fasaco_edge.review.spot import Spot
     from fasaco_edge.wire.path_documents import Rectangle
 
 NOT_KNOWN = "not known"
@@ -53,6 +56,103 @@ MOST_REPLANS = 8
 
 # The most important settings; the others are in the run card and in the JSON document.
 CARD_SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
+
+
+ORDERS = ("order", "from", "to", "result", "driven", "replans", "paused", "asked for")
+UNREACHED = ("order", "m2", "at", "why")
+LEFT = ("m2", "at", "why")
+COMMANDS = ("at", "command")
+"""Columns of ``order_rows``, ``unreached_rows``, ``left_rows`` and ``command_rows``."""
+
+
+def order_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
+    """Return a chapter of each order: when it held, how it went, and what it asked for."""
+    return [
+        (
+            str(number),
+            clock(order.at_s),
+            clock(order.until_s),
+            order.state or NOT_KNOWN,
+            amount(order.driven_m, "m"),
+            str(order.replans),
+            clock(order.paused_s) if order.paused_s else "-",
+            order_words(order.order) if order.order else "everything, or as ordered before",
+        )
+        for number, order in enumerate(document.orders, 1)
+    ]
+
+
+def unreached_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
+    """Return the areas that each order left uncovered: area, place, and the daemon's reason."""
+    return [
+        (str(number), f"{area.m2:.2f}", f"({area.x:.2f}, {area.y:.2f})", area.reason)
+        for number, order in enumerate(document.orders, 1)
+        for area in order.unreached
+    ]
+
+
+def left_rows(document: ReviewDocument, spots: Sequence[Spot]) -> list[tuple[str, ...]]:
+    """Return the patches left of the reachable floor, and why; spots are of their places."""
+    return [
+        (f"{patch.m2:.2f}", f"({patch.x:.2f}, {patch.y:.2f})", f"{spot.why}: {spot.words}")
+        for patch, spot in zip(document.left, spots, strict=True)
+    ]
+
+
+def command_rows(document: ReviewDocument) -> list[tuple[str, str]]:
+    """Return when each command came, and what it said."""
+    return [(clock(each.at_s), each.command) for each in document.commands]
+
+
+def replans_in_time(review: Review) -> list[tuple[str, ...]]:
+    """Return all replans as ``replan_rows`` has the slowest ones, in order of time."""
+    return [_replan_row(path) for path in review.replans.later]
+
+
+MOST_PLACES = 3
+
+
+def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str]]:
+    """Return what matters most, a line each: it fits on one screen with verdict and curve."""
+    by_name = {figure.name: figure.text for figure in figures(document)}
+    config, grid = document.config, document.map
+    sides = "" if grid is None else "{:.1f} x {:.1f} m, ".format(*grid.sides_m)
+    planner = f"{config.get('planner.name', 'planner not recorded')}"
+    reached = [
+        f"{percent} % {by_name[f'{percent} % of cells covered after']}" for percent in MILESTONES
+    ]
+    slowest = review.replans.slowest
+    replans = f"{document.replans}"
+    if slowest is not None and document.replan_ms_p50 is not None:
+        replans += f", {amount(document.replan_ms_p50, 'ms')} in the median"
+        replans += f", the slowest {amount(slowest.plan_ms, 'ms')} at {clock(slowest.at_s)}"
+    left = [f"{patch.m2:.2f} m2 at ({patch.x:.2f}, {patch.y:.2f})" for patch in document.left]
+    areas = [area for order in document.orders[-1:] for area in order.unreached]
+    unreached = [
+        f"{area.m2:.2f} m2 at ({area.x:.2f}, {area.y:.2f}) {area.reason}" for area in areas
+    ]
+    troubles = [
+        f"{t.state} {clock(t.at_s or 0.0)} for {t.seconds or 0:.1f} s" for t in document.troubles
+    ]
+    commands = [" ".join(row) for row in command_rows(document)]
+    return [
+        ("run", f"{_began(document.began)}, {sides}{planner}, {document.robot or 'robot'}"),
+        ("swept", by_name["reachable floor swept"]),
+        ("covered", by_name["covered"]),
+        ("cells after", ", ".join(reached)),
+        ("left", _some(left)),
+        ("not reached", _some(unreached)),
+        ("driven", f"{amount(document.driven_m, 'm')}, {_count(document.steps, 'steps')}"),
+        ("replans", replans),
+        ("commands", _some(commands)),
+        ("troubles", _some(troubles)),
+        ("refused", f"{document.faults} messages; lost {_count(document.recorder_lost, '')}"),
+    ]
+
+
+def _some(texts: Sequence[str]) -> str:
+    more = f"; {len(texts) - MOST_PLACES} more" if len(texts) > MOST_PLACES else ""
+    return "; ".join(texts[:MOST_PLACES]) + more or "none"
 
 
 def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
@@ -127,19 +227,20 @@ def reason_rows(document: ReviewDocument) -> list[tuple[str, str, str, str]]:
 
 def replan_rows(review: Review) -> list[tuple[str, ...]]:
     """Return the slowest replans: when, how long, the plan, where the map changed, and why."""
-    slowest = review.replans.slowest_first(MOST_REPLANS)
-    return [
-        (
-            clock(path.at_s),
-            amount(path.plan_ms, "ms"),
-            str(about.steps if about.planned_steps is None else about.planned_steps),
-            "-" if about.gap is None else f"{100 * about.gap:.1f} %",
-            "-" if about.planned_cost_s is None else clock(about.planned_cost_s),
-            _place(about.changed),
-            about.reason,
-        )
-        for path, about in ((path, path.about) for path in slowest)
-    ]
+    return [_replan_row(path) for path in review.replans.slowest_first(MOST_REPLANS)]
+
+
+def _replan_row(path: PublishedPath) -> tuple[str, ...]:
+    about = path.about
+    return (
+        clock(path.at_s),
+        amount(path.plan_ms, "ms"),
+        str(about.steps if about.planned_steps is None else about.planned_steps),
+        "-" if about.gap is None else f"{100 * about.gap:.1f} %",
+        "-" if about.planned_cost_s is None else clock(about.planned_cost_s),
+        _place(about.changed),
+        about.reason,
+    )
 
 
 def moment_rows(review: Review) -> list[tuple[str, ...]]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -15,8 +16,9 @@ from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import MissionOrder, read_command
+from fasaco_edge.mission.orders.order import MissionOrder, Zone, read_command
 from fasaco_edge.wire.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.path_digest import PATH_DIGEST
@@ -121,6 +123,7 @@ class RunData:
         plan_log: plans, by the turn log.
         grid: the map at the end, with all updates.
         ordered_keep_out: polygons of the last order.
+        zones: of the last order; without one, and in one for everything, empty.
         config, version, robot: of the daemon, by its last status.
         undecodable: samples that could not be read, by topic.
         last_s: when the last sample came.
@@ -135,6 +138,7 @@ class RunData:
     plan_log: PlanLog = field(default_factory=PlanLog)
     grid: OccupancyGrid | None = None
     ordered_keep_out: tuple[Polygon, ...] = ()
+    zones: tuple[Zone, ...] = ()
     config: Settings = field(default_factory=dict)
     version: str = ""
     robot: str = ""
@@ -178,6 +182,11 @@ class RunData:
         )
 
     @property
+    def jump_m(self) -> float:
+        """Two poses further apart than this are no drive [m]."""
+        return JUMP_CELLS * self.footprint.cell_m if self.footprint else math.inf
+
+    @property
     def times(self) -> NDArray[np.float64]:
         """When each pose came [s], float64 (n,)."""
         return np.array(self.pose_s, np.float64)
@@ -213,6 +222,16 @@ def gather(samples: Iterable[Arrival], began_ns: int) -> RunData:
     for arrival in samples:
         reader.read(arrival)
     return reader.data
+
+
+def maps_of(samples: Iterable[Arrival], began_ns: int) -> Iterator[tuple[float, OccupancyGrid]]:
+    """Yield each state of the map, and when it came, since the recording began [s]."""
+    reader = _SampleReader(RunData(), began_ns)
+    for arrival in samples:
+        if arrival.topic in ("map", "map_update"):
+            reader.read(arrival)
+            if reader.data.grid is not None:
+                yield reader.data.map_s[-1], reader.data.grid
 
 
 class _SampleReader:
@@ -271,6 +290,7 @@ class _SampleReader:
         self.data.commands.append((self._now, name, order))
         if name == "start":
             self.data.ordered_keep_out = order.keep_out
+            self.data.zones = tuple(zone for zone in order.zones if zone.polygon is not None)
 
     def _status(self, arrival: Arrival) -> None:
         status, data = decode_tolerant(arrival.sample.payload, Status), self.data

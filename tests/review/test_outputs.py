@@ -206,7 +206,7 @@ def test_a_recorder_in_trouble_is_told(review):
 def test_texts_of_a_recording_do_nothing_to_a_terminal(review, capsys):
     told = document_of(review)
     told.robot, told.remarks = "[/red] \x1b]0;title\x07", ["[/]\x1b[2J"]
-    print_review(review, told)
+    print_review(review, told, full=True)
     out = capsys.readouterr().out
     assert "\x1b" not in out
     assert "[/red]" in out
@@ -236,7 +236,7 @@ def test_what_begins_like_a_formula_is_text_to_a_table(review, tmp_path):
 def test_a_terminal_of_few_characters_is_told_everything(parts, tmp_path, encoding):
     """The curve is of ASCII there, and what a name has besides is escaped."""
     odd = shutil.copytree(parts[0].parent, tmp_path / "räum\u2192")
-    words = [*PROGRAM, "review", *map(str, odd.glob("*.rrd")), "--json"]
+    words = [*PROGRAM, "review", "--long", *map(str, odd.glob("*.rrd")), "--json"]
     env = ENVIRONMENT | {"PYTHONIOENCODING": encoding}
     for command in (words, words[:-1]):
         ended = subprocess.run(command, check=False, capture_output=True, env=env)

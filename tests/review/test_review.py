@@ -13,6 +13,7 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.review.drive import walk_figures
+from fasaco_edge.review.instant import scene_at
 from fasaco_edge.review.page import page_of
 from fasaco_edge.review.panels import TimeAxis, branching_panel, covered_share, saved_panel
 from fasaco_edge.review.pictures import FIELDS, draw_fields
@@ -229,6 +230,14 @@ def test_the_page_shows_what_ants_and_local_search_saved(review, recording):
     assert panel.title in page_of(review)
 
 
+def test_a_moment_tells_what_the_colony_held(review):
+    instant = scene_at(review, 0.6 * review.duration_s).instant
+    assert instant.trail.startswith("living trail at path ")
+    assert "directions in reach of the best" in instant.trail
+    assert "from the robot's cell on " in instant.trail
+    assert instant.path.at_s <= instant.at_s < (instant.path_after or instant.path).at_s + 60
+
+
 def test_faults_are_those_of_the_status(told, recording):
     assert recording.status["errors"]["by_code"] == {"malformed_message": BROKEN_POSES}
     assert told["faults_by_code"] == {"malformed_message": BROKEN_POSES}
@@ -334,7 +343,7 @@ def test_the_command_prints_the_document(recording, told):
 
 
 def test_the_command_prints_a_report(recording, told):
-    ended = fasaco_edge("review", *recording.paths)
+    ended = fasaco_edge("review", *recording.paths, "--long")
     assert ended.code == 0
     for text in (
         f"{told['covered_cells']} of {told['coverable_cells']} cells",

@@ -90,9 +90,9 @@ def update_bytes(
     return oracle.to_bytes("map_msgs/msg/OccupancyGridUpdate", message)
 
 
-def pose_bytes(x: float, y: float, frame: str = "map") -> bytes:
+def pose_bytes(x: float, y: float, frame: str = "map", yaw: float = 0.0) -> bytes:
     """Return a geometry_msgs/PoseStamped, by rosbags."""
-    message = oracle.pose_stamped(frame, 1, oracle.pose(Pose2D(x, y)))
+    message = oracle.pose_stamped(frame, 1, oracle.pose(Pose2D(x, y, yaw)))
     return oracle.to_bytes("geometry_msgs/msg/PoseStamped", message)
 
 

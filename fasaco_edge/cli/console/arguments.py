@@ -122,7 +122,7 @@ def with_negative_pairs(words: Sequence[str]) -> list[str]:
     for word in words:
         if (
             joined
-            and joined[-1] in ("--start", "--start-xy", "--end", "--keep-out")
+            and joined[-1] in ("--start", "--start-xy", "--end", "--keep-out", "--point")
             and re.match(r"-[\d.]", word)
         ):
             joined[-1] += f"={word}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -40,6 +41,30 @@ class DrawnField:
         return np.frombuffer(zlib.decompress(self._packed), np.uint8).reshape(shape)
 
 
+def fields_in(batch: pa.RecordBatch, times: list[int]) -> Iterator[DrawnField]:
+    """Yield the fields of a batch of rows, drawn at ``times`` [ns].
+
+    Raises:
+        ValueError: the batch holds something else.
+    """
+    data = column(batch, "GridMap:data", _DATA)
+    cells = column(batch, "GridMap:cell_size", _CELL)
+    places = column(batch, "GridMap:translation", _PLACE)
+    if data is None or cells is None or places is None:
+        return
+    formats = batch.column("GridMap:format").to_pylist()
+    for row, at_ns in enumerate(times):
+        levels = np.asarray(data[row].values[0].values, np.uint8)
+        shape = int(formats[row][0]["height"]), int(formats[row][0]["width"])
+        cell_m, (x, y, _) = cells[row].as_py()[0], places[row].as_py()[0]
+        if levels.size != shape[0] * shape[1] or not cell_m > 0:
+            raise ValueError(f"a field of {levels.size} cells, {shape[0]} x {shape[1]} told")
+        corner = Window(0, 0, *shape).moved(round(y / cell_m), round(x / cell_m))
+        # An image's row 0 is its top.
+        upright = np.ascontiguousarray(levels.reshape(shape)[::-1])
+        yield DrawnField(at_ns, corner, zlib.compress(upright.data, 1))
+
+
 @dataclass(slots=True)
 class FieldSampler:
     """Takes fields in order of time and keeps some.
@@ -60,22 +85,8 @@ class FieldSampler:
         Raises:
             ValueError: the batch holds something else.
         """
-        data = column(batch, "GridMap:data", _DATA)
-        cells = column(batch, "GridMap:cell_size", _CELL)
-        places = column(batch, "GridMap:translation", _PLACE)
-        if data is None or cells is None or places is None:
-            return
-        formats = batch.column("GridMap:format").to_pylist()
-        for row, at_ns in enumerate(times):
-            levels = np.asarray(data[row].values[0].values, np.uint8)
-            shape = int(formats[row][0]["height"]), int(formats[row][0]["width"])
-            cell_m, (x, y, _) = cells[row].as_py()[0], places[row].as_py()[0]
-            if levels.size != shape[0] * shape[1] or not cell_m > 0:
-                raise ValueError(f"a field of {levels.size} cells, {shape[0]} x {shape[1]} told")
-            corner = Window(0, 0, *shape).moved(round(y / cell_m), round(x / cell_m))
-            # An image's row 0 is its top.
-            upright = np.ascontiguousarray(levels.reshape(shape)[::-1])
-            self._keep(DrawnField(at_ns, corner, zlib.compress(upright.data, 1)))
+        for taken in fields_in(batch, times):
+            self._keep(taken)
 
     def _keep(self, taken: DrawnField) -> None:
         if self.count % self._every == 0:

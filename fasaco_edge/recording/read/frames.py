@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from fasaco_edge.errors import MalformedMessage, UnreadableRecording
+from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.repair import (
     FOOTER_KIND,
@@ -120,6 +121,19 @@ def column(batch: pa.RecordBatch, name: str, kind: pa.DataType) -> pa.Array | No
     if found.type != kind or found.null_count:
         raise ValueError(f"{name} has to be {kind} without nulls, got {found.type}")
     return found
+
+
+def wall_ns(batch: pa.RecordBatch) -> list[int]:
+    """Return when the rows of a record batch were logged [ns].
+
+    Raises:
+        ValueError: they have no times.
+    """
+    found = column(batch, entities.WALL_CLOCK, pa.timestamp("ns"))
+    if found is None:
+        raise ValueError(f"rows without the timeline {entities.WALL_CLOCK}")
+    times: list[int] = found.cast(pa.int64()).to_pylist()
+    return times
 
 
 def _chunk(body: bytes) -> Chunk | None:

@@ -20,7 +20,7 @@ from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecord
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.fields import DrawnField, FieldSampler
-from fasaco_edge.recording.read.frames import HINT, Chunk, chunks, column, open_part
+from fasaco_edge.recording.read.frames import HINT, Chunk, chunks, column, open_part, wall_ns
 from fasaco_edge.samples import Place, SampleDecoder, place_of
 
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
@@ -230,7 +230,7 @@ class _RunReader:
         if entity == entities.INPUTS:
             self.batches += _batches_of(chunk, path)
         elif entity.startswith(READ) and not chunk.is_static and batch.num_rows:
-            times = _wall_ns(batch)
+            times = wall_ns(batch)
             self.span += [min(times), max(times)]
             self.rows[entity] += [
                 (at, value[0])
@@ -239,7 +239,7 @@ class _RunReader:
             ]
         else:
             if entity == entities.PHEROMONE and not chunk.is_static and batch.num_rows:
-                self.fields.take(batch, _wall_ns(batch))
+                self.fields.take(batch, wall_ns(batch))
             return 0
         return chunk.bytes
 
@@ -280,15 +280,6 @@ class _RunReader:
             for entity, rows in self.rows.items()
             if entity.startswith(prefix)
         }
-
-
-def _wall_ns(batch: pa.RecordBatch) -> list[int]:
-    """Return when the rows of a record batch were logged [ns]."""
-    found = column(batch, entities.WALL_CLOCK, pa.timestamp("ns"))
-    if found is None:
-        raise ValueError(f"rows without the timeline {entities.WALL_CLOCK}")
-    times: list[int] = found.cast(pa.int64()).to_pylist()
-    return times
 
 
 def _values(batch: pa.RecordBatch) -> list[list[float | str] | None]:

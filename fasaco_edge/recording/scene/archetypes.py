@@ -9,6 +9,7 @@ The looks of states are static, logged once.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,12 +64,16 @@ WINDOW = LineStyle((219, 39, 119), z=0.055, width=2.0)
 OLD_PATH = LineStyle((196, 181, 253), z=0.03, width=0.8)
 PATH = LineStyle((124, 58, 237), z=0.04, width=1.2)
 DRIVEN = LineStyle((5, 150, 105), z=0.05, width=1.6)
+ZONE = LineStyle((37, 99, 235), z=0.052, width=2.0)
+KEEP_OUT = LineStyle((234, 88, 12), z=0.053, width=2.4)
 LINES = {
     entities.MAP_CHANGE: CHANGE,
     entities.REPLAN_WINDOW: WINDOW,
     entities.OLD_PATH: OLD_PATH,
     entities.PATH: PATH,
     entities.DRIVEN_PATH: DRIVEN,
+    entities.ZONES: ZONE,
+    entities.KEEP_OUT: KEEP_OUT,
 }
 
 
@@ -207,6 +212,16 @@ def box_archetype(bounds: Bounds, style: LineStyle) -> rr.LineStrips3D:
     """Return the outline of a rectangle (x_min, y_min, x_max, y_max) [m]."""
     x0, y0, x1, y1 = bounds
     return line_archetype(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]), style)
+
+
+def polygons_archetype(
+    polygons: Sequence[tuple[str, NDArray[np.float64]]], style: LineStyle
+) -> rr.LineStrips3D:
+    """Return the borders of named polygons, each of corners (n, 2) [m]; nothing for none."""
+    closed = [np.vstack([corners, corners[:1]]) for _, corners in polygons]
+    strips = [np.column_stack((xy, np.full(len(xy), style.z))) for xy in closed]
+    names = [name for name, _ in polygons]
+    return rr.LineStrips3D.from_fields(strips=strips, labels=names, show_labels=True)
 
 
 def coverage_fractions(grid: OccupancyGrid) -> tuple[float, float]:

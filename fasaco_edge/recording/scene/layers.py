@@ -50,6 +50,11 @@ class Anchor:
     def __bool__(self) -> bool:
         return bool(self.x or self.y)
 
+    @property
+    def xy(self) -> tuple[float, float]:
+        """Its place [m]."""
+        return self.x, self.y
+
     def pose(self, pose: Pose2D) -> Pose2D:
         """Return where a pose is drawn."""
         return replace(pose, x=pose.x - self.x, y=pose.y - self.y)

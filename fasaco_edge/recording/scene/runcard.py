@@ -30,6 +30,7 @@ LEGEND = """\
 - **Path** violet, pale the one before; **driven** green
 - **Pink** what of the map led to this path, and how
 - **Cyan** an obstacle came or went
+- **Blue line** a zone of the order, **orange** one to keep out of
 - **Pheromone** dark little, bright much, black none
 - **Arrows** where it points to, bright where that is decided; at the robot, its share there"""
 

@@ -10,6 +10,7 @@ import numpy as np
 from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import Bounds, Pose2D, StampedPose, union_bounds
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, known_bounds
+from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.archetypes import log_styles
@@ -21,6 +22,7 @@ from fasaco_edge.recording.scene.layers import Anchor, Layers, changed_bounds, s
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
+from fasaco_edge.text import one_line
 from fasaco_edge.wire.maps import directions_of
 from fasaco_edge.wire.path_documents import PathAttachment, TrailAttachment
 from fasaco_edge.wire.paths import PathMessage
@@ -97,9 +99,23 @@ class Scene:
         self._robot = pose
         self._driven.add(pose.x, pose.y)
 
-    def add_command(self, command: str) -> None:
-        """Log the name of a command that the mission has taken."""
+    def add_command(self, command: str, order: MissionOrder) -> None:
+        """Log a command that the mission has taken; draw the zones of what it has to do then."""
         self.add_line(entities.MISSION_LOG, f"command: {command}")
+        if command not in ("start", "cancel", "reset"):
+            return
+        # Only a start comes with an order; the others take its zones away.
+        zones = [(zone.name, zone.polygon) for zone in order.zones if zone.polygon is not None]
+        keep_out = [("keep out", polygon) for polygon in order.keep_out]
+        for entity, style, polygons in (
+            (entities.ZONES, draw.ZONE, zones),
+            (entities.KEEP_OUT, draw.KEEP_OUT, keep_out),
+        ):
+            placed = [
+                (one_line(name), np.array(corners) - self._anchored(Pose2D(*corners[0])).xy)
+                for name, corners in polygons
+            ]
+            self._writer.log(entity, draw.polygons_archetype(placed, style), latched=True)
 
     def add_path(self, message: PathMessage, about: PathAttachment) -> None:
         """Draw the path to drive, over the one before it, and log reason."""

@@ -20,6 +20,7 @@ from fasaco_edge.bus.session import Bus, BusSettings, open_bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.host.processes import memory_limit, resident_mb, return_soon, stop_event
+from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.recording.scene.blueprint import build_blueprint
@@ -237,7 +238,7 @@ class Recorder:
             self._scene.add_pose(pose)
 
     def _draw_command(self, sample: Sample) -> None:
-        self._scene.add_command(str(decode_json(sample.payload).get("command", "")))
+        self._scene.add_command(*read_command(decode_json(sample.payload)))
 
     def _draw_path(self, sample: Sample) -> None:
         about = decode_tolerant(sample.attachment, PathAttachment)

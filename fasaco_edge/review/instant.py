@@ -1,0 +1,398 @@
+"""One moment of a recorded mission: robot, paths before and after, map, command, trail.
+
+It answers why the robot did then what it did. Maps are decoded once more up to that time, and the
+lines of paths are read as they were drawn: of many paths in quick succession not each one was.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.read.drawn import DrawnLabel, DrawnLine, drawings
+from fasaco_edge.recording.read.run import RecordedSamples, RunRecord
+from fasaco_edge.review.orders import CommandThen, commands_of, order_words
+from fasaco_edge.review.rows import clock
+from fasaco_edge.review.run_data import maps_of
+from fasaco_edge.wire.path_documents import Rectangle
+
+if TYPE_CHECKING:
+    from fasaco_edge.review.review import Review
+    from fasaco_edge.review.run_data import PublishedPath
+
+# A turn is looked for so long before and after [s], and lasts at most so long.
+TURN_S = 2.0
+# Less is a bend [deg]; a turn by so many more may be a second longer, or further off.
+TURN_DEG, SHORTER_DEG_S = 60.0, 20.0
+# How far ahead a path shows where it leads to [m]; less than this apart it leads the same way.
+AHEAD_M = 0.5
+APART_DEG = 60.0
+# What of the map changed is told for so long before [s].
+MAP_S = 5.0
+
+DIRECTIONS = (
+    *("east", "north-east", "north", "north-west"),
+    *("west", "south-west", "south", "south-east"),
+)
+
+
+class PathThen(msgspec.Struct):
+    """A path: when it came, why, and where it leads on from the robot's place [deg]."""
+
+    at_s: float
+    revision: int
+    reason: str
+    steps: int
+    leads_deg: float | None
+    changed: Rectangle | None
+
+
+class MapThen(msgspec.Struct):
+    """What changed on the map between two times [m2], and the rectangle around it."""
+
+    since_s: float
+    seen_m2: float
+    blocked_m2: float
+    freed_m2: float
+    around: Rectangle | None
+
+
+class TurnThen(msgspec.Struct):
+    """The sharpest turn about a time: how far to the left [deg], where, and why."""
+
+    begin_s: float
+    end_s: float
+    degrees: float
+    x: float
+    y: float
+    why: str
+
+
+class Instant(msgspec.Struct):
+    """All that is known of one moment; times are [s] since the recording began."""
+
+    at_s: float
+    state: str | None
+    state_reason: str
+    order: str
+    x: float | None
+    y: float | None
+    yaw_deg: float | None
+    speed_m_s: float | None
+    turn: TurnThen | None
+    path_before: PathThen | None
+    path: PathThen | None
+    path_after: PathThen | None
+    map: MapThen | None
+    command: CommandThen | None
+    next_command: CommandThen | None
+    trail: str
+
+
+class Scene(msgspec.Struct, frozen=True):
+    """An instant and what a picture of it shows: the map then, and lines of the paths."""
+
+    instant: Instant
+    grid: OccupancyGrid | None
+    before: DrawnLine | None
+    line: DrawnLine | None
+    after: DrawnLine | None
+
+
+def scene_at(review: Review, at_s: float) -> Scene:
+    """Return what was at a time [s].
+
+    Raises:
+        UnreadableRecording: a file of the recording is gone.
+    """
+    record, data = review.record, review.data
+    pose_index = int(np.searchsorted(data.times, at_s, side="right")) - 1
+    pose = data.poses[pose_index] if pose_index >= 0 else None
+    drawn = _Drawn.read(record)
+    span = next((s for s in reversed(review.states) if s.begin_s <= at_s), None)
+    chapter = next((c for c in reversed(review.orders) if c.at_s <= at_s), None)
+    turn = _turn(review, drawn, at_s)
+    # A turn has the path for its reason that came while it began.
+    place = (turn.x, turn.y) if turn else pose[:2] if pose else None
+    index = sum(path.at_s <= at_s for path in data.paths) - 1
+    before, path, after = (
+        _path(data.paths, number, drawn, place) for number in (index - 1, index, index + 1)
+    )
+    grid, change = _map_at(record, at_s)
+    commands = commands_of(data)
+    past = [each for each in commands if each.at_s <= at_s]
+    instant = Instant(
+        at_s=round(at_s, 3),
+        state=span.name if span else None,
+        state_reason=span.reason if span else "",
+        order=order_words(chapter.order) if chapter and chapter.order else "",
+        x=round(pose[0], 3) if pose else None,
+        y=round(pose[1], 3) if pose else None,
+        yaw_deg=round(math.degrees(math.remainder(pose[2], math.tau)), 1) if pose else None,
+        speed_m_s=_speed(data.times, data.track, at_s),
+        turn=turn,
+        path_before=before,
+        path=path,
+        path_after=after,
+        map=change,
+        command=past[-1] if past else None,
+        next_command=next((each for each in commands if each.at_s > at_s), None),
+        trail=drawn.trail_at(record.began_ns + round(1e9 * at_s)),
+    )
+    lines = (drawn.line_of(each.revision if each else 0) for each in (before, path, after))
+    return Scene(instant, grid, *lines)
+
+
+class _Drawn(msgspec.Struct):
+    """Lines and labels of a run."""
+
+    lines: dict[int, DrawnLine]
+    labels: dict[str, list[DrawnLabel]]
+
+    @classmethod
+    def read(cls, record: RunRecord) -> _Drawn:
+        lines: dict[int, DrawnLine] = {}
+        labels: dict[str, list[DrawnLabel]] = {entities.COHORT: [], entities.HERE: []}
+        wanted = (entities.PATH, *labels)
+        for entity, one in drawings([part.path for part in record.parts], *wanted):
+            if isinstance(one, DrawnLine):
+                lines.setdefault(one.revision, one)
+            elif isinstance(one, DrawnLabel):
+                labels[entity].append(one)
+        return cls(lines, labels)
+
+    def line_of(self, revision: int) -> DrawnLine | None:
+        return self.lines.get(revision)
+
+    def trail_at(self, at_ns: int) -> str:
+        """Return what the labels of the living trail said; "" where there were none."""
+        said = []
+        for lead, entity in (("", entities.COHORT), ("from the robot's cell ", entities.HERE)):
+            past = [one for one in self.labels[entity] if one.at_ns <= at_ns]
+            newest = max(past, key=lambda one: one.at_ns, default=None)
+            if newest is not None and newest.text:
+                said.append(lead + newest.text.replace("\n", "; "))
+        return "; ".join(said)
+
+
+def _path(
+    paths: Sequence[PublishedPath],
+    number: int,
+    drawn: _Drawn,
+    place: tuple[float, float] | None,
+) -> PathThen | None:
+    if not 0 <= number < len(paths):
+        return None
+    at_s, about = paths[number].at_s, paths[number].about
+    line = drawn.line_of(about.revision)
+    leads = heading_from(line.xy, place) if line is not None and place is not None else None
+    return PathThen(
+        round(at_s, 3),
+        about.revision,
+        about.reason,
+        about.steps,
+        None if leads is None else round(leads, 1),
+        about.changed,
+    )
+
+
+def heading_from(line: NDArray[np.float64], place: tuple[float, float]) -> float | None:
+    """Return where a line (n, 2) leads to from its point nearest to a place, (-180, 180] [deg].
+
+    None where it ends there.
+    """
+    if len(line) < 2:
+        return None
+    starts, ways = line[:-1], np.diff(line, axis=0)
+    squares = np.maximum((ways**2).sum(axis=1), 1e-12)
+    shares = np.clip(((np.array(place) - starts) * ways).sum(axis=1) / squares, 0.0, 1.0)
+    nearest = starts + shares[:, None] * ways
+    index = int(np.argmin(np.hypot(*(nearest - place).T)))
+    rest = np.vstack([nearest[index], line[index + 1 :]])
+    far = np.hypot(*(rest - rest[0]).T) >= AHEAD_M
+    dx, dy = (rest[int(np.argmax(far))] if far.any() else rest[-1]) - rest[0]
+    return math.degrees(math.atan2(dy, dx)) if dx or dy else None
+
+
+def _turn(review: Review, drawn: _Drawn, at_s: float) -> TurnThen | None:
+    """Return the sharpest turn about a time; None where it went on as it did."""
+    data = review.data
+    times, track = data.times, data.track
+    about = np.abs(times - at_s) <= TURN_S
+    times, track = times[about], track[about]
+    if len(times) < 2:
+        return None
+    yaw = np.degrees(np.unwrap(track[:, 2]))
+    turned = yaw[None, :] - yaw[:, None]
+    seconds = times[None, :] - times[:, None]
+    # Of turns as sharp the shortest and nearest one; two in a row are two.
+    away = np.abs((times[None, :] + times[:, None]) / 2 - at_s)
+    sharp = np.minimum(np.abs(turned), 180.0) - SHORTER_DEG_S * (seconds + away)
+    worth = np.where((seconds > 0) & (seconds <= TURN_S), sharp, 0.0)
+    first, last = np.unravel_index(int(np.argmax(worth)), worth.shape)
+    degrees = float(turned[first, last])
+    if abs(degrees) < TURN_DEG:
+        return None
+    x, y, _ = track[first].tolist()
+    begin_s, end_s = float(times[first]), float(times[last])
+    why = _why(data.paths, drawn, (x, y), begin_s, end_s)
+    return TurnThen(
+        round(begin_s, 3), round(end_s, 3), round(degrees, 1), round(x, 3), round(y, 3), why
+    )
+
+
+def _why(
+    paths: Sequence[PublishedPath],
+    drawn: _Drawn,
+    place: tuple[float, float],
+    begin_s: float,
+    end_s: float,
+) -> str:
+    """Return which path turned the robot at a place: a new one, or the one that it followed."""
+    index = sum(path.at_s <= begin_s for path in paths) - 1
+    known = [
+        (path, heading)
+        for path in paths[max(index - 1, 0) :]
+        if path.at_s <= end_s
+        and (line := drawn.line_of(path.about.revision)) is not None
+        and (heading := heading_from(line.xy, place)) is not None
+    ]
+    for (old, was), (new, now) in pairwise(known):
+        apart = abs(math.remainder(now - was, 360.0))
+        if new.at_s >= begin_s - TURN_S and apart > APART_DEG:
+            return (
+                f"path {new.about.revision} came ({new.about.reason}) and leads {direction(now)}, "
+                f"where path {old.about.revision} led {direction(was)}"
+            )
+    led = [path.about for path in paths if path.at_s <= end_s and path.about.steps]
+    if not led:
+        return "there was no path"
+    planned = next((about for about in reversed(led) if about.planner), led[-1])
+    by = f", by the plan of path {planned.revision}" if planned is not led[-1] else ""
+    return f"as planned: path {led[-1].revision} turns there{by} ({planned.reason})"
+
+
+def direction(degrees: float) -> str:
+    """Return a direction in the map frame in words; 0 is east, 90 north."""
+    return DIRECTIONS[round(degrees / 45.0) % 8]
+
+
+def _speed(times: NDArray[np.float64], track: NDArray[np.float64], at_s: float) -> float | None:
+    near = np.abs(times - at_s) <= 0.5
+    if np.count_nonzero(near) < 2:
+        return None
+    way = np.hypot(*np.diff(track[near, :2], axis=0).T).sum()
+    seconds = np.ptp(times[near])
+    return round(float(way / seconds), 2) if seconds > 0 else None
+
+
+def _map_at(record: RunRecord, at_s: float) -> tuple[OccupancyGrid | None, MapThen | None]:
+    """Return the map in force at a time [s], and how it changed in the ``MAP_S`` before."""
+    since_s = max(at_s - MAP_S, 0.0)
+    old: OccupancyGrid | None = None
+    new: OccupancyGrid | None = None
+    for came_s, grid in maps_of(RecordedSamples.of(record.batches), record.began_ns):
+        if came_s > at_s:
+            break
+        new = grid
+        old = grid if came_s <= since_s or old is None else old
+    if new is None or old is None:
+        return None, None
+    return new, _map_change(old, new, since_s)
+
+
+def _map_change(old: OccupancyGrid, new: OccupancyGrid, since_s: float) -> MapThen:
+    before = _resampled(old, new)
+    known, free, was_free = new.cells >= FREE, new.cells < 50, before < 50
+    seen = known & (before < FREE)
+    blocked = known & (before >= FREE) & was_free & ~free
+    freed = known & (before >= FREE) & ~was_free & free
+    pixel_m2 = new.geometry.resolution**2
+    seen_m2, blocked_m2, freed_m2 = (
+        round(int(np.count_nonzero(mask)) * pixel_m2, 2) for mask in (seen, blocked, freed)
+    )
+    window = Window.of(seen | blocked | freed)
+    around = None
+    if window is not None:
+        around = Rectangle(*(round(edge, 2) for edge in new.geometry.bounds(window)))
+    return MapThen(round(since_s, 3), seen_m2, blocked_m2, freed_m2, around)
+
+
+def _resampled(old: OccupancyGrid, new: OccupancyGrid) -> NDArray[np.int8]:
+    """Return an older map's values on the pixels of a newer one, int8 (rows, cols); -1 outside."""
+    found = np.full(new.cells.shape, -1, np.int8)
+    if abs(old.geometry.resolution - new.geometry.resolution) > 1e-9:
+        return found
+    x, y = new.geometry.origin.x, new.geometry.origin.y
+    col, row = (round(at) for at in old.geometry.to_pixels(x, y))
+    rows, cols = new.cells.shape
+    here = Window(row, col, row + rows, col + cols)
+    common = here.intersection(Window(0, 0, *old.cells.shape))
+    if common is not None:
+        theirs = old.cells[common.row0 : common.row1, common.col0 : common.col1]
+        found[common.slices_in(here)] = theirs
+    return found
+
+
+def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
+    """Yield name and text of all that is known of a moment."""
+    state, why = instant.state or "not known", instant.state_reason
+    # The first path since that state was entered: which one it is now is told below.
+    yield "state", f"{state}: {why}" if why and not why.startswith("path ") else state
+    if instant.order:
+        yield "order", instant.order
+    if instant.x is not None and instant.yaw_deg is not None:
+        moving = "" if instant.speed_m_s is None else f", {instant.speed_m_s:.2f} m/s"
+        facing = direction(instant.yaw_deg)
+        yield "robot", f"at ({instant.x:.2f}, {instant.y:.2f}) m, facing {facing}{moving}"
+    if (turn := instant.turn) is not None:
+        side = "left" if turn.degrees > 0 else "right"
+        span = f"{clock(turn.begin_s)} to {clock(turn.end_s)}"
+        yield "turned", f"{abs(turn.degrees):.0f} deg to the {side}, {span}: {turn.why}"
+    for name, path in (
+        ("path before", instant.path_before),
+        ("path", instant.path),
+        ("path after", instant.path_after),
+    ):
+        if path is not None:
+            yield name, _path_words(path, clock(path.at_s))
+    if (change := instant.map) is not None:
+        yield "map", _map_words(change, clock(change.since_s))
+    for name, command in (("command", instant.command), ("next command", instant.next_command)):
+        if command is not None:
+            yield name, f"{clock(command.at_s)} {command.command}"
+    yield "trail", instant.trail or "not recorded"
+
+
+def _path_words(path: PathThen, when: str) -> str:
+    leads = "" if path.leads_deg is None else f"; leads {direction(path.leads_deg)} from there"
+    where = "" if path.changed is None else f", map changed {_box_words(path.changed)}"
+    return f"{path.revision} at {when}: {path.reason}{where}; {path.steps} steps{leads}"
+
+
+def _map_words(change: MapThen, since: str) -> str:
+    parts = [
+        f"{m2:.2f} m2 {what}"
+        for m2, what in (
+            (change.seen_m2, "seen for the first time"),
+            (change.blocked_m2, "now blocked"),
+            (change.freed_m2, "now free"),
+        )
+        if m2
+    ]
+    if not parts or change.around is None:
+        return f"no change since {since}"
+    return f"since {since} {', '.join(parts)}, {_box_words(change.around)}"
+
+
+def _box_words(box: Rectangle) -> str:
+    return f"within ({box.x_min:.1f}, {box.y_min:.1f}) to ({box.x_max:.1f}, {box.y_max:.1f}) m"

@@ -1,0 +1,343 @@
+"""One spot of the floor: swept or not, and why not.
+
+The reasons are looked for in this order: the map does not show it, it is no floor, a keep-out zone,
+no way for the robot, not ordered; what the robot could have swept it missed, or its path passed by.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bench.floor import JudgedFloor
+from fasaco_edge.bench.pixels import Mask, Patches, within
+from fasaco_edge.grid.geometry import GridGeometry, Polygon, Window
+from fasaco_edge.grid.lattice import Footprint
+from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
+from fasaco_edge.mission.orders.zones import cells_inside
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.read.drawn import DrawnLine, drawings
+from fasaco_edge.recording.read.run import RecordedSamples
+from fasaco_edge.review.floor import swept_floor
+from fasaco_edge.review.rows import clock
+from fasaco_edge.review.run_data import BETTER, maps_of
+from fasaco_edge.wire.settings import known_settings
+
+if TYPE_CHECKING:
+    from fasaco_edge.review.review import Review
+
+# A path that leads so near [m] would have swept what lies at its tool's edge.
+NEAR_M = 0.02
+# The reason of a path whose line alone is another, as the mission gives it.
+POLISHED = "line polished"
+# Patches that are listed, the largest first, and the least one [m2].
+MOST_PATCHES, LEAST_M2 = 8, 0.04
+
+
+class Spot(msgspec.Struct):
+    """A place (x, y) [m] in the map frame, and why it was not swept.
+
+    Attributes:
+        swept: whether the tool passed over it; None where that is not known.
+        why: the reason in a word: swept, never seen, not floor, keep-out, too narrow, closed off,
+            not ordered, still to come, seen late, missed, not worth it, not known.
+        words: the reason in full.
+        missed_m: how far the edge of the tool stayed away from it [m].
+        nearest_s: when the robot came nearest [s since the recording began].
+        seen_s: when the map first showed it free [s].
+        patch_m2: all unswept floor in one piece with it [m2].
+    """
+
+    x: float
+    y: float
+    swept: bool | None
+    why: str
+    words: str
+    missed_m: float | None = None
+    nearest_s: float | None = None
+    seen_s: float | None = None
+    patch_m2: float | None = None
+
+
+class LeftPatch(msgspec.Struct, frozen=True):
+    """Reachable floor in one piece that was not swept: its area, and its most inner place [m]."""
+
+    m2: float
+    x: float
+    y: float
+
+
+def left_patches(floor: JudgedFloor) -> list[LeftPatch]:
+    """Return the largest patches that a robot left, the largest first."""
+    found, rest, pixel_m2 = [], floor.unswept, floor.geometry.resolution**2
+    patches = Patches.of(rest)
+    cols = rest.shape[1] + 1
+    for patch in np.argsort(-patches.pixels, kind="stable")[:MOST_PATCHES].tolist():
+        m2 = int(patches.pixels[patch]) * pixel_m2
+        if m2 < LEAST_M2:
+            break
+        runs = patches.of_run == patch
+        # The middle of its longest row: inside, however it bends.
+        starts, ends = patches.starts[runs], patches.ends[runs]
+        longest = int(np.argmax(ends - starts))
+        row, first = divmod(int(starts[longest]), cols)
+        middle = first + 0.5 * int(ends[longest] - starts[longest])
+        x, y = floor.geometry.to_map(middle, row + 0.5)
+        found.append(LeftPatch(round(m2, 3), round(x, 3), round(y, 3)))
+    return found
+
+
+def spots_left(review: Review) -> list[Spot]:
+    """Return why each of ``left_patches`` was not swept."""
+    patches = left_patches(review.floor) if review.floor else []
+    return explain(review, [(patch.x, patch.y) for patch in patches])
+
+
+def explain(review: Review, places: Sequence[tuple[float, float]]) -> list[Spot]:
+    """Return of each place (x, y) [m] why it was not swept, or that it was.
+
+    Raises:
+        UnreadableRecording: a file of the recording is gone.
+    """
+    drawn = _DrawnLater(review, places)
+    return [_Judge(review, drawn, number).spot() for number in range(len(places))]
+
+
+class _DrawnLater:
+    """What is read once more of a recording, for all places together, where one needs it."""
+
+    def __init__(self, review: Review, places: Sequence[tuple[float, float]]) -> None:
+        self._review, self.places = review, places
+
+    @cached_property
+    def seen_s(self) -> list[float | None]:
+        """Since when the map has shown each place free to the end [s]."""
+        record, footprint = self._review.record, self._review.data.footprint
+        free_at_most = footprint.free_at_most if footprint else -1
+        since: list[float | None] = [None] * len(self.places)
+        for at_s, grid in maps_of(RecordedSamples.of(record.batches), record.began_ns):
+            for number, (x, y) in enumerate(self.places):
+                value = _value(grid.cells, grid.geometry, x, y)
+                is_free = value is not None and FREE <= value <= free_at_most
+                before = since[number]
+                since[number] = (at_s if before is None else before) if is_free else None
+        return since
+
+    @cached_property
+    def paths(self) -> list[DrawnLine]:
+        """The paths as they were drawn, in order of time."""
+        parts = [part.path for part in self._review.record.parts]
+        found = [one for _, one in drawings(parts, entities.PATH) if isinstance(one, DrawnLine)]
+        return sorted((one for one in found if len(one.xy)), key=lambda one: one.at_ns)
+
+
+class _Judge:
+    """Looks for the reason of one place."""
+
+    def __init__(self, review: Review, drawn: _DrawnLater, number: int) -> None:
+        self._review, self._drawn, self._number = review, drawn, number
+        self._x, self._y = drawn.places[number]
+        self._data = review.data
+        known = known_settings(self._data.config).robot
+        self._tool_m, self._radius_m = known.tool_width_m, known.radius_m
+
+    def _spot(self, why: str, words: str, *, swept: bool | None = False) -> Spot:
+        return Spot(round(self._x, 3), round(self._y, 3), swept, why, words)
+
+    def spot(self) -> Spot:
+        grid, floor, footprint = self._data.grid, self._review.floor, self._data.footprint
+        if grid is None or footprint is None:
+            why = self._review.no_lattice or "there is no map"
+            return self._spot("not known", why, swept=None)
+        spot = self._off_the_floor(grid, footprint)
+        if spot is not None:
+            return spot
+        if floor is None:
+            words = "floor was swept before the recording began, or no pose lies on the map"
+            return self._spot("not known", words, swept=None)
+        if not _is_in(floor.reachable, floor.geometry, self._x, self._y):
+            return self._out_of_reach(grid)
+        return self._within_reach(floor)
+
+    def _off_the_floor(self, grid: OccupancyGrid, footprint: Footprint) -> Spot | None:
+        """Tell why it is no floor to sweep by the map and the order; None where it is."""
+        value = _value(grid.cells, grid.geometry, self._x, self._y)
+        if value is None:
+            return self._spot("never seen", "outside of the map at the end")
+        if value < FREE:
+            return self._spot("never seen", "unknown to the map at the end")
+        if value > footprint.free_at_most:
+            what = "an obstacle" if value >= footprint.occupied_at_least else "not surely free"
+            return self._spot("not floor", f"the map at the end shows {what} ({value} %)")
+        if (zone := self._zone(self._data.keep_out)) is not None:
+            ordered = zone < len(self._data.ordered_keep_out)
+            which = (
+                f"keep-out zone {zone + 1} of the order" if ordered else "a standing keep-out zone"
+            )
+            return self._spot("keep-out", f"in {which}")
+        return None
+
+    def _out_of_reach(self, grid: OccupancyGrid) -> Spot:
+        """Tell why the tool cannot come to it."""
+        lattice, footprint = self._review.lattice, self._data.footprint
+        assert lattice is not None
+        assert footprint is not None
+        if self._data.keep_out:
+            free = swept_floor(self._data, lattice, 0.0, keep_out=())
+            if free is not None and _is_in(free.reachable, free.geometry, self._x, self._y):
+                return self._spot("keep-out", "a keep-out zone is in the way, or too near")
+        geometry = grid.geometry
+        free_mask = (grid.cells >= FREE) & (grid.cells <= footprint.free_at_most)
+        # As the judge has it: a disc fits where all that it touches is free.
+        radius_px, tool_px = (m / geometry.resolution for m in (self._radius_m, self._tool_m / 2))
+        fits = ~within(~np.pad(free_mask, 1), radius_px + 0.5)[1:-1, 1:-1]
+        could = within(fits, tool_px)
+        if _is_in(could, geometry, self._x, self._y):
+            words = "the robot would fit, but no way leads there that it fits through"
+            return self._spot("closed off", words)
+        room_m, place = _nearest(~free_mask, geometry, self._x, self._y)
+        stand_m, _ = _nearest(fits, geometry, self._x, self._y)
+        near = "" if room_m is None else f"; an obstacle or unknown ground {room_m:.2f} m away"
+        near += "" if place is None else f" at ({place[0]:.2f}, {place[1]:.2f})"
+        stand = ""
+        if stand_m is not None:
+            stand = (
+                f": it fits {stand_m:.2f} m away at the nearest, "
+                f"its tool reaches {self._tool_m / 2:.2f} m"
+            )
+        words = f"too narrow for the robot (radius {self._radius_m:g} m){stand}{near}"
+        return self._spot("too narrow", words)
+
+    def _within_reach(self, floor: JudgedFloor) -> Spot:
+        times, track = self._data.times, self._data.track[:, :2]
+        away_m, at_s = _passed(track, times, self._data.jump_m, (self._x, self._y))
+        first = int(np.argmin(away_m))
+        nearest_m, nearest_s = float(away_m[first]), float(at_s[first])
+        if _is_in(floor.swept, floor.geometry, self._x, self._y):
+            passed = at_s[away_m <= self._tool_m / 2 + floor.geometry.resolution]
+            words = "swept" + (f", first at {clock(float(passed[0]))}" if len(passed) else "")
+            return self._spot("swept", words, swept=True)
+        missed_m = max(nearest_m - self._tool_m / 2, 0.0)
+        spot = self._missed(missed_m, nearest_s)
+        spot.missed_m, spot.nearest_s = round(missed_m, 3), round(nearest_s, 3)
+        patches = Patches.of(floor.unswept)
+        here = patches.nearest_to(*floor.geometry.to_pixels(self._x, self._y))
+        m2 = int(np.count_nonzero(here)) * floor.geometry.resolution**2
+        spot.patch_m2 = round(m2, 3)
+        return spot
+
+    def _missed(self, missed_m: float, nearest_s: float) -> Spot:
+        """Tell why the tool passed by."""
+        by = f"the tool's edge passed {100 * missed_m:.0f} cm from it at {clock(nearest_s)}"
+        if self._data.zones and self._zone([zone.polygon for zone in self._data.zones]) is None:
+            words = f"in no zone of the last order; {by}"
+            for at_s, _, order in self._data.commands:
+                if (zone := self._zone(order.keep_out)) is not None:
+                    words += f"; in keep-out zone {zone + 1} of the order at {clock(at_s)}"
+            return self._spot("not ordered", words)
+        over = self._last_path_over()
+        seen_s = self._drawn.seen_s[self._number]
+        if over is not None and over is self._drawn.paths[-1] and not self._review.complete:
+            words = f"path {over.revision}, the last one, leads over it; it was not driven so far"
+            why = "still to come"
+        elif over is not None:
+            why, words = self._left_by(over)
+        elif seen_s is not None and seen_s > nearest_s:
+            why = "seen late"
+            words = f"the map showed it free from {clock(seen_s)} on, and then no path led there"
+        else:
+            why = "not worth it"
+            words = "no path led over it: a detour was not worth the way, or did not fit"
+        spot = self._spot(why, f"{words}; {by}")
+        spot.seen_s = None if seen_s is None else round(seen_s, 3)
+        return spot
+
+    def _last_path_over(self) -> DrawnLine | None:
+        """Return the last path that would have swept it; None without any."""
+        reach_m = self._tool_m / 2 - NEAR_M
+        for one in reversed(self._drawn.paths):
+            stamps = np.zeros(len(one.xy))
+            away_m, _ = _passed(one.xy, stamps, math.inf, (self._x, self._y))
+            if float(away_m.min()) <= reach_m:
+                return one
+        return None
+
+    def _left_by(self, over: DrawnLine) -> tuple[str, str]:
+        """Tell what became of a path that led over it."""
+        led = f"path {over.revision} led over it"
+        later = [p.about for p in self._data.paths if p.about.revision > over.revision]
+        if not later:
+            return "missed", f"{led}, and the robot did not follow it so far"
+        words = f"{led}, until path {later[0].revision} took its place ({later[0].reason})"
+        # What makes a line shorter leaves floor that is not worth the way.
+        return "not worth it" if later[0].reason in (POLISHED, BETTER) else "missed", words
+
+    def _zone(self, polygons: Sequence[Polygon | None]) -> int | None:
+        """Return the number of the first polygon around the spot; None without any."""
+        for number, polygon in enumerate(polygons):
+            if polygon is not None and is_inside(polygon, self._x, self._y):
+                return number
+        return None
+
+
+def is_inside(polygon: Polygon, x: float, y: float) -> bool:
+    """Return whether a polygon holds a place [m]."""
+    # As one cell of a lattice whose centre the place is.
+    moved = tuple((px - x + 0.5, py - y + 0.5) for px, py in polygon)
+    return bool(cells_inside(moved, Window(0, 0, 1, 1), 1.0)[0, 0])
+
+
+def _value(cells: NDArray[np.int8], geometry: GridGeometry, x: float, y: float) -> int | None:
+    col, row = (math.floor(at) for at in geometry.to_pixels(x, y))
+    rows, cols = cells.shape
+    return int(cells[row, col]) if 0 <= row < rows and 0 <= col < cols else None
+
+
+def _is_in(mask: Mask, geometry: GridGeometry, x: float, y: float) -> bool:
+    return bool(_value(mask.view(np.int8), geometry, x, y))
+
+
+def _nearest(
+    mask: Mask, geometry: GridGeometry, x: float, y: float
+) -> tuple[float | None, tuple[float, float] | None]:
+    """Return how far the nearest marked pixel is [m], and where; None without any."""
+    rows, cols = np.nonzero(mask)
+    if not len(rows):
+        return None, None
+    col, row = geometry.to_pixels(x, y)
+    away = np.hypot(cols + 0.5 - col, rows + 0.5 - row)
+    best = int(np.argmin(away))
+    place = geometry.to_map(cols[best] + 0.5, rows[best] + 0.5)
+    return float(away[best]) * geometry.resolution, place
+
+
+def _passed(
+    line: NDArray[np.float64],
+    at_s: NDArray[np.float64],
+    jump_m: float,
+    place: tuple[float, float],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how near each piece of a line came to a place [m], and when it ended [s]."""
+    if len(line) < 2:
+        return np.hypot(*(line - place).T), at_s
+    starts, ways = line[:-1], np.diff(line, axis=0)
+    squares = np.maximum((ways**2).sum(axis=1), 1e-12)
+    shares = np.clip(((np.array(place) - starts) * ways).sum(axis=1) / squares, 0.0, 1.0)
+    away = np.hypot(*(starts + shares[:, None] * ways - place).T)
+    away[squares > jump_m**2] = math.inf
+    return away, at_s[1:]
+
+
+def spot_rows(spot: Spot) -> Iterator[tuple[str, str]]:
+    """Yield name and text of what is known of a spot."""
+    known = {True: "swept", False: "not swept", None: "not known"}[spot.swept]
+    yield "at", f"({spot.x:.2f}, {spot.y:.2f}) m: {known}"
+    yield "why", spot.words if spot.words.startswith(spot.why) else f"{spot.why}: {spot.words}"
+    if spot.patch_m2 is not None:
+        yield "in one piece", f"{spot.patch_m2:.2f} m2 of floor not swept"

@@ -1,0 +1,260 @@
+"""Questions to a recording: why the robot turned round, and why a spot is not swept."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.cli import main
+from fasaco_edge.drawing import palette
+from fasaco_edge.recording import entities
+from fasaco_edge.review.instant import direction, heading_from, instant_rows, scene_at
+from fasaco_edge.review.page import page_of
+from fasaco_edge.review.review import read_review
+from fasaco_edge.review.spot import explain, is_inside, spots_left
+from fasaco_edge.wire import topics
+from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.paths import encode_path
+from tests.support.recordings import bus_on_free_port, read_column, recorder_process
+from tests.support.rooms import UNKNOWN, WALL, fill, map_bytes, pose_bytes, room
+
+CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "planner": {"line": "thorough"}}
+KEEP_OUT = [[2.6, 0.4], [3.4, 0.4], [3.4, 1.0], [2.6, 1.0]]
+ZONE = [[0.1, 0.1], [3.9, 0.1], [3.9, 2.3], [0.1, 2.3]]
+ORDER = {"zones": [{"name": "a", "polygon": ZONE}], "keep_out": [KEEP_OUT], "return_home": True}
+Y = 0.45
+
+
+def ground():
+    """Return a room with a corner never seen, a box, a niche of 20 cm and a closed chamber."""
+    pixels = fill(room(6.0, 3.0), 5.0, 0.0, 6.0, 3.0, UNKNOWN)
+    pixels = fill(pixels, 4.0, 0.0, 4.1, 3.0, WALL)
+    pixels = fill(pixels, 2.0, 2.0, 2.4, 2.4, WALL)
+    return fill(pixels, 2.6, 2.0, 3.0, 3.0, WALL)
+
+
+def seen_first():
+    """Return what was known of it when the robot began."""
+    return fill(ground(), 0.0, 1.2, 4.0, 1.6, UNKNOWN)
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory):
+    """A robot drives east along a path, until the map grows and another leads back west."""
+    folder, keys = tmp_path_factory.mktemp("questions") / "runs", Keys()
+    folder.mkdir()
+    with bus_on_free_port() as (bus, endpoint):
+        names = ("map", "pose", "path", "status", "command")
+        put = {name: bus.advertise(keys, getattr(topics, name.upper())) for name in names}
+        with recorder_process(bus, endpoint, folder) as recorder:
+            sent = 0
+
+            def tell(name, payload, note=None):
+                nonlocal sent
+                sent += 1
+                put[name].put(payload, encode_json(note) if note else b"")
+                time.sleep(0.04)
+
+            def path(revision, reason, xs, y=Y, **more):
+                xy = np.array([(x, y) for x in xs])
+                note = {"revision": revision, "reason": reason, "planner": "fasaco", "steps": 3}
+                tell("path", encode_path(xy, np.zeros(len(xy)), "map", 1), note | more)
+
+            def status(state, reason, **more):
+                said = {"robot": "robot", "state": state, "reason": reason, "config": CONFIG}
+                tell("status", encode_json(said | more))
+
+            tell("map", map_bytes(seen_first()))
+            status("idle", "waits for an order")
+            tell("command", encode_json({"command": "start", "order": ORDER}))
+            status("covering", "path 1")
+            path(1, "first plan", [0.45, 2.0])
+            for x in np.arange(0.45, 1.4, 0.15):
+                tell("pose", pose_bytes(float(x), Y))
+            tell("map", map_bytes(ground()))
+            box = {"x_min": 1.0, "y_min": 1.2, "x_max": 2.0, "y_max": 1.6}
+            path(2, "map: 3 cells more", [1.35, 0.3], changed=box)
+            for yaw in np.linspace(0.0, math.pi, 6):
+                tell("pose", pose_bytes(1.35, Y, yaw=float(yaw)))
+            for x in np.arange(1.2, 0.4, -0.15):
+                tell("pose", pose_bytes(float(x), Y, yaw=math.pi))
+            tell("command", encode_json({"command": "pause"}))
+            area = {"cells": 4, "m2": 0.36, "x": 3.0, "y": 0.7, "reason": "in a keep-out zone"}
+            status("paused", "paused by command", mission={"unreached": {"areas": [area]}})
+            recorder.written(sent)
+            recorder.process.terminate()
+            recorder.process.wait(120)
+    return sorted(folder.glob("*.rrd"))
+
+
+@pytest.fixture(scope="module")
+def review(parts):
+    return read_review(parts)
+
+
+def turned_s(review):
+    """Return when the robot stood half turned [s]."""
+    yaws = [yaw for _, _, yaw in review.data.poses]
+    return review.data.pose_s[next(i for i, yaw in enumerate(yaws) if yaw > 1.0)]
+
+
+def test_why_the_robot_turned_round(review):
+    instant = scene_at(review, turned_s(review)).instant
+    assert (instant.state, instant.x, instant.y) == ("covering", 1.35, Y)
+    assert instant.turn.degrees == pytest.approx(180.0, abs=1.0)
+    assert instant.turn.why == (
+        "path 2 came (map: 3 cells more) and leads west, where path 1 led east"
+    )
+    paths = instant.path_before, instant.path, instant.path_after
+    assert [path.revision if path else None for path in paths] == [1, 2, None]
+    assert [round(path.leads_deg) for path in paths[:2]] == [0, 180]
+    assert instant.path.changed.x_max == 2.0
+
+
+def test_what_of_the_map_changed_and_which_commands_came(review):
+    instant = scene_at(review, turned_s(review)).instant
+    # A band of 40 cm across the room, of which the box and two walls are no floor.
+    assert instant.map.seen_m2 == pytest.approx(0.4 * 4.0, abs=0.05)
+    assert instant.map.around.y_min == pytest.approx(1.2, abs=0.06)
+    assert instant.command.command.startswith("start: zone a, keep out of (2.6, 0.4)")
+    assert instant.command.command.endswith("return home")
+    assert instant.next_command.command == "pause"
+    told = dict(instant_rows(instant))
+    assert told["order"].startswith("zone a, keep out of")
+    assert "seen for the first time" in told["map"]
+
+
+def test_before_anything_came_nothing_is_told(review):
+    first = min(review.data.map_s[0], review.data.pose_s[0])
+    instant = scene_at(review, max(first - 0.01, 0.0)).instant
+    assert instant.path is instant.x is instant.command is None
+
+
+def test_a_line_leads_on_from_its_nearest_point():
+    line = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])
+    assert heading_from(line, (1.0, 0.1)) == pytest.approx(0.0)
+    assert heading_from(line, (1.9, 1.0)) == pytest.approx(90.0)
+    assert heading_from(line, (2.0, 5.0)) is None
+    assert heading_from(line[:1], (0.0, 0.0)) is None
+    assert [direction(deg) for deg in (0, 44, 91, 180, -180, -90)] == [
+        *("east", "north-east", "north", "west", "west", "south")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("place", "why", "words"),
+    [
+        ((0.9, Y), "swept", "first at 0:0"),
+        ((9.0, 1.0), "never seen", "outside of the map"),
+        ((5.5, 1.0), "never seen", "unknown to the map"),
+        ((2.2, 2.2), "not floor", "an obstacle (100 %)"),
+        ((3.0, 0.7), "keep-out", "in keep-out zone 1"),
+        ((2.5, 2.2), "too narrow", "its tool reaches 0.15 m"),
+        ((4.5, 1.0), "closed off", "no way leads there"),
+        ((1.0, 2.5), "not ordered", "in no zone of the last order"),
+        (
+            (1.75, Y),
+            "missed",
+            "path 1 led over it, until path 2 took its place (map: 3 cells more)",
+        ),
+        ((0.9, 1.4), "seen late", "the tool's edge passed 80 cm from it"),
+        ((0.9, 0.7), "not worth it", "the tool's edge passed 10 cm from it"),
+    ],
+)
+def test_why_a_spot_is_not_swept(review, place, why, words):
+    (spot,) = explain(review, [place])
+    assert spot.why == why
+    assert words in spot.words
+    assert spot.swept is (why == "swept")
+
+
+def test_by_how_much_it_was_missed(review):
+    (spot,) = explain(review, [(0.9, 0.7)])
+    assert spot.missed_m == pytest.approx(0.10, abs=1e-3)
+    x, y, _ = review.data.poses[review.data.pose_s.index(pytest.approx(spot.nearest_s, abs=1e-3))]
+    assert (x, y) == pytest.approx((0.9, Y), abs=0.16)
+    assert spot.patch_m2 > 1.0
+    assert spot.seen_s == pytest.approx(review.data.map_s[0], abs=1e-3)
+
+
+def test_what_the_last_path_leads_over_is_still_to_come(review):
+    """Of the path back the robot drove all but the last 15 cm."""
+    (spot,) = explain(review, [(0.2, Y)])
+    assert spot.why == "still to come"
+
+
+def test_a_spot_without_a_map_is_not_known(review):
+    bare = replace(review, data=replace(review.data, grid=None), no_lattice="there is no map")
+    (spot,) = explain(bare, [(1.0, 1.0)])
+    assert (spot.swept, spot.words) == (None, "there is no map")
+
+
+def test_the_largest_patches_come_with_reasons(review):
+    spots = spots_left(review)
+    assert spots
+    assert all(spot.swept is False for spot in spots)
+
+
+def test_a_place_is_inside_of_a_polygon():
+    assert is_inside(((0.0, 0.0), (4.0, 0.0), (0.0, 4.0)), 1.0, 1.0)
+    assert not is_inside(((0.0, 0.0), (4.0, 0.0), (0.0, 4.0)), 3.0, 3.0)
+
+
+def test_zones_are_drawn_for_the_viewer(parts):
+    zones = read_column(parts[0], entities.ZONES, "LineStrips3D:strips").values[-1]
+    assert np.allclose(np.asarray(zones[0])[:, :2], [*ZONE, ZONE[0]], atol=1e-6)
+    kept = read_column(parts[0], entities.KEEP_OUT, "LineStrips3D:strips").values[-1]
+    assert np.allclose(np.asarray(kept[0])[:, :2], [*KEEP_OUT, KEEP_OUT[0]], atol=1e-6)
+
+
+def test_the_page_has_a_chapter_of_the_order(review):
+    page = page_of(review)
+    for text in ("zone a, keep out of (2.6, 0.4)", "in a keep-out zone"):
+        assert text in page
+
+
+@pytest.mark.parametrize("option", [("--at", "0:01"), ("--point", "-0.5,0.7")])
+def test_the_command_answers(parts, tmp_path, capsys, option):
+    picture = tmp_path / "answer.png"
+    assert main(["review", *map(str, parts), *option, "--png", str(picture)]) == 0
+    assert "robot" in capsys.readouterr().out or option[0] == "--point"
+    with Image.open(picture) as image:
+        colours = {colour for _, colour in image.getcolors(maxcolors=1 << 20)}
+    assert {palette.BLUE, palette.VERMILION} <= colours
+    assert main(["review", *map(str, parts), *option, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["at" if option[0] == "--at" else "points"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"), [("9:59", "the recording is 0:0"), ("1:x", "MM:SS"), ("nan", "MM:SS")]
+)
+def test_a_time_that_is_none_is_named(parts, capsys, text, said):
+    try:
+        code = main(["review", *map(str, parts), "--at", text])
+    except SystemExit as ended:
+        code = ended.code
+    assert code in (2, 78)
+    assert said in capsys.readouterr().err
+
+
+def test_a_review_fits_on_one_screen(parts, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["review", *map(str, parts)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 24
+    assert max(map(len, lines)) <= 80
+    assert any("start: zone a" in line for line in lines)
+    assert main(["review", *map(str, parts), "--long"]) == 0
+    full = capsys.readouterr().out
+    for title in ("Orders", "Commands", "Not reached", "Floor left", "Replans in order of time"):
+        assert title in full
