@@ -231,9 +231,11 @@ def _program(size: int, beam: int, cells: int) -> Program:
     mates = np.full((2, states, MOST_IDS), NO_END, np.int16)
     scratch, base = (np.full(MOST_IDS, NO_END, np.int16) for _ in range(2))
     choice = Choice(
-        np.zeros(KINDS, np.int32),
-        np.zeros((KINDS, MOST_CHOICES), np.int64),
-        np.zeros((KINDS, MOST_CHOICES), np.int32),
+        listed=np.zeros(KINDS, np.int32),
+        keys=np.zeros((KINDS, MOST_CHOICES), np.int64),
+        named=np.zeros(KINDS, np.int32),
+        ends=np.zeros((KINDS, MOST_CHOICES, 2 * MOST_PAIRS), np.int16),
+        how=np.zeros((KINDS, MOST_CHOICES, MOST_PAIRS), np.uint8),
     )
     parts = Parts(
         label=np.zeros(size, np.int32),
@@ -257,8 +259,8 @@ def _program(size: int, beam: int, cells: int) -> Program:
         code=np.zeros(states, np.int64),
         kept_parent=np.zeros((cells + 1, beam), np.int32),
         kept_code=np.zeros((cells + 1, beam), np.int64),
-        table=np.zeros(slots, np.int32),
-        stamp=np.zeros(slots, np.int32),
+        hash=np.zeros(states, np.int64),
+        table=np.zeros(slots, np.int64),
         order=np.zeros(states, np.int64),
         scratch=scratch,
         scratch_words=scratch.view(np.int64),

@@ -7,6 +7,10 @@ from fasaco_edge.kernels.jit import inlined, lean_kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.random import draw, index_of
 from fasaco_edge.kernels.windows.memory import (
+    AHEAD,
+    BELOW,
+    CODE_BITS,
+    ENDING,
     FIRST_PAIRING,
     MOST_PAIRS,
     MUCH,
@@ -101,7 +105,7 @@ def list_choices(
     most: int,
 ) -> None:
     """List what a cell may have, cheapest first, below a cost."""
-    costs, codes = program.choice.cost[kind], program.choice.code[kind]
+    keys = program.choice.keys[kind]
     reduced, kinds, pairs = program.reduced[here.number], program.kinds, program.pairs
     at_ahead = at_rim(program, here.cell, here.ahead)
     at_below = at_rim(program, here.cell, here.below)
@@ -135,9 +139,11 @@ def list_choices(
                 one, other = pairs[pairing, 2 * pair], pairs[pairing, 2 * pair + 1]
                 cost += reduced[kinds[one], kinds[other]]
             if cost < most:
-                code = pairing | ahead << 8 | below << 10 | ending << 12
-                listed = _insert(costs, codes, listed, cost, code)
-    program.choice.listed[kind] = listed
+                code = ahead << AHEAD | below << BELOW | ending << ENDING | pairing
+                keys[listed] = cost << CODE_BITS | code
+                listed += 1
+    _sort(keys, listed)
+    program.choice.listed[kind], program.choice.named[kind] = listed, 0
 
 
 @inlined
@@ -149,16 +155,19 @@ def _fill(kinds: NDArray[np.int64], first: int, lanes: int, direction: int) -> i
 
 
 @inlined
-def _insert(
-    costs: NDArray[np.int64], codes: NDArray[np.int32], listed: int, cost: int, code: int
-) -> int:
-    """Insert a choice behind those that cost no more; return how many there are."""
-    place = listed
-    while place > 0 and costs[place - 1] > cost:
-        costs[place], codes[place] = costs[place - 1], codes[place - 1]
-        place -= 1
-    costs[place], codes[place] = cost, code
-    return listed + 1
+def _sort(keys: NDArray[np.int64], size: int) -> None:
+    """Sort the first ``size`` keys (Shell, 1959)."""
+    gap = 1
+    while gap < size // 3:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for at in range(gap, size):
+            key, place = keys[at], at
+            while place >= gap and keys[place - gap] > key:
+                keys[place] = keys[place - gap]
+                place -= gap
+            keys[place] = key
+        gap //= 3
 
 
 @lean_kernel

@@ -3,6 +3,7 @@
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 from fasaco_edge.kernels.windows.choices import list_choices
 from fasaco_edge.kernels.windows.memory import (
+    CODE_BITS,
     EXPANDED,
     KINDS,
     LAYER_STAMP,
@@ -14,41 +15,25 @@ from fasaco_edge.kernels.windows.memory import (
     at_rim,
 )
 from fasaco_edge.kernels.windows.parts import is_stuck
-from fasaco_edge.kernels.windows.states import apply, file_state, order_lanes, shrink, take_in
+from fasaco_edge.kernels.windows.states import (
+    apply,
+    file_state,
+    name_ends,
+    order_lanes,
+    shrink,
+    take_in,
+)
 
-
-@lean_kernel
-def decide(
-    program: Program, here: Here, ends: Ends, layer: int, states: int, beam: int, limit: int
-) -> int:
-    """Write the states after a cell into the other layer; return how many there are."""
-    program.clock[LAYER_STAMP] += 1
-    for kind in range(KINDS):
-        program.choice.listed[kind] = -1
-    # From what cost on a state before the cell, and one after it, cannot come below the limit.
-    most, threshold = limit - program.left[here.number], limit - program.left[here.number + 1]
-    cheapest = MUCH
-    for state in range(states):
-        cheapest = min(cheapest, program.cost[layer, state])
-    made = 0
-    for state in range(states):
-        if program.cost[layer, state] < min(most, threshold):
-            room = threshold - cheapest
-            made, threshold = _expand(
-                program, here, ends, layer, state, made, beam, threshold, room
-            )
-    if made > beam:
-        made, _ = shrink(program, 1 - layer, made, _words(here), beam)
-    for state in range(made):
-        program.kept_parent[here.number + 1, state] = program.parent[state]
-        program.kept_code[here.number + 1, state] = program.code[state]
-    return made
+CODES = (1 << CODE_BITS) - 1
 
 
 @inlined
 def _words(here: Here) -> int:
-    """Return how many words of a state are in use: four identifiers each, four of them spare."""
-    return (here.spare_id + 7) >> 2
+    """Return how many words of a state are in use, an even number: four identifiers each.
+
+    Four of them are spare.
+    """
+    return (here.spare_id + 11) >> 3 << 1
 
 
 @inlined
@@ -61,7 +46,16 @@ def _leads_nowhere(program: Program, ends: Ends, closed: int) -> bool:
     return is_stuck(program, is_open, may_ring)
 
 
-@lean_kernel
+@inlined
+def _order_sides(program: Program, here: Here) -> int:
+    """Order the lanes of the sides to come; return where they change places: 1 ahead, 2 below."""
+    swaps = order_lanes(program.scratch, here.ahead_id) if here.to_ahead else 0
+    if here.to_below:
+        swaps += 2 * order_lanes(program.scratch, here.below_id)
+    return swaps
+
+
+@inlined
 def _expand(
     program: Program,
     here: Here,
@@ -92,22 +86,50 @@ def _expand(
     was_closed = program.closed[layer, state]
     brought = behind << 20 | above << 22 | int(ends.begin_id >= 0) << 26
     for number in range(choice.listed[kind]):
-        total = cost + choice.cost[kind, number]
+        key = choice.keys[kind, number]
+        total = cost + (key >> CODE_BITS)
         if total >= threshold:
             break
         program.clock[EXPANDED] += 1
-        code = choice.code[kind, number]
-        closed = apply(program, here, ends, code, behind, above, was_closed, words)
+        if number == choice.named[kind]:
+            name_ends(program, here, ends, kind, number, behind, above)
+        closed = apply(program, ends, kind, number, was_closed, words)
         if closed > 1:
             total, closed = total + (closed - 1) * ends.ring_price, 1
         if closed < 0 or total >= threshold or _leads_nowhere(program, ends, closed):
             continue
-        swaps = order_lanes(program.scratch, here.ahead_id) if here.to_ahead else 0
-        if here.to_below:
-            swaps += 2 * order_lanes(program.scratch, here.below_id)
-        code |= brought | swaps << 24
+        swaps = _order_sides(program, here)
+        code = key & CODES | brought | swaps << 24
         made = file_state(program, 1 - layer, made, words, total, closed, state, code)
         if made == program.parent.size:
             made, cut = shrink(program, 1 - layer, made, words, beam)
             threshold = min(threshold, cut)
     return made, threshold
+
+
+@lean_kernel
+def decide(
+    program: Program, here: Here, ends: Ends, layer: int, states: int, beam: int, limit: int
+) -> int:
+    """Write the states after a cell into the other layer; return how many there are."""
+    program.clock[LAYER_STAMP] += 1
+    for kind in range(KINDS):
+        program.choice.listed[kind] = -1
+    # From what cost on a state before the cell, and one after it, cannot come below the limit.
+    most, threshold = limit - program.left[here.number], limit - program.left[here.number + 1]
+    cheapest = MUCH
+    for state in range(states):
+        cheapest = min(cheapest, program.cost[layer, state])
+    made = 0
+    for state in range(states):
+        if program.cost[layer, state] < min(most, threshold):
+            room = threshold - cheapest
+            made, threshold = _expand(
+                program, here, ends, layer, state, made, beam, threshold, room
+            )
+    if made > beam:
+        made, _ = shrink(program, 1 - layer, made, _words(here), beam)
+    for state in range(made):
+        program.kept_parent[here.number + 1, state] = program.parent[state]
+        program.kept_code[here.number + 1, state] = program.code[state]
+    return made

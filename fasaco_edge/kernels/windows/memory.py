@@ -20,6 +20,10 @@ MOST_CHOICES, KINDS = 600, 18
 MOST_PAIRS = 4
 PAIRINGS = 1 + 1 + 3 + 15 + 105
 FIRST_PAIRING = (0, 1, 2, 5, 20, 125)
+# The code of a choice: bits, and where in them lanes ahead, lanes below and an end begin; the
+# lowest ones are the pairing.
+CODE_BITS, AHEAD, BELOW, ENDING, PAIRING = 12, 10, 8, 7, 127
+FIRST_NEW, SECOND_NEW, NO_PAIR = 1, 2, 4
 
 
 class Choice(NamedTuple):
@@ -27,13 +31,19 @@ class Choice(NamedTuple):
 
     Attributes:
         listed: int32 (KINDS,), how many; -1 where they are not listed yet.
-        cost: int64 (KINDS, MOST_CHOICES).
-        code: int32 (KINDS, MOST_CHOICES): lanes ahead, lanes below, whether it ends, pairing.
+        keys: int64 (KINDS, MOST_CHOICES): cost, and in the lowest CODE_BITS the code: lanes ahead,
+            lanes below, whether it ends, pairing.
+        named: int32 (KINDS,), of how many of them the ends are named.
+        ends: int16 (KINDS, MOST_CHOICES, 2 * MOST_PAIRS), identifiers that are paired up.
+        how: uint8 (KINDS, MOST_CHOICES, MOST_PAIRS), which of the two are new: FIRST_NEW,
+            SECOND_NEW, both or neither; NO_PAIR behind the last one.
     """
 
     listed: NDArray[np.int32]
-    cost: NDArray[np.int64]
-    code: NDArray[np.int32]
+    keys: NDArray[np.int64]
+    named: NDArray[np.int32]
+    ends: NDArray[np.int16]
+    how: NDArray[np.uint8]
 
 
 class Parts(NamedTuple):
@@ -73,7 +83,8 @@ class Program(NamedTuple):
         closed: uint8 (2, states), whether the ring is closed.
         parent, code: int32, int64 (states,): how the states of the layer after came about.
         kept_parent, kept_code: int32, int64 (most cells + 1, beam), the same of all layers.
-        table: int32 (slots,), states by hash; stamp int32 (slots,), from which layer.
+        hash: int64 (states,), of the states of the layer after.
+        table: int64 (slots,), stamp of the layer and number of a state, by its hash.
         order: int64 (states,), costs while the dearest are dropped.
         scratch, base: int16 (MOST_IDS,), the state that comes about, and without the cell's ends;
             scratch_words, base_words int64 (MOST_IDS / 4,), the same memory.
@@ -100,8 +111,8 @@ class Program(NamedTuple):
     code: NDArray[np.int64]
     kept_parent: NDArray[np.int32]
     kept_code: NDArray[np.int64]
-    table: NDArray[np.int32]
-    stamp: NDArray[np.int32]
+    hash: NDArray[np.int64]
+    table: NDArray[np.int64]
     order: NDArray[np.int64]
     scratch: NDArray[np.int16]
     scratch_words: NDArray[np.int64]

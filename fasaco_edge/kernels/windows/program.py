@@ -24,9 +24,12 @@ from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.windows.choices import price_cells, real_cost
 from fasaco_edge.kernels.windows.decide import decide
 from fasaco_edge.kernels.windows.memory import (
+    AHEAD,
     BEGIN_ID,
+    BELOW,
     COUNT,
     END_ID,
+    ENDING,
     IDS,
     LAST,
     LAYER,
@@ -35,6 +38,7 @@ from fasaco_edge.kernels.windows.memory import (
     MOST_IDS,
     NO_END,
     NUMBER,
+    PAIRING,
     RING_PRICE,
     STATES,
     Ends,
@@ -340,23 +344,23 @@ def _put_back(
         for lane in range(code >> 22 & 3):
             taken[size] = 2 * above + lane
             size += 1
-        for lane in range(code >> 8 & 3):
+        for lane in range(code >> AHEAD & 3):
             taken[size] = 2 * ahead + (1 - lane if swaps & 1 else lane)
             size += 1
-        for lane in range(code >> 10 & 3):
+        for lane in range(code >> BELOW & 3):
             taken[size] = 2 * below + (1 - lane if swaps & 2 else lane)
             size += 1
         if swaps & 4:
             taken[size] = BEGIN
             size += 1
-        if code >> 12 & 1:
+        if code >> ENDING & 1:
             taken[size] = END
             size += 1
             passages.ends[1] = cell
         for slot in range(SLOTS):
             partner[cell, slot] = NONE
         for pair in range(size >> 1):
-            one = taken[program.pairs[code & 255, 2 * pair]]
-            other = taken[program.pairs[code & 255, 2 * pair + 1]]
+            one = taken[program.pairs[code & PAIRING, 2 * pair]]
+            other = taken[program.pairs[code & PAIRING, 2 * pair + 1]]
             partner[cell, one], partner[cell, other] = other, one
         state = program.kept_parent[index, state]

@@ -4,7 +4,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import inlined, lean_kernel
-from fasaco_edge.kernels.windows.memory import LAYER_STAMP, NO_END, Ends, Here, Program
+from fasaco_edge.kernels.windows.memory import (
+    AHEAD,
+    BELOW,
+    ENDING,
+    FIRST_NEW,
+    LAYER_STAMP,
+    MOST_PAIRS,
+    NO_END,
+    NO_PAIR,
+    PAIRING,
+    SECOND_NEW,
+    Ends,
+    Here,
+    Program,
+)
+
+# Of what is filed in a slot the lowest bits are the state, the others the stamp of its layer.
+INDEX_BITS, INDICES = 16, 65535
 
 
 @inlined
@@ -30,19 +47,19 @@ def _name(program: Program, size: int, cell: int, direction: int, lanes: int, fi
 
 
 @inlined
-def apply(
+def name_ends(
     program: Program,
     here: Here,
     ends: Ends,
-    code: int,
+    kind: int,
+    number: int,
     behind: int,
     above: int,
-    was_closed: int,
-    words: int,
-) -> int:
-    """Write the state after a choice into ``scratch``; return how many rings are closed, or -1."""
-    taken, mates = program.taken, program.scratch
-    pairing, ahead, below = code & 255, code >> 8 & 3, code >> 10 & 3
+) -> None:
+    """Write which identifiers a choice pairs up, and which of them are new."""
+    taken, choice = program.taken, program.choice
+    code = choice.keys[kind, number]
+    ahead, below = code >> AHEAD & 3, code >> BELOW & 3
     cell, spare = here.cell, here.spare_id
     size = _name(program, 0, cell, here.behind, behind, spare if here.from_behind else -1)
     size = _name(program, size, cell, here.above, above, spare + 2 if here.from_above else -1)
@@ -54,28 +71,44 @@ def apply(
     if ends.begin_id >= 0:
         taken[size] = ends.begin_id
         size += 1
-    if code >> 12 & 1:
+    if code >> ENDING & 1:
         taken[size] = ends.end_id
         size += 1
-    if was_closed and size and not ends.ring_price:
+    for pair in range(size >> 1):
+        how = 0
+        for end in range(2):
+            at = program.pairs[code & PAIRING, 2 * pair + end]
+            is_new = here.to_ahead if at < first_below else here.to_below
+            if is_new and first_new <= at < last_new:
+                how |= FIRST_NEW << end
+            choice.ends[kind, number, 2 * pair + end] = taken[at]
+        choice.how[kind, number, pair] = how
+    if size >> 1 < MOST_PAIRS:
+        choice.how[kind, number, size >> 1] = NO_PAIR
+    choice.named[kind] = number + 1
+
+
+@inlined
+def apply(program: Program, ends: Ends, kind: int, number: int, was_closed: int, words: int) -> int:
+    """Write the state after a choice into ``scratch``; return how many rings are closed, or -1."""
+    choice, mates = program.choice, program.scratch
+    if was_closed and choice.how[kind, number, 0] != NO_PAIR and not ends.ring_price:
         return -1
     closed = was_closed
     for word in range(words):
         program.scratch_words[word] = program.base_words[word]
-    for pair in range(size >> 1):
-        at, to = program.pairs[pairing, 2 * pair], program.pairs[pairing, 2 * pair + 1]
-        one, other = taken[at], taken[to]
-        is_new = here.to_ahead if first_new <= at < first_below else here.to_below
-        is_new = is_new and first_new <= at < last_new
-        other_new = here.to_ahead if first_new <= to < first_below else here.to_below
-        other_new = other_new and first_new <= to < last_new
-        if is_new and other_new:
+    for pair in range(MOST_PAIRS):
+        how = choice.how[kind, number, pair]
+        if how == NO_PAIR:
+            break
+        one, other = choice.ends[kind, number, 2 * pair], choice.ends[kind, number, 2 * pair + 1]
+        if how == FIRST_NEW | SECOND_NEW:
             mates[one], mates[other] = other, one
-        elif is_new:
+        elif how == FIRST_NEW:
             mate = mates[other]
             mates[one], mates[mate] = mate, one
             mates[other] = NO_END
-        elif other_new:
+        elif how == SECOND_NEW:
             mate = mates[one]
             mates[other], mates[mate] = mate, other
             mates[one] = NO_END
@@ -104,11 +137,18 @@ def order_lanes(mates: NDArray[np.int16], first: int) -> int:
 
 @inlined
 def _hash(state: NDArray[np.int64], words: int) -> int:
-    value = 1469598103934665603
-    for word in range(words):
-        value = (value ^ state[word]) * -7046029254386353131
-        value ^= value >> 29
-    return value
+    """Return the hash of a state: its highest bits depend on all that is in it."""
+    one, other = 1469598103934665603, 6148914691236517205
+    # Two chains: each multiplication waits for the last one.
+    for word in range(0, words, 2):
+        one = (one ^ state[word]) * -7046029254386353131
+        other = (other ^ state[word + 1]) * -4417276706812531889
+    return one ^ other * -7046029254386353131
+
+
+@inlined
+def _slot_of(value: int, mask: int) -> int:
+    return (value >> 48 ^ value >> 32) & mask
 
 
 @inlined
@@ -133,21 +173,22 @@ def file_state(
     """File the state in ``scratch``, or its lower cost; return how many states there are."""
     mask = program.table.size - 1
     stamp = program.clock[LAYER_STAMP]
-    slot = _hash(program.scratch_words, words) & mask
-    while program.stamp[slot] == stamp:
-        found = program.table[slot]
-        is_same = program.closed[layer, found] == closed
+    value = _hash(program.scratch_words, words)
+    slot = _slot_of(value, mask)
+    while program.table[slot] >> INDEX_BITS == stamp:
+        found = program.table[slot] & INDICES
+        is_same = program.hash[found] == value and program.closed[layer, found] == closed
         if is_same and _same(program.words[layer, found], program.scratch_words, words):
             if cost < program.cost[layer, found]:
                 program.cost[layer, found] = cost
                 program.parent[found], program.code[found] = parent, code
             return made
         slot = (slot + 1) & mask
-    program.stamp[slot], program.table[slot] = stamp, made
+    program.table[slot] = stamp << INDEX_BITS | made
     for word in range(words):
         program.words[layer, made, word] = program.scratch_words[word]
     program.cost[layer, made], program.closed[layer, made] = cost, closed
-    program.parent[made], program.code[made] = parent, code
+    program.parent[made], program.code[made], program.hash[made] = parent, code, value
     return made + 1
 
 
@@ -176,10 +217,11 @@ def shrink(program: Program, layer: int, made: int, words: int, beam: int) -> tu
                 program.words[layer, kept, word] = program.words[layer, state, word]
             cost[kept], program.closed[layer, kept] = cost[state], program.closed[layer, state]
             program.parent[kept], program.code[kept] = program.parent[state], program.code[state]
-        slot = _hash(program.words[layer, kept], words) & mask
-        while program.stamp[slot] == stamp:
+            program.hash[kept] = program.hash[state]
+        slot = _slot_of(program.hash[kept], mask)
+        while program.table[slot] >> INDEX_BITS == stamp:
             slot = (slot + 1) & mask
-        program.stamp[slot], program.table[slot] = stamp, kept
+        program.table[slot] = stamp << INDEX_BITS | kept
         kept += 1
     return kept, cut
 
