@@ -25,8 +25,9 @@ LOG = logging.getLogger(__name__)
 
 FIRST_PAUSE_S = 1.0
 LONGEST_PAUSE_S = 30.0
-# A running recorder without a report for this long is considered hung.
-SILENT_AFTER_S = 10.0
+# A running recorder without a report for this long is considered hung; one that a slow computer
+# holds up is not.
+SILENT_AFTER_S = 30.0
 # Its first report may take longer: slow computers load its libraries for half a minute.
 START_WITHIN_S = 120.0
 # One that hangs at its end uses less processor time than this, each time that is waited for it [s].

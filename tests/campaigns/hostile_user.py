@@ -130,7 +130,7 @@ class Campaign:
                     self.violations.append(f"{words[0]}: ended with {process.poll()}: {told}")
             finally:
                 process.send_signal(signal.SIGTERM)
-                process.wait(20)
+                process.wait(TIMEOUT_S)
 
 
 def try_alone(campaign: Campaign) -> None:

@@ -117,7 +117,7 @@ def test_a_recorder_that_starts_slowly_is_waited_for_and_one_that_hangs_is_not(
                 time.sleep(0.01)
                 states.append(watched.poll(time.monotonic()))
         finally:
-            watched.close(60.0)
+            watched.close(60.0, 60.0)
     assert {"starting", "recording"} <= {state.state for state in states}
     assert states[-1].reason == "no status for 0 s"
 

@@ -168,13 +168,7 @@ def test_what_waits_at_the_end_is_an_input_and_drawn_as_far_as_there_is_time(tmp
     monkeypatch.setattr(recorder, "LAST_DRAWN_NS", 0)
     with bus_on_free_port() as (bus, _):
         one = recorder.Recorder(DaemonConfig(), bus, tmp_path, DiskBudget(10**9, 0), None)
-        one.listen()
-        publisher = bus.advertise(Keys(), topics.POSE)
-        poses = [encode_pose_stamped(StampedPose(Pose2D(x, 0.0), "map", x)) for x in range(300)]
-        for pose in poses:
-            publisher.put(pose)
-        while len(one._inbox._waiting) < len(poses):
-            time.sleep(0.01)
+        poses = hear(one, bus, 300)
         assert one.end()
     (path,) = parts(tmp_path)
     samples = RecordedSamples([path])
@@ -183,6 +177,34 @@ def test_what_waits_at_the_end_is_an_input_and_drawn_as_far_as_there_is_time(tmp
     assert entities.ROBOT not in read_summary(path).rows
     said = [line for (line,) in read_column(path, entities.RECORDER_LOG, TEXT).values]
     assert "300 messages that came last are not drawn: there was no time" in said
+
+
+def test_a_recorder_reports_while_it_catches_up(tmp_path, monkeypatch):
+    """Its supervisor takes one that is silent for one that hangs."""
+    monkeypatch.setattr(recorder, "REPORT_PERIOD_NS", 0)
+    reports = []
+    with bus_on_free_port() as (bus, _):
+        one = recorder.Recorder(DaemonConfig(), bus, tmp_path, DiskBudget(10**9, 0), None)
+        hear(one, bus, 50)
+        bus.listen(Keys(), topics.RECORDER, lambda sample: reports.append(sample.payload))
+        one.step(0.0)
+        deadline = time.monotonic() + 60.0
+        while len(reports) <= 50 and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert one.end()
+    assert len(reports) > 50
+
+
+def hear(one, bus, count):
+    """Let poses wait for a recorder; return what they are."""
+    one.listen()
+    publisher = bus.advertise(Keys(), topics.POSE)
+    poses = [encode_pose_stamped(StampedPose(Pose2D(x, 0.0), "map", x)) for x in range(count)]
+    for pose in poses:
+        publisher.put(pose)
+    while len(one._inbox._waiting) < count:
+        time.sleep(0.01)
+    return poses
 
 
 def test_a_recording_without_samples_is_named(tmp_path):

@@ -166,6 +166,22 @@ def test_a_stalled_disk_is_told_and_taken_up_again(tmp_path):
     assert len(values) == 2
 
 
+def test_a_disk_that_pauses_loses_nothing(tmp_path):
+    """As a memory card does for a second, or a flush on a slow computer."""
+    pipe = tmp_path / f"{RUN}-part1.rrd"
+    os.mkfifo(pipe)
+    clock = Clock()
+    writer = writer_in(tmp_path)
+    drained = threading.Timer(1.5, drain, args=(pipe, tmp_path / "copy.rrd"))
+    drained.start()
+    writer.message(clock.now_ns)
+    writer.log("noise", noise(1, 400_000))
+    writer.sync(clock.tick())
+    assert (writer.state, writer.lost) == (WriterState.RECORDING, 0)
+    assert writer.close()
+    drained.join()
+
+
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(BadConfiguration, match="cannot record into"):

@@ -161,15 +161,18 @@ class Recorder:
     def step(self, timeout_s: float) -> None:
         """Write what came within ``timeout_s`` [s], check that it is written, report."""
         arrivals = deque(self._inbox.take(timeout_s))
+        heard_ns = arrivals[-1].at_ns if arrivals else time.monotonic_ns()
         while arrivals:  # release what is written
             self._write(arrivals.popleft())
             self._sync()
+            # Much to catch up with is no silence.
+            self._report_writing()
         self._inputs.note_lost(self._inbox.lost)
         self._writer.at(self._clock.now_ns())
         self._sync()
         self._scene.catch_up()
-        self._watch_planner()
-        self._report_state(self._writer.state.value, self._writer.reason)
+        self._watch_planner(heard_ns)
+        self._report_writing()
 
     def end(self) -> bool:
         """Write what waits and the footer; False where the disk does not take them."""
@@ -218,6 +221,8 @@ class Recorder:
             line = "another daemon of this robot's name is there, and waits: it is not recorded"
             self._scene.add_line(entities.BUS_LOG, line, "WARN")
             return
+        if arrival.topic == "status":
+            self._last_status_ns = arrival.at_ns
         self._inputs.add(arrival)
         if not is_drawn:
             return
@@ -250,13 +255,16 @@ class Recorder:
         self._scene.add_pheromone(message, about)
 
     def _draw_status(self, sample: Sample) -> None:
-        self._last_status_ns = time.monotonic_ns()
         self._scene.add_status(decode_tolerant(sample.payload, Status))
 
-    def _watch_planner(self) -> None:
+    def _watch_planner(self, heard_ns: int) -> None:
+        """Tell of a planner that has said nothing for long, of all that came up to a time [ns]."""
         last = self._last_status_ns
-        if last is not None and time.monotonic_ns() - last > SILENCE_NS:
+        if last is not None and heard_ns - last > SILENCE_NS:
             self._scene.enter(entities.MISSION_STATE, "silent", "the planner says nothing any more")
+
+    def _report_writing(self) -> None:
+        self._report_state(self._writer.state.value, self._writer.reason)
 
     def _report_state(self, state: str, reason: str) -> None:
         """Report on the bus and in the recording: on change, and once a second."""

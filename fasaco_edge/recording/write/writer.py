@@ -28,9 +28,11 @@ RETRY_PERIOD_NS = 1_000_000_000
 MOST_DOUBLINGS = 5
 # Rerun's own queue has no bound: at most this waits in it between two flushes.
 FLUSH_BYTES = 8_000_000
-FLUSH_TIMEOUT_S = 0.5
+# How long to wait for a disk that pauses, as memory cards do, or for a slow computer: what comes
+# meanwhile waits in the recorder's queue.
+FLUSH_TIMEOUT_S = 4.0
 # How long to probe whether a stalled disk is back.
-PROBE_TIMEOUT_S = 0.05
+PROBE_TIMEOUT_S = 0.2
 # A slow computer takes long; a supervisor does not wait for what hangs.
 CLOSE_TIMEOUT_S = 4.0
 
