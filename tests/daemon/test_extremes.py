@@ -19,4 +19,4 @@ def test_a_recorder_that_cannot_be_started_is_tried_again(tmp_path, monkeypatch)
         assert state.state == "restarting"
         assert "could not be started" in state.reason
         assert recorder.poll(100.0 + 2 * FIRST_PAUSE_S).restarts == 1
-        recorder.close(1.0)
+        recorder.close(1.0, 1.0)
