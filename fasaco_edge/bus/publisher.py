@@ -46,7 +46,10 @@ class Publisher:
     def forget(self) -> None:
         """Drop the samples that are kept for late joiners."""
         if self._latched is not None:
-            self._publisher.undeclare()
+            # Released and not undeclared: undeclare() of an advanced publisher (zenoh-python 1.10)
+            # waits for locks of Zenoh's while it holds the interpreter's, and a callback that
+            # holds the former and waits for the latter stops the process for good.
+            self._publisher = None
             self._publisher = self._latched()
 
     def put(self, payload: bytes | zenoh.ZBytes, attachment: bytes = b"") -> None:
