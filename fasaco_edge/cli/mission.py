@@ -34,7 +34,7 @@ evening.yaml, or the same as JSON; all lengths in metres in the frame of the map
   keep_out:                   # the robot must not touch these, nor mission.keep_out
     - [[1, 1], [2, 1], [2, 2], [1, 2]]
   passes: 1                   # of zones without passes, and of everything
-  return_home: true           # at the end, to where the mission began
+  return_home: true           # at the end: mission.home, mission.dock, or where the mission began
   keep_covered: false         # true: skip what is already covered in the first pass
 
 Each pass starts from zero: what was covered before is covered again. An order, its progress, and
@@ -48,6 +48,7 @@ COMMANDS = {
     "start": "start an order in place of the current one; the same order continues",
     "pause": "stop the robot; what it passes over still counts as covered",
     "resume": "continue a paused mission",
+    "home": "drive home and stay there: an order goes on after resume",
     "cancel": "stop and drop the order; what is covered is kept",
     "stop": "the same as cancel; to go on later with the same order, pause it",
     "replan": "plan in full now, starting from the current path",
@@ -90,7 +91,7 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--passes", type=int, metavar="N", help="how often to cover (default: 1)")
     parser.add_argument(
-        "--return-home", action="store_true", help="at the end drive to where the mission began"
+        "--return-home", action="store_true", help="at the end drive home, or to where it began"
     )
     parser.add_argument(
         "--keep-covered", action="store_true", help="skip what is already covered in the first pass"

@@ -34,6 +34,8 @@ CHANGEABLE = frozenset(
         "mission.zones",
         "mission.keep_out",
         "mission.keep_out_mask",
+        "mission.home",
+        "mission.dock",
     }
 )
 # Of a section that can change: the ledger's cells follow from it.

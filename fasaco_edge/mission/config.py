@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 from msgspec import Meta
 
-from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Polygon
-from fasaco_edge.mission.orders.order import MOST_KEEP_OUT, MOST_ZONES, StandingZone
+from fasaco_edge.grid.geometry import FARTHEST_M, MAX_LATTICE_CELLS, Polygon, Pose2D
+from fasaco_edge.mission.orders.order import MOST_KEEP_OUT, MOST_ZONES, Errand, StandingZone
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.living_trail import PAPERS_RULES, TrailRules
 
@@ -19,6 +20,32 @@ if TYPE_CHECKING:
     from fasaco_edge.planners.line import LineConfig
 
 Period = Annotated[float, Meta(ge=0, le=86_400)]
+Coordinate = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
+
+
+class Place(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Where a robot stands [m] in the map frame, and where it looks to [deg]."""
+
+    x_m: Coordinate
+    y_m: Coordinate
+    yaw_deg: Annotated[float, Meta(ge=-360, le=360)] = 0.0
+
+    @property
+    def stand(self) -> Pose2D:
+        """The pose that paths lead to."""
+        return Pose2D(self.x_m, self.y_m, math.radians(self.yaw_deg))
+
+
+class Dock(Place, frozen=True):
+    """The pose of a robot in its dock; it comes to stand ``approach_m`` [m] before that."""
+
+    approach_m: Annotated[float, Meta(ge=0, le=10)] = 0.5
+
+    @property
+    def stand(self) -> Pose2D:
+        """The pose before the dock, from which it is straight ahead."""
+        yaw, back = math.radians(self.yaw_deg), self.approach_m
+        return Pose2D(self.x_m - back * math.cos(yaw), self.y_m - back * math.sin(yaw), yaw)
 
 
 class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
@@ -33,6 +60,8 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         zones: which orders use by their names.
         keep_out: polygons (x, y) [m] in the map frame that the robot never touches.
         keep_out_mask: file of a mask of more, see ``orders.mask``; "" for none.
+        home: where the robot returns to; None for the dock, or else where an order began.
+        dock: where it charges.
     """
 
     autostart: bool = True
@@ -43,6 +72,12 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
     zones: Annotated[tuple[StandingZone, ...], Meta(max_length=MOST_ZONES)] = ()
     keep_out: Annotated[tuple[Polygon, ...], Meta(max_length=MOST_KEEP_OUT)] = ()
     keep_out_mask: str = ""
+    home: Place | None = None
+    dock: Dock | None = None
+
+    def place(self, errand: Errand) -> Place | None:
+        """Return where an errand leads to; None for where an order began."""
+        return self.dock or self.home if errand == "charge" else self.home or self.dock
 
 
 NO_PATIENCE = MissionPolicy(retries=0, lost_pose_s=0.0)

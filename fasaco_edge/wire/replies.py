@@ -131,7 +131,7 @@ class MissionReport(Document, frozen=True):
         pass: which pass that is; null without an order.
         passes: of how many.
         keep_out: how many keep-out zones there are, standing ones too; a mask counts as one.
-        home: where the mission began.
+        home: where the robot returns to; without one in the configuration where the mission began.
         tries: how often what was left over was tried again.
         unreached: what of the order stays uncovered as things are.
     """

@@ -111,7 +111,7 @@ def test_commands():
         ({}, "the order: missing member command"),
         (
             {"command": "go"},
-            "expected start, pause, resume, cancel, reset, replan, status, got 'go'",
+            "expected start, pause, resume, home, cancel, reset, replan, status, got 'go'",
         ),
         ({"command": "pause", "order": {}}, "order goes with start alone"),
         ({"command": "start", "order": {"zones": 3}}, "order.zones: expected array, got 3"),

@@ -193,7 +193,10 @@ class MissionRunner:
             if rival:
                 raise CommandError(rival, hint="command the one that plans")
             order = located(asked.order, self.config.mission.zones)
-            self._keeper.order_state = self.order_state.commanded(asked.command, order)
+            has_home = self.config.mission.place("home") is not None
+            self._keeper.order_state = self.order_state.commanded(
+                asked.command, order, has_home=has_home
+            )
             if asked.command == "replan":
                 raise CommandError("nothing to plan: the first plan is still to come")
         except FasacoError as error:

@@ -82,16 +82,23 @@ class Outbox:
         assert mission.lattice is not None
         grid = mission.grid
         xy = mission.lattice.centres(update.cells) if update.xy is None else update.xy
+        yaw = headings(xy)
+        if len(yaw) and update.end_yaw is not None:
+            yaw[-1] = update.end_yaw
         about = path_attachment(mission, update)
-        if not self.guard.attempt("path", lambda: self._say_path(xy, grid, about)):
+        if not self.guard.attempt("path", lambda: self._say_path(xy, yaw, grid, about)):
             nothing = replace(about, steps=0)
-            self.guard.attempt("path", lambda: self._say_path(xy[:0], grid, nothing))
+            self.guard.attempt("path", lambda: self._say_path(xy[:0], yaw[:0], grid, nothing))
 
     def _say_path(
-        self, xy: NDArray[np.float64], grid: OccupancyGrid, about: PathAttachment
+        self,
+        xy: NDArray[np.float64],
+        yaw: NDArray[np.float64],
+        grid: OccupancyGrid,
+        about: PathAttachment,
     ) -> None:
         attachment = encode_json(about)
-        payload = encode_path(xy, headings(xy), grid.frame, grid.stamp_ns)
+        payload = encode_path(xy, yaw, grid.frame, grid.stamp_ns)
         path = Shared.of(payload, schemas.PATH, attachment)
         self._last.keep("path", path)
         self._path.put(path.payload, attachment)

@@ -143,10 +143,10 @@ class StatusBoard:
         if (mission := runner.mission) is not None:
             return str(mission.state), mission.reason
         order_state, loading = runner.order_state, runner.loading
+        if order_state.paused:
+            return "paused", order_state.why_paused
         if order_state.order is None:
             return "idle", order_state.why
-        if order_state.paused:
-            return "paused", "paused by command"
         return ("loading", loading) if loading else ("waiting for map", self.waits)
 
     def _drive(self, mission: Mission | None) -> DriveReport:
@@ -255,7 +255,7 @@ def mission_report(
 ) -> MissionReport:
     """Return this part of the status; ``standing`` is how many keep-out zones hold for all."""
     order, zone = order_state.order, order_state.current_zone
-    home = order_state.home
+    home = mission.home if mission else order_state.home
     lattice = mission.lattice if mission else None
     return MissionReport(
         ordered=None if order is None else ("itself" if order_state.automatic else "command"),

@@ -223,7 +223,8 @@ class EventHandler:
             order = located(event.order, self.policy.zones)
             if event.command == "start":
                 self.map.check_zones(order)
-            after = before.commanded(event.command, order)
+            has_home = self.policy.place("home") is not None
+            after = before.commanded(event.command, order, has_home=has_home)
             plan = self._replan() if event.command == "replan" else None
         except FasacoError as error:
             self._answers.append(Answer(event.number, error))
@@ -236,7 +237,7 @@ class EventHandler:
             self.update_area()
         elif after.paused and not before.paused:
             self.route.pause()
-        elif before.paused and not after.paused:
+        elif before.paused and not (after.paused or after.errand):
             self._path = self._resume(after) or self._path
         self.orders.set_state(after)
 

@@ -142,6 +142,7 @@ class PathUpdate:
         plan_s: how long planning took [s].
         changed: window of the cells whose change is the reason; None where that is not the reason.
         xy: float64 (m, 2), x, y [m]: the line to drive; None for the centres of the cells.
+        end_yaw: heading at its end [rad]; None for that of the way there.
     """
 
     revision: int
@@ -151,6 +152,7 @@ class PathUpdate:
     plan_s: float = 0.0
     changed: Window | None = None
     xy: NDArray[np.float64] | None = None
+    end_yaw: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,15 +6,18 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.orders.order_state import Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
@@ -24,6 +27,10 @@ PATIENCE_S = 1.0
 # A robot that stands for so long on its path gets it again [s]: it may have lost it, or stopped for
 # something that is gone.
 STANDING_S, STANDING_M = 30.0, 0.1
+# An errand ends once the robot was so long in the last cell of its way [s]: its path leads to the
+# middle of it, and turns it there.
+ARRIVAL_S = 2.0
+PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
 # The states of a robot that drives, or soon will.
 DRIVING = (State.PLANNING, State.COVERING, State.RETURNING)
@@ -39,6 +46,7 @@ class Executive:
     orders: Sequencer
     route: Route
     trail: TrailLayer
+    policy: MissionPolicy
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
     _now: float = field(default=0.0, init=False)
@@ -62,7 +70,7 @@ class Executive:
         self._now = now
         if resting := self._why_resting():
             return self._rest(*resting)
-        route, orders = self.route, self.orders
+        route = self.route
         cell = self.map.robot_cell()
         if cell is None or self.map.area is None:
             self.map.forget_area()
@@ -72,6 +80,13 @@ class Executive:
         if not len(route.path.cells):
             self.monitor.clear_doubt()  # there is no path the robot could be off
         update = route.truncate(now)
+        if self.orders.order_state.errand:
+            return self._run_errand(cell, update)
+        return self._carry_on(cell, route.take_up("goes on", now) or update)
+
+    def _carry_on(self, cell: Cell, update: PathUpdate | None) -> Decision:
+        """Carry the order out."""
+        route, orders, now = self.route, self.orders, self._now
         self._check_deviation(cell)
         if reason := orders.begin(cell, now):
             route.want(reason)
@@ -81,7 +96,7 @@ class Executive:
             # A robot that had to stop waits a moment.
             is_too_soon = self._state is State.BLOCKED and not self._has_waited()
             return Decision(path=update) if is_too_soon else self._request(cell, update)
-        if orders.order_state.stage is Stage.RETURNING and cell == orders.order_state.home:
+        if orders.order_state.stage is Stage.RETURNING and cell == orders.goal():
             orders.advance(now)
         if orders.order_state.stage is Stage.OVER or (
             orders.is_waiting and route.path.finished and route.pending is None
@@ -96,11 +111,11 @@ class Executive:
     def _why_resting(self) -> tuple[State, str] | None:
         """Return the state and reason of a robot with nothing to decide on; None where there is."""
         order = self.orders.order_state
-        if order.order is None:
-            return State.IDLE, order.why
         if order.paused:
-            return State.PAUSED, "paused by command"
-        if order.stage is Stage.OVER and not order.automatic:
+            return State.PAUSED, order.why_paused
+        if not order.errand and order.order is None:
+            return State.IDLE, order.why
+        if not order.errand and not order.is_open:
             return State.DONE, self.orders.ending
         if self.map.lattice is None:
             return State.WAITING_FOR_MAP, self.map.why_no_map()
@@ -201,7 +216,7 @@ class Executive:
         return self._return_home(cell, update)
 
     def _return_home(self, cell: Cell, update: PathUpdate | None) -> Decision:
-        route, area, home = self.route, self.map.area, self.orders.order_state.home
+        route, area, home = self.route, self.map.area, self.orders.goal()
         assert area is not None
         route.drop()
         self.monitor.clear_doubt()
@@ -214,4 +229,38 @@ class Executive:
         self._state, self._reason = State.RETURNING, "on the way home"
         if np.array_equal(path, route.path.ahead):
             return Decision(path=update)
-        return Decision(path=route.publish(path, "returning home", self._now))
+        return Decision(path=self._lead(path, "returning home", "home"))
+
+    def _lead(self, path: NDArray[np.int32], reason: str, errand: Errand) -> PathUpdate:
+        """Publish the way to where an errand leads, with the robot's heading there."""
+        place = self.policy.place(errand)
+        yaw = None if place is None else place.stand.yaw
+        return self.route.publish(path, reason, self._now, end_yaw=yaw)
+
+    def _run_errand(self, cell: Cell, update: PathUpdate | None) -> Decision:
+        """Drive where the errand leads, by the shortest way; what is planned waits."""
+        route, orders, area, path = self.route, self.orders, self.map.area, self.route.path
+        errand = orders.order_state.errand
+        is_new = route.set_aside()
+        route.drop()
+        goal = orders.goal(errand)
+        if cell == goal and not is_new and self._now - self._entered_at >= ARRIVAL_S:
+            return self._arrive()
+        is_off = path.finished or path.is_far(cell) or bool(self.monitor.doubt)
+        is_lost = cell != goal and is_off and self._has_waited()
+        to = PLACES[errand]
+        if is_new or is_lost or not len(path.cells) or tuple(path.cells[-1].tolist()) != goal:
+            self.monitor.clear_doubt()
+            if goal is None or area is None or not area.contains(goal):
+                return self._rest(State.BLOCKED, f"no way {to}: waits for a map that shows one")
+            update = self._lead(area.shortest_path(cell, goal), f"drives {to}", errand)
+        self._state, self._reason = State.RETURNING, f"on the way {to}"
+        return Decision(path=update)
+
+    def _arrive(self) -> Decision:
+        """End the way of an errand."""
+        orders = self.orders
+        orders.set_state(orders.order_state.arrived())
+        resting = self._why_resting()
+        assert resting is not None
+        return self._rest(*resting)

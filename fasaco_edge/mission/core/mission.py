@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.event_handler import EventHandler
@@ -55,7 +55,7 @@ class Mission:
         self._trail = TrailLayer(config, self._map, self.route)
         self._drive = DriveMeter()
         self._handler = EventHandler(*owners, self._line, self._trail, self._drive, config.policy)
-        self._executive = Executive(*owners, self._trail)
+        self._executive = Executive(*owners, self._trail, config.policy)
         self.restore_order(order or OrderState.autostart())
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:
@@ -119,6 +119,11 @@ class Mission:
     def order_state(self) -> OrderState:
         """The order, and how far it is carried out."""
         return self._orders.order_state
+
+    @property
+    def home(self) -> Cell | None:
+        """The cell (row, col) the robot returns to; None where there is none yet."""
+        return self._orders.goal()
 
     @property
     def grid(self) -> OccupancyGrid | None:

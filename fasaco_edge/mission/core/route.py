@@ -44,6 +44,10 @@ class Route:
         # What is kept of a path that is not driven now: what lay beyond where a map blocked it, or,
         # of a robot that was stopped, all that was left.
         self._kept = PathProgress(NO_CELLS)
+        # What was left of the path before an errand, for after it; None without one.
+        self._aside: NDArray[np.int32] | None = None
+        # The heading of the robot at the end of its path [rad]; None for the way's.
+        self._end_yaw: float | None = None
         # The path over a map that has moved since, until a pose tells where to.
         self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
@@ -115,7 +119,24 @@ class Route:
         self.drop()
         self.forget_failure()
         self._is_abandoned = self.pending is not None
-        self._kept, self._before_motion = PathProgress(NO_CELLS), None
+        self._kept, self._before_motion, self._aside = PathProgress(NO_CELLS), None, None
+
+    def set_aside(self) -> bool:
+        """Keep the path for after an errand, unless that was done; return whether it was now."""
+        if self._aside is not None:
+            return False
+        self.pause()
+        self._aside, self._kept = self.path_to_keep, PathProgress(NO_CELLS)
+        return True
+
+    def take_up(self, reason: str, now: float) -> PathUpdate | None:
+        """Go on after an errand with what was set aside, once a plan leads there."""
+        if self._aside is None:
+            return None
+        update = self.publish(NO_CELLS, reason, now) if len(self.path.cells) else None
+        self._kept, self._aside = PathProgress(self._aside), None
+        self.want(reason)
+        return update
 
     def pause(self) -> None:
         """Discard the plan under way; what it was for is planned once the robot continues."""
@@ -282,6 +303,7 @@ class Route:
         now: float,
         ready: PlanReady | None = None,
         changed: Window | None = None,
+        end_yaw: float | None = None,
     ) -> PathUpdate:
         """Publish a path in place of the one before."""
         self.revision += 1
@@ -289,14 +311,17 @@ class Route:
         self._walks += not np.array_equal(cells, self.path.ahead)
         self.published_at = now
         self.path, self._kept = PathProgress(cells), PathProgress(NO_CELLS)
+        self._end_yaw = end_yaw
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
-        return PathUpdate(self.revision, cells, reason, plan, seconds, changed)
+        return PathUpdate(
+            self.revision, cells, reason, plan, seconds, changed, end_yaw=self._end_yaw
+        )
 
     def publish_line(self, reason: str, now: float) -> PathUpdate:
         """Publish another line along the same cells; an attempt at better ones still holds."""
         self.revision += 1
         self.published_at = now
-        return PathUpdate(self.revision, self.path.ahead, reason)
+        return PathUpdate(self.revision, self.path.ahead, reason, end_yaw=self._end_yaw)
 
     def follow(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> None:
         """Note that the robot is in ``cell``, see ``PathProgress.driven_to``."""

@@ -64,7 +64,9 @@ class MissionOrder:
 
 EVERYTHING_ONCE = MissionOrder()
 
-CommandName = Literal["start", "pause", "resume", "cancel", "reset", "replan", "status"]
+CommandName = Literal["start", "pause", "resume", "home", "cancel", "reset", "replan", "status"]
+# What a robot drives for beside its order; "" for nothing.
+Errand = Literal["", "home", "charge"]
 
 _Passes = Annotated[int, Meta(ge=1, le=MOST_PASSES, description="how often to cover")]
 _Polygon = Annotated[

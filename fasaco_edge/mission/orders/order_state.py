@@ -16,6 +16,7 @@ from msgspec import Meta
 from fasaco_edge.errors import CommandError, OrderError
 from fasaco_edge.mission.orders.order import (
     CommandName,
+    Errand,
     MissionOrder,
     OrderDocument,
     Zone,
@@ -25,6 +26,7 @@ from fasaco_edge.mission.orders.order import (
 
 # Why a daemon without autostart is idle.
 NO_ORDER = "no order yet: start a mission"
+AT_HOME = "at home"
 
 
 class Stage(StrEnum):
@@ -51,7 +53,8 @@ class OrderState:
         tries: how often what was left over was tried again.
         home: the cell (row, col) the mission began in.
         paused: whether the robot is to stop.
-        why: why there is no order, where there is none.
+        errand: what it drives for before it goes on.
+        why: why there is no order, where there is none; of a paused one where that has led to.
     """
 
     order: MissionOrder | None = None
@@ -63,6 +66,7 @@ class OrderState:
     tries: int = 0
     home: tuple[int, int] | None = None
     paused: bool = False
+    errand: Errand = ""
     why: str = ""
 
     @classmethod
@@ -106,28 +110,59 @@ class OrderState:
             return replace(self, zone=self.zone + 1, pass_number=1, begun=False)
         return self
 
-    def commanded(self, command: CommandName, order: MissionOrder) -> OrderState:
+    @property
+    def is_open(self) -> bool:
+        """Whether there is an order with something left to do."""
+        return self.order is not None and (self.stage is not Stage.OVER or self.automatic)
+
+    @property
+    def why_paused(self) -> str:
+        """Why the robot stands, where it is paused."""
+        at_home = "at home, " if self.order is not None and self.why == AT_HOME else ""
+        return at_home + "paused by command"
+
+    def arrived(self) -> OrderState:
+        """Return the state of a robot that came home by command: there it stays."""
+        return replace(self, errand="", paused=self.is_open, why=AT_HOME)
+
+    def commanded(
+        self, command: CommandName, order: MissionOrder, *, has_home: bool = False
+    ) -> OrderState:
         """Return the state after a command.
 
         A command may be sent twice: the second time changes nothing. ``start`` replaces another
-        order; the same one goes on, unless it is over.
+        order; the same one goes on, unless it is over. ``has_home``: the configuration has one.
 
         Raises:
-            CommandError: there is nothing to pause, to resume or to plan.
+            CommandError: there is nothing to pause, to resume or to plan, or no home.
         """
         match command:
             case "start":
                 return self._started(order)
             case "pause" | "resume":
-                if self.order is None or (self.stage is Stage.OVER and not self.automatic):
+                if not (self.is_open or self.errand):
                     raise CommandError(f"there is no mission to {command}")
-                return replace(self, paused=command == "pause")
+                why = self.why if self.order is None or command == "pause" else ""
+                goes_on = command == "resume" and self.is_open and self.errand == "home"
+                errand: Errand = "" if goes_on else self.errand
+                return replace(self, paused=command == "pause", errand=errand, why=why)
+            case "home":
+                if not has_home and self.home is None:
+                    raise CommandError(
+                        "there is no home yet",
+                        hint="set mission.home of the configuration; without it home is where an "
+                        "order began",
+                    )
+                why = self.why if self.order is None else ""
+                return replace(self, errand="home", paused=False, why=why)
             case "replan":
+                if self.errand:
+                    raise CommandError("nothing to plan: the robot is on its way home")
                 if self.order is None or self.paused:
                     why = "the mission is paused" if self.paused else "there is no mission"
                     raise CommandError(f"nothing to plan: {why}")
-            case "cancel" if self.order is not None:
-                return OrderState.idle("cancelled")
+            case "cancel" if self.order is not None or self.errand:
+                return replace(OrderState.idle("cancelled"), home=self.home)
             case "reset":
                 return OrderState.idle("reset: what was covered is forgotten")
         return self
@@ -155,7 +190,8 @@ class OrderState:
             self.order, keep_covered=order.keep_covered
         )
         if same and self.stage is not Stage.OVER:
-            return replace(self, paused=False)
+            errand: Errand = "" if self.errand == "home" else self.errand
+            return replace(self, paused=False, errand=errand, why="")
         return OrderState(order)
 
     def to_json(self) -> str:
@@ -190,8 +226,13 @@ class OrderState:
         return cls(**state)
 
 
-class _Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An order state as it is kept; its names are those of the files on disk."""
+class _Note(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True
+):
+    """An order state as it is kept; its names are those of the files on disk.
+
+    Without an errand it is as older daemons read it.
+    """
 
     version: Literal[1]
     order: OrderDocument | None
@@ -204,3 +245,4 @@ class _Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     home: tuple[int, int] | None
     paused: bool
     why: str
+    errand: Errand = ""

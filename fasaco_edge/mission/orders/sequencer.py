@@ -15,8 +15,8 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.mission.orders.order import Zone
+from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
+from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.problem import CoverageProblem
@@ -164,6 +164,14 @@ class Sequencer:
         """How the order ended."""
         return self._run.ending
 
+    def goal(self, errand: Errand = "home") -> Cell | None:
+        """Return the cell (row, col) an errand leads to; None where that is nowhere."""
+        place, lattice = self._config.policy.place(errand), self._map.lattice
+        if place is None or lattice is None:
+            return self.order_state.home
+        pose = place.stand
+        return anchor_cell(lattice, pose) or lattice.cell_at(pose.x, pose.y)
+
     def start(self, state: OrderState) -> None:
         """Begin with another order, or with none."""
         self.order_state, self._run = state, _Run()
@@ -216,7 +224,7 @@ class Sequencer:
         """
         area, state = self._map.area, self.order_state
         assert area is not None
-        lattice, home = area.lattice, state.home
+        lattice, home = area.lattice, self.goal()
         self._run.exploration.end_if_reached(state.current_zone, area)
         ends_home = home is not None and state.returns_home_next and area.contains(home)
         return CoverageProblem.of(

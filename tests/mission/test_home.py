@@ -1,0 +1,185 @@
+"""A robot that drives home by command, or at the end of its order: mission.home, mission.dock."""
+
+import math
+
+import pytest
+from msgspec import structs
+
+from fasaco_edge.mission.config import Dock, Place
+from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.orders.order_state import OrderState
+from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, with_policy
+
+ROOM = ("........",) * 6
+HOME = Place(x_m=0.5 * CELL, y_m=5.5 * CELL, yaw_deg=90.0)
+# Its robot stands in the dock at (5, 6), and before it at (5, 4).
+DOCK = Dock(x_m=6.5 * CELL, y_m=5.5 * CELL, approach_m=2 * CELL)
+
+
+def robot(cell=(0, 0), order_state=None, **policy):
+    config = with_policy(CONFIG, **policy)
+    events = MapReceived(building(*ROOM)), pose_at(*cell)
+    return Drive(cell, *events, config=config, order_state=order_state)
+
+
+def covering(steps=5, **policy):
+    drive = robot(**policy)
+    drive.plan()
+    for _ in range(steps):
+        drive.go()
+    return drive
+
+
+def arrive(drive, ticks=80):
+    """Drive until the robot stands."""
+    for _ in range(ticks):
+        if drive.mission.state is not State.RETURNING:
+            return
+        drive.go()
+    raise AssertionError(drive.mission.reason)
+
+
+@pytest.mark.parametrize(
+    ("policy", "there"),
+    [
+        ({}, (0, 0)),
+        ({"home": HOME}, (5, 0)),
+        ({"dock": DOCK}, (5, 4)),
+        ({"home": HOME, "dock": DOCK}, (5, 0)),
+    ],
+)
+def test_it_drives_home_stands_there_and_goes_on_where_it_was(policy, there):
+    drive = covering(**policy)
+    decision = drive.command("home")
+    assert (decision.path.reason, drive.mission.state) == ("drives home", State.RETURNING)
+    arrive(drive)
+    assert (drive.cell, drive.walk) == (there, [])
+    assert (drive.mission.state, drive.mission.reason) == (
+        State.PAUSED,
+        "at home, paused by command",
+    )
+    before = drive.visited
+    assert drive.command("resume").plan.reason == "goes on"
+    drive.finish()
+    assert before < drive.visited
+    assert len(drive.visited) == 48
+
+
+def test_the_way_home_ends_with_the_heading_of_that_place():
+    drive = covering(home=HOME)
+    assert drive.command("home").path.end_yaw == math.pi / 2
+    drive = covering()
+    assert drive.command("home").path.end_yaw is None
+
+
+def test_resumed_on_the_way_it_stops_driving_home_at_once():
+    drive = covering(20)
+    drive.command("home")
+    drive.go()
+    decision = drive.command("resume")
+    assert len(decision.path.cells) == 0
+    assert decision.plan.reason == "goes on"
+    drive.finish()
+
+
+def test_home_told_twice_is_home_told_once():
+    drive = covering()
+    revision = drive.command("home").path.revision
+    assert drive.command("home").path is None
+    arrive(drive)
+    drive.command("home")
+    arrive(drive)
+    assert drive.mission.state is State.PAUSED
+    assert drive.mission.route.revision <= revision + 3
+
+
+def test_cancelled_on_the_way_it_stops_and_can_still_be_told_to_go_home():
+    drive = covering(20)
+    drive.command("home")
+    decision = drive.command("cancel")
+    assert len(decision.path.cells) == 0
+    assert (drive.mission.state, drive.mission.reason) == (State.IDLE, "cancelled")
+    drive.command("home")
+    arrive(drive)
+    assert (drive.cell, drive.mission.state) == ((0, 0), State.IDLE)
+    assert drive.mission.reason == "at home"
+
+
+def test_paused_on_the_way_it_stops():
+    drive = covering(20)
+    drive.command("home")
+    drive.go()
+    assert len(drive.command("pause").path.cells) == 0
+    assert (drive.mission.state, drive.mission.reason) == (State.PAUSED, "paused by command")
+    drive.command("resume")
+    drive.finish()
+
+
+def test_without_an_order_it_stops_on_the_way_and_goes_on_home():
+    drive = robot((0, 7), OrderState.idle("no order yet"), home=HOME)
+    drive.command("home")
+    drive.go()
+    drive.command("pause")
+    assert drive.mission.state is State.PAUSED
+    drive.command("resume")
+    arrive(drive)
+    assert (drive.cell, drive.mission.reason) == ((5, 0), "at home")
+
+
+def test_where_there_is_no_home_that_is_said():
+    drive = robot(order_state=OrderState.idle("no order yet"))
+    drive.command("home")
+    assert str(drive.refused) == "there is no home yet"
+
+
+def test_a_home_out_of_reach_is_waited_for():
+    drive = covering(home=structs.replace(HOME, x_m=7.5 * CELL))
+    drive.tell(patch(*["#"] * 6, at=(0, 6)))
+    drive.command("home")
+    assert drive.mission.state is State.BLOCKED
+    assert drive.mission.reason == "no way home: waits for a map that shows one"
+    assert drive.walk == []
+    drive.tell(patch(*["."] * 6, at=(0, 6)))
+    arrive(drive)
+    assert drive.cell == (5, 7)
+
+
+def test_a_way_home_that_is_blocked_leads_round():
+    drive = covering(home=HOME)
+    drive.command("home")
+    drive.tell(patch("#", at=drive.walk[2]))
+    arrive(drive)
+    assert drive.cell == (5, 0)
+
+
+def test_a_robot_carried_off_its_way_finds_another():
+    drive = covering(home=HOME)
+    drive.command("home")
+    drive.cell = (5, 7)
+    for _ in range(3):
+        drive.tell(pose_at(5, 7), after=2.0)
+    arrive(drive)
+    assert drive.cell == (5, 0)
+
+
+def test_an_order_ends_at_home():
+    drive = robot((3, 3), OrderState.idle("no order yet"), home=HOME)
+    drive.command("start", {"return_home": True})
+    drive.plan()
+    drive.finish()
+    assert drive.cell == (5, 0)
+
+
+def test_the_errand_survives_a_restart():
+    drive = covering(20)
+    drive.command("home")
+    note = drive.mission.snapshot().note
+    assert OrderState.from_json(note) == drive.mission.order_state
+    assert drive.mission.order_state.errand == "home"
+    again = robot(drive.cell, OrderState.from_json(note))
+    assert again.mission.state is State.RETURNING
+
+
+def test_an_order_without_an_errand_is_kept_as_older_daemons_read_it():
+    drive = covering()
+    assert "errand" not in drive.mission.snapshot().note
