@@ -13,7 +13,9 @@ Choices for every process, and why:
 
 from __future__ import annotations
 
+import contextlib
 import json
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
@@ -42,6 +44,9 @@ from fasaco_edge.wire.topic_types import VOLATILE, Qos, Topic
 
 # Timeout of the handshake of an incoming connection [ms], and how many may be pending.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
+# Longest wait for the end of a session [s]: before a listener that no longer reads, Zenoh tries for
+# ten seconds to get rid of what is queued, and fails then.
+CLOSE_S = 1.2
 # A map or a path is many packets of 64 kB. Where two of them fill the queue, as by default, a
 # computer that is busy for 50 ms drops the map; these take a megabyte, and only when there is one.
 QUEUED_BATCHES = dict.fromkeys(("interactive_high", "data_high", "data", "data_low"), 16)
@@ -249,14 +254,20 @@ class Bus:
         )
 
     def close(self) -> None:
-        """End the session; a process that does not close it may hang at exit."""
+        """End the session, within ``CLOSE_S``; a process that does not close it may hang at exit."""
         self._asker.close()
         self._declared.clear()
         self._served.clear()
         for lent in self._lent:
             lent.release()
         self._lent.clear()
-        session: Any = self._session  # close() has no annotation
+        ending = threading.Thread(target=_end, args=(self._session,), name="close", daemon=True)
+        ending.start()
+        ending.join(CLOSE_S)
+
+
+def _end(session: Any) -> None:  # close() has no annotation
+    with contextlib.suppress(zenoh.ZError):  # it took too long
         session.close()
 
 

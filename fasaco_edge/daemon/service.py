@@ -25,7 +25,7 @@ from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.errors import BusUnavailable
-from fasaco_edge.host.processes import call_on, memory_limit, return_soon
+from fasaco_edge.host.processes import call_on, end_within, memory_limit, return_soon
 from fasaco_edge.wire import topics
 
 LOG = logging.getLogger(__name__)
@@ -37,6 +37,9 @@ WORKER_STOP_S = 0.4
 # The ledger is written meanwhile: its disk gets this long in all, and at least the second figure
 # once they have ended.
 LEDGER_STOP_S, LEDGER_LEAST_S = 0.5, 0.2
+# Whatever still holds the process then is not waited for [s]: the unit's ``TimeoutStopSec=`` is 10,
+# and its SIGKILL would leave no trace of what it was.
+END_S = 9.0
 # A client tries so often whether its router is there [s].
 ROUTER_RETRY_S = 1.0
 
@@ -68,7 +71,12 @@ def run_daemon(
     # Otherwise every thread keeps what its largest map took: 430 MB resident in place of 250.
     return_soon()
     stop = threading.Event()
-    call_on(signal.SIGTERM, signal.SIGINT, call=stop.set)
+
+    def end() -> None:
+        end_within(END_S)
+        stop.set()
+
+    call_on(signal.SIGTERM, signal.SIGINT, call=end)
     manager = ServiceManager()
     reload = Reload(read or (lambda: config), manager)
     if manager.is_there:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import _thread
 import ctypes
+import faulthandler
 import os
 import signal
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path, PurePath
 from types import FrameType
 
@@ -157,6 +158,16 @@ def call_on(*numbers: int, call: Callable[[], None]) -> Callable[[], None]:
     Only the main thread may handle signals: in any other this changes nothing.
     """
     return _handle(numbers, lambda: _call_apart(call))
+
+
+def end_within(seconds: float) -> None:
+    """End this process if it still exists after so long [s]: code 1, its stacks on stderr.
+
+    A thread of C does that, which needs no lock of the interpreter's.
+    """
+    shown = sys.stderr or sys.__stderr__
+    with suppress(AttributeError, OSError, ValueError):  # stderr may be closed, or no file
+        faulthandler.dump_traceback_later(seconds, exit=True, file=shown)
 
 
 def _call_apart(call: Callable[[], None]) -> None:

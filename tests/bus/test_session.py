@@ -282,6 +282,32 @@ with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
             listener.kill()
 
 
+def test_a_frozen_subscriber_does_not_hold_the_end_of_a_session(endpoint):
+    """Zenoh alone tries for ten seconds to get rid of what is queued, and fails then."""
+    code = f"""
+import time
+from fasaco_edge.bus.session import BusSettings, open_bus
+with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
+    bus.subscribe({KEY!r}, lambda sample: None)
+    print("listening", flush=True)
+    time.sleep(60)
+"""
+    bus = open_bus(BusSettings("peer", (), (endpoint,)))
+    publisher = bus.publisher(KEY, qos=QOS["path"])
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as listener:
+        try:
+            assert listener.stdout.readline() == b"listening\n"
+            until(publisher.has_listeners)
+            listener.send_signal(signal.SIGSTOP)
+            for _ in range(30):
+                publisher.put(bytes(1_000_000))
+            started = time.monotonic()
+            bus.close()
+            assert time.monotonic() - started < 8.0
+        finally:
+            listener.kill()
+
+
 def _numbered(number):
     return b"%04d" % number + bytes(1_000_000)
 

@@ -42,6 +42,22 @@ def test_a_signal_inside_a_wait_is_not_lost_in_a_lock():
     assert ended.stdout == "True\n"
 
 
+# The main thread holds the interpreter's lock for ever: no thread of Python's runs.
+STUCK = """
+import ctypes
+from fasaco_edge.host.processes import end_within
+end_within(0.2)
+ctypes.PyDLL(None).sleep(50)
+"""
+
+
+def test_a_process_that_stands_still_ends_in_time_and_says_where():
+    program = [sys.executable, "-c", STUCK]
+    ended = subprocess.run(program, capture_output=True, text=True, timeout=40, check=False)
+    assert ended.returncode == 1
+    assert 'File "<string>", line 5 in <module>' in ended.stderr
+
+
 def test_nobody_starts_a_module_otherwise():
     package = Path(__file__).parents[2] / "fasaco_edge"
     found = [
