@@ -254,7 +254,7 @@ class Bus:
         )
 
     def close(self) -> None:
-        """End the session, within ``CLOSE_S``; a process that does not close it may hang at exit."""
+        """End the session, within ``CLOSE_S``; a process that does not may hang at its exit."""
         self._asker.close()
         self._declared.clear()
         self._served.clear()
@@ -266,9 +266,10 @@ class Bus:
         ending.join(CLOSE_S)
 
 
-def _end(session: Any) -> None:  # close() has no annotation
+def _end(session: zenoh.Session) -> None:
+    ending: Any = session  # close() has no annotation
     with contextlib.suppress(zenoh.ZError):  # it took too long
-        session.close()
+        ending.close()
 
 
 def open_bus(settings: BusSettings) -> Bus:

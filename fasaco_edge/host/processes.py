@@ -165,9 +165,8 @@ def end_within(seconds: float) -> None:
 
     A thread of C does that, which needs no lock of the interpreter's.
     """
-    shown = sys.stderr or sys.__stderr__
-    with suppress(AttributeError, OSError, ValueError):  # stderr may be closed, or no file
-        faulthandler.dump_traceback_later(seconds, exit=True, file=shown)
+    with suppress(AttributeError, OSError, RuntimeError, ValueError):  # no stderr, or no file
+        faulthandler.dump_traceback_later(seconds, exit=True)
 
 
 def _call_apart(call: Callable[[], None]) -> None:
