@@ -606,3 +606,34 @@ def cell_beside(area: frozenset[Cell], allowed: set[Cell]) -> Cell:
     square = any({(r + 1, c), (r, c + 1), (r + 1, c + 1)} <= area for r, c in area)
     beside = sorted({(r + up, c + right) for r, c in area for up, right in DIRECTIONS} & allowed)
     return beside[len(beside) // 2] if square and beside else (-1, -1)
+
+
+def certain_pixels(swept: set[Cell], places: list[tuple[float, ...]], tile: Window) -> set[Cell]:
+    """The pixels of a tile that lie on swept ones wherever it lay.
+
+    ``places``: of each the row and column of the origin, then what a step along a row adds to the
+    column and to the row. Rounded from the corner on that the docstrings of the lookup speak of.
+    """
+    bounds = [_bounds(place, tile) for place in places]
+    around = Window.around(*bounds)
+    assert around is not None
+    is_near = around.rows * around.cols <= 2**20
+    left = set(itertools.product(range(tile.row0, tile.row1), range(tile.col0, tile.col1))) & swept
+    for (row0, col0, right, up), alone in zip(places, bounds, strict=True):
+        corner = around if is_near else alone
+        for row, col in list(left):
+            y, x = row + 0.5, col + 0.5
+            i = math.floor((right * y + (row0 - corner.row0)) + up * x) + corner.row0
+            j = math.floor(((col0 - corner.col0) - up * y) + right * x) + corner.col0
+            if (i, j) not in swept:
+                left.remove((row, col))
+    return left
+
+
+def _bounds(place: tuple[float, ...], tile: Window) -> Window:
+    row0, col0, right, up = place
+    corners = itertools.product((tile.row0, tile.row1), (tile.col0, tile.col1))
+    points = [(row0 + up * c + right * r, col0 + right * c - up * r) for r, c in corners]
+    rows, cols = zip(*points, strict=True)
+    low, high = (math.floor(min(rows)) - 1, math.floor(min(cols)) - 1), (max(rows), max(cols))
+    return Window(*low, *(math.floor(most) + 2 for most in high))

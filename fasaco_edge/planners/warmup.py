@@ -17,6 +17,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 from fasaco_edge.kernels.floor.capsule import is_clear
+from fasaco_edge.kernels.floor.certain import TILE, FloorTiles, Whereabouts, certain_floor
 from fasaco_edge.kernels.floor.driven import note_driven, set_causes, set_open
 from fasaco_edge.kernels.floor.runs import common_runs
 from fasaco_edge.kernels.floor.sweeps import Sweeps
@@ -168,6 +169,9 @@ def _take_line(room: _TinyRoom) -> None:
     set_open(sweeps, state, (0, 0), np.zeros(shape, np.bool_), np.zeros(shape, np.bool_))
     set_causes(state, (0, 0), np.zeros(shape, np.uint8), np.zeros(4, np.int64))
     common_runs(walk, walk, 1)
+    tiles = FloorTiles(np.zeros((1, 2), np.int64), np.full((1, TILE, TILE // 8), 255, np.uint8))
+    still = Whereabouts(np.array([[[0.0, 0.0, 1.0, 0.0]]]), np.ones(1, np.int64))
+    certain_floor(tiles, tiles, still)
 
 
 def _plan_with(name: str, room: _TinyRoom) -> None:

@@ -24,7 +24,7 @@ from fasaco_edge.mission.coverage.swept_floor import (
     MOST_FLOOR_TILES,
     SweptFloor,
 )
-from fasaco_edge.mission.map.loop_closure import Motion, uncertain_floor
+from fasaco_edge.mission.map.loop_closure import Motion, certain_floor
 from tests.mission.world import CELL, Drive, MapReceived, building, pose_at, rectangle
 
 TOOL = 0.3
@@ -264,7 +264,7 @@ def test_after_a_loop_closure_only_what_was_swept_wherever_the_map_lay_counts(se
     motion = Motion(start, Pose2D(0.6 + jump[0], 0.6 + jump[1], 0.3 + 0.2 * jump[2]))
     before = floor.snapshot()
     floor.break_track()
-    floor.forget(uncertain_floor(before, motion))
+    floor.leave(certain_floor(before, motion))
     left = floor.swept_in(AROUND)
     x, y = (each[left] for each in centres(AROUND))
     assert len(x) > 100
@@ -282,8 +282,8 @@ def test_after_a_loop_closure_only_what_was_swept_wherever_the_map_lay_counts(se
 
 def test_who_stood_still_forgets_nothing():
     floor = drive(*[(0.1 * n, 0.0) for n in range(20)])
-    doubt = uncertain_floor(floor.snapshot(), Motion(Pose2D(0, 0), Pose2D(0, 0)))
-    assert not (doubt(AROUND) & floor.swept_in(AROUND)).any()
+    before = floor.snapshot()
+    assert not certain_floor(before, Motion(Pose2D(0, 0), Pose2D(0, 0)))(before.tiles)
 
 
 def test_a_mission_sweeps_the_floor_it_drives_over():
@@ -389,7 +389,7 @@ def test_a_map_that_jumps_by_thousands_of_kilometres_leaves_nothing_sure():
     floor = drive(*[(0.1 * n, 0.0) for n in range(20)])
     before = floor.snapshot()
     floor.break_track()
-    floor.forget(uncertain_floor(before, Motion(Pose2D(0, 0), Pose2D(9e6, -1e7, -4.4))))
+    floor.leave(certain_floor(before, Motion(Pose2D(0, 0), Pose2D(9e6, -1e7, -4.4))))
     assert floor.pixels == 0
 
 

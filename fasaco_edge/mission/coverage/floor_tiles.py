@@ -7,7 +7,7 @@ begins at y = row * PIXEL_M, x = col * PIXEL_M.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import NamedTuple
@@ -27,9 +27,6 @@ ROW_BYTES = FLOOR_TILE // 8
 
 # Edges of the squares in which floor is shown [pixels]: whole bytes, and parts of a tile.
 SQUARES = (1, 8, 16, 32, 64, FLOOR_TILE)
-
-# Most pixels that are looked up together.
-MOST_TOGETHER = 1 << 20
 
 _BITS = np.array([bin(byte).count("1") for byte in range(256)], np.uint8)
 
@@ -108,15 +105,6 @@ class FloorSnapshot:
         """Return which pixels of ``window`` were swept, bool (rows, cols)."""
         return swept_in(self.tiles, window)
 
-    def swept_wherever(self, places: Sequence[Similarity], window: Window) -> Mask:
-        """Return which pixels of a raster have a centre that was swept, bool (rows, cols).
-
-        Args:
-            places: where that raster may lie; only what was swept at all of them is.
-            window: of its pixels.
-        """
-        return swept_wherever(self.swept_in, places, window)
-
     def shown(self, most: int, frame: str, stamp_ns: int) -> OccupancyGrid | None:
         """Return how much of each square is swept, in percent, rounded down, as a grid.
 
@@ -158,7 +146,7 @@ def _percent(tiles: Tiles, side: int) -> Iterator[tuple[Place, NDArray[np.int8]]
 
 def count_bits(bits: Bits) -> int:
     """Return how many pixels are marked."""
-    return int(_BITS[bits].sum())
+    return int.from_bytes(bits.tobytes()).bit_count()
 
 
 def window_of(place: Place) -> Window:
@@ -188,41 +176,22 @@ def swept_in(tiles: Tiles, window: Window) -> Mask:
     return swept
 
 
-def swept_wherever(
-    swept_in: Callable[[Window], Mask], places: Sequence[Similarity], window: Window
-) -> Mask:
-    """Return which pixels of a raster have a marked centre, see ``FloorSnapshot``.
+def swept_on(swept_in: Callable[[Window], Mask], place: Similarity, window: Window) -> Mask:
+    """Return which pixels of another raster have a marked centre, bool (rows, cols).
 
     Args:
         swept_in: returns which pixels of a window are marked.
-        places: where that raster may lie.
+        place: where that raster lies.
         window: of its pixels.
     """
-    bounds = [place.bounds(window) for place in places]
-    around = Window.around(*bounds)
-    assert around is not None
-    # Places far apart, as of a map that jumped, are looked up one by one.
-    is_near = around.rows * around.cols <= MOST_TOGETHER
-    together = swept_in(around) if is_near else None
-    if together is not None and not together.any():
+    under = place.bounds(window)
+    swept = swept_in(under)
+    if not swept.any():
         return np.zeros((window.rows, window.cols), np.bool_)
-    found = np.ones((window.rows, window.cols), np.bool_)
-    for place, alone in zip(places, bounds, strict=True):
-        if together is None:
-            found &= _looked_up(swept_in(alone), alone, place, window)
-        else:
-            found &= _looked_up(together, around, place, window)
-        if not found.any():
-            break
-    return found
-
-
-def _looked_up(swept: Mask, under: Window, place: Similarity, window: Window) -> Mask:
-    """Return the pixels of ``swept``, bool over ``under``, at the centres of those of a window."""
-    row0, col0, right, up = place
     rows = (np.arange(window.row0, window.row1) + 0.5)[:, np.newaxis]
     cols = np.arange(window.col0, window.col1) + 0.5
     # From the corner of ``under`` on all is above 0, and cut off where it is rounded down.
+    row0, col0, right, up = place
     i = ((right * rows + (row0 - under.row0)) + up * cols).astype(np.int32)
     j = (((col0 - under.col0) - up * rows) + right * cols).astype(np.int32)
     i *= under.cols

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import product
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Self
 
@@ -242,11 +243,15 @@ class CoverageLedger:
 
 def _visits(tiles: Tiles, window: Window) -> NDArray[np.uint16]:
     result = np.zeros((window.rows, window.cols), np.uint16)
-    for (tile_row, tile_col), tile in tiles.items():
+    rows = range(window.row0 // TILE, -(-window.row1 // TILE))
+    cols = range(window.col0 // TILE, -(-window.col1 // TILE))
+    # Of a window far wider than what is covered, only the tiles that there are.
+    many = len(rows) * len(cols) > len(tiles)
+    for tile_row, tile_col in tiles if many else product(rows, cols):
         row, col = tile_row * TILE, tile_col * TILE
         place = Window(row, col, row + TILE, col + TILE)
-        common = window.intersection(place)
-        if common is not None:
+        tile, common = tiles.get((tile_row, tile_col)), window.intersection(place)
+        if tile is not None and common is not None:
             result[common.slices_in(window)] = tile[common.slices_in(place)]
     return result
 

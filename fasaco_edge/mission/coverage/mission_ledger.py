@@ -46,7 +46,7 @@ from fasaco_edge.mission.coverage.swept_floor import (
     MOST_FLOOR_TILES,
     SweptFloor,
 )
-from fasaco_edge.mission.map.loop_closure import Motion, uncertain_cells, uncertain_floor
+from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertain_cells
 
 PlaceOf = Callable[[Cell], Point | None]
 
@@ -237,10 +237,10 @@ class MissionLedger:
         if motion is None or motion.is_still:
             return 0
         before = self.snapshot()
-        cells, floor = uncertain_cells(before, motion), uncertain_floor(before.floor, motion)
+        cells, floor = uncertain_cells(before, motion), certain_floor(before.floor, motion)
         for covered in self._all:
             covered.cells.forget(cells)
-            covered.floor.forget(floor)
+            covered.floor.leave(floor)
         return before.cells - self.current.snapshot().cells
 
     def forget(self, inside: Callable[[Window, float], NDArray[np.bool_]]) -> None:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Self
@@ -30,10 +30,11 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     FloorSnapshot,
     Mask,
     Similarity,
+    Tiles,
     count_bits,
     places_of,
     swept_in,
-    swept_wherever,
+    swept_on,
     window_of,
 )
 from fasaco_edge.mission.coverage.floor_tiles import Place as TilePlace
@@ -131,12 +132,12 @@ class SweptFloor:
         """
         whole = window or Window(0, 0, geometry.rows, geometry.cols)
         found = np.zeros((whole.rows, whole.cols), np.bool_)
-        places = (Similarity.of(geometry),)
+        place = Similarity.of(geometry)
         side = max(min(int(BLOCK * PIXEL_M / geometry.resolution), BLOCK), 1)
         for row in range(whole.row0, whole.row1, side):
             for col in range(whole.col0, whole.col1, side):
                 block = Window(row, col, min(row + side, whole.row1), min(col + side, whole.col1))
-                found[block.slices_in(whole)] = swept_wherever(self.swept_in, places, block)
+                found[block.slices_in(whole)] = swept_on(self.swept_in, place, block)
         return found
 
     def record(self, pose: Pose2D) -> None:
@@ -176,14 +177,26 @@ class SweptFloor:
         Args:
             inside: returns for a window which of its pixels, bool (rows, cols).
         """
+        self.leave(
+            lambda tiles: [
+                (place, tile & ~np.packbits(inside(window_of(place)), axis=1))
+                for place, tile in tiles.items()
+            ]
+        )
+
+    def leave(self, left_of: Callable[[Tiles], Iterable[tuple[TilePlace, Bits]]]) -> None:
+        """Forget pixels of all tiles at once, but those that lie under the tool now.
+
+        Args:
+            left_of: returns what is left of those tiles of which anything is forgotten.
+        """
         self._end_track()
         before = self.pixels
-        for place in list(self._tiles):
-            tile = self._tiles[place]
-            left = tile & ~np.packbits(inside(window_of(place)), axis=1)
-            self.pixels -= count_bits(tile) - count_bits(left)
+        for place, left in left_of(self._tiles):
+            count = count_bits(left)
+            self.pixels -= count_bits(self._tiles[place]) - count
             self._own.discard(place)
-            if left.any():
+            if count:
                 self._tiles[place] = left
                 self._own.add(place)
             else:

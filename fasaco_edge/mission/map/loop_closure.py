@@ -17,7 +17,18 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import UNKNOWN
-from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, FloorSnapshot, Similarity
+from fasaco_edge.kernels.floor import certain as kernels
+from fasaco_edge.kernels.floor.certain import FloorTiles, Whereabouts
+from fasaco_edge.mission.coverage.floor_tiles import (
+    FLOOR_TILE,
+    PIXEL_M,
+    ROW_BYTES,
+    Bits,
+    FloorSnapshot,
+    Place,
+    Similarity,
+    Tiles,
+)
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 
 # This many cells change between free and blocked in one map, and this share of those that were
@@ -124,19 +135,48 @@ def uncertain_cells(
     return inside
 
 
-def uncertain_floor(before: FloorSnapshot, motion: Motion) -> Callable[[Window], NDArray[np.bool_]]:
-    """Return a function of a window: which pixels, bool (rows, cols), may not have been swept."""
+def certain_floor(
+    before: FloorSnapshot, motion: Motion
+) -> Callable[[Tiles], list[tuple[Place, Bits]]]:
+    """Return a function of tiles: what is left of those that have pixels that may not be swept."""
+    known = _stacked(before.tiles)
 
-    def inside(window: Window) -> NDArray[np.bool_]:
-        rows, cols = (window.row0, window.row1), (window.col0, window.col1)
-        x, y = (np.array(each, float) * PIXEL_M for each in (cols * 2, rows + rows[::-1]))
-        was_x, was_y = motion.back(1.0, x, y)
-        farthest = float(np.hypot(was_x - x, was_y - y).max())
-        count = min(max(math.ceil(farthest / PIXEL_M), 1), MOST_BETWEEN)
-        places = [motion.undone(number / count) for number in range(1, count + 1)]
-        return ~before.swept_wherever(places, window)
+    def left_of(tiles: Tiles) -> list[tuple[Place, Bits]]:
+        if not tiles:
+            return []
+        asked = _stacked(tiles)
+        counts = _places_between(asked.places, motion)
+        between = np.zeros((MOST_BETWEEN, MOST_BETWEEN, 4))
+        for count in np.unique(counts).tolist():
+            places = [motion.undone(number / count) for number in range(1, count + 1)]
+            between[count - 1, :count] = places
+        left = kernels.certain_floor(known, asked, Whereabouts(between, counts))
+        is_less = (left != asked.bits).any(axis=(1, 2))
+        # Each for itself: a view would keep all of them in memory.
+        return [
+            ((row, col), bits.copy())
+            for (row, col), bits in zip(asked.places[is_less].tolist(), left[is_less], strict=True)
+        ]
 
-    return inside
+    return left_of
+
+
+def _stacked(tiles: Tiles) -> FloorTiles:
+    """Return tiles as arrays."""
+    places = sorted(tiles)
+    bits = np.zeros((len(tiles), FLOOR_TILE, ROW_BYTES), np.uint8)
+    for number, place in enumerate(places):
+        bits[number] = tiles[place]
+    return FloorTiles(np.array(places, np.int64).reshape(-1, 2), bits)
+
+
+def _places_between(tiles: NDArray[np.int64], motion: Motion) -> NDArray[np.int64]:
+    """Return at how many places of a motion the pixels of tiles, int64 (n, 2), are looked up."""
+    corners = np.array([(0, 0), (1, 1), (1, 0), (0, 1)])
+    y, x = np.moveaxis((tiles[:, np.newaxis] + corners) * FLOOR_TILE * PIXEL_M, 2, 0)
+    was_x, was_y = motion.back(1.0, x, y)
+    farthest: NDArray[np.float64] = np.hypot(was_x - x, was_y - y).max(axis=1)
+    return np.clip(np.ceil(farthest / PIXEL_M), 1, MOST_BETWEEN).astype(np.int64)
 
 
 def _covered(
