@@ -62,13 +62,14 @@ class Queue:
         length: items at most.
         size: of all together at most [bytes]; one alone may be larger.
         at_once: items that one take hands out at most; the others wait for the next.
-        before: a kind that must not overtake this one: with an item of that, all are handed out.
+        after: a queued kind that this one must not overtake: an item waits for those of that kind
+            that were posted before it.
     """
 
     length: int
     size: float = math.inf
     at_once: float = math.inf
-    before: str = ""
+    after: str = ""
 
 
 class Mailbox(Generic[Item]):
@@ -91,6 +92,9 @@ class Mailbox(Generic[Item]):
         self._sizes = dict.fromkeys(queued, 0)
         self._size_of = size_of
         self._lost = dict.fromkeys(queued, 0)
+        # How many of a kind have left their queue, and for which of another kind each item waits.
+        self._gone = dict.fromkeys(queued, 0)
+        self._waits = {kind: deque[int]() for kind, bounds in queued.items() if bounds.after}
         self._spacing = spacing
         self._free_at = float("-inf")
 
@@ -108,10 +112,13 @@ class Mailbox(Generic[Item]):
             queue.append(item)
             self._sizes[kind] += self._size_of(item)
             bounds = self._bounds[kind]
+            if bounds.after:
+                posted = self._gone[bounds.after] + len(self._queued[bounds.after])
+                self._waits[kind].append(posted)
             while len(queue) > bounds.length or (
                 len(queue) > 1 and self._sizes[kind] > bounds.size
             ):
-                self._sizes[kind] -= self._size_of(queue.popleft())
+                self._pop(kind)
                 self._lost[kind] += 1
 
     def take(self, timeout_s: float) -> list[tuple[str, Item]]:
@@ -131,13 +138,12 @@ class Mailbox(Generic[Item]):
                 self._changed.wait((min(deadline, self._free_at) if held else deadline) - now)
             items = list(self._newest.items())
             self._newest = {}
-            for kind in ready:
-                queue, bounds = self._queued[kind], self._bounds[kind]
-                most = math.inf if bounds.before in ready else bounds.at_once
-                for _ in range(int(min(len(queue), most))):
-                    item = queue.popleft()
-                    self._sizes[kind] -= self._size_of(item)
-                    items.append((kind, item))
+            # What waits for another kind comes after it.
+            for kind in sorted(ready, key=self._waits.__contains__):
+                most = min(len(self._queued[kind]), self._bounds[kind].at_once)
+                while most > 0 and not self._has_to_wait(kind):
+                    items.append((kind, self._pop(kind)))
+                    most -= 1
             if self._spacing is not None and self._spacing.kind in ready:
                 self._free_at = now + self._spacing.seconds
             return items
@@ -147,6 +153,19 @@ class Mailbox(Generic[Item]):
         with self._changed:
             lost, self._lost[kind] = self._lost[kind], 0
             return lost
+
+    def _pop(self, kind: str) -> Item:
+        """Return the oldest item of a queued kind, which leaves its queue."""
+        item = self._queued[kind].popleft()
+        self._sizes[kind] -= self._size_of(item)
+        self._gone[kind] += 1
+        if kind in self._waits:
+            self._waits[kind].popleft()
+        return item
+
+    def _has_to_wait(self, kind: str) -> bool:
+        """Tell whether the oldest item of a kind must not overtake another that is still there."""
+        return kind in self._waits and self._waits[kind][0] > self._gone[self._bounds[kind].after]
 
     def _held(self, now: float) -> tuple[str, ...]:
         """Return the kinds that have to wait."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -40,6 +41,9 @@ LEDGER_STOP_S, LEDGER_LEAST_S = 0.5, 0.2
 # Whatever still holds the process then is not waited for [s]: the unit's ``TimeoutStopSec=`` is 10,
 # and its SIGKILL would leave no trace of what it was.
 END_S = 9.0
+# So soon a thread that runs lets another one run [s]. Zenoh's threads call back with each sample;
+# at 5 ms, as Python has it, the loop waits for them several times a cycle.
+SWITCH_S = 0.0005
 # A client tries so often whether its router is there [s].
 ROUTER_RETRY_S = 1.0
 
@@ -68,6 +72,7 @@ def run_daemon(
         ProcessEnded: a service's kernels could not be compiled.
     """
     started = time.monotonic()
+    sys.setswitchinterval(SWITCH_S)
     # Otherwise every thread keeps what its largest map took: 430 MB resident in place of 250.
     return_soon()
     stop = threading.Event()

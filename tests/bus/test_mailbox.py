@@ -56,13 +56,21 @@ def test_more_than_is_handed_out_at_once_waits_for_the_next_take():
     assert box.take_lost("pose") == 0
 
 
-def test_with_what_must_not_overtake_them_all_are_handed_out():
-    box = Mailbox({"pose": Queue(9, at_once=2, before="command"), "command": Queue(9)})
-    for number in range(5):
+def test_what_must_not_overtake_waits_for_those_before_it_alone():
+    box = Mailbox({"command": Queue(2, after="pose"), "pose": Queue(4, at_once=2)})
+    for number in range(4):
         box.post("pose", number)
-    assert box.take(0) == [("pose", 0), ("pose", 1)]
     box.post("command", "reset")
-    assert box.take(0) == [("pose", 2), ("pose", 3), ("pose", 4), ("command", "reset")]
+    box.post("pose", 4)
+    assert box.take(0) == [("pose", 1), ("pose", 2)], "the first was lost"
+    assert box.take(0) == [("pose", 3), ("pose", 4), ("command", "reset")]
+    box.post("command", "pause")
+    box.post("pose", 5)
+    assert box.take(0) == [("pose", 5), ("command", "pause")]
+    for number in range(3):
+        box.post("command", number)
+        box.post("pose", number)
+    assert box.take(0) == [("pose", 0), ("pose", 1), ("command", 1), ("command", 2)]
 
 
 def weighed(length, size):

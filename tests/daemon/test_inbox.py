@@ -8,6 +8,7 @@ import weakref
 import pytest
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.queries import Question
 from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.daemon.loop.inbox import (
     MOST_POSES,
@@ -82,6 +83,19 @@ def test_a_map_does_not_wait_for_a_thousand_poses(arrivals):
     while taken[-1]:
         taken.append(arrivals.decode()[0])
     assert sum(map(len, taken)) == 1001, "none is lost"
+
+
+def test_a_command_waits_for_the_poses_before_it_and_takes_them_in_no_larger_cycles(arrivals):
+    for _ in range(70):
+        arrivals.post("pose", pose_bytes(1.0, 1.0))
+    arrivals.mailbox.post("command", object.__new__(Question))
+    batches = [take_batch(arrivals.mailbox, 0.0) for _ in range(3)]
+    assert [len(batch.samples) for batch in batches] == [
+        MOST_POSES,
+        MOST_POSES,
+        70 - 2 * MOST_POSES,
+    ]
+    assert [len(batch.questions) for batch in batches] == [0, 0, 1]
 
 
 def test_the_newest_map_comes_first_and_updates_in_order(arrivals):

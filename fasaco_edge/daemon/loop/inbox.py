@@ -38,8 +38,8 @@ ASK_FOR_MAP_S = 2.0
 # Least time between two maps that are taken [s]: a flood of maps must not take a core. No mapper
 # is that fast.
 MAP_SPACING_S = 0.05
-# Most poses of a cycle: other samples must not wait for a thousand. With a command all are taken:
-# what was swept before a reset must not count after it.
+# Most poses of a cycle: other samples must not wait for a thousand. A command waits for those that
+# came before it: what was swept before a reset must not count after it.
 MOST_POSES = 32
 
 
@@ -126,7 +126,8 @@ def make_mailbox(
     """
     spacing = Spacing("map", map_spacing_s, followers=("map_update",))
     bounds = queues(max_pixels)
-    bounds["pose"] = replace(bounds["pose"], at_once=most_poses, before="command")
+    bounds["pose"] = replace(bounds["pose"], at_once=most_poses)
+    bounds["command"] = replace(bounds["command"], after="pose")
     return Mailbox(bounds, spacing, _size_of)
 
 
