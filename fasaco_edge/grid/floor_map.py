@@ -21,6 +21,7 @@ from fasaco_edge.grid.fine_raster import (
 )
 from fasaco_edge.grid.floor import StandLattice, states_of
 from fasaco_edge.grid.geometry import GridGeometry, Point, Polygon, Window
+from fasaco_edge.grid.kept_out import PolygonsOnRaster
 from fasaco_edge.grid.lattice import (
     UNKNOWN,
     Cell,
@@ -37,7 +38,6 @@ from fasaco_edge.kernels.floor.places import (
     within,
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
-from fasaco_edge.kernels.lattice.polygons import add_near, turn_inside
 
 # A step may bend over places this far from its two cells' middles; a pixel more for rounding.
 REACH_CELLS, REACH_PX = 2.5, 2.0
@@ -90,6 +90,8 @@ class FloorMap:
         """
         self.discs = discs
         self._footprint, self._most_pixels, self._keep_out = footprint, most_pixels, keep_out
+        # Where they lie on which raster.
+        self._kept_out: tuple[GridGeometry, PolygonsOnRaster] | None = None
         self._see(grid, plain)
 
     def change(
@@ -192,7 +194,12 @@ class FloorMap:
     def _look(self, grid: OccupancyGrid, parts: int, first: int, end: int) -> None:
         """See what is blocked in rows of the raster, and where the robot's disc fits there."""
         rows = self.geometry.rows
-        keep_out = self._kept_out if self._keep_out else None
+        keep_out = None
+        if self._keep_out:
+            if self._kept_out is None or self._kept_out[0] != self.geometry:
+                kept_out = PolygonsOnRaster.of(self._keep_out, self.geometry)
+                self._kept_out = self.geometry, kept_out
+            keep_out = self._kept_out[1].touched
         free_at_most = self.discs.free_at_most
         seen = blocked_pixels(grid, self.geometry, parts, free_at_most, (first, end), keep_out)
         disc = disc_rows(self.discs.radius_m / self.geometry.resolution)
@@ -233,31 +240,6 @@ class FloorMap:
         lattice = CoverageLattice(before.window, before.cell_m, states, before.steps)
         self.stands = StandLattice(lattice, self.stands.stands, self.stands.bends)
         return lattice
-
-    def _kept_out(self, part: Window) -> NDArray[np.bool_]:
-        """Return which pixels of a part of the raster any polygon touches, bool (rows, cols)."""
-        kept_out = np.zeros((part.rows, part.cols), np.bool_)
-        for polygon in self._keep_out:
-            corners = np.array([self.geometry.to_pixels(x, y) for x, y in polygon])
-            (x0, y0), (x1, y1) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-            # With the pixels that the border only touches.
-            low, high = (math.floor(y0) - 1, math.floor(x0) - 1), (math.ceil(y1), math.ceil(x1))
-            around = Window(*low, high[0] + 1, high[1] + 1)
-            if box := around.intersection(part):
-                kept_out[box.slices_in(part)] |= self._touched_by(corners, box)
-        return kept_out
-
-    def _touched_by(self, corners: NDArray[np.float64], part: Window) -> NDArray[np.bool_]:
-        """Return which pixels of a part of the raster a polygon touches, bool (rows, cols).
-
-        ``corners`` are float64 (n, 2), column and row on the raster.
-        """
-        starts = np.zeros((part.rows, part.cols + 1), np.int32)
-        inside = np.zeros((part.rows, part.cols), np.bool_)
-        add_near(corners, part.row0, part.col0, 1.0, 0.5, starts)
-        turn_inside(corners, part.row0, part.col0, 1.0, inside)
-        touched: NDArray[np.bool_] = (np.cumsum(starts, axis=1)[:, :-1] > 0) | inside
-        return touched
 
     def _pixels_of(
         self, stale: NDArray[np.bool_], window: Window, geometry: GridGeometry

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     _Value = TypeVar("_Value", np.uint8, np.bool_)
+    _Coordinate = TypeVar("_Coordinate", float, NDArray[np.float64])
 
 # A raster's corner is rounded to this part of a pixel: a map that grows by whole pixels stays on
 # its raster, also where its origin is rounded to float32.
@@ -176,8 +177,8 @@ class GridGeometry:
         corner = Pose2D(window.col0 * cell_m, window.row0 * cell_m)
         return cls(window.rows, window.cols, cell_m, corner)
 
-    def to_pixels(self, x: float, y: float) -> tuple[float, float]:
-        """Return the pixel coordinates (column, row), not rounded, of a point [m]."""
+    def to_pixels(self, x: _Coordinate, y: _Coordinate) -> tuple[_Coordinate, _Coordinate]:
+        """Return the pixel coordinates (column, row), not rounded, of a point or of many [m]."""
         dx, dy = x - self.origin.x, y - self.origin.y
         cos, sin = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
         return (cos * dx + sin * dy) / self.resolution, (cos * dy - sin * dx) / self.resolution

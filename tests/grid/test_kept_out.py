@@ -1,0 +1,54 @@
+"""Which pixels of a raster many polygons touch: what each touches alone, near by or not."""
+
+import time
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.kept_out import PolygonsOnRaster
+
+ROWS, COLS = 120, 170
+
+
+def polygons_of(count, seed=0):
+    """Triangles and rectangles all over a raster of 6 m x 8.5 m, and beyond it."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for number in range(count):
+        x, y, width, height = [*rng.uniform(-3.0, 10.0, 2), *rng.choice([0.05, 0.3, 0.61], 2)]
+        corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height)]
+        found.append(tuple(corners[: 3 + number % 2]))
+    return found
+
+
+@pytest.mark.parametrize("origin", [Pose2D(0.0, 0.0), Pose2D(-0.7, 0.31, 0.4)])
+def test_together_they_touch_what_each_touches_alone(origin):
+    geometry, whole = GridGeometry(ROWS, COLS, 0.05, origin), Window(0, 0, ROWS, COLS)
+    polygons = polygons_of(60)
+    expected = np.zeros((ROWS, COLS), bool)
+    for polygon in polygons:
+        expected |= PolygonsOnRaster.of([polygon], geometry).touched(whole)
+    together = PolygonsOnRaster.of(polygons, geometry)
+    assert 0.05 < expected.mean() < 0.95
+    for part in (whole, Window(40, 0, 41, COLS), Window(7, 100, 90, 131)):
+        assert np.array_equal(together.touched(part), expected[part.slices_in(whole)])
+
+
+def test_corners_lie_where_those_of_one_polygon_do_bit_for_bit():
+    geometry = GridGeometry(ROWS, COLS, 0.05, Pose2D(-123.4, 0.31, 0.4))
+    polygons = polygons_of(5)
+    together = PolygonsOnRaster.of(polygons, geometry)
+    for polygon, corners in zip(polygons, together.corners, strict=True):
+        assert corners.tolist() == [list(geometry.to_pixels(x, y)) for x, y in polygon]
+
+
+def test_a_part_costs_what_is_near_it():
+    """Each part looked at each of two thousand: three seconds for these."""
+    geometry = GridGeometry(ROWS, COLS, 0.05, Pose2D(100.0, 0.0))
+    far = PolygonsOnRaster.of(polygons_of(2000), geometry)
+    far.touched(Window(0, 0, 9, 9))
+    started = time.thread_time()
+    for row in range(100):
+        assert not far.touched(Window(row, 0, row + 20, COLS)).any()
+    assert time.thread_time() - started < 0.5
