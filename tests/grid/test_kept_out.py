@@ -29,8 +29,8 @@ def test_together_they_touch_what_each_touches_alone(origin):
     expected = np.zeros((ROWS, COLS), bool)
     for polygon in polygons:
         expected |= PolygonsOnRaster.of([polygon], geometry).touched(whole)
+    assert expected.any()
     together = PolygonsOnRaster.of(polygons, geometry)
-    assert 0.05 < expected.mean() < 0.95
     for part in (whole, Window(40, 0, 41, COLS), Window(7, 100, 90, 131)):
         assert np.array_equal(together.touched(part), expected[part.slices_in(whole)])
 
