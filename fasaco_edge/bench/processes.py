@@ -14,7 +14,8 @@ from typing import Any, Self
 
 import yaml
 
-from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable, ProcessEnded
 from fasaco_edge.host.processes import python_program
 from fasaco_edge.wire import topics

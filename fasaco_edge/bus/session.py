@@ -1,28 +1,20 @@
 """Session on the Zenoh bus: publishers, subscribers, queryables, queries.
 
-Choices for every process, and why:
-
-* no multicast scouting and no shared memory: only what is configured can be reached, and the idle
-  session stays small;
-* each topic has its quality of service, see ``wire.topics``: what a planner publishes is dropped on
-  congestion, so that a frozen subscriber never blocks it;
-* latched topics have advanced publishers with a cache of one sample, so that a late joiner has the
-  newest path at once (ROS calls this transient local);
-* callbacks run on Zenoh's threads and only hand the sample on.
+Latched topics have advanced publishers with a cache of one sample, so that a late joiner has the
+newest path at once (ROS calls this transient local). Callbacks run on Zenoh's threads and only hand
+the sample on.
 """
 
 from __future__ import annotations
 
 import contextlib
-import json
 import threading
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import zenoh
 
-from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Asker, LatchedSubscription, Subscription
 from fasaco_edge.bus.publisher import JSON, Publisher
@@ -37,38 +29,15 @@ from fasaco_edge.bus.queries import (
     send,
     size_of,
 )
+from fasaco_edge.bus.settings import BusSettings, first_line, session_config
+from fasaco_edge.bus.stand_in import StandIn
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 from fasaco_edge.wire.topic_types import VOLATILE, Qos, Topic
 
-# Timeout of the handshake of an incoming connection [ms], and how many may be pending.
-ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
 # Longest wait for the end of a session [s]: before a listener that no longer reads, Zenoh tries for
 # ten seconds to get rid of what is queued, and fails then.
 CLOSE_S = 1.2
-# A map or a path is many packets of 64 kB. Where two of them fill the queue, as by default, a
-# computer that is busy for 50 ms drops the map; these take a megabyte, and only when there is one.
-QUEUED_BATCHES = dict.fromkeys(("interactive_high", "data_high", "data", "data_low"), 16)
-
-
-@dataclass(frozen=True, slots=True)
-class BusSettings:
-    """How to join the bus.
-
-    Attributes:
-        mode: "peer", "client" or "router".
-        connect: endpoints to connect to.
-        listen: endpoints to listen on. Where another process listens there
-            already, the session joins that one instead, unless it is secured.
-        secured: authentication and access rules, a part of Zenoh's configuration, see
-            ``bus.access``. It may hold a password, and is never shown.
-    """
-
-    mode: str = "client"
-    connect: tuple[str, ...] = (DEFAULT_ENDPOINT,)
-    listen: tuple[str, ...] = ()
-    secured: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(slots=True)
@@ -84,8 +53,11 @@ class _Served:
 class Bus:
     """A session, with everything declared on it; close it on every way out."""
 
-    def __init__(self, session: zenoh.Session, listens: bool = False) -> None:
+    def __init__(
+        self, session: zenoh.Session, listens: bool = False, stand_in: StandIn | None = None
+    ) -> None:
         self._session = session
+        self._stand_in = stand_in
         self._listens = listens
         self._declared: list[Any] = []
         self._served: list[_Served] = []
@@ -237,6 +209,14 @@ class Bus:
         info = self._session.info
         return self._listens or bool(info.routers_zid() or info.peers_zid())
 
+    def keep_in_touch(self, now: float) -> bool:
+        """Tell whether samples can arrive; where the process that was joined is gone, listen in its
+        place before long. To be called again and again, ``now`` is steady [s]."""
+        in_touch = self.is_in_touch()
+        if self._stand_in is not None:
+            self._stand_in.poll(now, is_alone=not in_touch)
+        return in_touch
+
     def alive(self, key: str, timeout_s: float = 1.0) -> list[str]:
         """Return the keys of the liveliness tokens that match ``key`` now."""
         replies = self._session.liveliness().get(key, timeout=timeout_s)
@@ -261,15 +241,19 @@ class Bus:
         for lent in self._lent:
             lent.release()
         self._lent.clear()
-        ending = threading.Thread(target=_end, args=(self._session,), name="close", daemon=True)
+        ending = threading.Thread(
+            target=_end, args=(self._session, self._stand_in), name="close", daemon=True
+        )
         ending.start()
         ending.join(CLOSE_S)
 
 
-def _end(session: zenoh.Session) -> None:
+def _end(session: zenoh.Session, stand_in: StandIn | None) -> None:
     ending: Any = session  # close() has no annotation
     with contextlib.suppress(zenoh.ZError):  # it took too long
         ending.close()
+        if stand_in is not None:
+            stand_in.close()
 
 
 def open_bus(settings: BusSettings) -> Bus:
@@ -284,69 +268,11 @@ def open_bus(settings: BusSettings) -> Bus:
         # A secured session connects only to what is configured.
         taken = settings.listen and "Address already in use" in str(error)
         if not taken or settings.secured:
-            raise BusUnavailable(_first_line(error)) from error
+            raise BusUnavailable(first_line(error)) from error
     # Another process listens there: connect to it as a client.
-    connect = settings.connect + settings.listen
-    return open_bus(replace(settings, mode="client", connect=connect, listen=()))
-
-
-def check_settings(settings: BusSettings) -> None:
-    """Check the configuration of a session without opening it.
-
-    Raises:
-        BusUnavailable: Zenoh does not take it.
-    """
+    joined = replace(settings, mode="client", connect=settings.connect + settings.listen, listen=())
     try:
-        session_config(settings)
+        session = zenoh.open(session_config(joined))
     except zenoh.ZError as error:
-        raise BusUnavailable(_first_line(error)) from error
-
-
-def session_config(settings: BusSettings) -> zenoh.Config:
-    """Return Zenoh's configuration of a session: what all have in common, and what secures one.
-
-    Raises:
-        zenoh.ZError: it has unknown keys or impossible values.
-    """
-    is_client = settings.mode == "client"
-    own = {
-        "mode": settings.mode,
-        "connect": {
-            "endpoints": list(settings.connect),
-            # A client without its router fails at once; a peer keeps trying.
-            "timeout_ms": 0 if is_client else -1,
-            "exit_on_failure": is_client,
-            "retry": {"period_init_ms": 200, "period_max_ms": 1000},
-        },
-        "listen": {"endpoints": list(settings.listen)},
-        "scouting": {"multicast": {"enabled": False}},
-        # Advanced publishers need timestamps for their cache.
-        "timestamping": {"enabled": True},
-        "transport": {
-            "shared_memory": {"enabled": False},
-            # Connections without a handshake must not keep others out: by default a hundred of
-            # them do, for twelve seconds.
-            "unicast": {"accept_timeout": ACCEPT_TIMEOUT_MS, "accept_pending": ACCEPT_PENDING},
-            "link": {
-                "rx": {"max_message_size": MAX_MESSAGE_BYTES},
-                "tx": {"queue": {"size": QUEUED_BATCHES}},
-            },
-        },
-    }
-    return zenoh.Config.from_json5(json.dumps(_merged(own, settings.secured)))
-
-
-def _merged(own: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return both; where both have a mapping, that of both."""
-    merged = dict(own)
-    for key, value in more.items():
-        before = own.get(key)
-        if isinstance(before, Mapping) and isinstance(value, Mapping):
-            merged[key] = _merged(before, value)
-        else:
-            merged[key] = value
-    return merged
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).partition(" at /")[0].strip()
+        raise BusUnavailable(first_line(error)) from error
+    return Bus(session, stand_in=StandIn(session_config(settings)))

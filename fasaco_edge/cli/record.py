@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from fasaco_edge.bus.session import BusSettings
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, robot_on_bus
 from fasaco_edge.config.config import (
     BusConfig,

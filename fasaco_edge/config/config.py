@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Meta, structs
 
 from fasaco_edge.bus import DEFAULT_ENDPOINT
-from fasaco_edge.bus.session import BusSettings
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.reading import (
     Fault,
     Section,

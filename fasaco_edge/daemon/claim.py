@@ -162,6 +162,7 @@ class NameClaim(Claim):
         The token follows with ``announce``, once the former path is withdrawn.
         """
         before = self.state
+        in_touch = self._bus.keep_in_touch(now)
         is_settled = self._is_settled and not self.is_uncertain(now)
         self._roll.ask(ASK_PERIOD_S if is_settled else 0.0)
         if not self._roll.version:
@@ -172,7 +173,7 @@ class NameClaim(Claim):
             self._others.pop(self._bus.id, None)
             # If none plans, one soon will.
             self._is_settled = ClaimState.PLANS in (self.state, *self._others.values())
-        self.decide(self._others, now, in_touch=self._bus.is_in_touch())
+        self.decide(self._others, now, in_touch=in_touch)
         if self.rival_yielded:
             LOG.warning("another daemon of this name was planning, too, and has yielded")
         return self.state is not before

@@ -10,7 +10,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.compiling import KernelCompiler

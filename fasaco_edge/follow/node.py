@@ -12,7 +12,8 @@ from typing import Protocol
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable, FasacoError
 from fasaco_edge.follow.estimate import STAND, Command, Limits
 from fasaco_edge.follow.follower import LINK_S, RATE_HZ, Follower, Patience, State

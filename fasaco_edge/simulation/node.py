@@ -10,7 +10,8 @@ from typing import Literal
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.host.processes import stop_event

@@ -9,7 +9,8 @@ from typing import Self
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Queue
-from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.watch.robot_view import Token
 from fasaco_edge.wire.keys import VERSION, Keys

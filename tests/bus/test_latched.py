@@ -13,7 +13,8 @@ import zenoh
 import zenoh.ext
 
 from fasaco_edge.bus import latched
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.wire.topics import QOS
 from tests.support.outsider import open_client
 from tests.support.processes import free_endpoint

@@ -11,7 +11,8 @@ from tests.support.processes import free_endpoint
 # held; meanwhile a latched publisher forgets. Ends by itself unless all of it stands still.
 FORGETTING = """
 import os, sys, threading, time
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.wire import topics
 
 endpoint = sys.argv[1]

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from queue import Queue
 
 import pytest
@@ -16,7 +17,8 @@ import zenoh.ext
 from fasaco_edge.bus import queries as roll_module
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.queries import Reply
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.topics import QOS
 from tests.support.outsider import Ear, open_client
@@ -200,6 +202,28 @@ def test_who_finds_the_port_taken_joins(endpoint, samples, mode):
         assert samples.get(timeout=TIMEOUT_S).payload == b"from the second"
 
 
+@pytest.mark.parametrize("mode", ["peer", "router"])
+def test_who_joined_listens_once_the_other_is_gone(endpoint, samples, mode):
+    settings = BusSettings(mode, (), (endpoint,))
+    first = open_bus(settings)
+    with open_bus(settings) as second, open_bus(settings) as third:
+        second.subscribe(KEY, samples.put)
+        first.close()
+
+        def is_reached():
+            for one in (second, third):
+                one.keep_in_touch(time.monotonic())
+            with suppress(BusUnavailable), open_bus(BusSettings("client", (endpoint,))) as other:
+                publisher = other.publisher(KEY)
+                until(publisher.has_listeners)
+                publisher.put(b"to the second")
+                return True
+
+        until(is_reached)
+        assert samples.get(timeout=TIMEOUT_S).payload == b"to the second"
+        until(third.is_in_touch)
+
+
 def test_two_clients_meet_in_a_peer(bus, endpoint, samples):
     client = BusSettings("client", (endpoint,))
     with open_bus(client) as one, open_bus(client) as other:
@@ -236,7 +260,8 @@ def test_a_frozen_subscriber_does_not_hold_a_publisher(bus, endpoint):
     """Puts drop on congestion: ten times 16 MB into a process that reads nothing."""
     code = f"""
 import time
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
     bus.subscribe({KEY!r}, lambda sample: None)
     print("listening", flush=True)
@@ -261,7 +286,8 @@ def test_what_a_frozen_subscriber_missed_last_comes_when_it_goes_on(bus, endpoin
     """A link that is full drops maps; who listens asks whether it was the last."""
     code = f"""
 import time
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
     bus.subscribe({KEY!r}, lambda sample: print(int(sample.payload[:4]), flush=True), latched=True)
     time.sleep(60)
@@ -286,7 +312,8 @@ def test_a_frozen_subscriber_does_not_hold_the_end_of_a_session(endpoint):
     """Zenoh alone tries for ten seconds to get rid of what is queued, and fails then."""
     code = f"""
 import time
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
     bus.subscribe({KEY!r}, lambda sample: None)
     print("listening", flush=True)
@@ -316,7 +343,8 @@ def test_a_process_that_closes_its_session_ends(endpoint):
     """Without close() a process with a subscription may hang at its exit."""
     code = f"""
 from fasaco_edge.wire.topics import QOS
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 with open_bus(BusSettings("peer", (), ({endpoint!r},))) as bus:
     bus.subscribe({KEY!r}, lambda sample: None, latched=True)
     bus.serve({KEY!r}, lambda asked: None)

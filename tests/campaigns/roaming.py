@@ -10,7 +10,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 
-from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
 from fasaco_edge.simulation.node import RobotOnBus

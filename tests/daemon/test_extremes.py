@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.supervisor import FIRST_PAUSE_S, RecorderSupervisor
 from tests.support.processes import free_endpoint

@@ -8,7 +8,8 @@ import time
 
 import pytest
 
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.daemon.loop.inbox import ASK_FOR_MAP_S
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.topics import QOS

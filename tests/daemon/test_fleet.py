@@ -7,7 +7,8 @@ import time
 
 import pytest
 
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from tests.daemon.test_security import SILENCE_S
 from tests.support.outsider import Outsider, open_client
 from tests.support.processes import daemon_process, free_endpoint

@@ -9,7 +9,8 @@ import pytest
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.queries import Question
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.daemon.loop.inbox import (
     MOST_POSES,
     Inbox,

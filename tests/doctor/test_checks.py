@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import BusConfig, DaemonConfig, MissionSettings, RobotConfig
 from fasaco_edge.doctor import machine, report, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit

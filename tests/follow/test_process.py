@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.twists import decode_velocity

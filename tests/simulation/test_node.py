@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BadConfiguration, BusUnavailable
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.simulation.node import run_simulation
@@ -29,7 +30,7 @@ from tests.simulation.rooms import building, centres, distances_to, serpentine
 
 ROBOT = """
 import json, sys
-from fasaco_edge.bus.session import BusSettings
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.node import run_simulation

@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.estimate import Command, moved
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire import topics

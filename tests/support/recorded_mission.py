@@ -14,7 +14,8 @@ import numpy as np
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid

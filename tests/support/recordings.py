@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import scan_recording
@@ -29,7 +30,7 @@ from fasaco_edge.wire.keys import Keys
 
 RUN = """
 import json, pathlib, sys
-from fasaco_edge.bus.session import BusSettings
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.recorder import run_recorder

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from fasaco_edge.bus.session import BusSettings, open_bus
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.watch.feed import Feed
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import PHEROMONE

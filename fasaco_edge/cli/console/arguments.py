@@ -19,7 +19,7 @@ from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.errors import BadConfiguration
 
 if TYPE_CHECKING:
-    from fasaco_edge.bus.session import BusSettings
+    from fasaco_edge.bus.settings import BusSettings
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.wire.keys import Keys
 
@@ -205,7 +205,7 @@ def robot_on_bus(args: argparse.Namespace) -> RobotOnBus:
 
 
 def _client(connect: tuple[str, ...], security_file: str | None) -> BusSettings:
-    from fasaco_edge.bus.session import BusSettings
+    from fasaco_edge.bus.settings import BusSettings
 
     if security_file is None:
         return BusSettings("client", connect)

@@ -19,7 +19,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.errors import BusUnavailable, ProcessEnded
 from fasaco_edge.grid.map_files import find_map

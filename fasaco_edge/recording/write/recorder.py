@@ -16,7 +16,8 @@ from pathlib import Path
 
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.publisher import Publisher
-from fasaco_edge.bus.session import Bus, BusSettings, open_bus
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.host.processes import memory_limit, resident_mb, return_soon, stop_event

@@ -1,0 +1,110 @@
+"""Settings of a session on the Zenoh bus, and the configuration that Zenoh gets of them.
+
+The same for every process, and why:
+
+* no multicast scouting and no shared memory: only what is configured can be reached, and the idle
+  session stays small;
+* each topic has its quality of service, see ``wire.topics``: what a planner publishes is dropped on
+  congestion, so that a frozen subscriber never blocks it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import zenoh
+
+from fasaco_edge.bus import DEFAULT_ENDPOINT
+from fasaco_edge.errors import BusUnavailable
+from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
+
+# Timeout of the handshake of an incoming connection [ms], and how many may be pending.
+ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
+# A map or a path is many packets of 64 kB. Where two of them fill the queue, as by default, a
+# computer that is busy for 50 ms drops the map; these take a megabyte, and only when there is one.
+QUEUED_BATCHES = dict.fromkeys(("interactive_high", "data_high", "data", "data_low"), 16)
+
+
+@dataclass(frozen=True, slots=True)
+class BusSettings:
+    """How to join the bus.
+
+    Attributes:
+        mode: "peer", "client" or "router".
+        connect: endpoints to connect to.
+        listen: endpoints to listen on. Where another process listens there
+            already, the session joins that one instead, unless it is secured.
+        secured: authentication and access rules, a part of Zenoh's configuration, see
+            ``bus.access``. It may hold a password, and is never shown.
+    """
+
+    mode: str = "client"
+    connect: tuple[str, ...] = (DEFAULT_ENDPOINT,)
+    listen: tuple[str, ...] = ()
+    secured: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+
+def check_settings(settings: BusSettings) -> None:
+    """Check the configuration of a session without opening it.
+
+    Raises:
+        BusUnavailable: Zenoh does not take it.
+    """
+    try:
+        session_config(settings)
+    except zenoh.ZError as error:
+        raise BusUnavailable(first_line(error)) from error
+
+
+def session_config(settings: BusSettings) -> zenoh.Config:
+    """Return Zenoh's configuration of a session: what all have in common, and what secures one.
+
+    Raises:
+        zenoh.ZError: it has unknown keys or impossible values.
+    """
+    is_client = settings.mode == "client"
+    own = {
+        "mode": settings.mode,
+        "connect": {
+            "endpoints": list(settings.connect),
+            # A client without its router fails at once; a peer keeps trying.
+            "timeout_ms": 0 if is_client else -1,
+            "exit_on_failure": is_client,
+            "retry": {"period_init_ms": 200, "period_max_ms": 1000},
+        },
+        "listen": {"endpoints": list(settings.listen)},
+        "scouting": {"multicast": {"enabled": False}},
+        # Advanced publishers need timestamps for their cache.
+        "timestamping": {"enabled": True},
+        "transport": {
+            "shared_memory": {"enabled": False},
+            # Connections without a handshake must not keep others out: by default a hundred of
+            # them do, for twelve seconds.
+            "unicast": {"accept_timeout": ACCEPT_TIMEOUT_MS, "accept_pending": ACCEPT_PENDING},
+            "link": {
+                "rx": {"max_message_size": MAX_MESSAGE_BYTES},
+                "tx": {"queue": {"size": QUEUED_BATCHES}},
+            },
+        },
+    }
+    return zenoh.Config.from_json5(json.dumps(_merged(own, settings.secured)))
+
+
+def _merged(own: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return both; where both have a mapping, that of both."""
+    merged = dict(own)
+    for key, value in more.items():
+        before = own.get(key)
+        if isinstance(before, Mapping) and isinstance(value, Mapping):
+            merged[key] = _merged(before, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def first_line(error: Exception) -> str:
+    """Return what Zenoh says is wrong, without the place in its sources."""
+    return str(error).partition(" at /")[0].strip()
