@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.offline.maps import load_map
     from fasaco_edge.offline.plan import plan
 
-    map = load_map(args.map)
+    map = load_map(args.map, resolution_m=args.resolution, unknown_free=args.unknown_free)
     if args.xy_out is not None and map.grid is None:
         raise BadConfiguration(
             f"--xy-out: {map.file} is a coverage grid (.npy), which lies in no map frame",

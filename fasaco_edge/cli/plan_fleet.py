@@ -43,7 +43,7 @@ def plan_fleet(args: argparse.Namespace, request: PlanRequest) -> int:
     from fasaco_edge.planners.fleet.division import divide
     from fasaco_edge.planners.fleet.sharing import Fleet
 
-    map = load_map(args.map)
+    map = load_map(args.map, resolution_m=args.resolution, unknown_free=args.unknown_free)
     lattice = map.lattice(robot)
     starts = args.robots or [lattice.cell_at(*xy) for xy in args.robots_xy]
     _check_apart(starts)

@@ -34,6 +34,7 @@ examples:
   fasaco-edge plan site.yaml --xy-out line.csv --png line.png
   fasaco-edge plan site.yaml --line quick --align axes --xy-out line.csv
   fasaco-edge plan site.yaml --line cells --path-out path.csv
+  fasaco-edge plan scan.png --resolution 0.05 --unknown-free --png line.png
   fasaco-edge plan site.yaml --config robot.yaml --json
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
@@ -76,7 +77,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "map",
         metavar="MAP",
-        help="map_server YAML, a name from `maps`, or a coverage grid .npy (bool, True = free)",
+        help="map_server YAML, a name from `maps`, an image with --resolution, or a coverage grid "
+        ".npy (bool, True = free)",
     )
     parser.add_argument(
         "--config",
@@ -91,6 +93,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_problem(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--resolution",
+        type=float,
+        metavar="M",
+        help="edge of a pixel [m] of a PNG, PGM, BMP or JPEG without a YAML file: its lower left "
+        "corner is 0,0; as map_server has it, free is brighter than 80.4 %%, occupied darker "
+        "than 35 %%, unknown between",
+    )
+    group.add_argument(
+        "--unknown-free", action="store_true", help="take unknown pixels for free ones"
+    )
     start = group.add_mutually_exclusive_group()
     start.add_argument(
         "--start", type=pair_of_ints, metavar="R,C", help="cell to start in; row 0 has smallest y"

@@ -41,6 +41,7 @@ MAX_PIXELS = 64_000_000
 # nav2's three recommended formats, and the one that published maps come in; PPM is Pillow's name
 # for the PGM family. What JPEG does to sharp edges may turn unknown pixels beside walls free.
 FORMATS = ("PPM", "PNG", "BMP", "JPEG")
+IMAGE_SUFFIXES = (".pgm", ".png", ".bmp", ".jpg", ".jpeg")
 # What ROS 1's map_saver writes; grey of 205, which it writes for unknown, is not free by that.
 FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 
@@ -59,6 +60,11 @@ def read_map(path: str | Path) -> OccupancyGrid:
             missing or its value impossible.
     """
     path = Path(path)
+    if path.suffix.lower() in IMAGE_SUFFIXES:
+        raise MapFileError(
+            f"{path}: an image alone does not tell how large its pixels are",
+            hint="give --resolution (metres a pixel), or the map_server YAML file beside it",
+        )
     keys = _YamlKeys(path, _load_yaml(path))
     keys.values.setdefault("free_thresh", FREE_THRESH)
     keys.values.setdefault("occupied_thresh", OCCUPIED_THRESH)
@@ -67,13 +73,55 @@ def read_map(path: str | Path) -> OccupancyGrid:
         raise keys.error("free_thresh", f"less than occupied_thresh, {thresholds[1]}")
     resolution = keys.number("resolution", MIN_RESOLUTION_M, MAX_RESOLUTION_M, " [m/pixel]")
     file, mode, origin, negate = keys.image(), keys.mode(), keys.origin(), keys.negate()
-    image = _read_image(file)
+    return _grid(_read_image(file), mode, thresholds, negate, resolution, origin)
+
+
+def read_bare_image(path: str | Path, resolution_m: float) -> OccupancyGrid:
+    """Return the map in an image without a YAML file.
+
+    Its lower left corner is the origin of the map frame; what is free and occupied is told apart
+    as map_server does where a YAML file says nothing of it: trinary, black is occupied.
+
+    Args:
+        path: PGM, PNG, BMP or JPEG.
+        resolution_m: edge of a pixel [m].
+
+    Raises:
+        MapFileError: the file is missing, no image, damaged or too large, or brings a resolution
+            of its own; the resolution is impossible.
+    """
+    path = Path(path)
+    if path.suffix.lower() in (".yaml", ".yml", ".npy"):
+        kind = "a coverage grid" if path.suffix.lower() == ".npy" else "a map_server YAML file"
+        own = "has cells of --cell" if kind == "a coverage grid" else "has a resolution of its own"
+        raise MapFileError(
+            f"{path}: {kind} {own}; --resolution is for an image alone",
+            hint="leave --resolution out, or give the image",
+        )
+    if not MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M:
+        raise MapFileError(
+            f"{path}: resolution must be from {MIN_RESOLUTION_M:g} to {MAX_RESOLUTION_M:g} "
+            f"[m/pixel], got {resolution_m:g}",
+            hint="give the edge of a pixel in metres, as 0.05",
+        )
+    thresholds = FREE_THRESH, OCCUPIED_THRESH
+    return _grid(_read_image(path), MODES[0], thresholds, False, resolution_m, Pose2D(0, 0, 0))
+
+
+def _grid(
+    image: _Image,
+    mode: str,
+    thresholds: tuple[float, float],
+    negate: bool,
+    resolution_m: float,
+    origin: Pose2D,
+) -> OccupancyGrid:
     # Images run from the top down, maps from the smallest y up.
     cells = _values(mode, thresholds, image.white, negate)[image.levels[::-1]]
     if image.transparent is not None and mode != "raw":
         cells[image.transparent[::-1]] = UNKNOWN
     rows, cols = cells.shape
-    return OccupancyGrid(GridGeometry(rows, cols, resolution, origin), cells)
+    return OccupancyGrid(GridGeometry(rows, cols, resolution_m, origin), cells)
 
 
 def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fasaco_edge.config.config import RobotConfig
 from fasaco_edge.errors import MapFileError
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
-from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.map_files import find_map, read_bare_image, read_coverage_grid, read_map
+from fasaco_edge.grid.occupancy import FREE, UNKNOWN, OccupancyGrid
 from fasaco_edge.planners.grids import start_cell
 
 
@@ -49,17 +49,26 @@ class Map:
         return start_cell(lattice, self.file or Path(self.name))
 
 
-def load_map(source: str | Path | NDArray[np.bool_]) -> Map:
+def load_map(
+    source: str | Path | NDArray[np.bool_],
+    *,
+    resolution_m: float | None = None,
+    unknown_free: bool = False,
+) -> Map:
     """Return a map.
 
     Args:
-        source: a map_server YAML file, the name of a built-in map (``fasaco-edge maps``), a
-            coverage grid in a .npy file, or one as an array, bool (rows, cols), True = coverable.
+        source: a map_server YAML file, the name of a built-in map (``fasaco-edge maps``), an image
+            alone, a coverage grid in a .npy file, or one as an array, bool (rows, cols), True =
+            coverable.
+        resolution_m: edge of a pixel [m] of an image alone; None for all else.
+        unknown_free: take unknown pixels for free ones.
 
     Raises:
-        MapFileError: it is none of these, or cannot be read.
+        MapFileError: it is none of these, or cannot be read; an option is not for such a map.
     """
     if isinstance(source, np.ndarray):
+        _without_pixels("the array", resolution_m, unknown_free)
         if source.dtype != np.bool_ or source.ndim != 2 or not source.size:
             raise MapFileError(
                 f"a coverage grid is bool (rows, cols), got {source.dtype} {source.shape}"
@@ -69,5 +78,19 @@ def load_map(source: str | Path | NDArray[np.bool_]) -> Map:
         return Map("array", free=free)
     file = find_map(source)
     if file.suffix == ".npy":
+        _without_pixels(str(file), resolution_m, unknown_free)
         return Map(file.name, free=read_coverage_grid(file), file=file)
-    return Map(file.name, read_map(file), file=file)
+    grid = read_map(file) if resolution_m is None else read_bare_image(file, resolution_m)
+    if unknown_free:
+        grid = replace(grid, cells=np.where(grid.cells == UNKNOWN, FREE, grid.cells))
+    return Map(file.name, grid, file=file)
+
+
+def _without_pixels(name: str, resolution_m: float | None, unknown_free: bool) -> None:
+    """Raise MapFileError where what counts for pixels is asked of a coverage grid."""
+    if resolution_m is not None or unknown_free:
+        option = "--unknown-free" if resolution_m is None else "--resolution"
+        raise MapFileError(
+            f"{name}: {option} is for maps of pixels; a coverage grid has cells, free or not",
+            hint=f"leave {option} out; --cell is the width of a cell",
+        )

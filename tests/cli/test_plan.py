@@ -334,6 +334,23 @@ def test_an_overlap_is_a_share_of_the_tool(capsys, overlap):
     assert "--overlap must be in [0, 0.5]" in capsys.readouterr().err
 
 
+def test_an_image_alone_is_planned_on_and_what_is_unknown_may_count_as_free(plan, tmp_path, capsys):
+    pixels = np.full((60, 80), 254, np.uint8)
+    pixels[:, 40:] = 205
+    pixels[[0, -1]] = pixels[:, [0, -1]] = 0
+    file = tmp_path / "scan.png"
+    Image.fromarray(pixels).save(file)
+    words = [file, "--resolution", "0.05", "--line", "cells"]
+    seen, _ = plan(*words)
+    all_of_it, _ = plan(*words, "--unknown-free")
+    assert 1.5 < all_of_it["cells"] / seen["cells"] < 2.5
+    assert all_of_it["floor"]["illegal_share"] == 0
+    assert main(["plan", str(file)]) == 1
+    assert "--resolution" in capsys.readouterr().err
+    assert main(["plan", "office", "--resolution", "0.05"]) == 1
+    assert "a resolution of its own" in capsys.readouterr().err
+
+
 def test_a_coverage_grid_has_no_floor(grid_file, capsys):
     assert main(["plan", str(grid_file), "--line", "thorough"]) == Exit.CONFIG
     assert "line thorough: grid.npy is a coverage grid" in capsys.readouterr().err

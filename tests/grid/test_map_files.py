@@ -16,7 +16,7 @@ from PIL import Image
 
 from fasaco_edge.errors import MapFileError
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
+from fasaco_edge.grid.map_files import find_map, read_bare_image, read_coverage_grid, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from maps.map_writer import write_map
 
@@ -126,6 +126,40 @@ def test_thresholds_that_are_missing_are_those_of_map_saver(tmp_path):
     image = grey([0, 254, 205, 100, 80])
     path = described(tmp_path, image, drop=("free_thresh", "occupied_thresh"))
     assert read_map(path).cells.tolist() == [[100, 0, -1, -1, 100]]
+
+
+@pytest.mark.parametrize("name", ["map.png", "map.PGM", "map.bmp", "map.jpg"])
+def test_an_image_alone_is_a_map_with_a_resolution(tmp_path, name):
+    # In blocks of what JPEG compresses as one.
+    image = Image.fromarray(
+        np.kron(np.array([[0, 255], [255, 205]]), np.ones((16, 16))).astype("B")
+    )
+    image.save(tmp_path / name)
+    with pytest.raises(MapFileError, match="how large its pixels are") as refused:
+        read_map(tmp_path / name)
+    assert "--resolution" in refused.value.hint
+    grid = read_bare_image(tmp_path / name, 0.02)
+    assert grid.cells[8::16, 8::16].tolist() == [[0, -1], [100, 0]]
+    assert grid.geometry == GridGeometry(32, 32, 0.02, Pose2D(0, 0, 0))
+
+
+@pytest.mark.parametrize(
+    ("name", "resolution_m", "said"),
+    [
+        ("map.yaml", 0.05, "map_server YAML file has a resolution of its own"),
+        ("grid.npy", 0.05, "coverage grid has cells of --cell"),
+        ("map.png", 0.05, "not an image"),
+        ("map.png", -1.0, "resolution must be from"),
+        ("map.png", math.nan, "resolution must be from"),
+        ("none.png", 0.05, "No such file"),
+    ],
+)
+def test_what_is_no_image_alone_is_named(tmp_path, name, resolution_m, said):
+    for there in ("map.yaml", "grid.npy", "map.png"):
+        (tmp_path / there).write_text("no image")
+    with pytest.raises(MapFileError, match=said) as refused:
+        read_bare_image(tmp_path / name, resolution_m)
+    assert name in str(refused.value)
 
 
 def _naming(folder, name):

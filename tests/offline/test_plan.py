@@ -127,6 +127,12 @@ def test_an_array_is_a_grid_of_true_and_false(array):
         fe.load_map(array)
 
 
+@pytest.mark.parametrize("option", [{"resolution_m": 0.1}, {"unknown_free": True}])
+def test_a_coverage_grid_has_no_pixels(option):
+    with pytest.raises(MapFileError, match="is for maps of pixels"):
+        fe.load_map(np.ones((3, 3), bool), **option)
+
+
 def test_to_import_the_package_loads_no_planner():
     code = "import sys, fasaco_edge; sys.exit('numpy' in sys.modules)"
     assert (
