@@ -69,6 +69,20 @@ class PlanFailed(FasacoError):
     hint = "planning is retried with the next map, or after a while; report it with the log"
 
 
+class PlannerFailed(FasacoError):
+    """A planner of the user's own, or the file it is in, raised an exception."""
+
+    code = "planner_failed"
+    hint = "the lines are those of your own file, the last one first"
+
+
+class IllegalWalk(FasacoError):
+    """What a planner of the user's own returned is no walk that solves the problem."""
+
+    code = "illegal_walk"
+    hint = "return cells (row, col): from the start, one step each, over all of problem.to_cover"
+
+
 class MissionBroke(FasacoError):
     """The mission failed with an internal error."""
 

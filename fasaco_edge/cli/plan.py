@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,7 +50,9 @@ def run(args: argparse.Namespace) -> int:
     asked = Interrupt()
     total = search.most_s if search.has_local_search else search.ants
     counted = not search.has_local_search
-    with ctrl_c_asks(asked.asked.set), watching(total, counted=counted) as show:
+    # Nobody asks a planner of the user's own to end.
+    on_ctrl_c = nullcontext() if request.own else ctrl_c_asks(asked.asked.set)
+    with on_ctrl_c, watching(total, counted=counted) as show:
         planned = plan(
             map,
             robot,
@@ -59,6 +62,7 @@ def run(args: argparse.Namespace) -> int:
             line=request.line,
             align=args.align,
             search=search,
+            planner=request.own,
             stop=asked,
             watch=show,
         )

@@ -37,6 +37,7 @@ examples:
   fasaco-edge plan scan.png --resolution 0.05 --unknown-free --png line.png
   fasaco-edge plan site.yaml --config robot.yaml --json
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
+  fasaco-edge plan office --planner mine.py:depth_first --png mine.png
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
   fasaco-edge plan basement --no-local-search --seed 7
   fasaco-edge plan office --robots 0,0 10,5 5,8 --end home --png fleet.png
@@ -66,7 +67,7 @@ fasaco searches until its budget ends, the walk is proven optimal, or all ants h
 walked: a complete walk within milliseconds, then better ones by local search, restarted
 from walks of the colony's ants (up to 8,000 cells; larger maps have local search only).
 --no-local-search is the paper's colony alone. The colony's options apply to fasaco; aco
-takes all but the velocities, the other planners none.
+takes all but the velocities, the other planners none; a function of your own gets the seed.
 """
 
 ROBOT, SEARCH = RobotConfig(), Search()
@@ -201,9 +202,11 @@ def _add_line(group: argparse._ArgumentGroup) -> None:
 def _add_planner(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--planner",
-        choices=PLANNER_NAMES,
+        type=_planner,
+        metavar=f"{'|'.join(PLANNER_NAMES)}|FILE.py:FUNCTION",
         help="; ".join(f"{name}: {entry.about}" for name, entry in PLANNERS.items())
-        + f" (default: {SEARCH.planner})",
+        + "; or a function of your own, which is run with your rights, see fasaco_edge/README.md "
+        + f"(default: {SEARCH.planner})",
     )
     group.add_argument("--ants", type=int, metavar="N", help=f"(default: {SEARCH.ants})")
     group.add_argument(
@@ -275,6 +278,15 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument("--png", type=Path, metavar="FILE", help="write a picture of the walk")
     add_json(group, "the figures")
+
+
+def _planner(text: str) -> str:
+    """Read the name of a planner, or where a function is."""
+    file, _, function = text.rpartition(":")
+    if text not in PLANNER_NAMES and not (file.endswith(".py") and function.isidentifier()):
+        names = ", ".join(PLANNER_NAMES)
+        raise argparse.ArgumentTypeError(f"must be {names} or FILE.py:FUNCTION, got {text!r}")
+    return text
 
 
 def _end(text: str) -> str | tuple[int, int]:

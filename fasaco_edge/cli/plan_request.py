@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import msgspec
@@ -13,6 +14,7 @@ import msgspec
 from fasaco_edge.cli.plan_turning import turning_of
 from fasaco_edge.config.config import DaemonConfig, RobotConfig, load_config
 from fasaco_edge.offline.settings import CELLS, Search, default_line, require
+from fasaco_edge.offline.user_function import load_function
 
 # Members of ``RobotConfig`` and ``Search`` by the options for them.
 ROBOT_OPTIONS = {
@@ -36,11 +38,13 @@ class PlanRequest:
         robot: its size, and what driving takes.
         search: how to search.
         line: which line is made.
+        own: the user's planner in place of the search; None for none.
     """
 
     robot: RobotConfig
     search: Search
     line: str
+    own: FunctionType | None
 
 
 def read_request(args: argparse.Namespace) -> PlanRequest:
@@ -48,10 +52,14 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
 
     Raises:
         BadConfiguration: a value is impossible; the error names it.
+        PlannerFailed: the file of the user's planner raised.
     """
     config = None if args.config is None else load_config(args.config)
-    search = replace(_search(config), **_given(args, SEARCH_OPTIONS))
-    if args.no_local_search:
+    given, own = _given(args, SEARCH_OPTIONS), None
+    if ":" in given.get("planner", ""):
+        own = load_function(given.pop("planner"))
+    search = replace(_search(config), **given)
+    if args.no_local_search or own:
         search = replace(search, local_search=False)
     has_floor = not (args.robots or args.robots_xy) and Path(args.map).suffix != ".npy"
     line = args.line or default_line(search, has_floor=has_floor)
@@ -68,7 +76,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
         allowed = 0.0 <= args.overlap <= 0.5
         require(allowed, "--overlap", "be in [0, 0.5], of the tool's width", args.overlap)
     changes = _given(args, ROBOT_OPTIONS) | turning_of(args, robot)
-    return PlanRequest(msgspec.structs.replace(robot, **changes), search, line)
+    return PlanRequest(msgspec.structs.replace(robot, **changes), search, line, own)
 
 
 def _search(config: DaemonConfig | None) -> Search:

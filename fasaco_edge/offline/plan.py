@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from types import FunctionType
 
 import msgspec
 import numpy as np
@@ -22,6 +23,7 @@ from fasaco_edge.offline.figures import figures_of
 from fasaco_edge.offline.floor import PlannedFloor, judged_floor
 from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
+from fasaco_edge.offline.own_planner import OwnPlanner
 from fasaco_edge.offline.picture import picture_of
 from fasaco_edge.offline.settings import (
     ANYWHERE,
@@ -38,6 +40,7 @@ from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
+    CoveragePlanner,
     GapReached,
     SearchProgress,
     StoppingCriterion,
@@ -139,6 +142,7 @@ def plan(
     line: str | None = None,
     align: str | float | None = None,
     search: Search | None = None,
+    planner: FunctionType | None = None,
     stop: StoppingCriterion | None = None,
     watch: Callable[[SearchProgress], None] = lambda _: None,
 ) -> Plan:
@@ -159,6 +163,8 @@ def plan(
         align: what the rows of cells lie along, with a line over the floor: "walls", "axes" or an
             angle [deg]; None for walls.
         search: how to search; None for the defaults.
+        planner: a function of your own in place of a search: takes a ``GridProblem`` and returns
+            the walk's cells (row, col) in order; only ``search.seed`` counts with it.
         stop: ends the search early.
         watch: is told how far the search is.
 
@@ -166,6 +172,7 @@ def plan(
         BadConfiguration: a value is impossible.
         StartOutsideMap, StartBlocked, EndBlocked: the robot cannot stand there.
         NothingToCover: there is no cell for it.
+        PlannerFailed, IllegalWalk: of a planner of your own.
     """
     if start is not None and start_xy is not None:
         raise BadConfiguration("start and start_xy cannot both be given")
@@ -178,10 +185,13 @@ def plan(
     require(is_point, "start_xy", "be a point (x, y) [m]", start_xy)
     robot = checked(robot or RobotConfig())
     search = search or Search()
+    if planner is not None:
+        require(isinstance(planner, FunctionType), "planner", "be a function", planner)
+        search = replace(search, local_search=False)
     line = line or default_line(search, has_floor=map.grid is not None)
     ground = _ground(map, robot, start, start_xy, line, align)
     problem = _problem(ground, robot, end)
-    path, ended_by, wall_s, cpu_s = _search(problem, search, stop, watch)
+    path, ended_by, wall_s, cpu_s = _search(problem, search, planner, stop, watch)
     xy = ground.line(path.cells, line, robot, ends=problem.end is not None)
     return Plan(map, robot, line, search, ground, problem, path, xy, ended_by, wall_s, cpu_s)
 
@@ -245,6 +255,7 @@ def _problem(ground: Ground, robot: RobotConfig, end: str | Cell) -> CoveragePro
 def _search(
     problem: CoverageProblem,
     search: Search,
+    function: FunctionType | None,
     stop: StoppingCriterion | None,
     watch: Callable[[SearchProgress], None],
 ) -> tuple[CoveragePath, str, float, float]:
@@ -252,7 +263,12 @@ def _search(
 
     A planner that knows no lower bound is given one, for its path and for the target gap.
     """
-    planner = planner_of(search.planner, search.colony(), search.threads, search.has_local_search)
+    planner: CoveragePlanner
+    if function is None:
+        colony, improves = search.colony(), search.has_local_search
+        planner = planner_of(search.planner, colony, search.threads, improves)
+    else:
+        planner = OwnPlanner(function, search.seed)
     bound = None if search.has_local_search else lower_bound_of(problem)
     criteria: dict[str, StoppingCriterion] = {}
     if stop is not None:

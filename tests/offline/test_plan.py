@@ -19,7 +19,9 @@ from tests.benchmarks.judge import check_walk
 from tests.support.processes import ENVIRONMENT
 
 ROOT = Path(__file__).parents[2]
-EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "fasaco_edge/README.md").read_text(), re.S)
+*EXAMPLES, OWN_PLANNER, OWN_TABLE = re.findall(
+    r"```python\n(.*?)```", (ROOT / "fasaco_edge/README.md").read_text(), re.S
+)
 QUICK = fe.Search(budget_s=0.05)
 # Without local search no clock decides.
 COLONY = fe.Search(local_search=False, ants=64, seed=3)

@@ -1,0 +1,171 @@
+"""A planner of the user's own: what his function gets, and what it returns, checked."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from types import FunctionType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import IllegalWalk
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.offline.user_function import failure, name_of
+from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import Observer, StoppingCriterion
+from fasaco_edge.planners.problem import CoverageProblem
+
+# Rows and columns from a cell to its neighbours: east, north, west, south.
+MOVES = ((0, 1), (1, 0), (0, -1), (-1, 0))
+# Walks of sound planners take a few steps a cell; one without end would fill the memory.
+MOST_STEPS_PER_CELL = 200
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GridProblem:
+    """What a planner gets; cells (row, col) are indices of the arrays, row 0 has the smallest y.
+
+    Attributes:
+        steps: bool (rows, cols, 4), read-only: whether the robot can go from a cell to its
+            neighbour in the east (col + 1), north (row + 1), west, south.
+        to_cover: bool (rows, cols), read-only: the cells to visit, all within reach.
+        start: the cell the walk begins in.
+        end: the cell it has to end in; None for anywhere.
+        cell_m: edge of a cell [m].
+        step_s, quarter_turn_s: what a step and a turn by 90 degrees take [s].
+        seed: for what a planner draws.
+    """
+
+    steps: NDArray[np.bool_]
+    to_cover: NDArray[np.bool_]
+    start: Cell
+    end: Cell | None
+    cell_m: float
+    step_s: float
+    quarter_turn_s: float
+    seed: int
+
+    def neighbours(self, cell: Cell) -> list[Cell]:
+        """Return the cells that one step leads to, from east counter-clockwise."""
+        row, col = cell
+        ways = zip(MOVES, self.steps[row, col], strict=True)
+        return [(row + up, col + right) for (up, right), is_open in ways if is_open]
+
+
+@dataclass(frozen=True, slots=True)
+class OwnPlanner:
+    """A user's function as a planner.
+
+    Attributes:
+        function: takes a ``GridProblem`` and returns, or yields, cells (row, col) in order.
+        seed: handed on.
+    """
+
+    function: FunctionType
+    seed: int = 0
+
+    def plan(
+        self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
+    ) -> CoveragePath:
+        """Return the function's walk; it is neither stopped nor observed.
+
+        Raises:
+            PlannerFailed: the function raised.
+            IllegalWalk: what it returned is no walk that solves the problem.
+        """
+        name = name_of(self.function)
+        posed, began = _posed(problem, self.seed), time.perf_counter()
+        try:
+            walk = _in_bounds(self.function(posed), MOST_STEPS_PER_CELL * posed.to_cover.size)
+        except Exception as error:
+            raise failure(error, name, self.function.__code__.co_filename) from error
+        taken_s = time.perf_counter() - began
+        cells = _checked(posed, walk, name)
+        window = problem.lattice.window
+        cells += np.array((window.row0, window.col0), np.int32)
+        cost_s = problem.cost.of_walk(cells)
+        return CoveragePath(cells, name, self.seed, cost_s=cost_s, first_walk_s=taken_s)
+
+
+def _posed(problem: CoverageProblem, seed: int) -> GridProblem:
+    lattice, cost = problem.lattice, problem.cost
+    bits = lattice.steps[..., np.newaxis] >> np.arange(len(MOVES), dtype=np.uint8)
+    steps = (bits & 1).astype(np.bool_)
+    steps.setflags(write=False)
+    return GridProblem(
+        steps,
+        problem.to_cover,
+        lattice.local(problem.start),
+        None if problem.end is None else lattice.local(problem.end),
+        lattice.cell_m,
+        cost.step_s,
+        cost.quarter_turn_s,
+        seed,
+    )
+
+
+def _in_bounds(walk: Iterable[Cell], most: int) -> list[Cell]:
+    """Return what a function returned or yielded, no more than one cell above ``most``."""
+    return [cell for _, cell in zip(range(most + 1), walk, strict=False)]
+
+
+def _checked(problem: GridProblem, walk: list[Cell], name: str) -> NDArray[np.int32]:
+    """Return a walk, int32 (n, 2).
+
+    Raises:
+        IllegalWalk: it is none, or does not solve the problem; the message names the step.
+    """
+
+    def no(why: str) -> IllegalWalk:
+        return IllegalWalk(f"planner {name}: {why}")
+
+    if len(walk) > MOST_STEPS_PER_CELL * problem.to_cover.size:
+        raise no(f"its walk does not end: more than {len(walk) - 1} cells")
+    before: Cell | None = None
+    seen = np.zeros(problem.to_cover.shape, np.bool_)
+    for number, given in enumerate(walk):
+        cell = _cell(given)
+        if cell is None:
+            raise no(f"cell {number} of its walk must be (row, col), got {given!r}")
+        if before is None and cell != problem.start:
+            raise no(f"its walk must begin in the start cell {problem.start}, begins in {cell}")
+        if before is not None and cell not in problem.neighbours(before):
+            raise no(
+                f"step {number} of its walk, {before} to {cell}, {_why_not(problem, before, cell)}"
+            )
+        seen[cell] = True
+        before = cell
+    if before is None:
+        raise no("its walk is empty; it has the start cell at least")
+    if problem.end not in (None, before):
+        raise no(f"its walk must end in cell {problem.end}, ends in {before}")
+    left = problem.to_cover & ~seen
+    if left.any():
+        first = tuple(np.argwhere(left)[0].tolist())
+        total = np.count_nonzero(problem.to_cover)
+        raise no(f"its walk leaves {np.count_nonzero(left)} of {total} cells, the first is {first}")
+    return np.array(walk, np.int32)
+
+
+def _cell(given: object) -> Cell | None:
+    """Return what was given as a cell of plain integers; None where it is none."""
+    if not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
+        return None
+    try:
+        row, col = (int(at) for at in given)
+        return (row, col) if row == given[0] and col == given[1] else None
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _why_not(problem: GridProblem, here: Cell, there: Cell) -> str:
+    rows, cols = problem.to_cover.shape
+    if not (0 <= there[0] < rows and 0 <= there[1] < cols):
+        return f"leaves the grid of {rows} x {cols} cells"
+    if abs(there[0] - here[0]) + abs(there[1] - here[1]) != 1:
+        return "is not to a neighbour in the same row or column"
+    if not problem.steps[there].any():
+        return "is to a cell that is not free"
+    return "is not possible: the robot does not fit between the two"

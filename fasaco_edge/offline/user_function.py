@@ -1,0 +1,71 @@
+"""A function of the user's own, in a file that the command line names, and what it raises.
+
+It is never sought in a configuration or in the working folder, and runs with the user's own rights.
+Free of the compiler.
+"""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from pathlib import Path
+from types import FunctionType, ModuleType
+
+from fasaco_edge.errors import BadConfiguration, PlannerFailed
+
+
+def load_function(place: str) -> FunctionType:
+    """Return the function at a place, ``FILE.py:FUNCTION``; the file is run for it.
+
+    Raises:
+        BadConfiguration: there is no such file or function.
+        PlannerFailed: the file raised.
+    """
+    name, _, member = place.rpartition(":")
+    file = Path(name).expanduser()
+    try:
+        source = file.read_bytes()
+    except OSError as error:
+        raise BadConfiguration(
+            f"--planner {place}: cannot read {file}: {error.strerror}"
+        ) from error
+    module = ModuleType("own_planner")
+    module.__file__ = str(file)
+    # Where dataclasses look for the module of a class.
+    sys.modules[module.__name__] = module
+    try:
+        exec(compile(source, str(file), "exec"), module.__dict__)
+    except Exception as error:
+        raise failure(error, place, str(file)) from error
+    functions = {name: value for name, value in vars(module).items() if type(value) is FunctionType}
+    if member not in functions:
+        raise BadConfiguration(
+            f"--planner {place}: {file} has no function {member!r}",
+            hint=f"it has {', '.join(functions)}" if functions else "it has none at all",
+        )
+    return functions[member]
+
+
+def name_of(function: FunctionType) -> str:
+    """Return what a planner is called in figures: the name of its file, and its own."""
+    return f"{Path(function.__code__.co_filename).name}:{function.__name__}"
+
+
+def failure(error: Exception, name: str, file: str) -> PlannerFailed:
+    """Return what a user is told of an exception: the lines of his own file, the last one first.
+
+    Args:
+        error: as it was raised.
+        name: of the planner.
+        file: the user's.
+    """
+    if isinstance(error, SyntaxError) and error.filename == file:
+        where = [f"{file}:{error.lineno}: {(error.text or '').strip()}"]
+    else:
+        frames = traceback.extract_tb(error.__traceback__)
+        own = [frame for frame in frames if frame.filename == file]
+        where = [f"{file}:{at.lineno}, in {at.name}: {at.line}" for at in reversed(own)]
+    kind, said = type(error).__name__, getattr(error, "msg", None) or str(error)
+    # A recursion has a thousand lines of the same.
+    lines = "".join(f"\n  {line}" for line in where[:5])
+    return PlannerFailed(f"planner {name}: {kind}: {said}{lines}")

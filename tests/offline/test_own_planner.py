@@ -1,0 +1,135 @@
+"""A planner of the user's own: the guide's example, and what is said of one that is wrong."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import fasaco_edge as fe
+from fasaco_edge.cli import main
+from fasaco_edge.errors import BadConfiguration, IllegalWalk, PlannerFailed
+from tests.offline.test_plan import OWN_PLANNER, OWN_TABLE
+from tests.support.processes import ENVIRONMENT
+
+#   . # .
+#   . . .   row 0 is below
+FREE = np.array([[True, True, True], [True, False, True]])
+WALK = [(1, 0), (0, 0), (0, 1), (0, 2), (1, 2)]
+
+
+@pytest.fixture
+def mine(tmp_path):
+    (tmp_path / "mine.py").write_text(OWN_PLANNER)
+    return tmp_path / "mine.py"
+
+
+def plan(function, **options):
+    return fe.plan(fe.load_map(FREE), start=(1, 0), planner=function, **options)
+
+
+def test_the_guide_s_planner_runs_and_stands_in_its_table(mine, capsys):
+    picture, walk = mine.with_suffix(".png"), mine.with_suffix(".csv")
+    words = ["--end", "home", "--png", str(picture), "--path-out", str(walk)]
+    assert main(["plan", "office", "--planner", f"{mine}:depth_first", *words]) == 0
+    assert "mine.py:depth_first" in capsys.readouterr().out
+    # There and back along a tree.
+    cells = np.loadtxt(walk, int, delimiter=",", skiprows=1)
+    assert len(cells) == 2 * len(np.unique(cells, axis=0)) - 1
+    assert picture.exists()
+    table = subprocess.run(
+        [sys.executable, "-c", OWN_TABLE],
+        cwd=mine.parent,
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=600,
+    ).stdout.splitlines()
+    assert [row.split()[0] for row in table[1:]] == [
+        *("mine.py:depth_first", "fasaco", "aco", "spiral-stc", "zigzag", "stc")
+    ]
+    assert int(table[1].split()[1]) == len(cells) - 1
+
+
+def test_what_a_planner_gets_cannot_be_written_and_is_what_it_says():
+    got = []
+
+    def watching(problem):
+        got.append(problem)
+        yield from np.array(WALK)
+
+    result = plan(watching, search=fe.Search(seed=7))
+    (problem,) = got
+    assert (result.cells == WALK).all()
+    assert result.figures["planner"] == "test_own_planner.py:watching"
+    assert (problem.to_cover == FREE).all()
+    assert problem.neighbours((0, 0)) == [(0, 1), (1, 0)]
+    assert (problem.start, problem.end, problem.seed) == ((1, 0), None, 7)
+    for array in (problem.to_cover, problem.steps):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0, 0] = False
+
+
+@pytest.mark.parametrize(
+    ("walk", "said"),
+    [
+        ([], "its walk is empty"),
+        (WALK[1:], r"must begin in the start cell \(1, 0\), begins in \(0, 0\)"),
+        (WALK[:-1], r"leaves 1 of 5 cells, the first is \(1, 2\)"),
+        ([*WALK[:2], (0, 2)], r"step 2 of its walk, \(0, 0\) to \(0, 2\), is not to a neighbour"),
+        ([(1, 0), (1, 1)], r"step 1 .* is to a cell that is not free"),
+        ([(1, 0), (1, -1)], "step 1 .* leaves the grid of 2 x 3 cells"),
+        ([(1, 0), (0, 0.5)], r"cell 1 of its walk must be \(row, col\), got \(0, 0.5\)"),
+        ([(1, 0), 3], r"cell 1 of its walk must be \(row, col\), got 3"),
+        ([(1, 0), (0, 0)] * 10_000, "its walk does not end"),
+        (None, "NoneType"),
+    ],
+)
+def test_a_wrong_walk_is_told_where_it_is_wrong(walk, said):
+    with pytest.raises((IllegalWalk, PlannerFailed), match=said):
+        plan(lambda problem: walk)
+
+
+def test_a_walk_ends_where_it_was_asked_to():
+    with pytest.raises(IllegalWalk, match=r"must end in cell \(1, 0\), ends in \(1, 2\)"):
+        plan(lambda problem: WALK, end="home")
+
+
+def test_an_exception_is_shown_with_the_user_s_lines_alone(mine, capsys):
+    mine.write_text("def deep(x):\n    return 1 / x\n\n\ndef walk(problem):\n    return deep(0)\n")
+    assert main(["plan", "office", "--planner", f"{mine}:walk"]) == 1
+    said = capsys.readouterr().err
+    assert "ZeroDivisionError: division by zero" in said
+    assert said.index(f"{mine}:2, in deep: return 1 / x") < said.index(f"{mine}:6, in walk:")
+    assert "fasaco_edge/" not in said
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "error", "said"),
+    [
+        ("def walk(problem:\n", "walk", PlannerFailed, "mine.py:1: def walk"),
+        ("import nowhere_to_be_found\n", "walk", PlannerFailed, "mine.py:1, in <module>: import"),
+        ("def one(problem): ...\n", "two", BadConfiguration, "has no function 'two'"),
+        (None, "walk", BadConfiguration, "cannot read"),
+    ],
+)
+def test_a_file_that_cannot_be_loaded_is_told(mine, text, name, error, said, capsys):
+    if text is None:
+        mine.unlink()
+    else:
+        mine.write_text(text)
+    assert main(["plan", "office", "--planner", f"{mine}:{name}"]) == (
+        78 if error is BadConfiguration else 1
+    )
+    assert said in capsys.readouterr().err
+
+
+def test_no_configuration_names_a_file(mine, tmp_path, capsys):
+    config = tmp_path / "robot.yaml"
+    config.write_text(f"planner:\n  name: {mine}:depth_first\n")
+    assert main(["check-config", str(config)]) == 78
+    with pytest.raises(BadConfiguration, match="planner must be one of"):
+        fe.Search(planner=f"{mine}:depth_first")
