@@ -84,7 +84,7 @@ class Loop:
         self._trail = TrailPublisher(bus.outbox)
         self._guard = bus.outbox.guard
         self._failed_at = float("-inf")
-        self._is_warm = False
+        self._has_begun = self._is_warm = False
 
     @property
     def config(self) -> DaemonConfig:
@@ -213,6 +213,11 @@ class Loop:
         if mission is None:
             return Decision(answers=self._runner.answer(commands, self._status.yield_reason))
         self._status.waits = "no map yet"
+        if not self._has_begun:
+            # Modules and kernels stay: to look through them for garbage holds the loop up by 80 ms;
+            # so does what comes with the first plan.
+            gc.freeze()
+            self._has_begun = True
         maps = mission.map_revision
         try:
             decision = mission.step([*events, *commands, *batch.plans], now)
@@ -280,7 +285,6 @@ class Loop:
         if update.plan is not None and (seconds := self._latency.answer()) is not None:
             self._status.map_to_path_s = seconds
         if update.plan is not None and not self._is_warm:
-            # Modules and kernels stay: to look through them for garbage holds the loop up by 80 ms.
             gc.freeze()
             self._is_warm = True
 

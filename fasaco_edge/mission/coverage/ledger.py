@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 JUMP_CELLS = 2.0
 
 TILE = 64
+# Cells are looked up together in squares of so many tiles by so many.
+DISTRICT = 16
 
 # The most tiles a ledger holds, 8 million cells, more than any path: each takes 8 kB, and as much
 # again in the copy that was written last. ``protocol/limits.yaml`` has the same number.
@@ -33,6 +35,8 @@ MOST_TILES = 2048
 DROPPED_TILES = MOST_TILES // 16
 
 Tiles = Mapping["Cell", NDArray[np.uint16]]
+Cells = NDArray[np.int64]
+"""Rows, or columns, of cells."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,9 +98,8 @@ class CoverageLedger:
         self._cell_m = cell_m
         # By tile, so that a map that jumps far away costs nothing in between.
         self._tiles: dict[Cell, NDArray[np.uint16]] = {}
-        # What the last snapshot holds, and which tiles have changed since.
-        self._frozen: dict[Cell, NDArray[np.uint16]] = {}
-        self._changed: set[Cell] = set()
+        # The tiles that no snapshot shares.
+        self._own: set[Cell] = set()
         self._under_tool: frozenset[Cell] = frozenset()
         self._last: Pose2D | None = None
 
@@ -105,19 +108,16 @@ class CoverageLedger:
         """Return the ledger as it was, without the last pose: the way from it is unknown."""
         ledger = cls(snapshot.cell_m, snapshot.frame)
         ledger.total = snapshot.total
-        ledger._tiles = {place: tile.copy() for place, tile in snapshot.tiles.items()}
-        ledger._frozen = dict(snapshot.tiles)
+        ledger._tiles = dict(snapshot.tiles)
         ledger._under_tool = snapshot.under_tool
         return ledger
 
     def snapshot(self) -> LedgerSnapshot:
-        """Return what it holds now; costs a copy of the tiles that changed since the last one."""
-        for place in self._changed:
-            copy = self._tiles[place].copy()
-            copy.flags.writeable = False
-            self._frozen[place] = copy
-        self._changed.clear()
-        tiles = MappingProxyType(dict(self._frozen))
+        """Return what it holds now; a tile is copied once it changes."""
+        for place in self._own:
+            self._tiles[place].flags.writeable = False
+        self._own.clear()
+        tiles = MappingProxyType(dict(self._tiles))
         return LedgerSnapshot(self._cell_m, self.frame, self.total, tiles, self._under_tool)
 
     def move_to(self, frame: str) -> None:
@@ -154,21 +154,33 @@ class CoverageLedger:
         self.break_track()
         self._under_tool = frozenset()
 
-    def forget(self, inside: Callable[[Window], NDArray[np.bool_]]) -> None:
+    def forget(self, inside: Callable[[Cells, Cells], NDArray[np.bool_]]) -> None:
         """Forget all visits to some cells, but the one to what lies under the tool now.
 
         Args:
-            inside: returns for a window which of its cells, bool (rows, cols).
+            inside: returns which of some cells, by their rows and columns, int64 (n,) both, bool
+                (n,). They lie near each other.
         """
-        for (row, col), tile in self._tiles.items():
-            corner = row * TILE, col * TILE
-            chosen = inside(Window(*corner, corner[0] + TILE, corner[1] + TILE))
-            if tile[chosen].any():
-                tile[chosen] = 0
-                self._changed.add((row, col))
+        for places in self._districts():
+            visited = [np.argwhere(self._tiles[place]) for place in places]
+            cells = np.concatenate(
+                [at + np.multiply(place, TILE) for place, at in zip(places, visited, strict=True)]
+            )
+            chosen = inside(cells[:, 0], cells[:, 1]) if len(cells) else np.zeros(0, np.bool_)
+            ends = np.cumsum([len(at) for at in visited])
+            for place, at, part in zip(places, visited, np.split(chosen, ends[:-1]), strict=True):
+                if part.any():
+                    self._writable(place)[tuple(at[part].T)] = 0
         for cell in self._under_tool:
             if not self.has_visited(cell):
                 self._visit(cell)
+
+    def _districts(self) -> list[list[Cell]]:
+        """Return the tiles, those near each other together."""
+        found: dict[Cell, list[Cell]] = {}
+        for row, col in self._tiles:
+            found.setdefault((row // DISTRICT, col // DISTRICT), []).append((row, col))
+        return list(found.values())
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
         """Return the number of visits, uint16 (rows, cols), of the cells of ``window``."""
@@ -188,12 +200,21 @@ class CoverageLedger:
         row, col = cell
         self.total += 1
         place = (row // TILE, col // TILE)
+        tile = self._writable(place)
+        tile[row % TILE, col % TILE] = min(int(tile[row % TILE, col % TILE]) + 1, 65535)
+
+    def _writable(self, place: Cell) -> NDArray[np.uint16]:
         tile = self._tiles.get(place)
+        if tile is not None and place in self._own:
+            return tile
         if tile is None:
             self._limit_tiles(place)
-            tile = self._tiles[place] = np.zeros((TILE, TILE), np.uint16)
-        self._changed.add(place)
-        tile[row % TILE, col % TILE] = min(int(tile[row % TILE, col % TILE]) + 1, 65535)
+            tile = np.zeros((TILE, TILE), np.uint16)
+        else:
+            tile = tile.copy()
+        self._tiles[place] = tile
+        self._own.add(place)
+        return tile
 
     def _limit_tiles(self, place: Cell) -> None:
         """Drop the tiles farthest from ``place`` where there is no room for another."""
@@ -205,8 +226,7 @@ class CoverageLedger:
 
         for far in sorted(self._tiles, key=distance)[-DROPPED_TILES:]:
             del self._tiles[far]
-            self._frozen.pop(far, None)
-            self._changed.discard(far)
+            self._own.discard(far)
         self.dropped += DROPPED_TILES
 
     def _centre(self, cell: Cell) -> Point | None:

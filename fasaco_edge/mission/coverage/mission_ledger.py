@@ -38,6 +38,7 @@ from fasaco_edge.mission.coverage.ledger import (
     DROPPED_TILES,
     MOST_TILES,
     TILE,
+    Cells,
     CoverageLedger,
     LedgerSnapshot,
 )
@@ -250,8 +251,14 @@ class MissionLedger:
             inside: returns for a window, and the edge [m] of the squares it is of, which of these
                 have their centre inside, bool (rows, cols).
         """
+
+        def cells_inside(rows: Cells, cols: Cells) -> NDArray[np.bool_]:
+            row0, col0 = int(rows.min()), int(cols.min())
+            around = Window(row0, col0, int(rows.max()) + 1, int(cols.max()) + 1)
+            return inside(around, self._cell_m)[rows - row0, cols - col0]
+
         for covered in self._all:
-            covered.cells.forget(lambda window: inside(window, self._cell_m))
+            covered.cells.forget(cells_inside)
             covered.floor.forget(lambda window: inside(window, PIXEL_M))
 
     def move_to(self, frame: str) -> LedgerMismatchError | None:

@@ -179,8 +179,9 @@ class SweptFloor:
         """
         self.leave(
             lambda tiles: [
-                (place, tile & ~np.packbits(inside(window_of(place)), axis=1))
+                (place, tile & ~np.packbits(found, axis=1))
                 for place, tile in tiles.items()
+                if (found := inside(window_of(place))).any()
             ]
         )
 

@@ -29,7 +29,7 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     Similarity,
     Tiles,
 )
-from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
+from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 
 # This many cells change between free and blocked in one map, and this share of those that were
 # known: doors and passers-by change less.
@@ -117,12 +117,11 @@ def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDAr
 
 def uncertain_cells(
     before: LedgerSnapshot, motion: Motion
-) -> Callable[[Window], NDArray[np.bool_]]:
-    """Return a function of a window: which cells, bool (rows, cols), may not have been covered."""
+) -> Callable[[Cells, Cells], NDArray[np.bool_]]:
+    """Return a function of cells, rows and columns: which, bool (n,), may not have been covered."""
 
-    def inside(window: Window) -> NDArray[np.bool_]:
-        rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1]
-        x, y = (cols + 0.5) * before.cell_m, (rows + 0.5) * before.cell_m
+    def inside(rows: Cells, cols: Cells) -> NDArray[np.bool_]:
+        x, y = ((each.astype(np.float64) + 0.5) * before.cell_m for each in (cols, rows))
         doubt = np.zeros(rows.shape, bool)
         for share in BETWEEN:
             doubt |= ~_covered(before, *motion.back(share, x, y))
