@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from collections import deque
+from collections.abc import Sequence
 from contextlib import nullcontext
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,10 +21,12 @@ from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map
 from fasaco_edge.host.processes import ctrl_c_asks
-from fasaco_edge.planners.planner import Interrupt
+from fasaco_edge.planners.planner import ColonySnapshot, Interrupt, ignore
 
 if TYPE_CHECKING:
     from fasaco_edge.offline.plan import Plan
+
+WITH_PHEROMONE = ("fasaco", "aco")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -29,12 +34,17 @@ def run(args: argparse.Namespace) -> int:
     request = read_request(args)
     robot, search = request.robot, request.search
     search.colony()  # what is wrong with it is said before kernels are compiled
-    for output in (args.path_out, args.xy_out, args.png):
+    for output in (args.path_out, args.xy_out, args.png, args.pheromone_png):
         check_output(output)
     if args.robots or args.robots_xy:
         from fasaco_edge.cli.plan_fleet import plan_fleet
 
         return plan_fleet(args, request)
+    if args.pheromone_png and (request.own or search.planner not in WITH_PHEROMONE):
+        raise BadConfiguration(
+            "--pheromone-png: the planner leaves no pheromone",
+            hint=f"choose --planner {' or '.join(WITH_PHEROMONE)}",
+        )
     find_map(args.map)
     compile_kernels()
     # After that, as they import the compiler.
@@ -52,6 +62,7 @@ def run(args: argparse.Namespace) -> int:
     counted = not search.has_local_search
     # Nobody asks a planner of the user's own to end.
     on_ctrl_c = nullcontext() if request.own else ctrl_c_asks(asked.asked.set)
+    trails: deque[ColonySnapshot] = deque(maxlen=1)
     with on_ctrl_c, watching(total, counted=counted) as show:
         planned = plan(
             map,
@@ -65,6 +76,7 @@ def run(args: argparse.Namespace) -> int:
             planner=request.own,
             stop=asked,
             watch=show,
+            observe=trails.append if args.pheromone_png else ignore,
         )
     if args.path_out is not None:
         with writing(args.path_out):
@@ -75,8 +87,22 @@ def run(args: argparse.Namespace) -> int:
     if args.png is not None:
         with writing(args.png):
             planned.plot(args.png)
+    if args.pheromone_png is not None:
+        _draw_pheromone(args.pheromone_png, planned, trails)
     _print(args, planned)
     return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
+
+
+def _draw_pheromone(file: Path, planned: Plan, trails: Sequence[ColonySnapshot]) -> None:
+    from fasaco_edge.offline.picture import pheromone_picture_of
+
+    if not trails or trails[0].tau is None:
+        raise BadConfiguration(
+            f"{file}: the search ended before its first cohort of ants",
+            hint="give it a larger --budget, or none",
+        )
+    with writing(file):
+        pheromone_picture_of(planned, trails[0].tau).save(file, "PNG")
 
 
 def _print(args: argparse.Namespace, planned: Plan) -> None:
@@ -88,7 +114,7 @@ def _print(args: argparse.Namespace, planned: Plan) -> None:
     figures["floor"] = planned.floor or "not known of a coverage grid"
     rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
     terminal.out().print(terminal.figures(rows))
-    for file in (args.path_out, args.xy_out, args.png):
+    for file in (args.path_out, args.xy_out, args.png, args.pheromone_png):
         if file is not None:
             terminal.out().print(f"wrote {file}")
 

@@ -93,6 +93,11 @@ def _check(args: argparse.Namespace, request: PlanRequest) -> None:
             "--target-gap: how far several robots' walks are from the best is not known well",
             hint="choose --budget",
         )
+    if args.pheromone_png is not None:
+        raise BadConfiguration(
+            "--pheromone-png: is of one robot's colony; several robots' walks are cut from one",
+            hint="leave --pheromone-png out, or plan for one robot",
+        )
     for option, value in (("--align", args.align), ("--overlap", args.overlap)):
         if value is not None:
             raise BadConfiguration(

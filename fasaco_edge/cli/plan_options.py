@@ -39,7 +39,7 @@ examples:
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
   fasaco-edge plan office --planner mine.py:depth_first --png mine.png
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
-  fasaco-edge plan basement --no-local-search --seed 7
+  fasaco-edge plan basement --no-local-search --seed 7 --pheromone-png trail.png
   fasaco-edge plan office --robots 0,0 10,5 5,8 --end home --png fleet.png
 
 figures:
@@ -277,6 +277,13 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
         "(several robots: robot,x_m,y_m); needs a YAML map, as a .npy grid has no frame",
     )
     group.add_argument("--png", type=Path, metavar="FILE", help="write a picture of the walk")
+    group.add_argument(
+        "--pheromone-png",
+        type=Path,
+        metavar="FILE",
+        help="write a picture of the trail that the colony leaves: where it points to from each "
+        "cell, and how decided it is (fasaco and aco)",
+    )
     add_json(group, "the figures")
 
 

@@ -54,7 +54,7 @@ class Sheet:
         title: one line, large.
         lines: caption, small.
         key: symbols and their meaning.
-        bar: labels at the beginning and the end of the colour bar.
+        bar: labels at the beginning and the end of the colour bar; None for no bar.
         scale: pixels per unit of the plot.
         framed: whether a line goes around the plot.
         unit: what the scale bar counts.
@@ -63,7 +63,7 @@ class Sheet:
     title: str
     lines: Sequence[str]
     key: Sequence[KeyEntry]
-    bar: tuple[str, str]
+    bar: tuple[str, str] | None
     scale: float
     framed: bool = True
     unit: str = "m"
@@ -93,7 +93,8 @@ class Sheet:
             draw.rectangle((x - 1, y - 1, x + plot.width, y + plot.height), outline=palette.RULE)
         y += plot.height + 18
         self._scale_bar(draw, MARGIN, y, plot.width)
-        self._colour_bar(sheet, draw, MARGIN + inner, y)
+        if self.bar is not None:
+            self._colour_bar(sheet, draw, self.bar, MARGIN + inner, y)
         for row, entries in enumerate(key_rows):
             for left, entry in entries:
                 place = (MARGIN + left, y + FOOT_PX + row * (LINE_PX + 4))
@@ -119,11 +120,12 @@ class Sheet:
             anchor="lm",
         )
 
+    @staticmethod
     def _colour_bar(
-        self, sheet: Image.Image, draw: ImageDraw.ImageDraw, right: int, y: int
+        sheet: Image.Image, draw: ImageDraw.ImageDraw, bar: tuple[str, str], right: int, y: int
     ) -> None:
         font = font_of(TEXT_PX)
-        before, after = self.bar
+        before, after = bar
         draw.text((right, y + 5), after, palette.INK, font, anchor="rm")
         end = right - math.ceil(font.getlength(after)) - 10
         width, height = BAR_PX

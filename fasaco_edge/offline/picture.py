@@ -1,15 +1,18 @@
-"""The picture of a plan: the line over the map, the floor that it leaves, and the figures."""
+"""Pictures of a plan: the line over the map with the floor that it leaves, and the pheromone."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 from PIL import Image
 
 from fasaco_edge.drawing.pictures import draw_walk
 from fasaco_edge.drawing.plot import MapLayer
+from fasaco_edge.drawing.trail import draw_trail
 from fasaco_edge.offline.figures import velocities_of
 from fasaco_edge.offline.settings import CELLS
+from fasaco_edge.planners.living_trail import Tau, branching
 from fasaco_edge.planners.path import walk_figures
 
 if TYPE_CHECKING:
@@ -19,9 +22,6 @@ if TYPE_CHECKING:
 def picture_of(plan: Plan) -> Image.Image:
     """Return a picture, RGB, of a plan."""
     path, ground, judged = plan.path, plan.ground, plan.judged
-    ants = path.work.ants
-    counted = "1 ant" if ants == 1 else f"{ants} ants"
-    colony = f" {velocities_of(plan)}, {counted}, seed {path.seed}" if ants else ""
     has_search = plan.search.has_local_search
     search = f", {path.work.perturbations} perturbations" if has_search else ""
     walk = walk_figures(ground.lattice, path.cells)
@@ -39,9 +39,40 @@ def picture_of(plan: Plan) -> Image.Image:
         ground.lattice,
         path.cells,
         grid=ground.grid,
-        title=path.planner + colony + search,
+        title=path.planner + _colony(plan) + search,
         lines=lines,
         line_xy=plan.xy,
         swept=MapLayer(judged.geometry, judged.swept) if judged and shows_floor else None,
         unswept=MapLayer(judged.geometry, judged.unswept) if judged else None,
     )
+
+
+def pheromone_picture_of(plan: Plan, tau: Tau) -> Image.Image:
+    """Return a picture, RGB, of the trail that a plan's colony left."""
+    ground = plan.ground
+    # Ants come nowhere else.
+    tau = np.where(plan.problem.to_cover[..., np.newaxis], tau, np.float32(0))
+    # Cells askew are drawn upright, without the map that they lie askew on.
+    deg = round(ground.lattice_deg, 3)
+    askew = f", along rows at {deg:g} degrees to the map, which is not drawn" if deg else ""
+    lines = [
+        f"{plan.map.name}: where the pheromone on a cell's steps points to{askew}. The stronger "
+        "the colour and the larger the arrow, the more of it lies on that one step, beside "
+        "the cell where it is most.",
+        f"On average {branching(tau):.2f} of a cell's directions have much pheromone (1: the trail "
+        "leads one way everywhere).",
+    ]
+    return draw_trail(
+        ground.lattice,
+        tau,
+        grid=None if deg else ground.grid,
+        title=f"pheromone of {plan.path.planner}{_colony(plan)}",
+        lines=lines,
+    )
+
+
+def _colony(plan: Plan) -> str:
+    """Return which ants walked; "" for none."""
+    ants = plan.path.work.ants
+    counted = "1 ant" if ants == 1 else f"{ants} ants"
+    return f" {velocities_of(plan)}, {counted}, seed {plan.path.seed}" if ants else ""

@@ -42,6 +42,7 @@ from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
     CoveragePlanner,
     GapReached,
+    Observer,
     SearchProgress,
     StoppingCriterion,
     TimeBudget,
@@ -145,6 +146,7 @@ def plan(
     planner: FunctionType | None = None,
     stop: StoppingCriterion | None = None,
     watch: Callable[[SearchProgress], None] = lambda _: None,
+    observe: Observer = ignore,
 ) -> Plan:
     """Plan a walk over all cells of a map that the robot can reach, and the line along it.
 
@@ -167,6 +169,8 @@ def plan(
             the walk's cells (row, col) in order; only ``search.seed`` counts with it.
         stop: ends the search early.
         watch: is told how far the search is.
+        observe: is shown what the colony leaves: a ``ColonySnapshot`` after each cohort, or once
+            the search with local search is over; nothing by planners without pheromone.
 
     Raises:
         BadConfiguration: a value is impossible.
@@ -191,7 +195,7 @@ def plan(
     line = line or default_line(search, has_floor=map.grid is not None)
     ground = _ground(map, robot, start, start_xy, line, align)
     problem = _problem(ground, robot, end)
-    path, ended_by, wall_s, cpu_s = _search(problem, search, planner, stop, watch)
+    path, ended_by, wall_s, cpu_s = _search(problem, search, planner, stop, watch, observe)
     xy = ground.line(path.cells, line, robot, ends=problem.end is not None)
     return Plan(map, robot, line, search, ground, problem, path, xy, ended_by, wall_s, cpu_s)
 
@@ -258,6 +262,7 @@ def _search(
     function: FunctionType | None,
     stop: StoppingCriterion | None,
     watch: Callable[[SearchProgress], None],
+    observe: Observer,
 ) -> tuple[CoveragePath, str, float, float]:
     """Search; return the path, what ended it, and the wall and processor time it took [s].
 
@@ -289,7 +294,7 @@ def _search(
         return bool(over)
 
     wall, cpu = time.perf_counter(), time.process_time()
-    path = planner.plan(problem, is_over, ignore)
+    path = planner.plan(problem, is_over, observe)
     wall_s, cpu_s = time.perf_counter() - wall, time.process_time() - cpu
     if bound is not None:
         path = replace(path, lower_bound_steps=bound.steps, lower_bound_cost_s=bound.cost_s)

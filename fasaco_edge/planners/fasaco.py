@@ -231,8 +231,9 @@ def snapshot_of(
     """Return what an observer sees after so many ants; ``trail`` is float64 (n, 4)."""
     lattice = problem.lattice
     legal = (lattice.steps[..., np.newaxis] >> np.arange(4, dtype=np.uint8)) & np.uint8(1)
-    mean = mean_into(trail.reshape(legal.shape) * legal)
-    return ColonySnapshot(lattice.window, lattice.cell_m, mean, cohort, velocity, ants, steps)
+    tau = trail.reshape(legal.shape) * legal
+    mean, ways = mean_into(tau), tau.astype(np.float32)
+    return ColonySnapshot(lattice.window, lattice.cell_m, mean, cohort, velocity, ants, steps, ways)
 
 
 @dataclass(frozen=True, slots=True)

@@ -206,6 +206,8 @@ class ColonySnapshot:
         velocity: its velocity [cells/move].
         ants: how many ants have walked so far.
         best_steps: steps of the best walk so far.
+        tau: float32 (rows, cols, 4): pheromone on the step out of each cell in each direction, 0
+            for no step; None where only ``trail`` is known.
     """
 
     window: Window
@@ -215,6 +217,7 @@ class ColonySnapshot:
     velocity: int
     ants: int
     best_steps: int
+    tau: NDArray[np.float32] | None = None
 
 
 Observer = Callable[[ColonySnapshot], None]

@@ -530,6 +530,27 @@ def test_a_picture_is_a_png_whatever_its_name(grid_file, tmp_path, capsys, name)
         assert min(image.size) > 100
 
 
+@pytest.mark.parametrize("words", [("--budget", "0.05"), ("--no-local-search", "--ants", "16")])
+def test_the_trail_of_the_colony_is_drawn(plan, tmp_path, words):
+    file = tmp_path / "trail.png"
+    plan("office", *words, "--pheromone-png", file)
+    with Image.open(file) as picture:
+        colours = picture.convert("P", palette=Image.Palette.ADAPTIVE, colors=64).getcolors()
+    assert len(colours) > 20
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("office", "--planner", "zigzag"), "leaves no pheromone"),
+        (("office", "--robots", "0,0", "5,5"), "of one robot's colony"),
+    ],
+)
+def test_without_a_colony_there_is_no_trail(tmp_path, capsys, words, said):
+    assert main(["plan", *words, "--pheromone-png", str(tmp_path / "trail.png")]) == Exit.CONFIG
+    assert said in capsys.readouterr().err
+
+
 def test_figures_are_printed_for_people_too(grid_file):
     ended = fasaco_edge("plan", grid_file, "--ants", 8)
     assert ended.code == 0

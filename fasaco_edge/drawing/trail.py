@@ -1,0 +1,107 @@
+"""The picture of a pheromone trail: where it points to from each cell, and how decided it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from fasaco_edge.drawing import palette
+from fasaco_edge.drawing.plot import Plot, View, bounds_of
+from fasaco_edge.drawing.sheet import KeyEntry, Sheet
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels import COL_STEP, EAST, NORTH, ROW_STEP, SOUTH, WEST
+from fasaco_edge.planners.living_trail import Tau, directions
+
+WAYS = {
+    EAST: ("right", palette.SKY),
+    NORTH: ("up", palette.GREEN),
+    WEST: ("left", palette.ORANGE),
+    SOUTH: ("down", palette.PURPLE),
+}
+# Arrows closer together than this cannot be told apart.
+ARROW_EVERY_PX = 16
+SMALLEST, LARGEST = 0.2, 0.5
+"""Arrow heads, as a share of the way from one to the next."""
+
+
+def draw_trail(
+    lattice: CoverageLattice,
+    tau: Tau,
+    *,
+    grid: OccupancyGrid | None,
+    title: str,
+    lines: Sequence[str],
+) -> Image.Image:
+    """Return a picture, RGB, of a trail over the lattice, with the map below it.
+
+    Args:
+        lattice: the planning grid.
+        tau: the trail, over the lattice's window.
+        grid: the map the lattice was made from; None draws the lattice's own states.
+        title: heading.
+        lines: caption below it.
+    """
+    pointed, decided = pointed_and_decided(tau)
+    decided = _compared(decided, tau)
+    colours = np.full((*pointed.shape, 3), palette.PAPER, np.float64)
+    key = []
+    for direction, (name, colour) in WAYS.items():
+        here = (pointed == direction) & (decided > 0.0)
+        # White where the trail is undecided: multiplied with what is below, that leaves the map.
+        share = 0.15 + 0.85 * decided[here][:, np.newaxis]
+        colours[here] += share * (np.array(colour) - palette.PAPER)
+        key.append(KeyEntry("tile", colour, f"{name} ({np.count_nonzero(here):,} cells)"))
+    view = View.over(bounds_of(grid, lattice, np.empty((0, 2))), lattice.cell_m)
+    plot = Plot(view)
+    plot.ground(lattice if grid is None else grid)
+    plot.tint(lattice, np.rint(colours).astype(np.uint8))
+    every = int(np.ceil(ARROW_EVERY_PX / (view.scale * lattice.cell_m)))
+    window = lattice.window
+    for row, col in _most_decided(decided, every):
+        direction = int(pointed[row, col])
+        cell = np.array([[row + window.row0, col + window.col0]], np.int32)
+        along = np.array((COL_STEP[direction], ROW_STEP[direction]), np.float64)
+        size = SMALLEST + (LARGEST - SMALLEST) * float(decided[row, col])
+        plot.arrow(lattice.centres(cell)[0], along, size * every * lattice.cell_m)
+    return Sheet(title, lines, key, None, view.scale).around(plot.finished())
+
+
+def pointed_and_decided(tau: Tau) -> tuple[NDArray[np.int8], NDArray[np.float64]]:
+    """Return the direction of the strongest step out of each cell, and how far it stands out.
+
+    Returns:
+        int8 (rows, cols), -1 for no step; float64 (rows, cols): 0 where all steps have as much
+        pheromone, 1 where this one has all of it, or is the only one there is.
+    """
+    pointed, share = directions(tau)
+    ways = np.count_nonzero(tau > 0, axis=2)
+    even = 1.0 / np.maximum(ways, 1)
+    decided = np.where(ways == 1, 1.0, (share - even) / np.maximum(1.0 - even, 1e-9))
+    # What rounding leaves of an even cell is no direction.
+    decided[(decided < 1e-5) | (ways == 0)] = 0.0
+    return pointed, np.minimum(decided, 1.0)
+
+
+def _compared(decided: NDArray[np.float64], tau: Tau) -> NDArray[np.float64]:
+    """Return how decided cells are beside the most decided one that has a choice, 0 to 1."""
+    choice = decided[np.count_nonzero(tau > 0, axis=2) > 1]
+    most = float(choice.max(initial=0.0))
+    return np.minimum(decided / most, 1.0) if most > 0.0 else decided
+
+
+def _most_decided(decided: NDArray[np.float64], every: int) -> list[tuple[int, int]]:
+    """Return the cell that stands out most of each block of ``every`` by ``every`` cells."""
+    rows, cols = decided.shape
+    padded = np.pad(decided, ((0, -rows % every), (0, -cols % every)))
+    down, across = padded.shape[0] // every, padded.shape[1] // every
+    blocks = padded.reshape(down, every, across, every).swapaxes(1, 2)
+    flat = blocks.reshape(down, across, -1)
+    best, some = flat.argmax(axis=2), np.argwhere(flat.max(axis=2) > 0.0)
+    return [
+        (row * every + int(best[row, col]) // every, col * every + int(best[row, col]) % every)
+        for row, col in some.tolist()
+    ]
