@@ -252,6 +252,13 @@ class LedgerMismatchError(FasacoError):
     hint = "it was renamed and a new one started; nothing has to be done to continue"
 
 
+class FleetError(FasacoError):
+    """What another robot of the fleet says cannot be used; it is left out."""
+
+    code = "fleet_member"
+    hint = "robots of one fleet need the same cell size and frame, and releases that fit together"
+
+
 class OrderError(FasacoError):
     """An order that cannot be carried out as it is written."""
 

@@ -78,6 +78,7 @@ ROLES: Mapping[str, Role] = {
     "ros": Role("publishes maps, updates and poses on ROS 2 topics, sees path and coverage"),
     # A daemon connects to it: what others may do there, the router itself has to restrict.
     "router": Role("forwards everything, both ways", speaks=EVERYTHING, listens=EVERYTHING),
+    "fleet": _role("fleet", "another robot of the fleet, beside its own role"),
     # The daemon itself, as a router sees it.
     "robot": _role("robot", "plans: receives maps, publishes paths"),
 }

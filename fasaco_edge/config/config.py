@@ -261,6 +261,12 @@ def _home(path: Path) -> Path:
         raise BadConfiguration(f"mission.state_dir: {path}: there is no home folder") from error
 
 
+class FleetConfig(Section, frozen=True):
+    """Robots under one ``bus.base`` with this name and one map frame share the work in an area."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=64)]
+
+
 class RecordingConfig(Section, frozen=True):
     """How large and how old a file may become, and what all may take.
 
@@ -276,7 +282,8 @@ class RecordingConfig(Section, frozen=True):
 
 
 class DaemonConfig(Section, frozen=True):
-    """The whole configuration; without ``ros2`` nothing is published or subscribed under ROS."""
+    """The whole configuration; without ``fleet`` the robot is alone, without ``ros2`` nothing is
+    published or subscribed under ROS."""
 
     robot: RobotConfig = RobotConfig()
     bus: BusConfig = BusConfig()
@@ -285,6 +292,7 @@ class DaemonConfig(Section, frozen=True):
     planner: PlannerConfig = PlannerConfig()
     mission: MissionSettings = MissionSettings()
     recording: RecordingConfig = RecordingConfig()
+    fleet: FleetConfig | msgspec.UnsetType = msgspec.UNSET
     ros2: RosConfig | msgspec.UnsetType = msgspec.UNSET
 
     @property

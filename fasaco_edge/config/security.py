@@ -21,6 +21,7 @@ from fasaco_edge.bus import access
 from fasaco_edge.config.reading import Section
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate, OpenToEveryone
 from fasaco_edge.host.plain_yaml import load, read_bounded
+from fasaco_edge.wire.topics import FLEET
 
 LOG = logging.getLogger(__name__)
 
@@ -202,7 +203,11 @@ class SecurityConfig(Section, frozen=True):
         part = self.of_client(self.user.dictionary_file)
         if self.kind == "none":
             return part
-        grants = [
+        base = prefix.rpartition("/")[0]
+        # A router represents the other robots, too.
+        fleet = access.Role("the other robots", (FLEET.suffix,), (FLEET.suffix,))
+        grants = [access.Grant("fleet", self.roles.router, f"{base}/*", rights=fleet)]
+        grants += [
             access.Grant(role, who, prefix) for role, who in self.names().items() if role != "ros"
         ]
         if ros is not None:

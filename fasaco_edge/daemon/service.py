@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
@@ -29,6 +30,9 @@ from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.host.processes import call_on, end_within, memory_limit, return_soon
 from fasaco_edge.wire import topics
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.loop.fleet import FleetEar, FleetVoice
 
 LOG = logging.getLogger(__name__)
 
@@ -153,6 +157,22 @@ def _afforded(config: DaemonConfig) -> DaemonConfig:
     return smaller
 
 
+def _ear(config: DaemonConfig) -> FleetEar | None:
+    if not config.fleet:
+        return None
+    from fasaco_edge.daemon.loop.fleet import FleetEar  # noqa: PLC0415
+
+    return FleetEar(config)
+
+
+def _voice(config: DaemonConfig, bus: Bus) -> FleetVoice | None:
+    if not config.fleet:
+        return None
+    from fasaco_edge.daemon.loop.fleet import FleetVoice  # noqa: PLC0415
+
+    return FleetVoice(bus.advertise(config.keys(), topics.FLEET), config)
+
+
 def _serve(
     config: DaemonConfig,
     bus: Bus,
@@ -170,9 +190,12 @@ def _serve(
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
     ports = BusPorts(
         mailbox=mailbox,
-        inbox=Inbox(bus, keys, mailbox, config.poses(), max_pixels, [ros.map] if ros else []),
+        inbox=Inbox(
+            bus, keys, mailbox, config.poses(), max_pixels, [ros.map] if ros else [], _ear(config)
+        ),
         commands=Commands(bus, keys, mailbox),
         outbox=Outbox(bus, keys, ros),
+        fleet=_voice(config, bus),
         turns=TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored),
         claim=NameClaim(bus, keys),
     )

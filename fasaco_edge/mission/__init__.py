@@ -18,6 +18,10 @@ Read in this order:
     coverage/progress    on the path, of the coverage, of each zone
     coverage/unreached   what stays uncovered, and why
 
+    fleet/layer          the other robots, and this one's part of what is left
+    fleet/shared         which cells they have swept
+    fleet/division       who sweeps what
+
     orders/sequencer     owns the order: zones, passes, tries, the way home
     orders/order_state   an order and how far it is; kept on disk with the ledger
     orders/order         what can be ordered, and its JSON or YAML form

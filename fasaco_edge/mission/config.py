@@ -112,6 +112,7 @@ class MissionConfig:
         sweeping: how floor is swept; None to drive through the centres of cells.
         trail: rules of the living trail.
         plans_on_trail: whether the planner's ants walk on it.
+        robot: its name in a fleet that shares the work; "" without one.
     """
 
     footprint: Footprint
@@ -122,3 +123,4 @@ class MissionConfig:
     sweeping: Sweeping | None = None
     trail: TrailRules = PAPERS_RULES
     plans_on_trail: bool = False
+    robot: str = ""

@@ -11,6 +11,7 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import ClaimState
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
+from fasaco_edge.daemon.loop.fleet import FleetEar
 from fasaco_edge.daemon.loop.inbox import Batch, Inbox, make_mailbox
 from fasaco_edge.daemon.loop.mission_runner import Loader, MissionRunner
 from fasaco_edge.errors import FasacoError
@@ -69,7 +70,10 @@ class MissionDrive:
     def __init__(self, config: DaemonConfig, ledger: LedgerSnapshot | None = None) -> None:
         max_pixels, planner = config.map.max_pixels, config.planner
         self.mailbox = make_mailbox(max_pixels, map_spacing_s=0.0, most_poses=math.inf)
-        self._inbox = Inbox(_NoBus(), config.keys(), self.mailbox, config.poses(), max_pixels)
+        ear = FleetEar(config) if config.fleet else None
+        self._inbox = Inbox(
+            _NoBus(), config.keys(), self.mailbox, config.poses(), max_pixels, fleet=ear
+        )
         loader = Loader(config, self.mailbox)
         while (loaded := loader.poll()) is None:
             self.mailbox.take(LOAD_S)

@@ -17,7 +17,7 @@ from fasaco_edge.watch.picture import MissionPicture
 from fasaco_edge.watch.robot_view import BAD, GOOD, ORDER, PLAIN, Event, RobotView
 from fasaco_edge.wire.path_documents import PathReport
 from fasaco_edge.wire.replies import CoverageReport, FloorReport, MissionReport
-from fasaco_edge.wire.status import Status, SupervisedRecorder
+from fasaco_edge.wire.status import FleetReport, Status, SupervisedRecorder
 
 Row = tuple[str, Text]
 
@@ -63,6 +63,7 @@ def _rows(status: Status, width: int, glyphs: GlyphSet) -> list[Row]:
     if status.path is not None:
         rows += _path(status.path, width)
     rows += _mission(status.mission)
+    rows += _fleet(status.fleet)
     rows += _running(status)
     return rows
 
@@ -117,6 +118,18 @@ def _mission(mission: MissionReport) -> list[Row]:
     if mission.unreached.cells:
         left = f"{_cells(mission.unreached.cells)}, {mission.unreached.m2:.1f} m2"
         rows.append(("unreached", _text(left)))
+    return rows
+
+
+def _fleet(fleet: FleetReport | None) -> list[Row]:
+    if fleet is None:
+        return []
+    part = "alone" if fleet.part_cells is None else f"{_cells(fleet.part_cells)} are its part"
+    rows: list[Row] = [("fleet", _text(f"{fleet.name}: {part}"))]
+    for member in fleet.members:
+        swept = f"{_cells(member.swept_cells)} swept"
+        what = f"away ({member.away}), {swept}" if member.away else f"{member.state}, {swept}"
+        rows.append((one_line(member.name), _text(what, "yellow" if member.away else "")))
     return rows
 
 

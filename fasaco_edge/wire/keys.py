@@ -43,6 +43,15 @@ class Keys:
         """Return the key of a topic; a key expression where its row has a ``*``."""
         return f"{self.prefix}/{topic.suffix}"
 
+    def of_all(self, topic: Topic) -> str:
+        """Return the key expression of a topic of all robots under this base."""
+        return f"{self.base}/{VERSION}/*/{topic.suffix}"
+
+    def robot_of(self, key: str) -> str:
+        """Return the name of the robot whose key this is; "" where it is a key expression."""
+        robot = key.removeprefix(f"{self.base}/{VERSION}/").partition("/")[0]
+        return robot if _CHUNK.fullmatch(robot) else ""
+
     def claim(self, own: str, stand: str) -> str:
         """Return the token of the daemon with the Zenoh id ``own``, which "plans" or "waits"."""
         return self.of(CLAIM).replace("*/*", f"{own}/{stand}")

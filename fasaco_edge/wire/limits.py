@@ -37,3 +37,5 @@ MAX_POSE_BYTES: Final = 1_048_576
 """Longest pose or tf message."""
 
 MAX_JSON_BYTES: Final = 1_048_576
+MAX_FLEET_TILES: Final = 24
+"""Of progress in one message of a fleet's robot, of 64 x 64 cells each: 17 kB."""

@@ -214,6 +214,40 @@ class SupervisedRecorder(Document, frozen=True):
     pid: Ordinal | UnsetType = UNSET
 
 
+class MemberReport(Document, frozen=True):
+    """Another robot of the fleet.
+
+    Attributes:
+        name: of the robot.
+        state: of its mission, as it said last.
+        heard_s: since then.
+        away: why it takes no part in what is left; null where it does.
+        swept_cells: cells that count for this robot, too.
+    """
+
+    name: Name = ""
+    state: str = ""
+    heard_s: Amount = 0.0
+    away: str | None = None
+    swept_cells: Count = 0
+
+
+class FleetReport(Document, frozen=True):
+    """The fleet, as this robot knows it.
+
+    Attributes:
+        name: of the fleet.
+        division: number of the newest division of what is left.
+        part_cells: how many cells of what it can reach are this robot's; null where all are.
+        members: the other robots, by name.
+    """
+
+    name: Name = ""
+    division: Count = 0
+    part_cells: Count | None = None
+    members: tuple[MemberReport, ...] = ()
+
+
 class Status(Document, frozen=True):
     """What a daemon says about itself. Members may be added; readers ignore unknown ones.
 
@@ -250,3 +284,4 @@ class Status(Document, frozen=True):
         default_factory=dict
     )
     mission: MissionReport = MissionReport()
+    fleet: FleetReport | None = None

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 from fasaco_edge.wire.schemas import POSE_SCHEMAS, TWIST_SCHEMAS
 
-Role = Literal["mapper", "viewer", "operator", "recorder", "driver", "robot"]
+Role = Literal["mapper", "viewer", "operator", "recorder", "driver", "robot", "fleet"]
 Direction = Literal["in", "out", "out, by the recorder", "out, by the follower", "liveliness token"]
 SizeClass = Literal["large", "pose", "json", "token"]
 Priority = Literal[

@@ -167,6 +167,19 @@ TURNS = Topic(
     is_input=True,
     limits=("max_json_bytes",),
 )
+FLEET = Topic(
+    name="fleet",
+    direction="out",
+    when="once a second, and when state or division have changed; only in a fleet",
+    speaker="robot",
+    # By the others' they share an area; it comes in, too, from the keys of other robots.
+    listeners=("fleet", "viewer"),
+    json="fleet.json",
+    qos=Qos("data_low", why="the next one says it all again, within a second"),
+    rate_hz=1.0,
+    queues=Queues(daemon=64),
+    limits=("max_json_bytes", "max_fleet_tiles", "queue_fleet"),
+)
 ALIVE = Topic(
     name="alive",
     direction="liveliness token",
@@ -208,7 +221,7 @@ RECORDER_ALIVE = Topic(
 # there, that subscriber receives everything else, too.
 TOPICS = (
     *(MAP, MAP_UPDATE, POSE),
-    *(PATH, COVERAGE, FLOOR, PHEROMONE, DIRECTIONS, STATUS, COMMAND, TURNS, ALIVE, CLAIM),
+    *(PATH, COVERAGE, FLOOR, PHEROMONE, DIRECTIONS, STATUS, COMMAND, TURNS, FLEET, ALIVE, CLAIM),
     *(RECORDER, RECORDER_ALIVE),
     CMD_VEL,
 )

@@ -96,6 +96,7 @@ def test_the_routers_grants_each_robot_its_own_keys(here):
         for name in ("r1", "r2")
         for role, begins in (("robot", ""), ("mapper", "slam-"))
     ]
+    grants.append(access.Grant("fleet", ["r1", "r2"], "fasaco/@v1/*"))
     who = {"viewer": "tablet", "operator": "office", "recorder": "recorder"}
     grants += [access.Grant(role, [name], "fasaco/@v1/*") for role, name in who.items()]
     asked = access.access_control(grants, "cert_common_names")

@@ -85,6 +85,15 @@ def test_a_trail_is_kept_to_a_share_of_itself_and_then_as_it_is(values):
     assert all_of(decode_ledger(encode_ledger(read), CELL_M)) == all_of(read)
 
 
+def test_what_a_fleet_has_swept_is_kept_in_a_version_of_its_own():
+    ledger = replace(driven((-1, 5)), fleet=b'{"version": 1}', note="{}")
+    payload = encode_ledger(ledger)
+    assert struct.unpack_from("<I", payload, 8) == (4,)
+    read = decode_ledger(payload, CELL_M)
+    assert (read.fleet, read.note) == (ledger.fleet, ledger.note)
+    assert contents(read) == contents(ledger)
+
+
 def test_a_ledger_without_a_trail_is_read_with_none():
     plain = struct.pack("<dQIIII", 0.3, 0, 3, 0, 0, 0) + b"map" + b"{}"
     ledger = decode_ledger(enveloped(zlib.compress(plain), version=2), CELL_M)
@@ -183,7 +192,7 @@ def test_a_body_that_is_none_is_refused_although_its_checksum_holds(body):
 @pytest.mark.parametrize("version", [1, 2, 3])
 @pytest.mark.parametrize("cell_m", [0.0, -0.3, float("nan"), float("inf")])
 def test_impossible_cells_are_refused(cell_m, version):
-    counts = (0,) * (3, 4, 6)[version - 1]
+    counts = (0,) * (3, 4, 6, 7)[version - 1]
     body = zlib.compress(struct.pack(f"<dQ{len(counts)}I", cell_m, 0, *counts) + bytes(16))
     with pytest.raises(LedgerFileError, match="cells of"):
         decode_ledger(enveloped(body, version), cell_m)
@@ -196,9 +205,9 @@ def test_another_file_is_no_ledger():
 
 def test_another_version_is_named_with_what_to_do():
     with pytest.raises(
-        LedgerMismatchError, match="version 4, this release reads versions 1 to 3"
+        LedgerMismatchError, match="version 5, this release reads versions 1 to 4"
     ) as told:
-        decode_ledger(enveloped(b"whatever it holds", version=4), CELL_M)
+        decode_ledger(enveloped(b"whatever it holds", version=5), CELL_M)
     assert "install the release that wrote it" in told.value.hint
     assert "rename the file back" in told.value.hint
 

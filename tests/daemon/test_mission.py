@@ -173,7 +173,7 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     assert set(status) == {
         *("robot", "version", "state", "reason", "uptime_s", "map", "pose", "coverage", "path"),
         *("plan", "latency_ms", "loop_ms", "errors", "ledger", "recorder", "rss_mb", "cpu_s"),
-        *("threads", "config", "mission", "claim", "floor", "drive"),
+        *("threads", "config", "mission", "claim", "floor", "drive", "fleet"),
     }
     assert (status["robot"], status["state"], status["reason"]) == ("robot", "covering", "path 1")
     assert status["map"] == {

@@ -157,6 +157,20 @@ def test_it_says_how_much_floor_is_swept_and_what_is_left_and_why():
         assert said in page, page
 
 
+def test_it_names_the_robots_of_the_fleet():
+    members = [
+        {"name": "r2", "state": "covering", "heard_s": 0.4, "away": None, "swept_cells": 12},
+        {"name": "r3", "state": "covering", "heard_s": 7.0, "away": "gone", "swept_cells": 1},
+    ]
+    fleet = {"name": "hall", "division": 2, "part_cells": 40, "members": members}
+    view = mid_mission()
+    tell(view, "status", status(fleet=fleet))
+    page = page_of(view, 120, 40)
+    assert "hall: 40 cells are its part" in page
+    assert "covering, 12 cells swept" in page
+    assert "away (gone), 1 cell swept" in page
+
+
 def test_a_path_without_points_is_a_stop():
     view = mid_mission()
     path = {"revision": 8, "reason": "paused by command"}

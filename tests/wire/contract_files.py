@@ -186,6 +186,7 @@ def template_grants() -> dict[str, list[access.Grant]]:
         for name in ("r1", "r2")
         for role in ("robot", "mapper")
     ]
+    routed += [access.Grant("fleet", ["r1", "r2"], "fasaco/@v1/*")]
     routed += [access.Grant(role, [role], "fasaco/@v1/*") for role in roles[1:]]
     return {"robot": robot, "user-robot": robot, "router": routed}
 

@@ -17,6 +17,7 @@ import msgspec
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.mission.orders.order import CommandDocument
+from fasaco_edge.wire.fleet import FleetMember
 from fasaco_edge.wire.path_documents import PathAttachment, TrailAttachment
 from fasaco_edge.wire.replies import Error, Replan, Reply, Version
 from fasaco_edge.wire.status import Recorder, Status
@@ -28,6 +29,7 @@ HEAD = {
 }
 DOCUMENTS = {
     "error": Error,
+    "fleet": FleetMember,
     "mission": CommandDocument,
     "path_attachment": PathAttachment,
     "recorder": Recorder,

@@ -11,8 +11,8 @@ broken one. Little endian:
 
     cell_m     float64   edge of a cell [m]
     total      uint64    visits in all
-    counts     6 uint32  bytes of the frame, cells under the tool, tiles, tiles of floor, rows and
-                         columns of the trail
+    counts     7 uint32  bytes of the frame, cells under the tool, tiles, tiles of floor, rows and
+                         columns of the trail, bytes of the fleet
     frame      UTF-8
     cells      int64 (row, col) of each cell under the tool
     places     int64 (row, col) of each tile
@@ -23,9 +23,11 @@ broken one. Little endian:
     corner     int64 (row, col) where the trail begins
     trail      uint8 (2, rows, cols, 4): the high bytes of the pheromone, then the low ones, of its
                first 16 bits as float32, rounded
+    fleet      what other robots have swept, JSON (``mission.fleet.shared``)
     note       UTF-8, up to the end: JSON of the order, with a version of its own; may be empty
 
-Versions before are read, too. Version 2 knows no trail: its counts, ``corner`` and ``trail`` are
+Versions before are read, too. Version 3, which is written of a robot without a fleet, lacks
+``fleet`` and its count. Version 2 knows no trail: its counts, ``corner`` and ``trail`` are
 not in it. Version 1 knows no floor, either: nor are the fourth count, ``floor`` and ``swept``.
 """
 
@@ -49,20 +51,21 @@ from fasaco_edge.mission.coverage.swept_floor import MOST_FLOOR_TILES
 from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot
 
 MAGIC = b"FASACOLG"
-VERSION = 3
+VERSION = 4
 
 _ENVELOPE = struct.Struct("<8sIIQ")
 _CHECKED = struct.Struct("<IQ")
-_HEADS = {version: struct.Struct(f"<dQ{3 + n}I") for version, n in ((1, 0), (2, 1), (3, 3))}
+_MORE_COUNTS = {1: 0, 2: 1, 3: 3, 4: 4}
+_HEADS = {version: struct.Struct(f"<dQ{3 + n}I") for version, n in _MORE_COUNTS.items()}
 _PLACE_BYTES, _TILE_BYTES, _FLOOR_BYTES = 16, 2 * TILE * TILE, FLOOR_TILE * ROW_BYTES
 # Of a cell: two for each direction.
 _TRAIL_BYTES = 8
-# What a ledger holds beside its tiles is small: frame, cells under the tool, the order.
+# What a ledger holds beside its tiles is small: frame, cells under the tool, the order, the fleet.
 MOST_BYTES = (
     MOST_TILES * (_TILE_BYTES + _PLACE_BYTES)
     + MOST_FLOOR_TILES * (_FLOOR_BYTES + _PLACE_BYTES)
     + MAX_LATTICE_CELLS * _TRAIL_BYTES
-    + 2_000_000
+    + 16_000_000
 )
 """Of a body, and of a file, which is smaller; longer ones are not read."""
 # Number of values of pheromone that are rounded at a time.
@@ -76,7 +79,12 @@ def encode_ledger(snapshot: LedgerSnapshot) -> bytes:
     # Part by part: a large ledger is not copied in memory as a whole.
     deflater = zlib.compressobj(_LEVEL)
     body = b"".join([*map(deflater.compress, _parts(snapshot)), deflater.flush()])
-    return _ENVELOPE.pack(MAGIC, VERSION, _checksum(VERSION, body), len(body)) + body
+    version = _version_of(snapshot)
+    return _ENVELOPE.pack(MAGIC, version, _checksum(version, body), len(body)) + body
+
+
+def _version_of(snapshot: LedgerSnapshot) -> int:
+    return VERSION if snapshot.fleet else VERSION - 1
 
 
 def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
@@ -84,7 +92,8 @@ def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
     counts = (len(frame), len(snapshot.under_tool), len(snapshot.tiles), len(floor))
     # One larger than what is read would make the ledger unreadable.
     trail = snapshot.trail if snapshot.trail.tau.size <= 4 * MAX_LATTICE_CELLS else NO_TRAIL
-    yield _HEADS[VERSION].pack(snapshot.cell_m, snapshot.total, *counts, *trail.tau.shape[:2])
+    more = (*trail.tau.shape[:2], *([len(snapshot.fleet)] if snapshot.fleet else ()))
+    yield _HEADS[_version_of(snapshot)].pack(snapshot.cell_m, snapshot.total, *counts, *more)
     yield frame
     yield np.array(sorted(snapshot.under_tool), "<i8").tobytes()
     yield np.array(sorted(snapshot.tiles), "<i8").tobytes()
@@ -98,6 +107,7 @@ def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
         for bits in np.array_split(trail.tau.view(np.uint32), -(-trail.tau.size // _AT_ONCE) or 1):
             rounded = bits + 0x7FFF + ((bits >> 16) & 1)
             yield (rounded >> plane).astype(np.uint8).tobytes()
+    yield snapshot.fleet
     yield snapshot.note.encode()
 
 
@@ -149,7 +159,10 @@ def _inflated(body: bytes) -> bytes:
 def _decode_body(plain: bytes, version: int) -> LedgerSnapshot:
     head = _HEADS[version]
     cell_m, total, *counts = head.unpack_from(plain)
-    frame_bytes, cell_count, tile_count, floor_count, rows, cols = (*counts, 0, 0, 0)[:6]
+    frame_bytes, cell_count, tile_count, floor_count, rows, cols, fleet_bytes = (
+        *counts,
+        *(0, 0, 0, 0),
+    )[:7]
     for count, most in ((tile_count, MOST_TILES), (floor_count, MOST_FLOOR_TILES)):
         if count > most:
             raise ValueError(f"{count} tiles, {most} are read at most")
@@ -160,7 +173,8 @@ def _decode_body(plain: bytes, version: int) -> LedgerSnapshot:
     tiles_end = cells_end + (_PLACE_BYTES + _TILE_BYTES) * tile_count
     floor_end = tiles_end + (_PLACE_BYTES + _FLOOR_BYTES) * floor_count
     trail_end = floor_end + (_PLACE_BYTES + _TRAIL_BYTES * rows * cols if version >= 3 else 0)
-    if len(plain) < trail_end:
+    fleet_end = trail_end + fleet_bytes
+    if len(plain) < fleet_end:
         raise ValueError(
             f"{len(plain)} bytes do not hold {tile_count} + {floor_count} tiles and "
             f"{rows} x {cols} cells of trail"
@@ -178,7 +192,8 @@ def _decode_body(plain: bytes, version: int) -> LedgerSnapshot:
         ),
         under_tool=frozenset(_places(plain[frame_end:cells_end])),
         floor=FloorSnapshot(MappingProxyType(swept)),
-        note=plain[trail_end:].decode(),
+        note=plain[fleet_end:].decode(),
+        fleet=plain[trail_end:fleet_end],
         trail=_trail(plain[floor_end:trail_end], rows, cols) if version >= 3 else NO_TRAIL,
     )
 

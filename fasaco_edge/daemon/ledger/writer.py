@@ -38,11 +38,12 @@ MOST_WAIT_S = 1.0
 
 
 class _Kept(NamedTuple):
-    """The state last handed over: visits, changes of swept floor and trail, the order."""
+    """The state last handed over: visits, changes of floor, trail and fleet, the order."""
 
     visits: int
     floor_changes: int
     trail_changes: int
+    heard: int
     order_state: OrderState
 
     def may_wait_s(self, before: _Kept) -> float:
@@ -64,7 +65,7 @@ class LedgerKeeper:
         self._writer = writer
         self._before = writer.restored or LedgerSnapshot(cell_m, "", 0, {})
         self.order_state = self._first_order_state(autostart)
-        self._kept = _Kept(self._before.total, self._before.floor.changes, 0, self.order_state)
+        self._kept = _Kept(self._before.total, self._before.floor.changes, 0, 0, self.order_state)
         self._kept_at = float("-inf")
 
     def restore(self, mission: Mission) -> None:
@@ -80,10 +81,10 @@ class LedgerKeeper:
     def keep(self, mission: Mission | None, now: float) -> None:
         """Write changes: an order at once, coverage once a period."""
         if mission is not None:
-            changes = mission.floor.changes, mission.trail.changes
+            changes = mission.floor.changes, mission.trail.changes, mission.shared.version
             held = _Kept(mission.ledger.total, *changes, mission.order_state)
         else:
-            held = _Kept(self._before.total, self._before.floor.changes, 0, self.order_state)
+            held = _Kept(self._before.total, self._before.floor.changes, 0, 0, self.order_state)
         if held == self._kept or now - self._kept_at < held.may_wait_s(self._kept):
             return
         self._kept, self._kept_at = held, now
@@ -119,7 +120,7 @@ class LedgerKeeper:
 
     def _begin_anew(self, fault: FasacoError | None, why: str) -> None:
         self._writer.begin_anew(fault, why)
-        self._kept, self._kept_at = _Kept(-1, -1, -1, OrderState()), float("-inf")
+        self._kept, self._kept_at = _Kept(-1, -1, -1, -1, OrderState()), float("-inf")
 
     def _first_order_state(self, autostart: bool) -> OrderState:
         """Return the order that was under way, or the one to begin with."""

@@ -30,6 +30,7 @@ from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.poses import PoseDecoder
 
 if TYPE_CHECKING:
+    from fasaco_edge.daemon.loop.fleet import FleetEar
     from fasaco_edge.planners.planner import ColonySnapshot
 
 MAPS = ("map", "map_update")
@@ -157,6 +158,7 @@ class Inbox:
         poses: decodes poses.
         max_pixels: of a map or an update.
         maps: further subscriptions that deliver maps.
+        fleet: hears the other robots of a fleet; None without one.
     """
 
     def __init__(
@@ -167,9 +169,11 @@ class Inbox:
         poses: PoseDecoder,
         max_pixels: int,
         maps: Sequence[Subscription] = (),
+        fleet: FleetEar | None = None,
     ) -> None:
         self._poses = poses
         self._max_pixels = max_pixels
+        self._fleet = fleet
         self._asked_for_map_at = float("-inf")
         self._maps = [
             bus.listen(keys, topics.MAP, poster(mailbox, "map", max_pixels)),
@@ -177,6 +181,8 @@ class Inbox:
         ]
         for topic in (topics.MAP_UPDATE, topics.POSE):
             bus.listen(keys, topic, poster(mailbox, topic.name, max_pixels))
+        if fleet is not None:
+            fleet.listen(bus, mailbox)
 
     def ask_for_map(self, now: float) -> None:
         """Ask the publishers of the map for their newest one, unless that was done lately."""
@@ -239,8 +245,10 @@ class Inbox:
         return dict(reversed(maps.items())), faults
 
     def _event(self, received: Received) -> Event | None:
-        """Return the event in a sample; None for transforms that give no new pose."""
+        """Return the event in a sample; None for transforms that give no new pose, and others."""
         kind, sample = received.kind, received.sample
+        if kind == topics.FLEET.name:
+            return self._fleet.event(received) if self._fleet else None
         if kind == "map_update":
             return PatchReceived(decode_map_update(sample.payload, self._max_pixels))
         is_static = kind == "tf_static"

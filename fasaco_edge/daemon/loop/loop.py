@@ -37,6 +37,7 @@ from fasaco_edge.mission.core.events import (
 )
 
 if TYPE_CHECKING:
+    from fasaco_edge.daemon.loop.fleet import FleetVoice
     from fasaco_edge.mission.core.mission import Mission
 
 LOG = logging.getLogger(__name__)
@@ -56,6 +57,7 @@ class BusPorts:
     outbox: Outbox
     turns: TurnLog
     claim: NameClaim
+    fleet: FleetVoice | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,6 +235,8 @@ class Loop:
         self._guard.attempt("coverage", partial(self._coverage.publish, mission, now))
         self._guard.attempt("floor", partial(self._floor.publish, mission, now))
         self._guard.attempt("pheromone", partial(self._trail.publish, mission, now))
+        if self._bus.fleet is not None:
+            self._guard.attempt("fleet", partial(self._bus.fleet.publish, mission, now))
         return decision
 
     def _perform(self, mission: Mission, decision: Decision) -> None:

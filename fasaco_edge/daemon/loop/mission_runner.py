@@ -8,6 +8,7 @@ the loop keeps answering. What arrives meanwhile is held.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -177,6 +178,9 @@ class MissionRunner:
         if loaded is not None:
             self.mission, self.worker = loaded
             self._keeper.restore(self.mission)
+            if self.config.fleet:
+                # No ledger that was set aside had this one.
+                self.mission.shared.begin(time.time_ns() // 1_000_000)
             self._held = HeldEvents()
         return self.mission, held, faults
 
@@ -317,6 +321,7 @@ def mission_config(config: DaemonConfig, chosen: CoveragePlanner) -> MissionConf
         _sweeping(config),
         TrailRules(planner.alpha, planner.tau0),
         isinstance(chosen, Fasaco),
+        robot.name if config.fleet else "",
     )
 
 

@@ -223,7 +223,7 @@ class CoveragePublisher:
     def publish(self, mission: Mission, now: float) -> None:
         """Publish the coverage if that is due."""
         # An order may forget what was covered, and keep the robot out of cells.
-        key = (mission.ledger.total, mission.map_revision, mission.order_state)
+        key = (mission.covered.version, mission.map_revision, mission.order_state)
         if key == self._key or now - self._published_at < COVERAGE_PERIOD_S:
             return
         lattice, grid = mission.lattice, mission.grid
@@ -231,7 +231,7 @@ class CoveragePublisher:
             return
         self._published_at, self._key = now, key
         geometry = GridGeometry.of_cells(lattice.window, lattice.cell_m)
-        values = coverage_values(lattice.states, mission.ledger.visits(lattice.window))
+        values = coverage_values(lattice.states, mission.covered.visits(lattice.window))
         self._outbox.coverage(OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns))
 
 

@@ -31,9 +31,11 @@ from fasaco_edge.wire.replies import (
 from fasaco_edge.wire.status import (
     ClaimReport,
     DriveReport,
+    FleetReport,
     Latencies,
     LedgerReport,
     MapReport,
+    MemberReport,
     PlanCounts,
     PoseReport,
     Status,
@@ -123,6 +125,7 @@ class StatusBoard:
             threads=thread_count(),
             config=self._shown_config,
             mission=mission_report(mission, order_state, self._standing),
+            fleet=self._fleet(mission, now),
         )
 
     def reply(self, runner: MissionRunner) -> Reply:
@@ -148,6 +151,24 @@ class StatusBoard:
         if order_state.order is None:
             return "idle", order_state.why
         return ("loading", loading) if loading else ("waiting for map", self.waits)
+
+    def _fleet(self, mission: Mission | None, now: float) -> FleetReport | None:
+        fleet = self._config.fleet
+        if not fleet:
+            return None
+        if mission is None:
+            return FleetReport(fleet.name)
+        members = tuple(
+            MemberReport(
+                name,
+                member.told.state,
+                round(max(now - member.heard_at, 0.0), 1),
+                member.absence(now) or None,
+                mission.shared.cells_of(name),
+            )
+            for name, member in sorted(mission.fleet.members.items())
+        )
+        return FleetReport(fleet.name, mission.fleet.number, mission.fleet.part_cells(), members)
 
     def _drive(self, mission: Mission | None) -> DriveReport:
         planned_s = round(self._cost.quarter_turn_s, 3)

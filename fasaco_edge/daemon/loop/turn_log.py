@@ -27,6 +27,7 @@ from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.orders.order import command_document
 from fasaco_edge.samples import SampleEncoder
 from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.topics import FLEET
 from fasaco_edge.wire.turns import (
     Cycle,
     Decided,
@@ -108,7 +109,12 @@ class TurnLog:
         if any(isinstance(plan, PlanBroken) for plan in batch.plans):
             self.end("a plan broke, which no replay repeats")
             return
-        samples = [self._taken(received) for received in batch.samples]
+        # What a fleet says before there is a mission is lost on it.
+        samples = [
+            self._taken(received)
+            for received in batch.samples
+            if mission is not None or received.kind != FLEET.name
+        ]
         plans = [plan for plan in batch.plans if isinstance(plan, PlanReady)]
         decided = self._news.of(turn.decision, mission)
         is_empty = not (samples or plans or turn.commands or batch.updates_lost or decided)
@@ -181,7 +187,7 @@ class TurnLog:
 
     def _taken(self, received: Received) -> TakenSample:
         kind, sample, at = received.kind, received.sample, received.at
-        if kind == POSE and len(sample.payload) <= POSE_BYTES:
+        if kind == FLEET.name or (kind == POSE and len(sample.payload) <= POSE_BYTES):
             self._samples.add(Arrival(kind, sample, 0, 0))
             return TakenSample(kind, 0)
         if kind == "map" and len(sample.payload) <= MAP_BYTES and at >= self._embed_until:

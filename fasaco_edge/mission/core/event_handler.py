@@ -14,6 +14,7 @@ from fasaco_edge.mission.core.events import (
     Decision,
     Event,
     MapReceived,
+    MemberHeard,
     PatchesLost,
     PatchRun,
     PathUpdate,
@@ -26,6 +27,7 @@ from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
@@ -47,6 +49,7 @@ class EventHandler:
     line: LineLayer
     trail: TrailLayer
     drive: DriveMeter
+    fleet: FleetLayer
     policy: MissionPolicy
     _now: float = field(default=0.0, init=False)
     # What the events of a step lead to.
@@ -123,6 +126,9 @@ class EventHandler:
                 raise event.why
             case CommandReceived():
                 self._obey(event)
+            case MemberHeard():
+                if reason := self.fleet.hear(event, self._now):
+                    self.route.want(reason)
 
     def _map_changed(self) -> None:
         """Follow a new map; raise LedgerMismatchError where it shows another building."""

@@ -84,6 +84,36 @@ class CommandReceived:
     order: MissionOrder = EVERYTHING_ONCE
 
 
+@dataclass(frozen=True, slots=True)
+class MemberHeard:
+    """What another robot of the fleet says of itself.
+
+    Attributes:
+        robot: its name.
+        misfit: why it cannot be of this fleet; "" where it can.
+        frame: of its map.
+        state: of its mission.
+        x, y: where it is [m].
+        step_s: what sweeping a cell takes it [s].
+        epoch: of its cells, see ``fleet.shared``.
+        division: number of its newest division of what is left.
+        open_cells: how many cells it knows that are still to be swept.
+        tiles: places and bits of what it has swept; of all tiles only some.
+    """
+
+    robot: str
+    misfit: str = ""
+    frame: str = ""
+    state: str = ""
+    x: float = 0.0
+    y: float = 0.0
+    step_s: float = 1.0
+    epoch: int = 0
+    division: int = 0
+    open_cells: int = 0
+    tiles: tuple[tuple[tuple[int, int], bytes], ...] = ()
+
+
 Event = (
     MapReceived
     | PatchReceived
@@ -92,6 +122,7 @@ Event = (
     | PlanReady
     | PlanBroken
     | CommandReceived
+    | MemberHeard
 )
 
 

@@ -15,6 +15,7 @@ from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order import Errand
@@ -46,6 +47,7 @@ class Executive:
     orders: Sequencer
     route: Route
     trail: TrailLayer
+    fleet: FleetLayer
     policy: MissionPolicy
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
@@ -89,6 +91,8 @@ class Executive:
         route, orders, now = self.route, self.orders, self._now
         self._check_deviation(cell)
         if reason := orders.begin(cell, now):
+            route.want(reason)
+        if reason := self._share(cell):
             route.want(reason)
         if route.wanted and route.pending is None:
             if why := route.why_not_yet(now):
@@ -194,6 +198,7 @@ class Executive:
         """Request the plan that is wanted; where nothing is to be covered, go on."""
         route, orders = self.route, self.orders
         orders.reopen()
+        self._share(cell, at_once=True)
         while orders.order_state.stage is not Stage.RETURNING:
             try:
                 problem = orders.problem(cell, route.path_to_keep)
@@ -214,6 +219,12 @@ class Executive:
             self._reason = request.reason
             return Decision(plan=request, path=update)
         return self._return_home(cell, update)
+
+    def _share(self, cell: Cell, *, at_once: bool = False) -> str:
+        """Divide what is left among the fleet where that is due; return why a plan is wanted."""
+        if self.orders.order_state.stage is Stage.RETURNING:
+            return ""
+        return self.fleet.share(self.orders.open_cells, cell, self._now, at_once=at_once)
 
     def _return_home(self, cell: Cell, update: PathUpdate | None) -> Decision:
         route, area, home = self.route, self.map.area, self.orders.goal()

@@ -24,6 +24,8 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import Coverage, ZoneProgress, zone_progress
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from fasaco_edge.mission.coverage.unreached import Unreached
+from fasaco_edge.mission.fleet.layer import FleetLayer
+from fasaco_edge.mission.fleet.shared import SharedProgress
 from fasaco_edge.mission.line.layer import FloorToSweep, LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
@@ -40,6 +42,7 @@ class Mission:
     Attributes:
         state, reason: what it is doing, and why.
         route: the path, the plan under way, and counts of both; to be read only.
+        fleet: the other robots; to be read only.
     """
 
     def __init__(self, config: MissionConfig, order: OrderState | None = None) -> None:
@@ -48,14 +51,17 @@ class Mission:
         cell_m, sweeping = config.footprint.cell_m, config.sweeping
         self._ledger = MissionLedger(cell_m, sweeping.tool_m if sweeping else cell_m)
         monitor = InputMonitor(config)
-        self._orders = Sequencer(config, self._map, self._ledger)
+        self.fleet = FleetLayer(config.robot, config.cost.step_s, self._map, self._ledger)
+        self._orders = Sequencer(config, self._map, self._ledger, self.fleet)
         self.route = Route(config.spare_share, self._map, self._orders)
         owners = self._map, self._ledger, monitor, self._orders, self.route
         self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
         self._trail = TrailLayer(config, self._map, self.route)
         self._drive = DriveMeter()
-        self._handler = EventHandler(*owners, self._line, self._trail, self._drive, config.policy)
-        self._executive = Executive(*owners, self._trail, config.policy)
+        self._handler = EventHandler(
+            *owners, self._line, self._trail, self._drive, self.fleet, config.policy
+        )
+        self._executive = Executive(*owners, self._trail, self.fleet, config.policy)
         self.restore_order(order or OrderState.autostart())
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:
@@ -92,7 +98,7 @@ class Mission:
 
     def coverage(self) -> Coverage | None:
         """Return how much is covered; None before there is a map."""
-        return self._map.coverage(self.ledger)
+        return self._map.coverage(self._ledger)
 
     def floor_to_sweep(self) -> FloorToSweep | None:
         """Return how much floor is to be swept; None where cells are counted."""
@@ -108,7 +114,7 @@ class Mission:
 
     def zone_progress(self) -> list[ZoneProgress]:
         """Return how far each zone of the order is."""
-        return zone_progress(self.order_state, self._map.area, self.ledger)
+        return zone_progress(self.order_state, self._map.area, self._ledger)
 
     def snapshot(self) -> LedgerSnapshot:
         """Return all that is to outlive a restart: what is covered, and how far the order is."""
@@ -149,6 +155,20 @@ class Mission:
     def ledger(self) -> CoverageLedger:
         """Which cells are covered."""
         return self._ledger.current
+
+    @property
+    def covered(self) -> MissionLedger:
+        """Which cells this robot and others have covered."""
+        return self._ledger
+
+    @property
+    def shared(self) -> SharedProgress:
+        """Which cells other robots have swept."""
+        return self._ledger.shared
+
+    def open_cells(self) -> int:
+        """Return how many cells are still to be swept, by this robot or another."""
+        return self._orders.left()
 
     @property
     def trail(self) -> LivingTrail:

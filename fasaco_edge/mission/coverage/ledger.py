@@ -55,6 +55,7 @@ class LedgerSnapshot:
         floor: what of the floor was swept, pixel by pixel.
         note: the order and how far it is, as JSON, see ``orders.order_state``; "" for none.
         trail: the pheromone.
+        fleet: what other robots have swept, see ``fleet.shared``; b"" for nothing.
     """
 
     cell_m: float
@@ -65,6 +66,7 @@ class LedgerSnapshot:
     floor: FloorSnapshot = NO_FLOOR
     note: str = ""
     trail: TrailSnapshot = NO_TRAIL
+    fleet: bytes = b""
 
     @property
     def cells(self) -> int:
@@ -74,7 +76,7 @@ class LedgerSnapshot:
     @property
     def is_empty(self) -> bool:
         """Whether nothing was covered or swept."""
-        return not self.cells and not self.floor.tiles
+        return not self.cells and not self.floor.tiles and not self.fleet
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
         """Return the number of visits, uint16 (rows, cols), of the cells of ``window``."""

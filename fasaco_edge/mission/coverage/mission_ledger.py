@@ -47,6 +47,7 @@ from fasaco_edge.mission.coverage.swept_floor import (
     MOST_FLOOR_TILES,
     SweptFloor,
 )
+from fasaco_edge.mission.fleet.shared import SharedProgress
 from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertain_cells
 
 PlaceOf = Callable[[Cell], Point | None]
@@ -159,6 +160,7 @@ class MissionLedger:
 
     Attributes:
         first_plan_reason: why the first plan is wanted.
+        shared: which cells other robots have swept.
     """
 
     def __init__(self, cell_m: float, tool_m: float) -> None:
@@ -166,6 +168,7 @@ class MissionLedger:
         self._cell_m, self._tool_m = cell_m, tool_m
         self._covered = self._nothing("")
         self.first_plan_reason = "first plan"
+        self.shared = SharedProgress()
         # A ledger from before a restart that no map has confirmed yet, and what was covered since:
         # that is true in any building.
         self._resumed: tuple[LedgerSnapshot, _Covered] | None = None
@@ -178,13 +181,23 @@ class MissionLedger:
         return self._covered.cells
 
     @property
+    def version(self) -> tuple[int, int]:
+        """Another one whenever more cells are covered."""
+        return self.current.total, self.shared.version
+
+    def visits(self, window: Window) -> NDArray[np.uint16]:
+        """Return the visits to cells, uint16 (rows, cols); one where another robot swept alone."""
+        own = self.current.visits(window)
+        return np.maximum(own, self.shared.swept(window)) if self.shared.version else own
+
+    @property
     def floor(self) -> SweptFloor:
         """Which floor is swept."""
         return self._covered.floor
 
     def snapshot(self) -> LedgerSnapshot:
         """Return what is covered now."""
-        return self._covered.snapshot()
+        return replace(self._covered.snapshot(), fleet=self.shared.encode())
 
     @property
     def _all(self) -> tuple[_Covered, ...]:
@@ -198,6 +211,7 @@ class MissionLedger:
         self._resumed = before, self._nothing("")
         floor = SweptFloor.restored(before.floor, self._tool_m)
         self._covered = _Covered(CoverageLedger.restored(before), floor)
+        self.shared.resume(before.fleet)
         if cells := before.cells:
             self.first_plan_reason = f"first plan, {cells} cells were covered before"
 
@@ -242,6 +256,9 @@ class MissionLedger:
         for covered in self._all:
             covered.cells.forget(cells)
             covered.floor.leave(floor)
+        # Where others were is as uncertain: they know it on maps of their own.
+        self.shared.disregard(uncertain_cells(self.shared.snapshot(self._cell_m), motion))
+        self.shared.note_forgotten()
         return before.cells - self.current.snapshot().cells
 
     def forget(self, inside: Callable[[Window, float], NDArray[np.bool_]]) -> None:
@@ -260,6 +277,8 @@ class MissionLedger:
         for covered in self._all:
             covered.cells.forget(cells_inside)
             covered.floor.forget(lambda window: inside(window, PIXEL_M))
+        self.shared.disregard(cells_inside)
+        self.shared.note_forgotten()
 
     def move_to(self, frame: str) -> LedgerMismatchError | None:
         """Move to ``frame``; start over, and report it, if another holds covered cells."""
@@ -269,6 +288,7 @@ class MissionLedger:
             return None
         cells = self.current.snapshot().cells
         self._replace(self._nothing(frame))
+        self.shared.clear()
         if not cells:
             return None
         return self._begun_anew(
@@ -278,6 +298,7 @@ class MissionLedger:
     def reset(self, frame: str) -> None:
         """Forget everything; ``frame`` is that of the poses, "" where none is active."""
         self._replace(self._nothing(frame))
+        self.shared.disregard(lambda rows, _: np.ones(len(rows), np.bool_))
         self.first_plan_reason = "first plan"
 
     def check(self, lattice: CoverageLattice, frame: str) -> LedgerMismatchError | None:
@@ -292,6 +313,8 @@ class MissionLedger:
         if verdict is Verdict.SAME:
             return None
         self._covered = since
+        self.shared.clear()
+        self.shared.note_forgotten()
         self.current.move_to(frame)
         return self._begun_anew(
             f"the ledger of {before.cells} covered cells is of another building than the map"
@@ -299,6 +322,7 @@ class MissionLedger:
 
     def _replace(self, covered: _Covered) -> None:
         self._covered, self._resumed, self._pose_before_motion = covered, None, None
+        self.shared.note_forgotten()
 
     def _begun_anew(self, why: str) -> LedgerMismatchError:
         misfit = LedgerMismatchError(why)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.pixels import count_free_beside
-from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.zones import counts_in
@@ -192,7 +192,7 @@ class ZoneProgress:
 
 
 def zone_progress(
-    order_state: OrderState, ground: ReachableArea | None, ledger: CoverageLedger
+    order_state: OrderState, ground: ReachableArea | None, ledger: MissionLedger
 ) -> list[ZoneProgress]:
     """Return how far each zone is, in order; none of an order for everything."""
     order = order_state.order

@@ -124,7 +124,7 @@ class UnreachedFinder:
         area = self._map.area
         if state.order is None:
             return Unreached()
-        key = (area, self._ledger.current.total, state)
+        key = (area, self._ledger.version, state)
         if area is not None and key != self._found[0]:
             self._found = key, self._list_areas(state.order, area, state.stage)
         return self._found[1]
@@ -179,7 +179,7 @@ class UnreachedFinder:
         """Return the cells that were to be covered and are not."""
         window = area.lattice.window
         uncovered: NDArray[np.bool_] = in_zones(order.zones, window, area.lattice.cell_m) & (
-            self._ledger.current.visits(window) == 0
+            self._ledger.visits(window) == 0
         )
         return uncovered
 

@@ -21,7 +21,7 @@ from fasaco_edge.grid.geometry import Point, Polygon, StampedPose, Window, polyg
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, without_base
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import Coverage, FreeArea
 from fasaco_edge.mission.map.ground import Ground
 from fasaco_edge.mission.map.inputs import FrameSelector
@@ -257,7 +257,7 @@ class MapState:
                     f"x {west:.2f}..{east:.2f} m, y {south:.2f}..{north:.2f} m"
                 )
 
-    def coverage(self, ledger: CoverageLedger) -> Coverage | None:
+    def coverage(self, ledger: MissionLedger) -> Coverage | None:
         """Return how much is covered; None before there is a map."""
         if self.lattice is None or self.grid is None:
             return None

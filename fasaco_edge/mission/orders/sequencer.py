@@ -14,6 +14,7 @@ from fasaco_edge.grid.lattice import UNKNOWN, Cell
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
+from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.orders.order import Errand, Zone
@@ -139,11 +140,14 @@ class Sequencer:
         order_state: the order, and how far it is.
     """
 
-    def __init__(self, config: MissionConfig, map_state: MapState, ledger: MissionLedger) -> None:
+    def __init__(
+        self, config: MissionConfig, map_state: MapState, ledger: MissionLedger, fleet: FleetLayer
+    ) -> None:
         self.order_state = OrderState.idle(NO_ORDER)
         self._config = config
         self._map = map_state
         self._ledger = ledger
+        self._fleet = fleet
         self._run = _Run()
         self._unreached = UnreachedFinder(map_state, ledger)
         # Whether anything is worth trying again, and as of which map and ledger.
@@ -157,7 +161,7 @@ class Sequencer:
     @property
     def can_plan(self) -> bool:
         """Whether a plan would have anything to cover."""
-        return self.order_state.stage is not Stage.RETURNING and self._left() > 0
+        return self.order_state.stage is not Stage.RETURNING and self.left() > 0
 
     @property
     def ending(self) -> str:
@@ -230,7 +234,7 @@ class Sequencer:
         return CoverageProblem.of(
             lattice,
             cell,
-            covered=~self.open_cells(lattice.window),
+            covered=~self._open_to_me(area),
             end=home if ends_home else None,
             cost=self._config.cost,
             before=before,
@@ -245,12 +249,24 @@ class Sequencer:
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
-        if self.order_state.order is None:
-            return np.zeros((window.rows, window.cols), bool)
-        wanted = self.asked_for(window)
-        open_cells: NDArray[np.bool_] = wanted & (self._ledger.current.visits(window) == 0)
+        open_cells = self._unswept(window)
         self._run.exploration.mark(open_cells, window)
         return open_cells
+
+    def _unswept(self, window: Window) -> NDArray[np.bool_]:
+        if self.order_state.order is None:
+            return np.zeros((window.rows, window.cols), bool)
+        unswept: NDArray[np.bool_] = self.asked_for(window) & (
+            self._ledger.current.visits(window) == 0
+        )
+        return unswept
+
+    def _open_to_me(self, area: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells still need a visit by this robot, as far as a fleet shares them."""
+        window = area.lattice.window
+        cells = self._fleet.mine(self._unswept(window), area).copy()
+        self._run.exploration.mark(cells, window)
+        return cells
 
     @property
     def is_exploring(self) -> bool:
@@ -262,19 +278,23 @@ class Sequencer:
         return bool((area.reachable & ~decided).any())
 
     def asked_for(self, window: Window) -> NDArray[np.bool_]:
-        """Return which cells of ``window`` are to be covered now, or were."""
+        """Return which cells of ``window`` this robot has to cover now, or had to."""
         order, zone = self.order_state.order, self.order_state.current_zone
         zones = () if order is None else order.zones if zone is None else (zone,)
-        return in_zones(zones, window, self._config.footprint.cell_m)
+        inside = in_zones(zones, window, self._config.footprint.cell_m)
+        shared = self._ledger.shared
+        return inside & ~shared.swept(window) if shared.version else inside
 
     def note_path_end(self) -> bool:
         """Note the end of a path; return whether what it left over has to wait."""
-        run, cells = self._run, self._left()
+        run, cells = self._run, self.left()
         if cells > 0:
             self._unreached.note_failure()
         run.same_again = run.same_again + 1 if cells == run.left_over else 1
         run.left_over = cells
         is_given_up = cells > 0 and run.same_again > MAX_SAME_LEFTOVERS
+        # Who is with others stays: they may leave before what they have taken on is swept.
+        is_given_up = is_given_up and not self._fleet.has_company
         return is_given_up and not run.exploration.skip_viewpoint()
 
     def advance(self, now: float) -> None:
@@ -323,11 +343,11 @@ class Sequencer:
         run.retry_at = None
         run.exploration.aim_at(self._viewpoints() - {cell})
         # In a retry, one path without progress is enough to give up.
-        run.left_over, run.same_again = self._left(), MAX_SAME_LEFTOVERS
+        run.left_over, run.same_again = self.left(), MAX_SAME_LEFTOVERS
         return f"tried again, {self.order_state.tries + 1} of {self._config.policy.retries}"
 
     def _end(self) -> None:
-        run, left, order = self._run, self._left(), self.order_state.order
+        run, left, order = self._run, self.left(), self.order_state.order
         run.retry_at = None
         self.order_state = replace(self.order_state, stage=Stage.OVER)
         every = order is None or order.zones[0].polygon is None
@@ -339,12 +359,12 @@ class Sequencer:
 
     def _is_worth_trying(self) -> bool:
         """Tell whether there is anything to try again; searched again if anything changed."""
-        key = (self._map.area, self._ledger.current.total)
+        key = (self._map.area, self._ledger.version)
         if key != self._retry_check[0]:
-            self._retry_check = key, bool(self._left() or self._viewpoints())
+            self._retry_check = key, bool(self.left() or self._viewpoints())
         return self._retry_check[1]
 
-    def _left(self) -> int:
+    def left(self) -> int:
         """Return how many reachable cells still need a visit."""
         area = self._map.area
         if area is None:

@@ -1,0 +1,143 @@
+"""The fleet on the bus: what this robot says to the others, and what they say as events.
+
+Without a block ``fleet`` in the configuration nothing here is made.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.publisher import Publisher
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.errors import FasacoError, FleetError
+from fasaco_edge.mission.core.events import MemberHeard
+from fasaco_edge.mission.fleet.shared import Telling
+from fasaco_edge.wire.fleet import FLEET_VERSION, FleetMember, SweptTile, decode_member
+from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.limits import MAX_FLEET_TILES
+from fasaco_edge.wire.topics import FLEET
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.loop.inbox import Received
+    from fasaco_edge.mission.core.mission import Mission
+
+PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
+# Of one robot no more is taken than one message in this time [s], of no more than so many robots.
+LEAST_SPACING_S, MOST_ROBOTS = 0.2, 64
+# Tiles in a message that comes once a second, and in one on change: 12 kB a second in all.
+TILES, FEW_TILES = MAX_FLEET_TILES // 2, 2
+
+
+class FleetEar:
+    """Hears the other robots of a fleet.
+
+    Args:
+        config: with a block ``fleet``.
+    """
+
+    def __init__(self, config: DaemonConfig) -> None:
+        assert config.fleet
+        self._keys, self._fleet, self._cell_m = config.keys(), config.fleet.name, config.cell_m
+        self._heard_at: dict[str, float] = {}
+
+    def listen(self, bus: Bus, mailbox: Mailbox[object]) -> None:
+        """Post what others say into a mailbox, as far as they keep to their rate."""
+        from fasaco_edge.daemon.loop.inbox import Received  # noqa: PLC0415
+
+        def post(sample: Sample) -> None:
+            if self._is_due(sample.key, now := time.monotonic()):
+                mailbox.post(FLEET.name, Received(FLEET.name, sample, now))
+
+        bus.subscribe(self._keys.of_all(FLEET), post)
+
+    def event(self, received: Received) -> MemberHeard | None:
+        """Return what a robot says; None of one of another fleet, and of this one.
+
+        Raises:
+            MalformedMessage: it is not what it should be.
+        """
+        robot = self._keys.robot_of(received.sample.key)
+        if robot in ("", self._keys.robot):
+            return None
+        try:
+            member = decode_member(received.sample.payload, self._fleet)
+        except FleetError as error:
+            return MemberHeard(robot, misfit=str(error))
+        except FasacoError as error:
+            raise type(error)(f"{robot}: {error}") from error
+        if member is None:
+            return None
+        misfit = ""
+        if abs(member.cell_m - self._cell_m) > 1e-9:
+            misfit = f"its cells are {member.cell_m:g} m wide, here they are {self._cell_m:g} m"
+        return MemberHeard(
+            robot=robot,
+            misfit=misfit,
+            frame=member.frame,
+            state=member.state,
+            x=member.x,
+            y=member.y,
+            step_s=member.step_s,
+            epoch=member.epoch,
+            division=member.division,
+            open_cells=member.open_cells,
+            tiles=tuple(((tile.row, tile.col), tile.cells) for tile in member.swept),
+        )
+
+    def _is_due(self, key: str, now: float) -> bool:
+        """Tell whether a message on a key may be taken now; on a Zenoh thread."""
+        if now - self._heard_at.get(key, float("-inf")) < LEAST_SPACING_S:
+            return False
+        if len(self._heard_at) >= MOST_ROBOTS and key not in self._heard_at:
+            return False
+        self._heard_at[key] = now
+        return True
+
+
+class FleetVoice:
+    """Tells the others of this robot: once a second, and when state or division have changed.
+
+    Args:
+        publisher: of the robot's own key.
+        config: with a block ``fleet``.
+    """
+
+    def __init__(self, publisher: Publisher, config: DaemonConfig) -> None:
+        assert config.fleet
+        self._publisher, self._fleet, self._cell_m = publisher, config.fleet.name, config.cell_m
+        self._step_s = config.robot.cost(config.cell_m).step_s
+        self._telling = Telling()
+        self._said: tuple[object, ...] = ()
+        self._said_at = float("-inf")
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Say what is due; the caller guards that."""
+        stamped = mission.pose
+        if stamped is None or not mission.ledger.frame:
+            return
+        key = mission.state, mission.fleet.number, mission.shared.epoch
+        is_news = key != self._said
+        wait_s = LEAST_PERIOD_S if is_news else PERIOD_S
+        if now - self._said_at < wait_s:
+            return
+        self._said, self._said_at = key, now
+        swept = self._telling.next(mission.ledger.snapshot().tiles, FEW_TILES if is_news else TILES)
+        member = FleetMember(
+            version=FLEET_VERSION,
+            fleet=self._fleet,
+            cell_m=self._cell_m,
+            frame=mission.ledger.frame,
+            state=str(mission.state),
+            x=round(stamped.pose.x, 3),
+            y=round(stamped.pose.y, 3),
+            step_s=self._step_s,
+            epoch=mission.shared.epoch,
+            division=mission.fleet.number,
+            open_cells=mission.open_cells(),
+            swept=tuple(SweptTile(*place, bits) for place, bits in swept),
+        )
+        self._publisher.put(encode_json(member))

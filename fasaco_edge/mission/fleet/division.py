@@ -1,0 +1,178 @@
+"""Division of what is left among robots that have come some way: a seed and a handicap for each.
+
+A cell belongs to the robot whose seed is nearest by the way there, in seconds and with the
+handicap added. So each part is connected, and cells that a map shows later have an owner, too.
+Handicaps are chosen so that all parts take about as long. Seeds are where the robots are, or lie
+far from one another, whichever makes the earlier end; from there they move to the middles of the
+parts (Lloyd's algorithm, with ways in place of distances).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.kernels.fleet.split import ways_from
+
+# Of more cells every second, third ... is looked at; larger lattices are searched less often.
+MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
+# How often seeds move, and handicaps change; each change is so much smaller than the one before.
+ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
+
+Seconds = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot that takes a part.
+
+    Attributes:
+        name: its name.
+        cell: where it is.
+        step_s: what sweeping a cell takes it [s].
+    """
+
+    name: str
+    cell: Cell
+    step_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Division:
+    """Who sweeps what.
+
+    Attributes:
+        robots: those that take part, in the order of their names.
+        seeds: a cell of each.
+        handicaps_s: what is added to the ways from there [s].
+    """
+
+    robots: tuple[Robot, ...]
+    seeds: tuple[Cell, ...]
+    handicaps_s: tuple[float, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the robots."""
+        return tuple(robot.name for robot in self.robots)
+
+    def owners(self, lattice: CoverageLattice) -> NDArray[np.int8]:
+        """Return the number of the robot that each cell belongs to, int8 (rows, cols)."""
+        ways_s = _ways_s(lattice, self.seeds, [robot.step_s for robot in self.robots])
+        ways_s += np.array(self.handicaps_s, np.float32)[:, None]
+        owners: NDArray[np.int8] = ways_s.argmin(axis=0).astype(np.int8)
+        return owners.reshape(lattice.steps.shape)
+
+
+def divide(
+    lattice: CoverageLattice, wanted: NDArray[np.bool_], robots: Sequence[Robot]
+) -> Division:
+    """Share cells out among robots; the order in which these are given does not count.
+
+    Args:
+        lattice: where they can be.
+        wanted: bool (rows, cols), the cells to share out; a walk leads from each robot to each.
+        robots: at least one.
+    """
+    robots = sorted(robots, key=lambda robot: robot.name)
+    starts, steps_s = [robot.cell for robot in robots], [robot.step_s for robot in robots]
+    cells = np.flatnonzero(wanted)
+    cells = cells[:: -(-len(cells) // MOST_CELLS) or 1]
+    if len(robots) == 1 or not len(cells):
+        return Division(tuple(robots), tuple(starts), (0.0,) * len(robots))
+    from_starts_s = _ways_s(lattice, starts, steps_s)[:, cells]
+    scale = np.count_nonzero(wanted) / len(cells)
+    rounds = max(1, min(ROUNDS, MOST_SEARCHED // (len(robots) * lattice.steps.size)))
+    best: tuple[float, list[Cell], NDArray[np.float32]] | None = None
+    for begin in (starts, _spread(lattice, cells, from_starts_s)):
+        seeds = begin
+        for _ in range(rounds):
+            ways_s = _ways_s(lattice, seeds, steps_s)[:, cells]
+            handicaps_s = _handicaps_s(ways_s, np.array(steps_s))
+            owner = (ways_s + handicaps_s[:, None]).argmin(axis=0)
+            end_s = _end_s(from_starts_s, owner, scale * np.array(steps_s))
+            if best is None or end_s < best[0]:
+                best = end_s, seeds, handicaps_s
+            seeds = _middles(lattice, cells, owner, seeds)
+    assert best is not None
+    return Division(tuple(robots), tuple(best[1]), tuple(best[2].tolist()))
+
+
+def _ways_s(lattice: CoverageLattice, cells: Sequence[Cell], steps_s: Sequence[float]) -> Seconds:
+    """Return how far cells are from some [s], float32 (k, rows * cols); from outside very far."""
+    ways = np.full((len(cells), lattice.steps.size), np.float32(1e9))
+    for way, cell, step_s in zip(ways, cells, steps_s, strict=True):
+        if lattice.contains(cell):
+            row, col = lattice.local(cell)
+            way[:] = ways_from(lattice.steps, row * lattice.steps.shape[1] + col) * np.float32(
+                step_s
+            )
+    return ways
+
+
+def _handicaps_s(ways_s: Seconds, steps_s: NDArray[np.float64]) -> Seconds:
+    """Return what to add to ways, float32 (k, n), so that all have about as much to do."""
+    handicaps = np.zeros(len(ways_s), np.float32)
+    best, least = handicaps, np.inf
+    change = float(np.ptp(ways_s)) / 2
+    for _ in range(CHANGES):
+        owner = (ways_s + handicaps[:, None]).argmin(axis=0)
+        load_s = np.bincount(owner, minlength=len(ways_s)) * steps_s
+        if load_s.max() < least:
+            best, least = handicaps, load_s.max()
+        handicaps = (handicaps + change * (load_s / load_s.mean() - 1.0)).astype(np.float32)
+        change *= DAMPING
+    return best
+
+
+def _end_s(from_starts_s: Seconds, owner: NDArray[np.int64], cell_s: NDArray[np.float64]) -> float:
+    """Return when the last robot will be done, if a cell takes each so long, float64 (k,) [s]."""
+    ends_s = [0.0]
+    for robot, way_s in enumerate(from_starts_s):
+        own = owner == robot
+        if own.any():
+            ends_s.append(float(way_s[own].min() + np.count_nonzero(own) * cell_s[robot]))
+    return max(ends_s)
+
+
+def _spread(
+    lattice: CoverageLattice, cells: NDArray[np.int64], from_starts_s: Seconds
+) -> list[Cell]:
+    """Return seeds far from one another, of each robot one that is as near to it as can be."""
+    count, nearest_s = len(from_starts_s), from_starts_s.min(axis=0)
+    seeds: list[int] = []
+    for _ in range(count):
+        seeds.append(int(nearest_s.argmax()))
+        (ways_s,) = _ways_s(lattice, [_cell(lattice, int(cells[seeds[-1]]))], [1.0])[:, cells]
+        nearest_s = np.minimum(nearest_s, ways_s) if len(seeds) > 1 else ways_s
+    apart_s, order = from_starts_s[:, seeds].copy(), [0] * count
+    for _ in range(count):
+        robot, seed = divmod(int(apart_s.argmin()), count)
+        order[robot] = seeds[seed]
+        apart_s[robot], apart_s[:, seed] = np.inf, np.inf
+    return [_cell(lattice, int(cells[seed])) for seed in order]
+
+
+def _middles(
+    lattice: CoverageLattice, cells: NDArray[np.int64], owner: NDArray[np.int64], seeds: list[Cell]
+) -> list[Cell]:
+    """Return of each part the cell that is nearest to its middle; the seed where it is empty."""
+    rows, cols = np.divmod(cells, lattice.steps.shape[1])
+    found = []
+    for robot, seed in enumerate(seeds):
+        own = np.flatnonzero(owner == robot)
+        if not own.size:
+            found.append(seed)
+            continue
+        off = (rows[own] - rows[own].mean()) ** 2 + (cols[own] - cols[own].mean()) ** 2
+        found.append(_cell(lattice, int(cells[own[off.argmin()]])))
+    return found
+
+
+def _cell(lattice: CoverageLattice, flat: int) -> Cell:
+    row, col = divmod(flat, lattice.steps.shape[1])
+    return row + lattice.window.row0, col + lattice.window.col0

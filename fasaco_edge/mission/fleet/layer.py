@@ -1,0 +1,243 @@
+"""Fleet layer: the other robots of the fleet, and this robot's part of what is left.
+
+There is no leader. Each robot divides what is left, on its own map, by the same rule from what all
+say of themselves; divisions are numbered, and a robot that hears of a later one than its own
+divides anew, too. Where two disagree for a moment cells may be swept twice; none is left out,
+because a robot that is done with its part takes one of what is still left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.core.events import MemberHeard, State
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.fleet.division import Division, Robot, divide
+from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
+
+# A robot that was not heard for so long is gone; one that covers and stands for so long hangs [s].
+GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
+# How often the division is looked at, and how long one holds at least that nobody has left [s].
+LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
+# Parts that differ by less than this share and time [s] are left alone.
+UNEVEN, UNEVEN_S = 1.25, 20.0
+# Another robot that sweeps so many cells of this one's part changes its path.
+MANY_TAKEN = 4
+MOST_NUMBER = 2**31 - 1
+LATER = "another robot has divided anew"
+
+AT_WORK = (State.PLANNING, State.COVERING, State.DEGRADED)
+OpenCells = Callable[[Window], NDArray[np.bool_]]
+
+
+@dataclass(slots=True)
+class Member:
+    """Another robot.
+
+    Attributes:
+        told: what it said last.
+        heard_at: when [s].
+        left_out: why it cannot be of this fleet; "" where it can.
+        place: where it is, to STANDING_M, x, y [m].
+        moved_at: since when [s].
+    """
+
+    told: MemberHeard
+    heard_at: float
+    left_out: str
+    place: tuple[float, float]
+    moved_at: float
+
+    def has_moved(self, told: MemberHeard) -> bool:
+        """Tell whether it is elsewhere by now, or has begun to work."""
+        has_begun = self.told.state not in AT_WORK and told.state in AT_WORK
+        return has_begun or math.dist(self.place, (told.x, told.y)) > STANDING_M
+
+    def absence(self, now: float) -> str:
+        """Return why it takes no part now; "" where it does."""
+        if self.left_out:
+            return self.left_out
+        if now - self.heard_at > GONE_S:
+            return "gone"
+        if self.told.state not in AT_WORK:
+            return self.told.state
+        return "stands" if now - self.moved_at > HANGING_S else ""
+
+
+class FleetLayer:
+    """Knows the others; does nothing without a fleet.
+
+    Attributes:
+        members: the others, by name.
+        number: of the newest division.
+    """
+
+    def __init__(
+        self, robot: str, step_s: float, map_state: MapState, ledger: MissionLedger
+    ) -> None:
+        self.members: dict[str, Member] = {}
+        self.number = 0
+        self._robot, self._step_s = robot, step_s
+        self._map, self._ledger = map_state, ledger
+        self._division: Division | None = None
+        self._divided_at = self._looked_at = float("-inf")
+        self._owners: tuple[ReachableArea | None, NDArray[np.int8]]
+        self._owners = None, np.zeros((0, 0), np.int8)
+        # How many cells of its own part others had swept when the path was planned.
+        self._taken = 0
+
+    @property
+    def has_company(self) -> bool:
+        """Whether others are at work on what is left, too."""
+        return self._division is not None
+
+    def hear(self, event: MemberHeard, now: float) -> str:
+        """Take in what another robot says; return why a plan is wanted by that, or "".
+
+        Raises:
+            FleetError: there is no room for what it says.
+        """
+        if not self._robot:
+            return ""
+        before, frame = self.members.get(event.robot), self._ledger.current.frame
+        left_out = event.misfit
+        if not left_out and event.frame != frame:
+            left_out = f"its frame is {event.frame!r}, here it is {frame!r}"
+        place, moved_at = (event.x, event.y), now
+        if before is None:
+            self._make_room()
+        elif not before.has_moved(event):
+            place, moved_at = before.place, before.moved_at
+        self.members[event.robot] = Member(event, now, left_out, place, moved_at)
+        if left_out:
+            return ""
+        if self._ledger.shared.hear(event.robot, event.epoch, event.tiles):
+            return f"{event.robot} has forgotten what it swept"
+        taken = self._count_taken()
+        if taken < self._taken + MANY_TAKEN:
+            return ""
+        self._taken = taken
+        return f"{event.robot} has swept cells of this robot's part"
+
+    def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+        """Return which of some cells are this robot's to sweep; all where none of its part are."""
+        if self._division is None:
+            return cells
+        part = cells & self._is_own(self._division, area)
+        return part if (part & area.reachable).any() else cells
+
+    def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
+        """Divide anew what is left, if that is worth it; return why a plan is wanted, or "".
+
+        Args:
+            open_cells: returns of a window which cells still need a visit.
+            cell: where this robot is.
+            now: [s].
+            at_once: whether this robot waits for work.
+        """
+        area = self._map.area
+        if area is None or not self.members or not (at_once or now - self._looked_at >= LOOK_S):
+            return ""
+        self._looked_at = now
+        robots, before = self._robots(area, cell, now), self._division
+        left = open_cells(area.lattice.window) & area.reachable
+        if not (why := self._why_anew(area, left, robots, now, at_once=at_once)):
+            return ""
+        own = left if before is None else left & self._is_own(before, area)
+        heard = [member.told.division for member in self.members.values() if not member.left_out]
+        self.number = min(max([self.number + (why != LATER), *heard]), MOST_NUMBER)
+        self._division = divide(area.lattice, left, robots) if len(robots) > 1 else None
+        self._divided_at, self._owners = now, (None, self._owners[1])
+        self._taken = self._count_taken()
+        after = left if self._division is None else left & self._is_own(self._division, area)
+        return why if (own != after).any() else ""
+
+    def part_cells(self) -> int | None:
+        """Return how many cells of the area are in this robot's part; None where all are."""
+        if self._division is None or self._map.area is None:
+            return None
+        area = self._map.area
+        return int(np.count_nonzero(self._is_own(self._division, area) & area.reachable))
+
+    def _robots(self, area: ReachableArea, cell: Cell, now: float) -> list[Robot]:
+        """Return who is at work where this robot can come to."""
+        robots = [Robot(self._robot, cell, self._step_s)]
+        for name, member in self.members.items():
+            place = anchor_cell(area.lattice, Pose2D(member.told.x, member.told.y))
+            if not member.absence(now) and place is not None and area.contains(place):
+                robots.append(Robot(name, place, member.told.step_s))
+        return robots
+
+    def _why_anew(
+        self,
+        area: ReachableArea,
+        left: NDArray[np.bool_],
+        robots: list[Robot],
+        now: float,
+        *,
+        at_once: bool,
+    ) -> str:
+        """Return why to divide anew, or ""."""
+        division = self._division
+        names = {robot.name for robot in robots}
+        known = set() if division is None else set(division.names)
+        if len(names) == 1 and division is None:
+            return ""
+        if gone := sorted(known - names):
+            return f"{', '.join(gone)} no longer at work"
+        if now - self._divided_at < HOLDS_S and not at_once:
+            return ""
+        if more := sorted(names - known - {self._robot}):
+            return f"shared with {', '.join(more)}"
+        assert division is not None
+        heard = max(self.members[name].told.division for name in names - {self._robot})
+        return LATER if heard > self.number else self._why_by_parts(division, area, left, now)
+
+    def _why_by_parts(
+        self, division: Division, area: ReachableArea, left: NDArray[np.bool_], now: float
+    ) -> str:
+        """Return why parts of what is left are to be others, or ""."""
+        cells = np.bincount(self._owners_on(division, area)[left], minlength=len(division.robots))
+        if not cells[division.names.index(self._robot)]:
+            return "own part is done" if left.any() else ""
+        steps_s = np.array([robot.step_s for robot in division.robots])
+        even_s = UNEVEN * cells.sum() / (1.0 / steps_s).sum() + UNEVEN_S
+        is_uneven = (cells * steps_s).max() > even_s and now - self._divided_at >= EVEN_S
+        return "parts have become uneven" if is_uneven else ""
+
+    def _is_own(self, division: Division, area: ReachableArea) -> NDArray[np.bool_]:
+        own: NDArray[np.bool_] = self._owners_on(division, area) == division.names.index(
+            self._robot
+        )
+        return own
+
+    def _owners_on(self, division: Division, area: ReachableArea) -> NDArray[np.int8]:
+        if self._owners[0] is not area:
+            self._owners = area, division.owners(area.lattice)
+        return self._owners[1]
+
+    def _count_taken(self) -> int:
+        """Return how many cells of this robot's part others have swept."""
+        area = self._map.area
+        if area is None:
+            return 0
+        swept = self._ledger.shared.swept(area.lattice.window) & area.reachable
+        if self._division is not None:
+            swept = swept & self._is_own(self._division, area)
+        return int(np.count_nonzero(swept))
+
+    def _make_room(self) -> None:
+        """Make room for another robot: the one not heard for longest goes."""
+        if len(self.members) < MOST_ROBOTS:
+            return
+        name = min(self.members, key=lambda name: (self.members[name].heard_at, name))
+        del self.members[name]

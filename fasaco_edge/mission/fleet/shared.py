@@ -1,0 +1,251 @@
+"""Shared progress: which cells the other robots of a fleet have swept, as each of them says itself.
+
+What a robot says has an epoch, another one whenever it has forgotten some of its cells. Within one
+epoch its cells only become more: they are united, so that lost, repeated and late messages do no
+harm, and two halves of a fleet that was split agree once they hear each other again. With another
+epoch all that was heard of that robot is dropped, and heard anew. What a robot that is gone had
+swept stays.
+
+Cells that this robot has to sweep again, whoever swept them (a second pass, a reset, a map that
+moved), are disregarded until the robot that swept them has forgotten them itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import FleetError
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.coverage.ledger import TILE, Cells, LedgerSnapshot
+
+if TYPE_CHECKING:
+    # For types only: a daemon speaks of its fleet before it has loaded the kernels.
+    from fasaco_edge.grid.lattice import Cell
+
+# A tile's cells as bits, row by row, the first of eight the highest [bytes].
+TILE_BYTES = TILE * TILE // 8
+# Of how many robots something is kept, and how many tiles of all of them: 16 million cells.
+MOST_ROBOTS, MOST_TILES = 32, 4096
+
+Bits = NDArray[np.uint8]
+Tiles = dict["Cell", Bits]
+Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
+
+
+@dataclass(slots=True)
+class _Heard:
+    """What one robot has swept: tiles of bits, and which of those bits do not count."""
+
+    epoch: int
+    tiles: Tiles = field(default_factory=dict)
+    disregarded: Tiles = field(default_factory=dict)
+
+    def begin(self, epoch: int) -> None:
+        self.epoch, self.tiles = epoch, {}
+
+    def counted(self, place: Cell) -> Bits:
+        tile, without = self.tiles[place], self.disregarded.get(place)
+        return tile if without is None else tile & ~without
+
+
+class SharedProgress:
+    """The cells that others have swept, on this robot's lattice.
+
+    Attributes:
+        epoch: of this robot's own cells; 0 without a fleet.
+        version: goes up with each change.
+    """
+
+    def __init__(self) -> None:
+        self.epoch = 0
+        self.version = 0
+        self._robots: dict[str, _Heard] = {}
+        # What was asked for last, and the answer.
+        self._known: tuple[tuple[int, Window] | None, NDArray[np.bool_]]
+        self._known = None, np.zeros((0, 0), np.bool_)
+        self._kept: tuple[int, bytes] = 0, b""
+
+    def begin(self, epoch: int) -> None:
+        """Begin with an epoch that no earlier ledger of this robot had, unless one was restored."""
+        if not self.epoch:
+            self.epoch = epoch
+            self.version += 1
+
+    def note_forgotten(self) -> None:
+        """Note that this robot has forgotten some of its own cells."""
+        if self.epoch:
+            self.epoch += 1
+            self.version += 1
+
+    def hear(self, robot: str, epoch: int, tiles: Iterable[tuple[Cell, bytes]]) -> bool:
+        """Take in what a robot says of itself; tell whether cells are to be swept again by that.
+
+        Args:
+            robot: its name.
+            epoch: of its cells.
+            tiles: places, and TILE_BYTES of bits each.
+
+        Raises:
+            FleetError: there is no room for it.
+        """
+        heard = self._robots.get(robot)
+        if heard is None:
+            if len(self._robots) >= MOST_ROBOTS:
+                raise FleetError(f"{robot}: progress of {MOST_ROBOTS} robots is kept at most")
+            heard = self._robots[robot] = _Heard(epoch)
+        has_lost = heard.epoch != epoch and bool(heard.tiles)
+        if heard.epoch != epoch:
+            heard.begin(epoch)
+            self.version += 1
+        for place, told in tiles:
+            bits, before = np.frombuffer(told, np.uint8), heard.tiles.get(place)
+            if before is None:
+                self._check_room(robot)
+                if (without := heard.disregarded.get(place)) is not None:
+                    heard.disregarded[place] = without & bits
+            after = bits if before is None else before | bits
+            if before is None or not np.array_equal(before, after):
+                heard.tiles[place] = after
+                self.version += 1
+        return has_lost
+
+    def swept(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of ``window`` others have swept, bool (rows, cols), read-only."""
+        key = self.version, window
+        if self._known[0] != key:
+            found = np.zeros((window.rows, window.cols), np.bool_)
+            for heard in self._robots.values():
+                for place in heard.tiles:
+                    whole = _window(place)
+                    if common := whole.intersection(window):
+                        cells = _cells(heard.counted(place))[common.slices_in(whole)]
+                        found[common.slices_in(window)] |= cells
+            found.flags.writeable = False
+            self._known = key, found
+        return self._known[1]
+
+    def disregard(self, inside: Inside) -> None:
+        """Count no sweep so far of some cells.
+
+        Args:
+            inside: returns which of some cells, rows and columns int64 (n,), bool (n,).
+        """
+        for heard in self._robots.values():
+            for place, tile in heard.tiles.items():
+                at = np.argwhere(_cells(tile))
+                rows, cols = (at + np.multiply(place, TILE)).T
+                chosen = inside(rows, cols) if len(at) else np.zeros(0, np.bool_)
+                if chosen.any():
+                    marked = np.zeros((TILE, TILE), np.bool_)
+                    marked[tuple(at[chosen].T)] = True
+                    bits = np.packbits(marked)
+                    heard.disregarded[place] = bits | heard.disregarded.get(place, np.uint8(0))
+                    self.version += 1
+
+    def clear(self) -> None:
+        """Forget all that was heard: it lies in another frame, or in another building."""
+        if self._robots:
+            self._robots.clear()
+            self.version += 1
+
+    def snapshot(self, cell_m: float) -> LedgerSnapshot:
+        """Return what others have swept as if one robot had."""
+        tiles: dict[Cell, NDArray[np.uint16]] = {}
+        for heard in self._robots.values():
+            for place in heard.tiles:
+                cells = _cells(heard.counted(place)).astype(np.uint16)
+                tiles[place] = cells | tiles.get(place, np.uint16(0))
+        return LedgerSnapshot(cell_m, "", 0, MappingProxyType(tiles))
+
+    def cells_of(self, robot: str) -> int:
+        """Return how many cells of a robot's count."""
+        heard = self._robots.get(robot)
+        if heard is None:
+            return 0
+        return sum(int(_cells(heard.counted(place)).sum()) for place in heard.tiles)
+
+    def encode(self) -> bytes:
+        """Return all of it, to be kept with the ledger; b"" where there is nothing."""
+        if self._kept[0] != self.version:
+            robots = {
+                name: _Kept(heard.epoch, _listed(heard.tiles), _listed(heard.disregarded))
+                for name, heard in self._robots.items()
+            }
+            self._kept = self.version, msgspec.json.encode(_Note(1, self.epoch, robots))
+        return self._kept[1]
+
+    def resume(self, kept: bytes) -> None:
+        """Go on with what ``encode`` returned; what another release kept is heard anew."""
+        note = msgspec.json.decode(kept, type=_Note) if kept else None
+        if note is None or note.version != 1:
+            return
+        self.epoch, self.version = note.epoch, self.version + 1
+        self._robots = {
+            name: _Heard(one.epoch, _placed(one.tiles), _placed(one.disregarded))
+            for name, one in note.robots.items()
+        }
+
+    def _check_room(self, robot: str) -> None:
+        if sum(len(heard.tiles) for heard in self._robots.values()) >= MOST_TILES:
+            raise FleetError(f"{robot}: {MOST_TILES} tiles of others' progress are kept at most")
+
+
+class _Kept(msgspec.Struct, frozen=True, array_like=True):
+    epoch: int
+    tiles: list[tuple[int, int, bytes]]
+    disregarded: list[tuple[int, int, bytes]]
+
+
+class _Note(msgspec.Struct, frozen=True):
+    version: int
+    epoch: int
+    robots: dict[str, _Kept]
+
+
+class Telling:
+    """Chooses which of its tiles a robot tells next: what is new first, then all others in turn."""
+
+    def __init__(self) -> None:
+        # What was told of each, in the order in which that was.
+        self._told: dict[Cell, NDArray[np.uint16]] = {}
+
+    def next(
+        self, tiles: Mapping[Cell, NDArray[np.uint16]], most: int
+    ) -> tuple[tuple[Cell, bytes], ...]:
+        """Return places and bits of at most so many tiles of a ledger's snapshot."""
+        self._told = {place: tile for place, tile in self._told.items() if place in tiles}
+        new = [place for place, tile in tiles.items() if self._told.get(place) is not tile]
+        chosen = [*sorted(new), *(place for place in self._told if place not in new)][:most]
+        for place in chosen:
+            self._told.pop(place, None)
+            self._told[place] = tiles[place]
+        return tuple((place, tile_bits(tiles[place])) for place in chosen)
+
+
+def tile_bits(tile: NDArray[np.uint16]) -> bytes:
+    """Return which cells of a ledger's tile were visited, as TILE_BYTES of bits."""
+    return np.packbits((tile > 0).reshape(-1)).tobytes()
+
+
+def _cells(bits: Bits) -> NDArray[np.bool_]:
+    return np.unpackbits(bits).reshape(TILE, TILE).view(np.bool_)
+
+
+def _window(place: Cell) -> Window:
+    row, col = place[0] * TILE, place[1] * TILE
+    return Window(row, col, row + TILE, col + TILE)
+
+
+def _listed(tiles: Tiles) -> list[tuple[int, int, bytes]]:
+    return [(*place, tiles[place].tobytes()) for place in sorted(tiles)]
+
+
+def _placed(tiles: list[tuple[int, int, bytes]]) -> Tiles:
+    return {(row, col): np.frombuffer(bits, np.uint8) for row, col, bits in tiles}

@@ -1,0 +1,96 @@
+"""Fleet documents: what a robot says of itself to the others that share an area with it.
+
+The key says whose message it is, never the message: access rules hold for keys. A reader refuses
+what is beyond a limit, as it comes from a computer of someone else.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+import msgspec
+from msgspec import Meta
+
+from fasaco_edge.errors import FleetError, MalformedMessage
+from fasaco_edge.wire.json_text import Document
+from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_FLEET_TILES, MAX_JSON_BYTES
+
+FLEET_VERSION: Final = 1
+# Of a tile of 64 x 64 cells: a bit each.
+TILE_BYTES: Final = 512
+
+Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
+Text = Annotated[str, Meta(max_length=256)]
+Whole = Annotated[int, Meta(ge=0, le=2**31 - 1)]
+Place = Annotated[int, Meta(ge=-(2**24), le=2**24)]
+
+
+class SweptTile(msgspec.Struct, frozen=True, array_like=True):
+    """Which cells of a tile of 64 x 64 were swept.
+
+    Attributes:
+        row, col: of the tile: it has the cells from 64 times these on.
+        cells: 512 bytes in base64: a bit a cell, row by row, the first of eight the highest.
+    """
+
+    row: Place
+    col: Place
+    cells: Annotated[bytes, Meta(min_length=TILE_BYTES, max_length=TILE_BYTES)]
+
+
+class FleetMember(Document, frozen=True):
+    """A robot of a fleet, as it says of itself.
+
+    Attributes:
+        version: of this document.
+        fleet: name of the fleet.
+        cell_m: edge of a cell [m].
+        frame: of the map.
+        state: of the mission, as in the status.
+        x, y: where the robot is [m] in the frame of the map.
+        step_s: what sweeping a cell takes it [s].
+        epoch: another one whenever the robot has forgotten some of what it swept.
+        division: number of the newest division of what is left that it knows.
+        open_cells: how many cells it knows that are still to be swept.
+        swept: tiles of what it has swept in this epoch: those with news first, then all in turn.
+    """
+
+    version: Annotated[int, Meta(ge=1)]
+    fleet: Text
+    cell_m: Annotated[float, Meta(gt=0)]
+    frame: Text
+    state: Text
+    x: Coordinate
+    y: Coordinate
+    step_s: Annotated[float, Meta(ge=1e-3, le=3600)]
+    epoch: Annotated[int, Meta(ge=1, le=2**62)]
+    division: Whole
+    open_cells: Whole
+    swept: Annotated[tuple[SweptTile, ...], Meta(max_length=MAX_FLEET_TILES)]
+
+
+class _Head(msgspec.Struct, frozen=True):
+    """What is there in every version."""
+
+    version: int
+    fleet: Text
+
+
+def decode_member(payload: bytes, fleet: str) -> FleetMember | None:
+    """Return what a robot says of itself; None where it is of another fleet.
+
+    Raises:
+        FleetError: it is of another version.
+        MalformedMessage: it is not what it should be.
+    """
+    if len(payload) > MAX_JSON_BYTES:
+        raise MalformedMessage(f"fleet: must have at most {MAX_JSON_BYTES} bytes")
+    try:
+        head = msgspec.json.decode(payload, type=_Head)
+        if head.fleet != fleet:
+            return None
+        if head.version != FLEET_VERSION:
+            raise FleetError(f"its messages are of version {head.version}, not {FLEET_VERSION}")
+        return msgspec.json.decode(payload, type=FleetMember)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise MalformedMessage(f"fleet: {error}") from error

@@ -1,0 +1,212 @@
+"""Robots that share an area: nothing is left out whatever happens, and little is swept twice."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.fleet.layer import GONE_S
+from fasaco_edge.mission.fleet.shared import MOST_TILES, TILE_BYTES, SharedProgress, Telling
+from tests.mission.fleets import FleetDrive, FleetRobot, flaky
+from tests.mission.world import rectangle
+
+HALL = ["." * 24] * 12
+ROOMS = [
+    "........#........#......",
+    "........#........#......",
+    "........#...............",
+    "........#........#......",
+    "........#........#......",
+    "........................",
+    "........#........#......",
+    "........#........#......",
+    "........#........#......",
+]
+TWO = {"r1": (0, 0), "r2": (0, 1)}
+THREE = {"r1": (0, 0), "r2": (0, 23), "r3": (8, 12)}
+
+
+def alone(rows):
+    drive = FleetDrive(rows, {"r1": (0, 0)})
+    drive.finish()
+    return drive.seconds
+
+
+@pytest.mark.parametrize("rows", [HALL, ROOMS], ids=["hall", "rooms"])
+@pytest.mark.parametrize(("starts", "share"), [(TWO, 0.68), (THREE, 0.55)], ids=["two", "three"])
+def test_robots_share_what_one_would_do(rows, starts, share):
+    fleet = FleetDrive(rows, starts)
+    fleet.finish()
+    assert fleet.left_out() == set()
+    assert fleet.seconds <= share * alone(rows)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_is_left_out_where_messages_are_lost_and_repeated(seed):
+    fleet = FleetDrive(ROOMS, THREE)
+    fleet.finish(**flaky(seed))
+    assert fleet.left_out() == set()
+
+
+@pytest.mark.parametrize("at", [5, 40, 70])
+def test_what_a_robot_that_dies_had_to_do_is_taken_over(at):
+    fleet = FleetDrive(HALL, TWO)
+    fleet.run(at)
+    del fleet.robots["r2"]
+    survivor = fleet.robots["r1"].mission
+    fleet.run(int(GONE_S) + 3)
+    assert not survivor.fleet.has_company
+    fleet.finish()
+    assert fleet.left_out() == set()
+
+
+def test_a_robot_that_stands_is_not_waited_for_and_may_come_back():
+    fleet = FleetDrive(HALL, TWO)
+    fleet.run(20)
+    fleet.robots["r2"].hangs = True
+    fleet.run(12)
+    assert not fleet.robots["r1"].mission.fleet.has_company
+    fleet.robots["r2"].hangs = False
+    fleet.run(4)
+    assert fleet.robots["r1"].mission.fleet.has_company
+    fleet.finish()
+    assert fleet.left_out() == set()
+
+
+def test_a_network_that_is_split_and_heals_unites_what_was_swept():
+    fleet = FleetDrive(HALL, THREE)
+    fleet.run(20)
+    fleet.hears = lambda speaker, listener: "r3" not in (speaker, listener)
+    fleet.run(30)
+    fleet.hears = lambda speaker, listener: True
+    fleet.finish()
+    assert fleet.left_out() == set()
+    assert fleet.seconds < 0.6 * alone(HALL)
+
+
+def sweeps_everything_again(robot):
+    """Order everything, whoever has covered it."""
+    zone = {"name": "hall", "polygon": rectangle(0, 0, 12, 24)}
+    return robot.command("start", {"zones": [zone]})
+
+
+def test_an_order_begun_later_counts_no_sweep_from_before():
+    fleet = FleetDrive(HALL, TWO)
+    fleet.finish()
+    fleet.swept = set()
+    for robot in fleet.robots.values():
+        sweeps_everything_again(robot)
+    assert all(robot.mission.state != "done" for robot in fleet.robots.values())
+    begun = fleet.seconds
+    fleet.finish()
+    # But for where the tools were when the orders came.
+    assert len(fleet.left_out()) <= 2
+    assert fleet.seconds - begun < 0.75 * alone(HALL)
+
+
+def test_what_is_reset_elsewhere_is_swept_again_and_a_commanded_order_goes_on():
+    fleet = FleetDrive(HALL, TWO)
+    fleet.run(60)
+    ours, other = fleet.robots["r1"], fleet.robots["r2"]
+    sweeps_everything_again(ours)
+    fleet.run(5)
+    before = ours.mission.order_state.order
+    other.command("reset")
+    fleet.run(2)
+    assert ours.mission.shared.cells_of("r2") <= 4
+    assert ours.mission.order_state.order == before
+    fleet.finish_one(ours)
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"frame": "hall_2"}, "its frame is 'hall_2', here it is 'map'"),
+        ({"misfit": "its cells are 0.5 m wide, here they are 0.25 m"}, "its cells are 0.5 m wide"),
+    ],
+)
+def test_a_robot_that_does_not_fit_is_named_and_left_out(changes, why):
+    fleet = FleetDrive(HALL, TWO)
+    ours, other = fleet.robots.values()
+    report = other.report()
+    ours.tell(replace(report, **changes))
+    ours.tick()
+    assert ours.mission.fleet.members["r2"].absence(ours.now).startswith(why)
+    assert not ours.mission.fleet.has_company
+    assert ours.mission.shared.cells_of("r2") == 0
+
+
+def test_what_others_swept_outlives_a_restart():
+    fleet = FleetDrive(HALL, TWO)
+    fleet.run(30)
+    ours = fleet.robots["r1"].mission
+    kept = ours.snapshot()
+    again = FleetRobot("r1", (0, 0), HALL, before=kept)
+    assert again.mission.shared.cells_of("r2") == ours.shared.cells_of("r2") > 20
+    assert again.mission.shared.epoch == ours.shared.epoch
+    # What is disregarded stays so.
+    sweeps_everything_again(again)
+    restarted = FleetRobot("r1", (0, 0), HALL, before=again.mission.snapshot())
+    restarted.tell(fleet.robots["r2"].report())
+    assert restarted.mission.shared.cells_of("r2") == 0
+
+
+def test_after_a_loop_closure_nothing_uncertain_is_given_back():
+    ledger, block = MissionLedger(0.3, 0.3), {(row, col) for row in range(10) for col in range(10)}
+    ledger.shared.begin(5)
+    ledger.shared.hear("r2", 1, tiles_of(block))
+    ledger.note_map_motion(Pose2D(1.5, 1.5))
+    ledger.forget_uncertain(Pose2D(2.1, 1.5))
+    left = ledger.shared.swept(Window(0, 0, 10, 10))
+    # It was there wherever between its two places the map lay.
+    assert left[:, 2:].all()
+    assert not left[:, :2].any()
+    assert ledger.shared.epoch == 6
+    ledger.shared.hear("r2", 1, tiles_of(block))
+    assert (ledger.shared.swept(Window(0, 0, 10, 10)) == left).all()
+    # Who swept them forgets them, and sweeps one again: that counts.
+    ledger.shared.hear("r2", 2, tiles_of({(99, 99)}))
+    ledger.shared.hear("r2", 3, tiles_of({(0, 5), (1, 0)}))
+    assert ledger.shared.cells_of("r2") == 1
+
+
+def test_no_more_is_kept_of_a_robot_that_lies_than_there_is_room_for():
+    fleet = FleetDrive(HALL, TWO)
+    ours, other = fleet.robots.values()
+    tiles = tuple(((row, 1000), bytes(TILE_BYTES)) for row in range(MOST_TILES + 1))
+    decision = ours.tell(replace(other.report(), tiles=tiles))
+    assert [fault.code for fault in decision.faults] == ["fleet_member"]
+    ours.tick()
+    assert ours.mission.state == "covering"
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 3), st.sets(st.integers(0, 40))), max_size=8), st.data())
+def test_within_an_epoch_order_and_number_of_messages_do_not_count(sweeps, data):
+    messages, swept = [], set()
+    for column, cells in sweeps:
+        swept |= {(cell, column) for cell in cells}
+        messages.append(tiles_of(swept))
+    one, other = SharedProgress(), SharedProgress()
+    for tiles in messages:
+        one.hear("r2", 7, tiles)
+    shuffled = data.draw(st.permutations(messages + messages[-2:]))
+    for tiles in shuffled:
+        other.hear("r2", 7, tiles)
+    window = Window(-5, -5, 60, 60)
+    found = {(row - 5, col - 5) for row, col in np.argwhere(one.swept(window)).tolist()}
+    assert found == swept
+    assert (one.swept(window) == other.swept(window)).all()
+
+
+def tiles_of(cells):
+    """Cells as a robot tells them."""
+    ledger = CoverageLedger(1.0)
+    for cell in cells:
+        ledger.credit(cell)
+    return Telling().next(ledger.snapshot().tiles, 100)

@@ -1,0 +1,100 @@
+"""What a robot says to its fleet: read back as it was, and refused beyond any limit."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.config.config import DaemonConfig, FleetConfig, RobotConfig
+from fasaco_edge.daemon.loop.fleet import LEAST_SPACING_S, FleetEar
+from fasaco_edge.daemon.loop.inbox import Received
+from fasaco_edge.errors import FleetError, MalformedMessage
+from fasaco_edge.wire.fleet import FleetMember, SweptTile, decode_member
+from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.limits import MAX_FLEET_TILES, MAX_JSON_BYTES
+from tests.wire.schemas import check
+
+TILE = SweptTile(-1, 2, bytes(range(256)) * 2)
+MEMBER = FleetMember(1, "hall", 0.3, "map", "covering", 1.5, -2.0, 1.2, 7, 3, 500, (TILE,))
+CONFIG = DaemonConfig(robot=RobotConfig(name="r1"), fleet=FleetConfig("hall"))
+
+
+def said(**members):
+    return json.dumps(json.loads(encode_json(MEMBER)) | members).encode()
+
+
+def heard(payload, robot="r2"):
+    ear = FleetEar(CONFIG)
+    return ear.event(Received("fleet", Sample(f"fasaco/@v1/{robot}/fleet", payload), 0.0))
+
+
+def test_it_comes_back_as_it_was_and_is_that_of_the_schema():
+    payload = encode_json(MEMBER)
+    assert decode_member(payload, "hall") == MEMBER
+    check("fleet.json", json.loads(payload))
+    assert decode_member(payload, "yard") is None
+
+
+@pytest.mark.parametrize(
+    "members",
+    [
+        {"x": float("nan")},
+        {"y": float("inf")},
+        {"x": 1e9},
+        {"cell_m": 0.0},
+        {"step_s": 0.0},
+        {"epoch": 0},
+        {"division": 2**31},
+        {"frame": "m" * 300},
+        {"state": 5},
+        {"swept": [[0, 0, "AAAA"]]},
+        {"swept": [[2**30, 0, "A" * 682 + "=="]]},
+        {"swept": [[0, 0, "A" * 682 + "=="]] * (MAX_FLEET_TILES + 1)},
+    ],
+    ids=str,
+)
+def test_what_is_beyond_a_limit_is_refused_and_the_robot_named(members):
+    with pytest.raises(MalformedMessage, match=r"^r2: fleet: "):
+        heard(said(**members))
+
+
+@given(st.binary(max_size=60))
+def test_other_bytes_are_refused(payload):
+    with pytest.raises(MalformedMessage):
+        decode_member(payload, "hall")
+
+
+def test_what_is_too_long_is_not_looked_at():
+    with pytest.raises(MalformedMessage, match="at most"):
+        decode_member(b" " * (MAX_JSON_BYTES + 1), "hall")
+
+
+def test_another_version_is_told_apart_even_where_nothing_else_can_be_read():
+    with pytest.raises(FleetError, match="version 2, not 1"):
+        decode_member(b'{"version": 2, "fleet": "hall"}', "hall")
+    assert heard(said(version=2)).misfit == "its messages are of version 2, not 1"
+
+
+def test_cells_of_another_size_do_not_fit():
+    cell_m = CONFIG.cell_m
+    assert heard(said(cell_m=cell_m)).misfit == ""
+    assert "its cells are 0.5 m wide" in heard(said(cell_m=0.5)).misfit
+
+
+@pytest.mark.parametrize("robot", ["r1", "*", "r$*"])
+def test_nobody_speaks_for_this_robot_or_for_all(robot):
+    assert heard(said(), robot) is None
+
+
+def test_a_robot_that_floods_is_heard_at_its_rate():
+    ear, key = FleetEar(CONFIG), "fasaco/@v1/r2/fleet"
+    taken = [at for at in range(1000) if ear._is_due(key, 0.001 * at)]
+    assert len(taken) == 1 / LEAST_SPACING_S
+    for number in range(1000):
+        ear._is_due(f"{key}{number}", 5.0)
+    assert ear._is_due(key, 6.0)
+    assert not ear._is_due("fasaco/@v1/another/fleet", 6.0)
