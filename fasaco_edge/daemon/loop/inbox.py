@@ -42,6 +42,8 @@ MAP_SPACING_S = 0.05
 # Most poses of a cycle: other samples must not wait for a thousand. A command waits for those that
 # came before it: what was swept before a reset must not count after it.
 MOST_POSES = 32
+# Most commands of a cycle: an order of a hundred zones takes as long as a map.
+MOST_COMMANDS = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +130,7 @@ def make_mailbox(
     spacing = Spacing("map", map_spacing_s, followers=("map_update",))
     bounds = queues(max_pixels)
     bounds["pose"] = replace(bounds["pose"], at_once=most_poses)
-    bounds["command"] = replace(bounds["command"], after="pose")
+    bounds["command"] = replace(bounds["command"], at_once=MOST_COMMANDS, after="pose")
     return Mailbox(bounds, spacing, _size_of)
 
 
