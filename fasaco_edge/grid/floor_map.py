@@ -7,6 +7,7 @@ at, see ``grid.changes``. Either way all is as if it had been found for the new 
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from fasaco_edge.grid.fine_raster import (
     stand_placement,
 )
 from fasaco_edge.grid.floor import StandLattice, states_of
-from fasaco_edge.grid.geometry import GridGeometry, Point, Polygon, Window
+from fasaco_edge.grid.geometry import GridGeometry, Point, Polygon, Window, polygon_bounds
 from fasaco_edge.grid.kept_out import PolygonsOnRaster
 from fasaco_edge.grid.lattice import (
     UNKNOWN,
@@ -132,6 +133,46 @@ class FloorMap:
             self._look(grids[1], parts, self.touched.row0, self.touched.row1)
         self._settle(plain, stale)
         return self._compared(before)
+
+    def keeping_out(
+        self, polygons: tuple[Polygon, ...], grid: OccupancyGrid, plain: CoverageLattice
+    ) -> FloorMap:
+        """Return the floor of the same map with polygons that the robot must not touch.
+
+        As if it had been found anew; only cells near the polygons are looked at. This one keeps out
+        of none.
+        """
+        geometry, parts = fine_geometry(grid.geometry, self.discs, self._most_pixels)
+        if geometry != self.geometry:
+            return FloorMap(grid, plain, self._footprint, self.discs, self._most_pixels, polygons)
+        other = copy(self)
+        other._keep_out, other._kept_out = polygons, None
+        other.blocked, other.places = self.blocked.copy(), self.places.copy()
+        stale = self._cells_near(polygons, grid.geometry.resolution, plain.window)
+        near = self._pixels_of(stale, plain.window, geometry)
+        if near is not None:
+            other.shift = 0, 0
+            other._look(grid, parts, near.row0, near.row1)
+            other._settle(plain, stale)
+        other.shift, other.touched = None, Window(0, 0, geometry.rows, geometry.cols)
+        return other
+
+    def _cells_near(
+        self, polygons: tuple[Polygon, ...], resolution: float, window: Window
+    ) -> NDArray[np.bool_]:
+        """Return the cells, bool (rows, cols), whose stands or steps polygons may change."""
+        cell_m = self._footprint.cell_m
+        # As far as a changed pixel of the map matters, whatever its yaw.
+        reach_m = self.discs.radius_m + (REACH_CELLS + 1.0) * cell_m + (REACH_PX + 1.0) * resolution
+        reach_m *= math.sqrt(2.0)
+        near = np.zeros((window.rows, window.cols), np.bool_)
+        for polygon in polygons:
+            x0, y0, x1, y1 = polygon_bounds(polygon)
+            low = math.floor((y0 - reach_m) / cell_m), math.floor((x0 - reach_m) / cell_m)
+            high = math.ceil((y1 + reach_m) / cell_m), math.ceil((x1 + reach_m) / cell_m)
+            if box := Window(*low, *high).intersection(window):
+                near[box.slices_in(window)] = True
+        return near
 
     def stand_xy(self, cell: Cell) -> Point | None:
         """Return where the robot stands in a cell, x, y [m]; None where it cannot."""

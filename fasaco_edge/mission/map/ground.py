@@ -50,7 +50,7 @@ class Ground:
             MapTooLarge, MapTooFar: see ``LatticeChange.first`` and ``FloorMap``.
         """
         change = LatticeChange.first(grid, self._config.footprint, self._config.max_lattice_cells)
-        free_floor = self._floor_of(grid, change.after, ())
+        free_floor = self._floor_of(grid, change.after)
         self._plain, self.free_floor = change.after, free_floor
         self._set_free(change if free_floor is None else None, grid)
         return change
@@ -125,18 +125,15 @@ class Ground:
         self.floor = free
         if self._keep_out:
             assert self._plain is not None
-            self.floor = self._floor_of(grid, self._plain, self._keep_out)
-        assert self.floor is not None
+            self.floor = free.keeping_out(self._keep_out, grid, self._plain)
         self.free, self.lattice = free.stands.lattice, self.floor.stands.lattice
 
-    def _floor_of(
-        self, grid: OccupancyGrid, plain: CoverageLattice, keep_out: tuple[Polygon, ...]
-    ) -> FloorMap | None:
+    def _floor_of(self, grid: OccupancyGrid, plain: CoverageLattice) -> FloorMap | None:
         sweeping, footprint = self._config.sweeping, self._config.footprint
         if sweeping is None:
             return None
         discs = RobotDiscs(footprint.robot_radius_m, sweeping.tool_m, footprint.free_at_most)
-        return FloorMap(grid, plain, footprint, discs, sweeping.most_pixels, keep_out)
+        return FloorMap(grid, plain, footprint, discs, sweeping.most_pixels)
 
     def _without_kept_out(self, free: CoverageLattice) -> CoverageLattice:
         if not self._keep_out:
