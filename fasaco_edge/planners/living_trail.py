@@ -119,19 +119,19 @@ class LivingTrail:
             self._window = window
             self.changes += 1
         if changed is None:
-            made = self._tau > 0
-            made ^= (steps[..., np.newaxis] & _BITS) > 0
-            at = np.argwhere(made.any(axis=2))
+            made = (self._tau > 0) != _legal(steps)
+            # The four directions of a cell at once.
+            places = np.flatnonzero(made.view(np.uint32))
         else:
-            at = changed[_inside(changed, window)] - np.array((window.row0, window.col0))
-        if not len(at):
+            at = changed[_inside(changed, window)].astype(np.intp)
+            places = (at[:, 0] - window.row0) * window.cols + at[:, 1] - window.col0
+        if not len(places):
             return
-        rows, cols = at.T
-        tau, tau0 = self._writable(), np.float32(self._rules.tau0)
-        legal = (steps[rows, cols, np.newaxis] & _BITS) > 0
-        then = tau[rows, cols]
+        flat, tau0 = self._writable().reshape(-1, 4), np.float32(self._rules.tau0)
+        then = flat.take(places, axis=0)
         after = np.where(then > 0, self._faded(then, self._rules.alpha), tau0)
-        tau[rows, cols] = np.where(legal, after, np.float32(0))
+        after *= _legal(steps.ravel().take(places))
+        flat[places] = after
 
     def strengthen(self, cells: NDArray[np.int32], amount: float) -> None:
         """Strengthen the steps of a path by equation (8); beside them its cells fade by (7).
@@ -208,6 +208,11 @@ class LivingTrail:
         moves = (4 * place + _DIRECTION.take(3 * up + right + 4, mode="clip"))[is_step]
         legal: NDArray[np.intp] = moves[self._tau.ravel().take(moves) > 0]
         return legal
+
+
+def _legal(steps: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Return which directions of step masks are legal, bool (..., 4)."""
+    return (steps[..., np.newaxis] & _BITS).astype(np.bool_)
 
 
 # By direction: from where its moves lead, and to where. One array at a time is several times as
