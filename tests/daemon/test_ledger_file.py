@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import os
 import re
 import shutil
 import time
@@ -114,6 +115,24 @@ def test_what_is_no_file_is_kept_aside(written):
     assert "no plain file" in str(found.fault)
     file.write(lane(6))
     assert contents(load(written).ledger) == contents(lane(6))
+
+
+@pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo])
+def test_what_is_no_file_is_not_in_the_way_of_a_write(written, make):
+    make(written / "robot.ledger.new")
+    found = load(written)
+    assert contents(found.ledger) == contents(lane(4))
+    assert "robot.ledger.new: no plain file" in str(found.fault)
+    LedgerFile(written, "robot").write(lane(6))
+    assert contents(load(written).ledger) == contents(lane(6))
+
+
+def test_a_pipe_in_place_of_the_lock_holds_nobody_up(tmp_path):
+    os.mkfifo(tmp_path / "robot.ledger.lock")
+    first, second = LedgerFile(tmp_path, "robot"), LedgerFile(tmp_path, "robot")
+    first.lock()
+    with pytest.raises(LedgerFileError, match="another daemon"):
+        second.lock()
 
 
 def test_nothing_kept_aside_overwrites_another(written):

@@ -139,7 +139,8 @@ class LedgerFile:
     def _take_lock(self) -> None:
         make_folder(self.path.parent)
         # Not open for writing: that would keep the disk from turning read-only.
-        lock = open_own(f"{self.path}.lock", os.O_RDONLY)
+        # Whatever lies under its name: to open a pipe would wait for somebody who writes to it.
+        lock = open_own(f"{self.path}.lock", os.O_RDONLY | os.O_NONBLOCK)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
@@ -214,9 +215,6 @@ def _reasons(broken: dict[Path, str]) -> str:
 
 
 def _read(path: Path) -> bytes:
-    # Anything but a plain file might keep the reader waiting.
-    if path.exists() and not path.is_file():
-        raise LedgerFileError("no plain file")
     payload = read_own(path, MOST_BYTES + 1)
     if len(payload) > MOST_BYTES:
         raise LedgerFileError(f"over {MOST_BYTES} bytes")
