@@ -17,7 +17,7 @@ from importlib import import_module
 from fasaco_edge import __version__
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, with_negative_pairs
 from fasaco_edge.cli.console.logs import begin_logging, say_why
-from fasaco_edge.cli.console.streams import clean_streams
+from fasaco_edge.cli.console.streams import clean_streams, open_missing_streams
 from fasaco_edge.errors import BadConfiguration, DiskFailed, FasacoError
 from fasaco_edge.host.processes import end_with_parent
 
@@ -58,6 +58,7 @@ def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
     """Run the command that ``parser`` finds in ``words``; report errors; return the exit code."""
     # Whatever the caller's mask is: what is written here, no other user may change.
     os.umask(os.umask(0o022) | 0o022)
+    open_missing_streams()
     clean_streams()
     args = parser.parse_args(with_negative_pairs(words))
     begin_logging(args.log_level)

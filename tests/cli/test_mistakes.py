@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
+import sys
 import time
 
 import numpy as np
@@ -146,6 +147,22 @@ def test_a_mistake_ends_a_process_in_order(folder):
     assert ended.out == ""
     assert ended.err.startswith("fasaco-edge: no map 'nowhere.yaml'")
     assert "  hint: " in ended.err
+
+
+def test_no_file_gets_the_number_of_a_stream_that_the_caller_closed(folder):
+    code = """
+import os, sys
+from fasaco_edge.cli.console.streams import open_missing_streams
+open_missing_streams()
+print("said"), print("said", file=sys.stderr), sys.stdout.flush(), sys.stdin.read()
+sys.exit(os.open("good.npy", os.O_RDONLY))
+"""
+    for closed in ("<&-", ">&-", "2>&-", "<&- >&- 2>&-"):
+        words = ["sh", "-c", f'exec "$@" {closed}', "sh", sys.executable, "-c", code]
+        ended = subprocess.run(
+            words, check=False, stdin=subprocess.DEVNULL, capture_output=True, env=ENVIRONMENT
+        )
+        assert ended.returncode > 2, ended
 
 
 def test_a_full_disk_is_named(capsys, folder):

@@ -6,6 +6,7 @@ escapes of their own, through ``cli.console.terminal``.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterable
 from io import TextIOWrapper
@@ -33,6 +34,21 @@ class CleanStream:
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever the stream has
         return getattr(self.rich_proxied_file, name)
+
+
+def open_missing_streams() -> None:
+    """Stand in for standard streams that the caller has closed.
+
+    Else the next file or socket that is opened has a stream's number, and gets what is printed.
+    """
+    for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
+        try:
+            os.fstat(number)
+        except OSError:
+            # It gets the lowest number that is free, which is this one.
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
 
 
 def clean_streams() -> None:
