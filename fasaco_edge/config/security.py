@@ -289,7 +289,7 @@ def _missing(security: SecurityConfig, listen: Sequence[str]) -> Iterator[BadCon
 
 def _read(name: str, file: str) -> str:
     try:
-        return Path(file).read_text(encoding="utf-8")
+        return read_bounded(Path(file))
     except OSError as error:
         raise BadConfiguration(f"bus.security.{name}: {file}: {error.strerror}") from error
     except ValueError as error:

@@ -6,6 +6,9 @@ into other types, are refused.
 
 from __future__ import annotations
 
+import os
+import select
+import time
 from pathlib import Path
 
 import yaml
@@ -15,6 +18,8 @@ MOST_VALUES = 50_000
 MOST_DEPTH = 32
 # Most digits of an integer: Python refuses to show those of 4300 digits.
 MOST_DIGITS = 100
+# So long a pipe may take [s]: a daemon that reads its configuration again does nothing meanwhile.
+PIPE_S = 5.0
 
 
 class PlainYamlError(ValueError):
@@ -28,8 +33,20 @@ def read_bounded(path: Path) -> str:
         OSError: it cannot be read.
         PlainYamlError: it is longer than ``MOST_BYTES``, or no UTF-8.
     """
-    with path.open("rb") as file:
-        content = file.read(MOST_BYTES + 1)
+    content = b""
+    # To open a pipe that nobody writes to would wait for ever, as would to read one.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        until = time.monotonic() + PIPE_S
+        while len(content) <= MOST_BYTES:
+            if not select.select([descriptor], [], [], max(until - time.monotonic(), 0.0))[0]:
+                raise PlainYamlError(f"nobody wrote its end into the pipe within {PIPE_S:g} s")
+            piece = os.read(descriptor, MOST_BYTES + 1 - len(content))
+            if not piece:
+                break
+            content += piece
+    finally:
+        os.close(descriptor)
     if len(content) > MOST_BYTES:
         raise PlainYamlError(f"more than {MOST_BYTES} bytes")
     try:

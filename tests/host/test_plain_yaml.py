@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import threading
 
 import pytest
 
+from fasaco_edge.host import plain_yaml
 from fasaco_edge.host.plain_yaml import (
     MOST_BYTES,
     MOST_DEPTH,
@@ -65,6 +68,18 @@ def test_what_is_not_plain_is_named(text, said):
         load(text)
     assert said in str(refused.value)
     assert len(str(refused.value)) < 1000
+
+
+def test_a_pipe_is_read_to_its_end_and_not_waited_for_for_ever(tmp_path, monkeypatch):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=pipe.write_text, args=["a: 1"])
+    writer.start()
+    assert read_bounded(pipe) == "a: 1"
+    writer.join()
+    monkeypatch.setattr(plain_yaml, "PIPE_S", 0.1)
+    with pytest.raises(PlainYamlError, match=r"nobody wrote its end into the pipe within 0\.1 s"):
+        read_bounded(pipe)
 
 
 def test_what_laughs_takes_no_memory():

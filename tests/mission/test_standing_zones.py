@@ -1,5 +1,7 @@
 """Standing zones of the configuration: orders name them, and every mission keeps out."""
 
+import time
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -128,11 +130,19 @@ def test_masks_that_are_none_are_refused(tmp_path):
     with pytest.raises(BadConfiguration, match=r"mission\.keep_out_mask: .*mask\.yaml"):
         inline_mask(tmp_path / "mask.yaml", 65)
     stripes = np.indices((64, 200)).sum(axis=0) % 2 == 0
-    with pytest.raises(BadConfiguration, match="take 6400 rectangles, at most 2000"):
+    with pytest.raises(BadConfiguration, match="take more than 2000 rectangles"):
         inline_mask(mask_file(tmp_path, stripes), 65)
     for wrong in ("mask:", "mask:{}", 'mask:{"geometry":[9,9,1,0,0,0],"deflated":"!"}'):
         with pytest.raises(BadConfiguration, match="not a mask"):
             mask_polygons(wrong)
+
+
+def test_a_picture_that_is_no_mask_is_refused_before_it_holds_a_reload_up(tmp_path):
+    noise = np.indices((1500, 1500)).sum(axis=0) % 2 == 0
+    began = time.process_time()
+    with pytest.raises(BadConfiguration, match="take more than 2000 rectangles"):
+        inline_mask(mask_file(tmp_path, noise), 65)
+    assert time.process_time() - began < 5.0
 
 
 def test_cells_inside_small_polygons_are_those_of_the_whole_window():

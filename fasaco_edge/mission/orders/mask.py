@@ -45,11 +45,10 @@ def inline_mask(file: Path, occupied_at_least: int) -> str:
     except MapFileError as error:
         raise BadConfiguration(f"mission.keep_out_mask: {error}") from error
     kept_out = grid.cells >= occupied_at_least
-    count = len(_rectangles(kept_out))
-    if count > MOST_RECTANGLES:
+    if len(_rectangles(kept_out)) > MOST_RECTANGLES:
         raise BadConfiguration(
-            f"mission.keep_out_mask: {file}: its outlines take {count} rectangles, at most "
-            f"{MOST_RECTANGLES}",
+            f"mission.keep_out_mask: {file}: its outlines take more than {MOST_RECTANGLES} "
+            "rectangles",
             hint="draw with straight edges, or larger pixels; or give mission.keep_out polygons",
         )
     place = grid.geometry
@@ -79,6 +78,9 @@ def mask_polygons(inline: str) -> tuple[Polygon, ...]:
         if len(bits) != -(-rows * cols // 8):
             raise ValueError(f"{rows} x {cols} pixels in {len(bits)} bytes")
         kept_out = np.unpackbits(bits, count=rows * cols).reshape(rows, cols).astype(bool)
+        rectangles = _rectangles(kept_out)
+        if len(rectangles) > MOST_RECTANGLES:
+            raise ValueError(f"more than {MOST_RECTANGLES} rectangles")
     except (msgspec.DecodeError, binascii.Error, zlib.error, ValueError) as error:
         raise BadConfiguration(f"mission.keep_out_mask: not a mask: {error}") from error
     geometry = GridGeometry(rows, cols, resolution, Pose2D(x, y, yaw))
@@ -87,24 +89,27 @@ def mask_polygons(inline: str) -> tuple[Polygon, ...]:
             geometry.to_map(col, row)
             for col, row in ((col0, row0), (col1, row0), (col1, row1), (col0, row1))
         )
-        for row0, col0, row1, col1 in _rectangles(kept_out)
+        for row0, col0, row1, col1 in rectangles
     )
 
 
 def _rectangles(marked: NDArray[np.bool_]) -> list[tuple[int, int, int, int]]:
     """Return row0, col0, row1, col1 of rectangles that are all that is marked, bool (rows, cols).
 
-    Equal stretches of rows that follow each other are one.
+    Equal stretches of rows that follow each other are one. Of more than ``MOST_RECTANGLES`` not
+    all are returned: a picture that is no mask must hold nobody up.
     """
     found: list[tuple[int, int, int, int]] = []
     open_since: dict[tuple[int, int], int] = {}
     for row in range(len(marked) + 1):
-        stretches: list[tuple[int, int]] = []
+        stretches: dict[tuple[int, int], None] = {}
         if row < len(marked) and marked[row].any():
             borders = np.flatnonzero(np.diff(marked[row].astype(np.int8), prepend=0, append=0))
-            stretches = [(int(low), int(high)) for low, high in borders.reshape(-1, 2)]
+            stretches = {(int(low), int(high)): None for low, high in borders.reshape(-1, 2)}
         for ended in [stretch for stretch in open_since if stretch not in stretches]:
             found.append((open_since.pop(ended), ended[0], row, ended[1]))
         for stretch in stretches:
             open_since.setdefault(stretch, row)
+        if len(found) > MOST_RECTANGLES:
+            break
     return found
