@@ -135,6 +135,17 @@ def shifted(grid, by_m):
     return OccupancyGrid(replace(grid.geometry, origin=origin), grid.cells)
 
 
+def test_a_pose_that_jumps_within_reach_searches_nothing():
+    """Each of a burst searched the whole lattice, and compared it with itself."""
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(room(3.0, 2.4)))
+    area, robot.at = robot.mission._map.area, (START[0] + 1.5, START[1])
+    robot.tell()
+    assert area is not None
+    assert robot.mission._map.area is area
+    assert not area.change_since(area)
+
+
 def test_a_room_is_swept_to_its_rim():
     grid = room(3.0, 2.4)
     robot = Robot(Mission(CONFIG))

@@ -183,7 +183,9 @@ class MapState:
         if cell is None or self.lattice is None:
             return
         change = self._ground.change
-        if before is None or change is None or change.after is not self.lattice:
+        if before is not None and before.lattice is self.lattice and before.contains(cell):
+            self.area = before  # as after each jump of a pose: steps lead there and back
+        elif before is None or change is None or change.after is not self.lattice:
             self.area = ReachableArea.around(self.lattice, cell)
         else:
             self.area = before.updated(change, cell)

@@ -89,6 +89,8 @@ class ReachableArea:
 
     def change_since(self, before: ReachableArea) -> AreaChange:
         """Compare with the area before; cells outside an array are not reachable."""
+        if before is self:
+            return AreaChange(0, 0, 0)  # as after each jump of a pose
         mine, theirs = self.lattice.window, before.lattice.window
         common = mine.intersection(theirs)
         total, total_before = np.count_nonzero(self.reachable), np.count_nonzero(before.reachable)
