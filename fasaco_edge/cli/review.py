@@ -98,7 +98,16 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--export",
         type=Path,
         metavar="DIR",
-        help="write CSV files of trail, paths, states, coverage and plots, and the map as .npz",
+        help="write tables: trail, paths and their points, plans, commands, states, coverage, "
+        "floor swept, pheromone, plots; columns.csv says what they hold, in what units; the map "
+        "as .npz",
+    )
+    parser.add_argument(
+        "--export-as",
+        choices=("csv", "parquet"),
+        default="csv",
+        help="what the tables are written as; Parquet keeps types and describes its columns itself "
+        "(default: %(default)s)",
     )
     parser.add_argument("--view", action="store_true", help="open the recording in Rerun's viewer")
 
@@ -137,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
         from fasaco_edge.review.export import export
 
         with writing(args.export):
-            export(review, args.export)
+            export(review, args.export, args.export_as)
     if args.view:
         from fasaco_edge.recording.read.repair import view
 

@@ -1,109 +1,110 @@
-"""A review as files for other programs: CSV with one header line, and NumPy arrays."""
+"""A review as files for other programs: CSV or Parquet, each column described, and NumPy arrays."""
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from msgspec.structs import astuple
 from numpy.typing import NDArray
 
-from fasaco_edge.review.panels import covered_share
+from fasaco_edge.recording.arrow import pa
 from fasaco_edge.review.review import Review
+from fasaco_edge.review.tables import Column, Table, tables_of
 from fasaco_edge.text import one_line
 
 FORMULA = re.compile(r"[=@]|[+-](?![\d.]+(e[+-]?\d+)?\Z)")
-PATH_COLUMNS = (
-    *("at_s", "revision", "steps", "planner", "plan_ms"),
-    *("planned_steps", "lower_bound_steps", "gap", "cost_s", "lower_bound_cost_s"),
-    *("x_min", "y_min", "x_max", "y_max", "reason"),
-)
+CSV, PARQUET = FORMATS = ("csv", "parquet")
+TYPES = {"float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string()}
+DESCRIPTION = "columns"
+"""The table that says what is in the others."""
 
 
-def export(review: Review, folder: Path) -> None:
+def export(review: Review, folder: Path, form: str = CSV) -> None:
     """Write all series of a review into ``folder``, which is made if missing.
 
-    =============  =======================================================================
-    trail.csv      each pose [m, rad]
-    paths.csv      each published path, and the rectangle in which the map had changed [m]
-    plans.csv      each plan that was made, also those that became no path
-    states.csv     the states of the mission
-    coverage.csv   covered share of the cells coverable at the end
-    plots.csv      all that was plotted: latencies, memory, fractions
-    end.npz        map int8 and its origin (x, y, yaw) and resolution_m; visits uint16 and
-                   reachable bool of the lattice with its first row, column and cell_m
-    =============  =======================================================================
+    A file for each of ``review.tables``; columns.csv, which says what they hold, in what units;
+    and end.npz: map int8 and its origin (x, y, yaw) and resolution_m; visits uint16 and reachable
+    bool of the lattice with its first row, column and cell_m.
+
+    Args:
+        review: what to write.
+        folder: where to.
+        form: CSV or PARQUET.
 
     Raises:
         OSError: a file cannot be written.
+        UnreadableRecording: a file of the recording is gone.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    for name, (columns, rows) in _tables(review).items():
-        with (folder / f"{name}.csv").open("w", encoding="utf-8", newline="") as target:
-            writer = csv.writer(target)
-            writer.writerow(columns)
-            writer.writerows([_cell(value) for value in row] for row in rows)
+    described = []
+    for table in tables_of(review):
+        file = folder / f"{table.name}.{form}"
+        if form == CSV:
+            _write_csv(table, file)
+        else:
+            _write_parquet(table, file)
+        described += [(file.name, table.about, *column) for column in table.columns]
+    columns = (
+        Column("file", "text", "", "its name"),
+        Column("row", "text", "", "what one of its rows is"),
+        Column("column", "text", "", "its name"),
+        Column("type", "text", "", "float, int, bool or text"),
+        Column("unit", "text", "", "of its values"),
+        Column("description", "text", "", "what it is"),
+    )
+    # Also beside Parquet: to be read by people.
+    _write_csv(Table(DESCRIPTION, "", columns, described), folder / f"{DESCRIPTION}.csv")
     _write_arrays(review, folder / "end.npz")
 
 
-def _tables(review: Review) -> dict[str, tuple[Sequence[str], Iterable[Sequence[object]]]]:
-    """Return columns and rows of each CSV file; times are since the recording began [s]."""
-    data, none = review.data, (None,) * 4
-    return {
-        "trail": (
-            ("at_s", "x_m", "y_m", "yaw_rad"),
-            (
-                (f"{at:.6f}", f"{x:.4f}", f"{y:.4f}", f"{yaw:.5f}")
-                for at, (x, y, yaw) in zip(data.pose_s, data.poses, strict=True)
-            ),
-        ),
-        "paths": (
-            PATH_COLUMNS,
-            (
-                (
-                    *(f"{at_s:.6f}", a.revision, a.steps, a.planner, plan_ms),
-                    *(a.planned_steps, a.lower_bound_steps, a.gap),
-                    *(a.planned_cost_s, a.lower_bound_cost_s),
-                    *(astuple(a.changed) if a.changed else none),
-                    a.reason,
-                )
-                for at_s, a, plan_ms in ((p.at_s, p.about, p.plan_ms) for p in data.paths)
-            ),
-        ),
-        "plans": (
-            ("at_s", "took_ms", "attempt", "used", "reason"),
-            (
-                (f"{p.at_s:.6f}", f"{p.took_ms:.3f}", int(p.is_attempt), int(p.is_used), p.reason)
-                for p in data.plan_log.plans
-            ),
-        ),
-        "states": (
-            ("begin_s", "end_s", "state", "reason"),
-            ((f"{s.begin_s:.6f}", f"{s.end_s:.6f}", s.name, s.reason) for s in review.states),
-        ),
-        "coverage": (
-            ("at_s", "share"),
-            (
-                (f"{at:.6f}", f"{share:.6f}")
-                for at, share in zip(*covered_share(review), strict=True)
-            ),
-        ),
-        "plots": (
-            ("at_s", "name", "value"),
-            (
-                (f"{at:.6f}", name, f"{value:.9g}")
-                for name, points in sorted(review.record.plots.items())
-                for at, value in points.tolist()
-            ),
-        ),
-    }
+def _write_csv(table: Table, file: Path) -> None:
+    with file.open("w", encoding="utf-8", newline="") as target:
+        writer = csv.writer(target)
+        writer.writerow(column.name for column in table.columns)
+        writer.writerows([_cell(value) for value in row] for row in table.rows)
+
+
+def _write_parquet(table: Table, file: Path) -> None:
+    from pyarrow import parquet  # noqa: PLC0415
+
+    schema = pa.schema(
+        [
+            pa.field(
+                column.name,
+                TYPES[column.kind],
+                metadata={"unit": column.unit, "description": column.about},
+            )
+            for column in table.columns
+        ],
+        metadata={"description": table.about},
+    )
+    with parquet.ParquetWriter(file, schema) as writer:
+        rows: list[Sequence[object]] = []
+        for row in table.rows:
+            rows.append([one_line(value) if isinstance(value, str) else value for value in row])
+            if len(rows) == ROWS:
+                writer.write_batch(_batch(rows, schema))
+                rows = []
+        writer.write_batch(_batch(rows, schema))
+
+
+# So many are held in memory.
+ROWS = 50_000
+
+
+def _batch(rows: list[Sequence[object]], schema: pa.Schema) -> pa.RecordBatch:
+    values = zip(*rows, strict=True) if rows else ((),) * len(schema)
+    arrays = [pa.array(column, kind) for column, kind in zip(values, schema.types, strict=True)]
+    return pa.record_batch(arrays, schema=schema)
 
 
 def _cell(value: object) -> object:
     """Return a value that no spreadsheet takes for a formula, unless it is a number."""
+    if isinstance(value, bool):
+        return int(value)
     text = one_line(value) if isinstance(value, str) else value
     return f"'{text}" if isinstance(text, str) and FORMULA.match(text) else text
 

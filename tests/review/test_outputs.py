@@ -15,12 +15,14 @@ from PIL import Image
 
 pytest.importorskip("rerun")
 
+from pyarrow import parquet
+
 from fasaco_edge.cli import main
 from fasaco_edge.cli.review import print_review
 from fasaco_edge.drawing import palette
 from fasaco_edge.grid.geometry import FARTHEST_M, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.review.export import export
+from fasaco_edge.review.export import FORMATS, export
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.page import page_of
@@ -33,6 +35,10 @@ from tests.review.test_parts import run_told
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge
 from tests.support.reviews import document
 
+TABLES = (
+    *("trail", "paths", "path_points", "plans", "commands", "states", "coverage", "plots"),
+    *("floor", "pheromone"),
+)
 VOID = ("meta", "img")
 
 
@@ -257,10 +263,7 @@ def test_the_command_writes_them(parts, tmp_path):
         assert image.size == SIZE
     assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
     names = {file.name for file in folder.iterdir()}
-    assert names == {
-        *(f"{name}.csv" for name in ("trail", "paths", "plans", "states", "coverage", "plots")),
-        "end.npz",
-    }
+    assert names == {*(f"{name}.csv" for name in (*TABLES, "columns")), "end.npz"}
 
 
 def test_exported_files_hold_what_was_driven(parts, tmp_path):
@@ -279,6 +282,38 @@ def test_exported_files_hold_what_was_driven(parts, tmp_path):
         assert visits[1 - row0, 1 - col0 : 5 - col0].tolist() == [1, 2, 2, 1]
         assert visits.sum() == 6
         assert arrays["reachable"].sum() == 24
+
+
+def test_parquet_holds_the_same_as_csv_and_describes_itself(parts, tmp_path):
+    review = read_review(parts)
+    for form in FORMATS:
+        export(review, tmp_path / form, form)
+    with (tmp_path / "csv" / "columns.csv").open(encoding="utf-8") as file:
+        described = {(row["file"], row["column"]): row for row in csv.DictReader(file)}
+    for name in TABLES:
+        table = parquet.read_table(tmp_path / "parquet" / f"{name}.parquet")
+        with (tmp_path / "csv" / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        assert len(rows) == table.num_rows
+        for field in table.schema:
+            unit = field.metadata[b"unit"].decode()
+            told = described[f"{name}.csv", field.name]
+            assert (told["unit"], told["description"]) == (
+                unit,
+                field.metadata[b"description"].decode(),
+            )
+            values = table.column(field.name).to_pylist()
+            assert [_as_csv(value) for value in values] == [row[field.name] for row in rows]
+    floor = parquet.read_table(tmp_path / "parquet" / "floor.parquet").to_pydict()
+    swept = np.array(floor["area_m2"])[np.array(floor["swept"])]
+    assert swept.sum() == pytest.approx(review.floor.figures.swept_m2, abs=0.01)
+    points = parquet.read_table(tmp_path / "parquet" / "path_points.parquet").to_pydict()
+    assert set(points["revision"]) <= {path.about.revision for path in review.data.paths}
+    assert points["number"][:2] == [0, 1]
+
+
+def _as_csv(value):
+    return "" if value is None else str(int(value) if isinstance(value, bool) else value)
 
 
 @pytest.mark.parametrize("option", ["--png", "--html"])

@@ -6,7 +6,7 @@ What a review does not need for its figures: it is read when somebody asks for i
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +83,8 @@ def drawings(paths: Sequence[Path], *wanted: str) -> Iterator[tuple[str, Drawn]]
 def _drawn(chunk: Chunk, anchor: NDArray[np.float64]) -> Iterator[Drawn]:
     batch, times = chunk.batch, wall_ns(chunk.batch)
     if chunk.entity == entities.PHEROMONE:
-        yield from fields_in(batch, times)
+        x, y = anchor.tolist()
+        yield from (replace(field, anchor=(x, y)) for field in fields_in(batch, times))
     elif (strips := column(batch, "LineStrips3D:strips", _STRIPS)) is not None:
         numbers = [0] * len(times)
         if entities.REPLAN in batch.schema.names:

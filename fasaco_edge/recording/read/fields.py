@@ -28,11 +28,15 @@ class DrawnField:
     Attributes:
         at_ns: when, by the recorder's clock [ns].
         window: the cells it spans, as it was drawn: relative to where 0 was.
+        cell_m: edge of a cell [m].
+        anchor: where 0 was, (x, y) [m] in the map frame, for those who know.
     """
 
     at_ns: int
     window: Window
     _packed: bytes
+    cell_m: float
+    anchor: tuple[float, float] = (0.0, 0.0)
 
     @property
     def levels(self) -> NDArray[np.uint8]:
@@ -62,7 +66,7 @@ def fields_in(batch: pa.RecordBatch, times: list[int]) -> Iterator[DrawnField]:
         corner = Window(0, 0, *shape).moved(round(y / cell_m), round(x / cell_m))
         # An image's row 0 is its top.
         upright = np.ascontiguousarray(levels.reshape(shape)[::-1])
-        yield DrawnField(at_ns, corner, zlib.compress(upright.data, 1))
+        yield DrawnField(at_ns, corner, zlib.compress(upright.data, 1), cell_m)
 
 
 @dataclass(slots=True)
