@@ -134,7 +134,11 @@ class Claim:
 
 
 class NameClaim(Claim):
-    """The claim of this daemon, and its token on the bus."""
+    """The claim of this daemon, and its token on the bus.
+
+    Attributes:
+        is_settled: whether it is known that a daemon of this name plans.
+    """
 
     def __init__(self, bus: Bus, keys: Keys) -> None:
         super().__init__(bus.id)
@@ -144,7 +148,7 @@ class NameClaim(Claim):
         self._token = bus.token(keys.claim(bus.id, ClaimState.WAITS))
         self._others: dict[str, ClaimState] = {}
         self._version = 0
-        self._is_settled = False
+        self.is_settled = False
         self._was_waiting = False
 
     def report(self) -> ClaimReport:
@@ -163,7 +167,7 @@ class NameClaim(Claim):
         """
         before = self.state
         in_touch = self._bus.keep_in_touch(now)
-        is_settled = self._is_settled and not self.is_uncertain(now)
+        is_settled = self.is_settled and not self.is_uncertain(now)
         self._roll.ask(ASK_PERIOD_S if is_settled else 0.0)
         if not self._roll.version:
             return False
@@ -172,7 +176,7 @@ class NameClaim(Claim):
             self._others = claims_in(self._roll.there())
             self._others.pop(self._bus.id, None)
             # If none plans, one soon will.
-            self._is_settled = ClaimState.PLANS in (self.state, *self._others.values())
+            self.is_settled = ClaimState.PLANS in (self.state, *self._others.values())
         self.decide(self._others, now, in_touch=in_touch)
         if self.rival_yielded:
             LOG.warning("another daemon of this name was planning, too, and has yielded")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import pytest
 
@@ -39,6 +40,21 @@ def test_it_is_small(waiting):
     resident = resident_mb(waiting.pid)
     print(f"idle: {resident:.1f} MB")
     assert resident < IDLE_MB
+
+
+def wakes(pid):
+    """How often its main thread has waited for something."""
+    lines = Path(f"/proc/{pid}/task/{pid}/status").read_text().splitlines()
+    (line,) = (line for line in lines if line.startswith("voluntary_ctxt_switches"))
+    return int(line.split()[1])
+
+
+def test_it_sleeps(waiting):
+    before, since = wakes(waiting.pid), time.monotonic()
+    time.sleep(4.0)
+    each_s = (wakes(waiting.pid) - before) / (time.monotonic() - since)
+    print(f"idle: wakes {each_s:.1f} times a second")
+    assert each_s < 5.0
 
 
 def test_poses_and_broken_samples_do_not_wake_it(waiting):

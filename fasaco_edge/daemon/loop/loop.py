@@ -42,7 +42,8 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-TICK_S = 0.1
+# How long a cycle waits for samples [s]: with a mission, and before the first map.
+TICK_S, IDLE_TICK_S = 0.1, 0.5
 # A mission that fails again within this time [s] failed on the map it has.
 SOON_S = 60.0
 
@@ -97,9 +98,14 @@ class Loop:
         """Run cycles until ``stop`` is set."""
         while not stop.is_set():
             if self._follow_claim(time.monotonic()):
-                self._cycle(take_batch(self._bus.mailbox, TICK_S))
+                self._cycle(take_batch(self._bus.mailbox, self._tick_s()))
             else:
                 stop.wait(TICK_S)
+
+    def _tick_s(self) -> float:
+        runner = self._runner
+        is_idle = runner.mission is None and not runner.loading and self._bus.claim.is_settled
+        return IDLE_TICK_S if is_idle else TICK_S
 
     def _cycle(self, batch: Batch) -> None:
         taken = time.monotonic()
