@@ -76,7 +76,8 @@ class Mailbox(Generic[Item]):
     """Collects items of several kinds until the loop takes them all.
 
     Of a kind only the newest is kept, unless it has a queue in ``queued``; ``size_of`` returns
-    the size of an item [bytes].
+    the size of an item [bytes]. ``on_lost`` is called with each item that a full queue drops, on
+    the thread that has posted too many.
     """
 
     def __init__(
@@ -84,6 +85,7 @@ class Mailbox(Generic[Item]):
         queued: Mapping[str, Queue],
         spacing: Spacing | None = None,
         size_of: Callable[[Item], int] = lambda _: 0,
+        on_lost: Callable[[Item], None] = lambda _: None,
     ) -> None:
         self._changed = threading.Condition()
         self._newest: dict[str, Item] = {}
@@ -91,6 +93,7 @@ class Mailbox(Generic[Item]):
         self._bounds = dict(queued)
         self._sizes = dict.fromkeys(queued, 0)
         self._size_of = size_of
+        self._on_lost = on_lost
         self._lost = dict.fromkeys(queued, 0)
         # How many of a kind have left their queue, and for which of another kind each item waits.
         self._gone = dict.fromkeys(queued, 0)
@@ -100,11 +103,17 @@ class Mailbox(Generic[Item]):
 
     def post(self, kind: str, item: Item) -> None:
         """Leave an item; safe from any thread."""
+        for lost in self._post(kind, item):
+            self._on_lost(lost)
+
+    def _post(self, kind: str, item: Item) -> list[Item]:
+        """Leave an item; return those that its queue drops."""
+        dropped: list[Item] = []
         with self._changed:
             if kind not in self._queued:
                 self._newest[kind] = item
                 self._changed.notify()
-                return
+                return dropped
             queue = self._queued[kind]
             # The first item that is held back wakes a waiting reader; the others need not.
             if not queue or kind not in self._held(time.monotonic()):
@@ -118,8 +127,9 @@ class Mailbox(Generic[Item]):
             while len(queue) > bounds.length or (
                 len(queue) > 1 and self._sizes[kind] > bounds.size
             ):
-                self._pop(kind)
+                dropped.append(self._pop(kind))
                 self._lost[kind] += 1
+        return dropped
 
     def take(self, timeout_s: float) -> list[tuple[str, Item]]:
         """Return what there is as (kind, item); wait up to ``timeout_s`` [s] for it.

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import gc
+import json
 import weakref
 
 import pytest
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.queries import Question
+from fasaco_edge.bus.queries import Question, Reply
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.daemon.loop.answers import Commands
 from fasaco_edge.daemon.loop.inbox import (
     MOST_POSES,
     Inbox,
@@ -31,6 +33,8 @@ from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
+from fasaco_edge.wire.topics import QUEUE_LENGTHS
+from tests.support.outsider import TIMEOUT_S, open_client
 from tests.support.processes import free_endpoint
 from tests.support.rooms import (
     RADIUS_M,
@@ -240,3 +244,22 @@ def test_a_broken_sample_is_held_by_nothing(arrivals, kind):
         assert error() is None
     finally:
         gc.enable()
+
+
+def test_a_command_that_others_push_out_is_answered(arrivals):
+    endpoint, most = free_endpoint(), QUEUE_LENGTHS["command"]
+    key = "fasaco/@v1/robot/@rpc/mission"
+    with open_bus(BusSettings("peer", (), (endpoint,))) as bus:
+        Commands(bus, Keys(), arrivals.mailbox)
+        session = open_client(endpoint)
+        try:
+            asked = [session.get(key, timeout=TIMEOUT_S) for _ in range(most + 1)]
+            (reply,) = asked[0]
+            assert reply.err is not None
+            assert json.loads(reply.err.payload.to_bytes())["code"] == "not_now"
+            for _ in range(most):
+                (question,) = take_batch(arrivals.mailbox, 10.0).questions
+                question.answer(Reply(b"{}"))
+            assert [one.ok is not None for replies in asked[1:] for one in replies] == [True] * most
+        finally:
+            session.close()

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Spacing
-from fasaco_edge.bus.queries import Question
+from fasaco_edge.bus.queries import Question, Reply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.memory import most_bytes, queues
-from fasaco_edge.errors import FasacoError, MalformedMessage, MapTooLarge
+from fasaco_edge.errors import CommandError, FasacoError, MalformedMessage, MapTooLarge
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import (
     Event,
@@ -28,6 +28,7 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.poses import PoseDecoder
+from fasaco_edge.wire.replies import encode_error
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.fleet import FleetEar
@@ -131,7 +132,14 @@ def make_mailbox(
     bounds = queues(max_pixels)
     bounds["pose"] = replace(bounds["pose"], at_once=most_poses)
     bounds["command"] = replace(bounds["command"], at_once=MOST_COMMANDS, after="pose")
-    return Mailbox(bounds, spacing, _size_of)
+    return Mailbox(bounds, spacing, _size_of, _refuse)
+
+
+def _refuse(lost: object) -> None:
+    """Answer a command that too many others have pushed out; who waits must not take it as done."""
+    if isinstance(lost, Question):
+        error = CommandError("too many commands at once: not carried out", hint="ask again")
+        lost.answer(Reply(encode_error(error), is_error=True))
 
 
 def _size_of(item: object) -> int:
