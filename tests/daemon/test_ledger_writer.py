@@ -19,6 +19,7 @@ from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.daemon.ledger.writer import (
     FLOOR_PERIOD_S,
+    HANGS_S,
     PERIOD_S,
     LedgerKeeper,
     LedgerWriter,
@@ -226,6 +227,10 @@ def test_a_disk_that_hangs_holds_nobody_up(tmp_path, caplog, retry_soon):
     for length in range(1, 10):
         writer.put(lane(length))
         document(writer)
+    now = time.monotonic()
+    for later in (now + HANGS_S, now + 2 * HANGS_S):
+        assert "the disk has hung for 10 s or more" in str(writer.report(later).fault)
+    assert len(writer.take_faults()) == 1
     writer.close(0.1)
     assert "the disk is too slow" in caplog.text
     os.close(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK))  # so that the thread can end

@@ -35,6 +35,8 @@ FLOOR_PERIOD_S = 1.0
 RETRY_S = 2.0
 # How long the answer to a command waits for a slow disk [s].
 MOST_WAIT_S = 1.0
+# A disk that has not taken a ledger for so long hangs [s]; memory cards pause for some.
+HANGS_S = 10.0
 
 
 class _Kept(NamedTuple):
@@ -180,6 +182,9 @@ class LedgerWriter:
         self._faults = deque[FasacoError]()
         # Why it cannot write now; what was wrong with the files at the start.
         self._trouble, self._finding = "", ""
+        # Since when it writes; whether it was said that this hangs.
+        self._writes_since: float | None = None
+        self._is_hang_told = False
         if found.fault is not None:
             self._finding = log_fault(LOG, found.fault)
             self._faults.append(found.fault)
@@ -220,12 +225,26 @@ class LedgerWriter:
     def report(self, now: float) -> LedgerReport:
         """Return this part of the status; ``now`` is monotonic time [s]."""
         written_at = self._written_at
+        hangs = self._hang(now)
         return LedgerReport(
             path=str(self._file.path),
             age_s=None if written_at is None else round(max(now - written_at, 0.0), 3),
             restored_cells=self._restored_cells,
-            fault=self._trouble or self._finding or None,
+            fault=hangs or self._trouble or self._finding or None,
         )
+
+    def _hang(self, now: float) -> str:
+        """Return that the disk does not take a ledger, "" where it does; count that once."""
+        since = self._writes_since
+        if since is None or now - since < HANGS_S:
+            self._is_hang_told = False
+            return ""
+        fault = _cannot_write(self._file, OSError(f"the disk has hung for {HANGS_S:g} s or more"))
+        if not self._is_hang_told:
+            self._is_hang_told = True
+            self._faults.append(fault)
+            log_fault(LOG, fault)
+        return fault_text(fault)
 
     def close(self, timeout_s: float) -> None:
         """Write what is left and end the thread, within ``timeout_s`` [s]."""
@@ -245,7 +264,9 @@ class LedgerWriter:
                 else:
                     self._changed.wait_for(lambda: self._stopping or self._has_work())
                 ledger, unwanted, stopping = self._waiting, self._unwanted[:], self._stopping
+            self._writes_since = time.monotonic()
             failed = not self._work(ledger, unwanted)
+            self._writes_since = None
             with self._changed:
                 if stopping and (failed or not self._has_work()):
                     return
