@@ -85,6 +85,9 @@ def test_another_robots_recordings_and_links_are_left_alone(tmp_path):
 
 def test_a_folder_that_is_not_there_yet_and_one_that_cannot_be_read(tmp_path, monkeypatch):
     assert next_run(tmp_path / "none", "maja", LAST_WEEK) == "run00001-20261120T100000Z-maja"
+    # A number of ten digits would be found by nobody.
+    (tmp_path / "run999999999-x.rrd").touch()
+    assert next_run(tmp_path, "maja", LAST_WEEK) == "run00001-20261120T100000Z-maja"
 
     def refuse(_folder: object) -> list[str]:
         raise PermissionError(13, "Permission denied")

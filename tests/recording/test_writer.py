@@ -17,7 +17,12 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.quota import DiskBudget, Quota
-from fasaco_edge.recording.write.writer import FLUSH_PERIOD_NS, RecordingWriter, WriterState
+from fasaco_edge.recording.write.writer import (
+    FLUSH_PERIOD_NS,
+    RETRY_PERIOD_NS,
+    RecordingWriter,
+    WriterState,
+)
 from tests.support.recordings import read_column, read_summary
 
 RUN = "run-1"
@@ -137,6 +142,33 @@ def test_no_part_is_written_below_the_floor(tmp_path):
     (part,) = tmp_path.glob("*.rrd")
     assert read_summary(part).complete
     assert writer.close()
+
+
+@pytest.mark.parametrize("least_free_bytes", [0, 1000])
+def test_a_part_that_somebody_deletes_is_told_and_followed_by_another(
+    tmp_path, caplog, least_free_bytes
+):
+    clock, folder = Clock(), tmp_path / "runs"
+    writer = writer_in(folder, least_free_bytes=least_free_bytes)
+
+    def write_and(delete, path):
+        writer.message(clock.now_ns)
+        writer.log("noise", noise(1), latched=True)
+        delete(path)
+        writer.sync(clock.tick())
+
+    write_and(os.unlink, writer.path)
+    assert (writer.part_number, writer.lost, writer.state) == (2, 1, WriterState.RECORDING)
+    assert "part1.rrd was deleted while it was written, with 1 samples" in caplog.text
+    write_and(shutil.rmtree, folder)
+    assert (writer.lost, writer.state) == (2, WriterState.DISK_FULL)
+    assert "runs" in writer.reason
+    folder.mkdir()
+    writer.sync(clock.tick() + RETRY_PERIOD_NS)
+    assert writer.state is WriterState.RECORDING
+    assert writer.close()
+    (part,) = folder.glob("*.rrd")
+    assert read_summary(part).rows["noise"] == 1
 
 
 def test_a_stalled_disk_is_told_and_taken_up_again(tmp_path):

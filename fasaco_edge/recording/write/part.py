@@ -102,6 +102,11 @@ class Part:
         """Size of the file so far [bytes]."""
         return os.fstat(self._lock).st_size
 
+    @property
+    def is_deleted(self) -> bool:
+        """Whether the file has lost its last name: what is written to it is gone at its end."""
+        return os.fstat(self._lock).st_nlink == 0
+
     def write_blob(self, blob: bytes, wall_ns: int) -> None:
         """Write bytes at ``wall_ns`` [ns], past what gathers."""
         time = rr.TimeColumn(entities.WALL_CLOCK, timestamp=np.array([wall_ns], "datetime64[ns]"))

@@ -21,6 +21,8 @@ from fasaco_edge.errors import BadConfiguration
 
 MEGABYTE = 1_000_000
 NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
+# No recorder has counted so far: a name with such a number is somebody else's.
+MOST_RUNS = 900_000_000
 TIME = "%Y%m%dT%H%M%SZ"
 # Free space above the minimum before recording resumes: the disk must not fill again at once.
 RESUME_BYTES = 1_000_000
@@ -39,7 +41,8 @@ def next_run(folder: Path, robot: str, began: datetime) -> str:
     except OSError as error:
         raise BadConfiguration(f"cannot record into {folder}: {error}") from error
     runs = [int(match[1]) for match in map(NUMBERED.fullmatch, names) if match]
-    return f"run{max(runs, default=0) + 1:05}-{began:{TIME}}-{robot}"
+    newest = max((number for number in runs if number < MOST_RUNS), default=0)
+    return f"run{newest + 1:05}-{began:{TIME}}-{robot}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,6 +69,7 @@ class RecordingWriter:
         self._part_until_ns: int | None = None
         self._unflushed_messages = 0
         self._unflushed_bytes = 0
+        self._part_messages = 0
         self._lost_before = 0
         self.lost = 0
         self.state = WriterState.RECORDING
@@ -115,6 +116,7 @@ class RecordingWriter:
         self.at(wall_ns)
         if self.state is WriterState.RECORDING:
             self._unflushed_messages += 1
+            self._part_messages += 1
         else:
             self.lost += 1
 
@@ -240,12 +242,23 @@ class RecordingWriter:
             self._budget.keep_quota(self._folder)
             self._part_until_ns = now_ns + round(1e9 * self._budget.part_s)
         is_old = self._budget.part_s > 0 and now_ns >= self._part_until_ns
+        is_deleted = part.is_deleted
+        if is_deleted:
+            self.lost += self._part_messages
+            LOG.warning(
+                "%s was deleted while it was written, with %d samples: the next part begins",
+                part.path.name,
+                self._part_messages,
+                extra={"event": "part_deleted"},
+            )
         if self._budget.is_full(self._folder):
             part.close()
             self._part = None
             floor_mb = self._budget.least_free_bytes / 1e6
-            self._enter(WriterState.DISK_FULL, f"less than {floor_mb:.0f} MB are free")
-        elif is_old or part.size >= self._budget.part_bytes:
+            is_there = self._folder.is_dir()
+            why = f"less than {floor_mb:.0f} MB are free" if is_there else f"no {self._folder}"
+            self._enter(WriterState.DISK_FULL, why)
+        elif is_deleted or is_old or part.size >= self._budget.part_bytes:
             try:
                 self._begin_part()
             except OSError as error:
@@ -287,7 +300,7 @@ class RecordingWriter:
             part.abandon()
             self._abandoned.append(part)
             raise OSError(f"{path.name}: {part.refused}")
-        self._part, self._part_until_ns = part, None
+        self._part, self._part_until_ns, self._part_messages = part, None, 0
         self._latched.begin(part.stream)
 
     def _enter(self, state: WriterState, reason: str) -> None:
