@@ -15,6 +15,7 @@ from msgspec import Meta, structs
 
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.config.metrics import MetricsConfig
 from fasaco_edge.config.reading import (
     Fault,
     Section,
@@ -292,6 +293,7 @@ class DaemonConfig(Section, frozen=True):
     planner: PlannerConfig = PlannerConfig()
     mission: MissionSettings = MissionSettings()
     recording: RecordingConfig = RecordingConfig()
+    metrics: MetricsConfig = MetricsConfig()
     fleet: FleetConfig | msgspec.UnsetType = msgspec.UNSET
     ros2: RosConfig | msgspec.UnsetType = msgspec.UNSET
 
@@ -417,6 +419,7 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
             f"recording.quota_mb must be 0 or at least twice recording.part_mb, {2 * part_mb}, "
             f"got {quota_mb}"
         )
+    yield from _refused("", config.metrics.address)
     if "\0" in config.mission.state_dir:
         yield BadConfiguration("mission.state_dir must be a path, got one with a NUL")
     if config.ros2:
@@ -434,4 +437,4 @@ def _refused(before: str, make: Callable[[], object]) -> Iterator[BadConfigurati
     try:
         make()
     except BadConfiguration as error:
-        yield BadConfiguration(before + str(error))
+        yield BadConfiguration(before + str(error), hint=error.hint)

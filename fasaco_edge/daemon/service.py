@@ -23,6 +23,7 @@ from fasaco_edge.daemon.loop.loop import BusPorts, Host, Loop
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.daemon.memory import afforded, needed_bytes
+from fasaco_edge.daemon.metrics import serve_metrics
 from fasaco_edge.daemon.notify import ServiceManager, Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
@@ -200,7 +201,8 @@ def _serve(
         claim=NameClaim(bus, keys),
     )
     keeper = LedgerKeeper(ledger, config.cell_m, autostart=config.mission.autostart)
-    loop = Loop(config, ports, keeper, Host(Watchdog(manager), reload, recorder))
+    metrics = serve_metrics(config.metrics.address())
+    loop = Loop(config, ports, keeper, Host(Watchdog(manager), reload, recorder, metrics))
     serve_about(bus, keys, lambda: loop.config)
     try:
         loop.announce()
@@ -212,6 +214,8 @@ def _serve(
         loop.run(stop)
     finally:
         manager.stopping()
+        if metrics is not None:
+            metrics.close()
         stopped = time.monotonic()
         loop.close(WORKER_STOP_S)
         if recorder is not None:

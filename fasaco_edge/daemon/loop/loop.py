@@ -38,6 +38,7 @@ from fasaco_edge.mission.core.events import (
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.fleet import FleetVoice
+    from fasaco_edge.daemon.metrics import MetricsServer
     from fasaco_edge.mission.core.mission import Mission
 
 LOG = logging.getLogger(__name__)
@@ -63,11 +64,12 @@ class BusPorts:
 
 @dataclass(frozen=True, slots=True)
 class Host:
-    """What the loop has to do with its computer: service manager, configuration, recorder."""
+    """What the loop has to do with its computer; None for what is not asked for."""
 
     watchdog: Watchdog
     reload: Reload
     recorder: RecorderSupervisor | None
+    metrics: MetricsServer | None
 
 
 class Loop:
@@ -324,3 +326,5 @@ class Loop:
         if due is not None:
             self._bus.outbox.status(due)
             self._host.watchdog.tell(due)
+            if self._host.metrics is not None:
+                self._host.metrics.show(due)

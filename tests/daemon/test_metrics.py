@@ -1,0 +1,209 @@
+"""Figures for Prometheus: the text format, read by a parser of its own, and the server."""
+
+from __future__ import annotations
+
+import re
+import socket
+import threading
+import time
+import urllib.error
+import urllib.request
+from contextlib import contextmanager
+
+import pytest
+from msgspec import structs
+
+from fasaco_edge.config.config import DaemonConfig, inspect_config
+from fasaco_edge.config.metrics import Address, MetricsConfig
+from fasaco_edge.daemon.exposition import CONTENT_TYPE, exposition
+from fasaco_edge.daemon.metrics import MetricsServer, serve_metrics
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.wire.path_documents import PathReport
+from fasaco_edge.wire.replies import STATES, CoverageReport, FloorReport
+from fasaco_edge.wire.status import ErrorCounts, LoopTimes, Status, SupervisedRecorder
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process, free_endpoint
+
+STATUS = Status(
+    robot="robot",
+    version="1.2",
+    state="covering",
+    uptime_s=12.5,
+    coverage=CoverageReport(coverable=40, covered=10, fraction=0.25),
+    floor=FloorReport(swept_m2=3.5),
+    path=PathReport(revision=7, remaining_steps=30, gap=0.04),
+    loop_ms=LoopTimes(turns=100, late=1, p50=2.0, p99=5.0, p99_9=20.0, max=250.0),
+    errors=ErrorCounts(total=3, by_code={"malformed_message": 2, "wrong_frame": 1}),
+    recorder=SupervisedRecorder(state="recording", restarts=1),
+    rss_mb=41.5,
+    cpu_s=3.25,
+    threads=9,
+)
+NAME, LABEL = "[a-zA-Z_:][a-zA-Z0-9_:]*", r'[a-zA-Z_][a-zA-Z0-9_]*="(?:[^"\\\n]|\\[\\"n])*"'
+SAMPLE = re.compile(rf"({NAME})(?:\{{((?:{LABEL},?)*)\}})? (\S+)")
+
+
+def parsed(text):
+    """Return samples {(name, labels): value} of a text in format 0.0.4, which is checked."""
+    assert text.endswith("\n")
+    kinds, samples, name = {}, {}, None
+    for line in text.splitlines():
+        if line.startswith("# HELP "):
+            name = line.split(" ")[2]
+            assert name not in kinds, "all samples of a figure stand together"
+            continue
+        if line.startswith("# TYPE "):
+            _, _, of, kind = line.split(" ")
+            assert of == name
+            assert kind in ("gauge", "counter")
+            assert (kind == "counter") == name.endswith("_total")
+            kinds[name] = kind
+            continue
+        found = SAMPLE.fullmatch(line)
+        assert found, line
+        assert found[1] == name
+        labels = tuple(sorted(re.findall(LABEL, found[2] or "")))
+        assert (name, labels) not in samples, "no sample twice"
+        samples[name, labels] = float(found[3])
+    return samples
+
+
+def test_a_status_is_told_in_base_units():
+    told = parsed(exposition(STATUS, 0.5))
+    assert told["fasaco_edge_covered_ratio", ()] == 0.25
+    assert told["fasaco_edge_swept_square_metres", ()] == 3.5
+    assert told["fasaco_edge_path_gap_ratio", ()] == 0.04
+    assert told["fasaco_edge_cycle_seconds", ('quantile="0.99"',)] == 0.005
+    assert told["fasaco_edge_memory_bytes", ()] == 41_500_000
+    assert told["fasaco_edge_errors_total", ('code="malformed_message"',)] == 2
+    assert told["fasaco_edge_recorder_up", ()] == 1
+    assert told["fasaco_edge_status_age_seconds", ()] == 0.5
+    states = {labels[0]: value for (name, labels), value in told.items() if name.endswith("_state")}
+    assert len(states) == len(STATES)
+    assert [name for name, value in states.items() if value] == ['state="covering"']
+
+
+def test_what_is_not_known_is_left_out():
+    told = parsed(exposition(Status(state="idle"), 0.0))
+    names = {name for name, _ in told}
+    assert "fasaco_edge_covered_ratio" not in names
+    assert "fasaco_edge_recorder_up" not in names
+    assert "fasaco_edge_latency_seconds" not in names
+
+
+def test_names_do_nothing_to_the_page():
+    evil = 'a"} 1\nfasaco_edge_up 1\\ \x1b[31m\u202e'
+    text = exposition(structs.replace(STATUS, robot=evil), 0.0)
+    told = parsed(text)
+    assert ("fasaco_edge_up", ()) not in told
+    assert "\x1b" not in text
+    assert "\u202e" not in text
+
+
+@contextmanager
+def served(status=STATUS):
+    port = int(free_endpoint().rpartition(":")[2])
+    server = MetricsServer(Address("127.0.0.1", port))
+    try:
+        if status is not None:
+            server.show(status)
+        yield f"http://127.0.0.1:{port}"
+    finally:
+        server.close()
+
+
+def test_a_page_is_served_and_nothing_else():
+    with served() as url:
+        with urllib.request.urlopen(f"{url}/metrics?x=1", timeout=60) as answer:
+            assert answer.headers["Content-Type"] == CONTENT_TYPE
+            assert parsed(answer.read().decode())["fasaco_edge_threads", ()] == 9
+        asked = urllib.request.Request(f"{url}/metrics", method="HEAD")
+        with urllib.request.urlopen(asked, timeout=60) as answer:
+            assert answer.read() == b""
+        for path, data, code in (("/", None, 404), ("/metrics", b"x", 405)):
+            with pytest.raises(urllib.error.HTTPError) as refused:
+                urllib.request.urlopen(url + path, data, timeout=60)
+            assert refused.value.code == code
+            refused.value.close()
+
+
+def test_before_the_first_status_there_is_no_page():
+    with served(None) as url:
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(f"{url}/metrics", timeout=60)
+        assert refused.value.code == 503
+        refused.value.close()
+
+
+def test_who_says_nothing_or_too_much_holds_up_nobody():
+    with served() as url:
+        port = int(url.rpartition(":")[2])
+        silent = [socket.create_connection(("127.0.0.1", port), 60) for _ in range(3)]
+        silent[1].sendall(b"GET /metrics HTTP/1.0\r\n")
+        silent[2].sendall(b"x" * 20_000)
+        try:
+            with urllib.request.urlopen(f"{url}/metrics", timeout=60) as answer:
+                assert answer.status == 200
+        finally:
+            for one in silent:
+                one.close()
+
+
+def test_a_port_that_is_taken_or_a_server_that_closes_stops_nothing(caplog):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        assert serve_metrics(Address(*taken.getsockname())) is None
+    assert "cannot listen on 127.0.0.1" in caplog.text
+    assert serve_metrics(None) is None
+    with served():
+        pass
+    until = time.monotonic() + 60.0
+    while any(thread.name == "metrics" for thread in threading.enumerate()):
+        assert time.monotonic() < until, "its thread ends"
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    ("listen", "said"),
+    [
+        ("9465", "must be an address and a port"),
+        ("127.0.0.1:0", "must be an address and a port"),
+        ("127.0.0.1:70000", "must be an address and a port"),
+        ("example.org:9465", "must be an address and a port"),
+        ("0.0.0.0:9465", "lets other computers read the status"),
+        ("[::]:9465", "lets other computers read the status"),
+    ],
+)
+def test_a_wrong_address_is_told(tmp_path, listen, said):
+    file = tmp_path / "robot.yaml"
+    file.write_text(f"metrics:\n  listen: '{listen}'\n")
+    config, faults = inspect_config(file)
+    assert config is None
+    assert said in str(faults[0].error)
+    assert faults[0].line == 2
+    with pytest.raises(BadConfiguration, match=r"metrics\.listen"):
+        MetricsConfig(listen=listen).address()
+
+
+def test_others_may_read_where_they_are_let_in():
+    assert DaemonConfig().metrics.address() is None
+    assert MetricsConfig("localhost:1").address() == Address("127.0.0.1", 1)
+    assert MetricsConfig("[::1]:1").address() == Address("::1", 1)
+    assert MetricsConfig("0.0.0.0:1", open_to_everyone=True).address() == Address("0.0.0.0", 1)
+
+
+def test_a_daemon_serves_its_status(tmp_path):
+    address = free_endpoint().rpartition("/")[2]
+    with (
+        daemon_process(tmp_path, metrics={"listen": address}) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        outsider.wait_status(lambda status: status["state"] == "waiting for map")
+        until = time.monotonic() + 60.0
+        while True:
+            with urllib.request.urlopen(f"http://{address}/metrics", timeout=60) as answer:
+                told = parsed(answer.read().decode())
+            if told["fasaco_edge_state", ('state="waiting for map"',)]:
+                break
+            assert time.monotonic() < until
+            time.sleep(0.1)
+        assert told["fasaco_edge_memory_bytes", ()] > 1e7
