@@ -25,6 +25,10 @@ FLOOR_TILE = 128
 # Bytes in a row of a tile.
 ROW_BYTES = FLOOR_TILE // 8
 
+# A centre of another raster that is so near to the border of two pixels lies on the farther one:
+# which it is must not depend on the window that is looked at [pixels].
+TIE = 1e-6
+
 # Edges of the squares in which floor is shown [pixels]: whole bytes, and parts of a tile.
 SQUARES = (1, 8, 16, 32, 64, FLOOR_TILE)
 
@@ -192,8 +196,8 @@ def swept_on(swept_in: Callable[[Window], Mask], place: Similarity, window: Wind
     cols = np.arange(window.col0, window.col1) + 0.5
     # From the corner of ``under`` on all is above 0, and cut off where it is rounded down.
     row0, col0, right, up = place
-    i = ((right * rows + (row0 - under.row0)) + up * cols).astype(np.int32)
-    j = (((col0 - under.col0) - up * rows) + right * cols).astype(np.int32)
+    i = ((right * rows + (row0 - under.row0 + TIE)) + up * cols).astype(np.int32)
+    j = (((col0 - under.col0 + TIE) - up * rows) + right * cols).astype(np.int32)
     i *= under.cols
     i += j
     found: Mask = swept.ravel().take(i)
