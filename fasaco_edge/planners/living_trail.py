@@ -172,19 +172,21 @@ class LivingTrail:
             cell_m: edge of a cell [m].
         """
         window = self._window
-        if not self._tau.size:
+        # Only cells that have steps; the four directions of a cell at once.
+        places = np.flatnonzero((self._tau > 0).view(np.uint32))
+        if not len(places):
             return
-        rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1]
-        x, y = back((cols + 0.5) * cell_m, (rows + 0.5) * cell_m)
+        rows, cols = np.divmod(places, window.cols)
+        x, y = back((cols + window.col0 + 0.5) * cell_m, (rows + window.row0 + 0.5) * cell_m)
         was = np.stack((np.floor(y / cell_m), np.floor(x / cell_m)), axis=-1).astype(np.int64)
-        was = was.reshape(-1, 2)
         inside = _inside(was, before.window)
-        found = np.full((len(was), 4), self._rules.tau0, np.float32)
         row, col = (was[inside] - np.array((before.window.row0, before.window.col0))).T
-        then = np.roll(before.tau[row, col], turns, axis=1)
-        found[inside] = np.where(then > 0, then, found[inside])
-        tau = self._writable()
-        tau[...] = np.where(tau > 0, found.reshape(tau.shape), np.float32(0))
+        then = before.tau.reshape(-1, 4).take(row * before.window.cols + col, axis=0)
+        then = np.roll(then, turns, axis=1)
+        found = np.full((len(was), 4), self._rules.tau0, np.float32)
+        found[inside] = np.where(then > 0, then, np.float32(self._rules.tau0))
+        flat = self._writable().reshape(-1, 4)
+        flat[places] = np.where(flat.take(places, axis=0) > 0, found, np.float32(0))
 
     def _writable(self) -> Tau:
         self.changes += 1
