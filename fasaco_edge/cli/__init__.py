@@ -47,6 +47,10 @@ _PASSING = frozenset(
     (errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE)
 )
 
+_OUT_OF_MEMORY = (
+    "end other programs, or raise the limits: ulimit -a; MemoryMax=, TasksMax= of a unit"
+)
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the process's exit code."""
@@ -79,10 +83,10 @@ def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
         # The reader has seen enough (``| head``); nothing is left to be flushed to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.ERROR
-    except OSError as error:
+    except (OSError, MemoryError, RuntimeError) as error:
         if not _may_pass(error):
             raise
-        return _fail(DiskFailed(": ".join(filter(None, (error.filename, error.strerror)))))
+        return _fail(_passing(error))
     return code
 
 
@@ -118,8 +122,16 @@ def _may_pass(error: BaseException | None) -> bool:
     while error is not None:
         if isinstance(error, OSError) and error.errno in _PASSING:
             return True
+        if isinstance(error, MemoryError) or "can't start new thread" in str(error):
+            return True
         error = error.__cause__
     return False
+
+
+def _passing(error: OSError | MemoryError | RuntimeError) -> DiskFailed:
+    if isinstance(error, OSError):
+        return DiskFailed(": ".join(filter(None, (error.filename, error.strerror))))
+    return DiskFailed("out of memory or threads", hint=_OUT_OF_MEMORY)
 
 
 def _fail(error: FasacoError) -> int:

@@ -240,3 +240,13 @@ def test_a_disk_that_fails_is_no_wrong_configuration():
     assert "/proc/self/mem: Input/output error" in ended.err
     assert "check the disk" in ended.err
     assert fasaco_edge("run", "--config", "/proc/self").code == 78, "that is a mistake"
+
+
+@pytest.mark.parametrize("error", [MemoryError(), RuntimeError("can't start new thread")])
+def test_a_computer_without_memory_or_threads_is_told(monkeypatch, capsys, error):
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("fasaco_edge.config.config.load_config", fail)
+    assert main(["run"]) == 1
+    assert "out of memory or threads\n  hint: end other programs" in capsys.readouterr().err
