@@ -7,6 +7,7 @@ import math
 import os
 import socket
 import time
+import weakref
 from collections.abc import MutableMapping
 from typing import TYPE_CHECKING
 
@@ -45,6 +46,10 @@ class ServiceManager:
         # "@" stands for the NUL of a name in the abstract namespace.
         self._address = f"\0{address[1:]}" if address.startswith("@") else address
         self.is_there = bool(address)
+        # Open all the time: a process that is out of files still has to feed the watchdog.
+        self._out = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) if address else None
+        if self._out is not None:
+            weakref.finalize(self, self._out.close)
         self.watchdog_s = int(silence_us) / 1e6 if is_ours and silence_us.isdecimal() else 0.0
         self._status = ""
 
@@ -76,12 +81,11 @@ class ServiceManager:
 
     def _send(self, text: str, patience_s: float = 0.0) -> bool:
         """Send a datagram; tell whether it was taken."""
-        if not self.is_there:
+        if self._out is None:
             return True
         try:
-            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as out:
-                out.settimeout(patience_s)
-                out.sendto(text.encode(), self._address)
+            self._out.settimeout(patience_s)
+            self._out.sendto(text.encode(), self._address)
         except OSError as error:
             why = "the service manager does not accept %s: %s"
             LOG.warning(why, text.partition("=")[0], error, extra={"event": "unheard"})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import socket
 import threading
 import time
@@ -35,6 +36,18 @@ def test_each_word_is_one_datagram(listening):
     said = [heard.recv(4096) for _ in range(5)]
     words = [b"READY=1", b"WATCHDOG=1", b"EXTEND_TIMEOUT_USEC=1500000", b"STOPPING=1"]
     assert said == [b"STATUS=waiting", *words]
+
+
+def test_who_is_out_of_files_is_not_taken_for_dead(listening):
+    heard, name = listening
+    manager = ServiceManager({"NOTIFY_SOCKET": name})
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (0, before[1]))
+    try:
+        manager.alive()
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+    assert heard.recv(4096) == b"WATCHDOG=1"
 
 
 def test_a_status_is_one_line_and_told_once(listening):

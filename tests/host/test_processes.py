@@ -24,6 +24,20 @@ def test_a_child_imports_nothing_of_the_working_folder(tmp_path: Path, how):
     assert not (tmp_path / "LOADED").exists()
 
 
+OUT_OF_FILES = """
+import resource
+from fasaco_edge.host.processes import resident_mb, thread_count
+before = resident_mb(), thread_count()
+resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3))
+assert resident_mb() >= before[0] > 5
+assert thread_count() == before[1] == 1
+"""
+
+
+def test_who_is_out_of_files_still_knows_its_memory_and_threads():
+    subprocess.run([sys.executable, "-c", OUT_OF_FILES], check=True)
+
+
 # A signal that arrives while the main thread is about to wait for the event, holding its lock.
 STOP_IN_WAIT = """
 import os, signal
