@@ -87,7 +87,7 @@ def fill_release(
     Raises:
         IncompleteError: a wheel that another one needs is not there.
     """
-    without = shutil.ignore_patterns("wheelhouse", "__pycache__")
+    without = shutil.ignore_patterns("wheelhouse", "__pycache__", "Containerfile")
     base = closure_of(wheels, target, extras=())
     whole = closure_of(wheels, target, extras=("record",)) if recording else base
     shutil.rmtree(release, ignore_errors=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import shutil
 import subprocess
@@ -44,6 +45,16 @@ def test_every_file_of_ours_is_there():
         files = [word.removeprefix(prefix) for word in named if word.startswith(prefix)]
         assert files
         assert [name for name in files if not (DEPLOY / name).is_file()] == []
+
+
+def test_the_container_file_copies_what_is_there():
+    text = (DEPLOY / "Containerfile").read_text(encoding="utf-8")
+    copied = [line.split()[1:-1] for line in text.splitlines() if line.startswith("COPY ")]
+    assert copied
+    missing = [name for names in copied for name in names if not (DEPLOY.parent / name).exists()]
+    assert missing == []
+    for place in re.findall(r"=(/var/\w+/fasaco-edge)", text):
+        assert f":{place}" in text, "a volume keeps it"
 
 
 @pytest.mark.parametrize("script", ["install.sh", "uninstall.sh"])
