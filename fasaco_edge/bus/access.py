@@ -69,7 +69,7 @@ def _role(name: str, description: str, includes: str = "") -> Role:
 EVERYTHING = tuple(entry.suffix for entry in ENTRIES)
 
 ROLES: Mapping[str, Role] = {
-    "mapper": _role("mapper", "publishes maps, map updates and poses"),
+    "mapper": _role("mapper", "publishes maps, map updates, poses and the battery"),
     "viewer": _role("viewer", "sees path, status, coverage and pheromone"),
     "operator": _role("operator", "commands the mission, and views", includes="viewer"),
     "recorder": _role("recorder", "receives everything, publishes its status", includes="viewer"),

@@ -249,6 +249,7 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
     _print_table(console, "Worst moments", ("what", "how much", "at", "context"), moments)
     troubles = rows.trouble_rows(review.troubles)
     _print_table(console, "Troubles", ("state", "at", "for", "reason"), troubles)
+    _print_table(console, "Charges", rows.CHARGES, rows.charge_rows(document))
     _print_table(console, "Refused messages", ("code", "messages"), rows.fault_rows(document))
     _print_remarks(console, document)
 

@@ -50,6 +50,14 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--map-hz", type=float, default=2.0, metavar="HZ", help="maps per simulated second, 1 to 5"
     )
     parser.add_argument(
+        "--battery-min",
+        type=float,
+        default=0.0,
+        metavar="MIN",
+        help="how long its battery lasts [simulated min], charged where it started; 0 for ever "
+        "(default: %(default)g)",
+    )
+    parser.add_argument(
         "--trail-out", type=Path, metavar="FILE.csv", help="write the driven positions, header x,y"
     )
     add_robot_on_bus(parser)
@@ -65,7 +73,10 @@ def run(args: argparse.Namespace) -> int:
     path = find_map(args.map)
     check_output(args.trail_out)
     config = SimulationConfig(
-        robot_radius_m=args.robot_radius, range_m=args.range, map_hz=args.map_hz
+        robot_radius_m=args.robot_radius,
+        range_m=args.range,
+        map_hz=args.map_hz,
+        battery_min=args.battery_min,
     )
     truth = read_map(path)
     x, y = args.start_xy or start_point(path, truth, args.robot_radius)
@@ -81,6 +92,9 @@ def run(args: argparse.Namespace) -> int:
         f"drove {result.distance_m:.1f} m in {result.sim_s:.0f} simulated s, "
         f"{result.collisions} collisions"
     )
+    if world.battery is not None:
+        battery = world.battery
+        print(f"charged {battery.charges} times, never below {battery.lowest:.1%}")
     return 0
 
 

@@ -32,7 +32,7 @@ from fasaco_edge.kernels.floor.turning import (
     proportional_turning,
     turn_seconds,
 )
-from fasaco_edge.mission.config import MissionPolicy
+from fasaco_edge.mission.config import BatteryPolicy, MissionPolicy
 from fasaco_edge.mission.orders.mask import INLINE, inline_mask, mask_polygons
 from fasaco_edge.mission.orders.order import OrderDocument, ZoneDocument, order_of
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
@@ -268,6 +268,10 @@ class FleetConfig(Section, frozen=True):
     name: Annotated[str, Meta(min_length=1, max_length=64)]
 
 
+class BatteryConfig(Section, BatteryPolicy, frozen=True, kw_only=True):
+    """When to charge; without the block ``battery`` the robot never does by itself."""
+
+
 class RecordingConfig(Section, frozen=True):
     """How large and how old a file may become, and what all may take.
 
@@ -292,6 +296,7 @@ class DaemonConfig(Section, frozen=True):
     pose: PoseConfig = PoseConfig()
     planner: PlannerConfig = PlannerConfig()
     mission: MissionSettings = MissionSettings()
+    battery: BatteryConfig | msgspec.UnsetType = msgspec.UNSET
     recording: RecordingConfig = RecordingConfig()
     metrics: MetricsConfig = MetricsConfig()
     fleet: FleetConfig | msgspec.UnsetType = msgspec.UNSET
@@ -422,6 +427,11 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
     yield from _refused("", config.metrics.address)
     if "\0" in config.mission.state_dir:
         yield BadConfiguration("mission.state_dir must be a path, got one with a NUL")
+    if (battery := config.battery) and battery.enough < max(battery.low, battery.reserve) + 0.1:
+        yield BadConfiguration(
+            "battery.enough must be at least 0.1 above battery.low and battery.reserve, got "
+            f"{battery.enough:g}, {battery.low:g} and {battery.reserve:g}"
+        )
     if config.ros2:
         for error in config.ros2.faults():
             yield BadConfiguration(f"ros2.{error}")

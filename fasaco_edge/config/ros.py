@@ -14,7 +14,7 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
 from fasaco_edge.wire.ros_keys import RosTopic, graph_key
 from fasaco_edge.wire.schemas import TWIST_SCHEMAS
-from fasaco_edge.wire.topics import ROS_TOPICS
+from fasaco_edge.wire.topics import ROS_TOPICS, TF_STATIC
 
 # ROS 2 design, "Topic and Service name mapping": letters, digits, _; no digit first.
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
@@ -23,6 +23,8 @@ _NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _MAX_TOPIC_LENGTH = 247
 
 DEFAULT_NODE = "fasaco_edge"
+# What a follower hears of them.
+POSES = ("pose", TF_STATIC)
 
 
 class RosTopicNames(Section, frozen=True):
@@ -30,6 +32,7 @@ class RosTopicNames(Section, frozen=True):
 
     map: str = "/map"
     map_updates: str = "/map_updates"
+    battery: str = "/battery_state"
     pose: str = "/pose"
     tf: str = "/tf"
     tf_static: str = "/tf_static"
@@ -70,7 +73,7 @@ class RosConfig(Section, frozen=True):
     def inputs(self) -> dict[str, RosTopic]:
         """What daemon and recorder subscribe to, by the topic's name in the daemon."""
         poses = ("tf_static", "tf") if self.pose == "tf" else ("pose",)
-        names = ("map", "map_updates", *poses)
+        names = ("map", "map_updates", "battery", *poses)
         return {ROS_TOPICS[name].topic: self._topic(name) for name in names}
 
     @property
@@ -105,7 +108,7 @@ class RosConfig(Section, frozen=True):
 
     def driver_rights(self) -> Role:
         """Return what those may do that have the role ``driver``."""
-        poses = [self.input_key(topic) for name, topic in self.inputs.items() if "map" not in name]
+        poses = [self.input_key(topic) for name, topic in self.inputs.items() if name in POSES]
         return ros_rights(self._driven_by, poses, self._graph)
 
     @property

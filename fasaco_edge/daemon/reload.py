@@ -109,7 +109,8 @@ def with_changeable(running: DaemonConfig, written: DaemonConfig) -> DaemonConfi
 def _flat(config: DaemonConfig) -> dict[str, object]:
     """Return the values by ``section.key``; a section that may be left out counts as one value."""
     sections = structs.asdict(config)
-    flat: dict[str, object] = {name: sections.pop(name) for name in ("fleet", "ros2")}
+    left_out = ("fleet", "battery", "ros2")
+    flat: dict[str, object] = {name: sections.pop(name) for name in left_out}
     for name, section in sections.items():
         flat |= {f"{name}.{key}": value for key, value in structs.asdict(section).items()}
     return flat

@@ -80,6 +80,22 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         return self.dock or self.home if errand == "charge" else self.home or self.dock
 
 
+class BatteryPolicy(msgspec.Struct, frozen=True, kw_only=True):
+    """When a robot goes to charge, and when it goes on; levels are shares of a full battery.
+
+    Attributes:
+        low: it goes to charge at this level, or above it where the way back needs more.
+        reserve: what is to be left when it comes there.
+        enough: it goes on at this level, or below it where the rest of the order needs less.
+        silent_s: how long no charge may come before that is told [s].
+    """
+
+    low: Annotated[float, Meta(ge=0.01, le=0.8)] = 0.2
+    reserve: Annotated[float, Meta(ge=0, le=0.8)] = 0.1
+    enough: Annotated[float, Meta(ge=0.1, le=1)] = 0.9
+    silent_s: Annotated[float, Meta(ge=10, le=86_400)] = 60.0
+
+
 NO_PATIENCE = MissionPolicy(retries=0, lost_pose_s=0.0)
 
 
@@ -113,6 +129,7 @@ class MissionConfig:
         trail: rules of the living trail.
         plans_on_trail: whether the planner's ants walk on it.
         robot: its name in a fleet that shares the work; "" without one.
+        battery: when to charge; None for never.
     """
 
     footprint: Footprint
@@ -124,3 +141,4 @@ class MissionConfig:
     trail: TrailRules = PAPERS_RULES
     plans_on_trail: bool = False
     robot: str = ""
+    battery: BatteryPolicy | None = None

@@ -17,6 +17,7 @@ from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.loop.inbox import Batch, Received
 from fasaco_edge.daemon.loop.turn_log import (
     POSE_BYTES,
+    TOLD,
     DecisionFilter,
     cells_checksum,
     kernels_name,
@@ -27,7 +28,7 @@ from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.planners.planner import StopAt, ignore
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
 from fasaco_edge.samples import SampleDecoder
-from fasaco_edge.wire.topics import POSE, TURNS
+from fasaco_edge.wire.topics import TURNS
 from fasaco_edge.wire.turns import (
     Cycle,
     Decided,
@@ -205,7 +206,7 @@ class CycleReplay:
         # A batch is played when the next has come: its samples are all there by then.
         batch: TurnBatch | None = None
         for arrival in samples:
-            if arrival.topic == POSE.name and len(arrival.sample.payload) <= POSE_BYTES:
+            if arrival.topic in TOLD and len(arrival.sample.payload) <= POSE_BYTES:
                 continue  # they are in the log
             if arrival.topic != TURNS.name:
                 self._untaken.add(arrival)

@@ -74,6 +74,15 @@ class Trouble(msgspec.Struct):
     seconds: float | None
 
 
+class Charge(msgspec.Struct, frozen=True):
+    """A time in which the robot charged, and how full its battery was before and after."""
+
+    at_s: float
+    seconds: float
+    level_from: float | None
+    level_to: float | None
+
+
 class PheromoneFigures(msgspec.Struct, frozen=True):
     """The pheromone that was drawn; None where nothing tells."""
 
@@ -145,6 +154,8 @@ class ReviewDocument(msgspec.Struct):
         states: seconds in each state.
         troubles: each time the mission was degraded, blocked or silent, or the recorder could not
             write (`recorder: disk full`, `recorder: stalled`): state, reason, at_s, seconds.
+        charges: each time the robot charged: at_s, seconds, level_from, level_to (0 to 1; null
+            where not known).
         worst: moments that stand out: what, value, unit, at_s, note.
         faults: messages refused by the daemon.
         faults_by_code: the same by code.
@@ -210,6 +221,7 @@ class ReviewDocument(msgspec.Struct):
     restored_cells: int = 0
     states: dict[str, float] = {}
     troubles: list[Trouble] = []
+    charges: list[Charge] = []
     worst: list[Moment] = []
     faults: int = 0
     faults_by_code: dict[str, int] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.runcard import flat_settings
 from fasaco_edge.review.document import (
+    Charge,
     MapSize,
     PheromoneFigures,
     RecordedFile,
@@ -67,6 +69,7 @@ def document_of(review: Review) -> ReviewDocument:
             Trouble(s.name, s.reason, _rounded(s.begin_s), _rounded(s.seconds))
             for s in review.troubles
         ],
+        charges=charges_of(review),
         worst=[replace(m, value=round(m.value, 3), at_s=round(m.at_s, 3)) for m in review.moments],
         faults=faults.total,
         faults_by_code=faults.by_code,
@@ -83,6 +86,26 @@ def document_of(review: Review) -> ReviewDocument:
         if (points := record.plots.get(entity)) is not None:
             setattr(document, member, _rounded(float(points[:, 1].max())))
     return document
+
+
+def charges_of(review: Review) -> list[Charge]:
+    """Return each time the robot charged, with the levels in the statuses at its ends."""
+    levels = [
+        (each.at_s, each.status.battery.level)
+        for each in review.data.statuses
+        if each.status.battery is not None and each.status.battery.level is not None
+    ]
+    times = [at_s for at_s, _ in levels]
+
+    def level(at_s: float) -> float | None:
+        index = bisect_right(times, at_s) - 1
+        return levels[index][1] if index >= 0 else None
+
+    return [
+        Charge(round(s.begin_s, 3), round(s.seconds, 3), level(s.begin_s), level(s.end_s))
+        for s in review.states
+        if s.name == "charging"
+    ]
 
 
 PLOTTED = {

@@ -19,7 +19,10 @@ from fasaco_edge.review.run_data import PublishedPath, RunData
 STILL_M = 0.05
 STILL_RAD = 0.1
 # In these the robot has nothing to do, or not yet.
-AT_REST = ("idle", "waiting for map", "waiting for pose", "loading", "done", "silent")
+AT_REST = (
+    *("idle", "waiting for map", "waiting for pose"),
+    *("loading", "charging", "done", "silent"),
+)
 TROUBLES = ("degraded", "blocked", "silent")
 # The effect of a command is published at most so long after it [s].
 COMMAND_S = 1.5

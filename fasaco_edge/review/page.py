@@ -328,6 +328,8 @@ def _remarkable(review: Review, figures: ReviewDocument, of: int) -> Html:
     none = "The mission was never degraded, blocked or silent, and the recorder could always write."
     titles = ("trouble", "at", "for", "why")
     parts.append(_table(titles, troubles, "notes") if troubles else element("p", none))
+    if charges := rows.charge_rows(figures):
+        parts.append(_table(("charged at", *rows.CHARGES[1:]), charges, "notes"))
     none = "No message was refused."
     parts.append(_table(("refused messages", "how many"), faults) if faults else element("p", none))
     torn = [part for part in figures.files if part.torn_bytes]

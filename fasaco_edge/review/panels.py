@@ -44,6 +44,7 @@ FAINT: Colour = (150, 156, 166)
 STATES: dict[str, Colour] = {
     "done": palette.BLUE,
     "returning": palette.SKY,
+    "charging": palette.SKY,
     "covering": palette.GREEN,
     "planning": palette.SKY,
     "paused": palette.PURPLE,

@@ -135,6 +135,7 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         f"{t.state} {clock(t.at_s or 0.0)} for {t.seconds or 0:.1f} s" for t in document.troubles
     ]
     commands = [" ".join(row) for row in command_rows(document)]
+    charges = [f"{at} for {seconds}, {levels}" for at, seconds, levels in charge_rows(document)]
     return [
         ("run", f"{_began(document.began)}, {sides}{planner}, {document.robot or 'robot'}"),
         ("swept", by_name["reachable floor swept"]),
@@ -145,6 +146,7 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         ("driven", f"{amount(document.driven_m, 'm')}, {_count(document.steps, 'steps')}"),
         ("replans", replans),
         ("commands", _some(commands)),
+        *([("charges", _some(charges))] if charges else []),
         ("troubles", _some(troubles)),
         ("refused", f"{document.faults} messages; lost {_count(document.recorder_lost, '')}"),
     ]
@@ -251,6 +253,24 @@ def moment_rows(review: Review) -> list[tuple[str, ...]]:
 def trouble_rows(troubles: list[Span]) -> list[tuple[str, ...]]:
     """Return each trouble: the state, when, for how long, and why."""
     return [(s.name, clock(s.begin_s), f"{s.seconds:.1f} s", s.reason) for s in troubles]
+
+
+CHARGES = ("at", "for", "battery")
+
+
+def charge_rows(document: ReviewDocument) -> list[tuple[str, str, str]]:
+    """Return each time the robot charged: when, for how long, and from what level to what."""
+    return [
+        (
+            clock(charge.at_s),
+            clock(charge.seconds),
+            " to ".join(
+                NOT_KNOWN if level is None else f"{level:.0%}"
+                for level in (charge.level_from, charge.level_to)
+            ),
+        )
+        for charge in document.charges
+    ]
 
 
 def fault_rows(document: ReviewDocument) -> list[tuple[str, str]]:

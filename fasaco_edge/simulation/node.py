@@ -17,6 +17,7 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.host.processes import stop_event
 from fasaco_edge.simulation.world import Activity, Emission, World
 from fasaco_edge.wire import topics
+from fasaco_edge.wire.battery import BatteryState, Power, encode_battery
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import encode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
@@ -136,6 +137,7 @@ class RobotOnBus:
         self._refused = 0
         self._map = bus.advertise(keys, topics.MAP)
         self._pose = bus.advertise(keys, topics.POSE)
+        self._battery = bus.advertise(keys, topics.BATTERY)
         self._newest: LatestSlot[Sample] = LatestSlot()
         self._take = self._follow if driver == "ideal" else self._move
         bus.listen(keys, topics.PATH if driver == "ideal" else topics.CMD_VEL, self._newest.put)
@@ -160,12 +162,16 @@ class RobotOnBus:
                 report(self.progress(now_s))
 
     def publish(self, emission: Emission) -> None:
-        """Publish map and pose, where there are any."""
+        """Publish map, pose and battery, where there are any."""
         # The map first: where the robot stands is on it.
         if emission.map is not None:
             self._map.put(encode_occupancy_grid(emission.map))
         if emission.pose is not None:
             self._pose.put(encode_pose_stamped(emission.pose))
+        if emission.battery is not None:
+            power: Power = "charging" if emission.battery.is_charging else "discharging"
+            state = BatteryState(emission.battery.level, power, "", self._world.stamp_ns)
+            self._battery.put(encode_battery(state))
 
     def _take_newest(self, timeout_s: float) -> None:
         """Wait for what drives the robot; what cannot do that costs only itself."""

@@ -63,6 +63,8 @@ class SimulationConfig:
         map_chunk_m: the published map grows by blocks of about this size [m].
         tick_s: the simulation's time step [s].
         scan_hz, map_hz, pose_hz: rates [Hz]; their periods are rounded to whole ticks.
+        battery_min: how long its battery lasts [min]; 0 for one without end. It charges where the
+            robot began.
     """
 
     speed_m_s: float = 0.25
@@ -78,11 +80,12 @@ class SimulationConfig:
     scan_hz: float = 5.0
     map_hz: float = 2.0
     pose_hz: float = 10.0
+    battery_min: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            may_be_zero = field.name in ("padding_m", "free_at_most")
+            may_be_zero = field.name in ("padding_m", "free_at_most", "battery_min")
             if not math.isfinite(value) or value < 0 or (value == 0 and not may_be_zero):
                 least = "at least 0" if may_be_zero else "above 0"
                 raise BadConfiguration(f"{field.name} must be {least}, got {value}")

@@ -17,6 +17,7 @@ from fasaco_edge.errors import StartBlocked, StartOutsideMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
+from fasaco_edge.simulation.battery import Battery
 from fasaco_edge.simulation.robot import (
     ARRIVED_M,
     DriveState,
@@ -134,12 +135,18 @@ class Activity(enum.Enum):
     """The path led into an obstacle; it stops there and waits for another path."""
 
 
+# So near to where it began the robot is in its dock [m].
+DOCK_M = 0.3
+BATTERY_HZ = 1.0
+
+
 @dataclass(frozen=True, slots=True)
 class Emission:
-    """What the robot publishes after a tick: its map, its pose, both or neither."""
+    """What the robot publishes after a tick: its map, its pose, its battery; or none of it."""
 
     map: OccupancyGrid | None = None
     pose: StampedPose | None = None
+    battery: Battery | None = None
 
 
 class World:
@@ -172,6 +179,8 @@ class World:
         self._corners: list[Point] = []
         # Where others drive it: speed [m/s], turn rate [rad/s], and the tick it was told.
         self._told: tuple[float, float, int] | None = None
+        self._dock = start.x, start.y
+        self.battery = Battery(config.battery_min) if config.battery_min else None
         self._track = [(start.x, start.y)]
         self._ticks = 0
         self.activity = Activity.IDLE
@@ -199,11 +208,14 @@ class World:
         pose = self._drive.pose
         return np.array([*self._track, (pose.x, pose.y)], np.float64)
 
-    def emission(self, *, with_map: bool = True, with_pose: bool = True) -> Emission:
+    def emission(
+        self, *, with_map: bool = True, with_pose: bool = True, with_battery: bool = True
+    ) -> Emission:
         """Return map and pose as they are now; there is no map before the first tick."""
         return Emission(
             self._mapper.snapshot(self.stamp_ns) if with_map else None,
             StampedPose(self.pose, self.frame, self.stamp_ns) if with_pose else None,
+            self.battery if with_battery else None,
         )
 
     def follow(self, path: NDArray[np.float64]) -> None:
@@ -224,6 +236,7 @@ class World:
         """Let one time step pass; return what is published after it."""
         self._move()
         self._ticks += 1
+        self._drain()
         config, since_first = self.config, self._ticks - 1
         if since_first % config.period_ticks(config.scan_hz) == 0:
             self._mapper.scan(self.pose)
@@ -231,7 +244,20 @@ class World:
                 self._join()
         map_is_due = since_first % config.period_ticks(config.map_hz) == 0
         pose_is_due = since_first % config.period_ticks(config.pose_hz) == 0
-        return self.emission(with_map=map_is_due, with_pose=pose_is_due)
+        battery_is_due = since_first % config.period_ticks(BATTERY_HZ) == 0
+        return self.emission(
+            with_map=map_is_due, with_pose=pose_is_due, with_battery=battery_is_due
+        )
+
+    def _drain(self) -> None:
+        battery, drive = self.battery, self._drive
+        if battery is None:
+            return
+        if battery.level == 0.0:  # it stands where it is
+            self._drive = DriveState(drive.pose)
+            self._path, self._corners, self.activity = None, [], Activity.IDLE
+        away_m = math.dist(self._dock, (drive.pose.x, drive.pose.y))
+        battery.tick(self.config.tick_s, moves=drive.moving, is_docked=away_m <= DOCK_M)
 
     def _join(self) -> None:
         if self._path is None:

@@ -17,7 +17,7 @@ from fasaco_edge.watch.picture import MissionPicture
 from fasaco_edge.watch.robot_view import BAD, GOOD, ORDER, PLAIN, Event, RobotView
 from fasaco_edge.wire.path_documents import PathReport
 from fasaco_edge.wire.replies import CoverageReport, FloorReport, MissionReport
-from fasaco_edge.wire.status import FleetReport, Status, SupervisedRecorder
+from fasaco_edge.wire.status import BatteryReport, FleetReport, Status, SupervisedRecorder
 
 Row = tuple[str, Text]
 
@@ -26,6 +26,7 @@ STATE_COLOURS = {
     "planning": "magenta",
     "covering": "green",
     "returning": "green",
+    "charging": "cyan",
     "paused": "yellow",
     "blocked": "red",
     "degraded": "yellow",
@@ -147,6 +148,7 @@ def _running(status: Status) -> list[Row]:
     counted = ", ".join(f"{count} {code}" for code, count in errors.by_code.items())
     rows: list[Row] = [
         ("drive", _text(phrases.drive(status.drive))),
+        *([("battery", _battery(status.battery))] if status.battery else []),
         ("latency", _text(f"{', '.join(latencies)} ms" if latencies else "-")),
         ("errors", _text(counted, "red") if errors.total else _text("none")),
         ("ledger", _ledger(status)),
@@ -154,6 +156,15 @@ def _running(status: Status) -> list[Row]:
         ("daemon", _text(f"up {phrases.age(status.uptime_s)}, {status.rss_mb:.0f} MB")),
     ]
     return rows
+
+
+def _battery(battery: BatteryReport) -> Text:
+    level = "not known" if battery.level is None else phrases.percent(battery.level)
+    is_low = None not in (battery.level, battery.turns_back_at) and (
+        (battery.level or 0.0) <= (battery.turns_back_at or 0.0)
+    )
+    until = f", goes on at {phrases.percent(battery.goes_on_at)}" if battery.goes_on_at else ""
+    return _text(f"{level}, {battery.power}{until}", "yellow" if is_low else "")
 
 
 def _ledger(status: Status) -> Text:

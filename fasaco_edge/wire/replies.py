@@ -11,7 +11,7 @@ from fasaco_edge.wire.json_text import Amount, Count, Document, Name, Ordinal, a
 
 STATES: Final = (
     *("idle", "waiting for map", "waiting for pose", "loading", "planning", "covering"),
-    *("returning", "paused", "blocked", "degraded", "done"),
+    *("returning", "charging", "paused", "blocked", "degraded", "done"),
 )
 State = Annotated[str, allowed(enum=STATES)]
 

@@ -30,6 +30,7 @@ TYPE_HASHES = {
     schemas.TF_MESSAGE: "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
     schemas.TWIST: "9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
     schemas.TWIST_STAMPED: "5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
+    schemas.BATTERY_STATE: "4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741",
     schemas.PATH: "1957a5bb3cee5da65c4e52e52b65a93df227efce4c20f8458b36e73066ca334b",
 }
 """Of each type its definition's hash in hexadecimal, version 1 (REP 2016)."""

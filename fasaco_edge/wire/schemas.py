@@ -13,6 +13,7 @@ TF_MESSAGE: Final = "tf2_msgs/msg/TFMessage"
 PATH: Final = "nav_msgs/msg/Path"
 TWIST: Final = "geometry_msgs/msg/Twist"
 TWIST_STAMPED: Final = "geometry_msgs/msg/TwistStamped"
+BATTERY_STATE: Final = "sensor_msgs/msg/BatteryState"
 PHEROMONE_GRID: Final = "fasaco_msgs/msg/PheromoneGrid"
 
 POSE_SCHEMAS = (POSE_STAMPED, POSE_WITH_COVARIANCE_STAMPED, ODOMETRY)

@@ -133,6 +133,26 @@ class DriveReport(Document, frozen=True):
     turns: Count = 0
 
 
+class BatteryReport(Document, frozen=True):
+    """The battery; levels are shares of a full one, null where they are not known.
+
+    Attributes:
+        level: its charge.
+        power: what the supply does, as its message says; "" before there was one.
+        age_s: how long no charge has come.
+        drain_per_h: what driving takes an hour, as measured.
+        turns_back_at: the robot goes to charge at this level.
+        goes_on_at: it goes on at this level; null where it does not charge.
+    """
+
+    level: Amount | None = None
+    power: str = ""
+    age_s: Amount = 0.0
+    drain_per_h: Amount | None = None
+    turns_back_at: Amount | None = None
+    goes_on_at: Amount | None = None
+
+
 class ErrorCounts(Document, frozen=True):
     """Faults since the start: what was refused, could not be published, or failed.
 
@@ -274,6 +294,7 @@ class Status(Document, frozen=True):
     latency_ms: Latencies = Latencies()
     loop_ms: LoopTimes = LoopTimes()
     drive: DriveReport = DriveReport()
+    battery: BatteryReport | None = None
     errors: ErrorCounts = ErrorCounts()
     ledger: LedgerReport = LedgerReport()
     recorder: SupervisedRecorder | None = None

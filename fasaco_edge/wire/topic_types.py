@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from fasaco_edge.wire.schemas import POSE_SCHEMAS, TWIST_SCHEMAS
+from fasaco_edge.wire.schemas import BATTERY_STATE, POSE_SCHEMAS, TWIST_SCHEMAS
 
 Role = Literal["mapper", "viewer", "operator", "recorder", "driver", "robot", "fleet"]
 Direction = Literal["in", "out", "out, by the recorder", "out, by the follower", "liveliness token"]
@@ -128,7 +128,8 @@ class Topic:
             return "token"
         if not self.schemas:
             return "json"
-        return "pose" if self.schemas in (POSE_SCHEMAS, TWIST_SCHEMAS) else "large"
+        small = POSE_SCHEMAS, TWIST_SCHEMAS, (BATTERY_STATE,)
+        return "pose" if self.schemas in small else "large"
 
 
 @dataclass(frozen=True, slots=True)

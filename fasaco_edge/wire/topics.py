@@ -58,6 +58,18 @@ POSE = Topic(
     is_input=True,
     limits=("max_coordinate_m", "quaternion_tolerance", "queue_pose"),
 )
+BATTERY = Topic(
+    name="battery",
+    direction="in",
+    when="the battery's charge is measured, some times a minute at least",
+    speaker="mapper",
+    listeners=("robot", "recorder"),
+    schemas=(schemas.BATTERY_STATE,),
+    qos=Qos("interactive_low"),
+    queues=Queues(daemon=16, recorder=NEWEST),
+    is_input=True,
+    limits=("max_pose_bytes", "queue_battery"),
+)
 PATH = Topic(
     name="path",
     direction="out",
@@ -220,7 +232,7 @@ RECORDER_ALIVE = Topic(
 # A recorder subscribes in this order, to the turn log last: once the daemon sees a subscriber
 # there, that subscriber receives everything else, too.
 TOPICS = (
-    *(MAP, MAP_UPDATE, POSE),
+    *(MAP, MAP_UPDATE, POSE, BATTERY),
     *(PATH, COVERAGE, FLOOR, PHEROMONE, DIRECTIONS, STATUS, COMMAND, TURNS, FLEET, ALIVE, CLAIM),
     *(RECORDER, RECORDER_ALIVE),
     CMD_VEL,
@@ -268,6 +280,7 @@ TF = (schemas.TF_MESSAGE,)
 _ROS_ROWS = (
     RosRow("map", "map", "in", MAP.schemas, latched=True, depth=1),
     RosRow("map_updates", "map_update", "in", MAP_UPDATE.schemas, latched=False, depth=256),
+    RosRow("battery", "battery", "in", BATTERY.schemas, latched=False, depth=16),
     RosRow("pose", "pose", "in", POSE.schemas, latched=False, depth=POSE_DEPTH),
     RosRow("tf", "pose", "in", TF, latched=False, depth=TF_DEPTH),
     RosRow("tf_static", TF_STATIC, "in", TF, latched=True, depth=TF_DEPTH),

@@ -172,6 +172,7 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     free_pixels = sum((row // 6, col // 6) not in fits for row, col in np.argwhere(pixels == FREE))
     assert set(status) == {
         *("robot", "version", "state", "reason", "uptime_s", "map", "pose", "coverage", "path"),
+        "battery",
         *("plan", "latency_ms", "loop_ms", "errors", "ledger", "recorder", "rss_mb", "cpu_s"),
         *("threads", "config", "mission", "claim", "floor", "drive", "fleet"),
     }

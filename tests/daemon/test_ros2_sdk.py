@@ -40,6 +40,7 @@ def test_a_robot_made_with_a_library_of_somebody_else_gets_its_path(tmp_path):
         assert found["topics"] == {
             "/map": [GRID],
             "/map_updates": ["map_msgs/msg/OccupancyGridUpdate"],
+            "/battery_state": ["sensor_msgs/msg/BatteryState"],
             "/tf": ["tf2_msgs/msg/TFMessage"],
             "/tf_static": ["tf2_msgs/msg/TFMessage"],
             "/coverage_path": [PATH],

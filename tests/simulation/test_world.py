@@ -158,3 +158,28 @@ def test_an_impossible_start_is_an_error():
         World(truth, Pose2D(9.0, 1.0), SimulationConfig())
     with pytest.raises(StartBlocked):
         World(truth, Pose2D(1.9, 2.2), SimulationConfig())
+
+
+def test_its_battery_drains_while_it_drives_and_charges_where_it_began():
+    config = SimulationConfig(battery_min=1.0)
+    world = started(building(6, 2), Pose2D(0.6, 1.0), config)
+    world.follow(centres((2, 1), (2, 9)))
+    heard = [each.battery for each in run(world) if each.battery is not None]
+    drove_s = 1e-9 * world.stamp_ns
+    assert world.battery.level == pytest.approx(1 - drove_s / 60, abs=0.01)
+    assert len(heard) == pytest.approx(drove_s, abs=1.5)
+    world.follow(centres((2, 9), (2, 1)))
+    run(world)
+    empty = world.battery.lowest
+    assert not world.battery.is_charging or world.battery.level > empty
+    ticks(world, 50)
+    assert world.battery.is_charging
+    assert world.battery.level == pytest.approx(empty + 4 * 50 * config.tick_s / 60, abs=0.01)
+
+
+def test_with_an_empty_battery_it_stands():
+    world = started(building(6, 2), Pose2D(0.6, 1.0), SimulationConfig(battery_min=0.1))
+    world.follow(centres((2, 1), (2, 12)))
+    run(world)
+    assert world.battery.level == 0.0
+    assert world.distance_m < 2.0

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from fasaco_edge.wire import schemas
+from fasaco_edge.wire.battery import decode_battery
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.paths import decode_path
 from fasaco_edge.wire.pheromone import decode_pheromone
@@ -28,6 +29,7 @@ DECODERS: dict[str, Callable[[bytes], object]] = {
     schemas.PATH: decode_path,
     schemas.PHEROMONE_GRID: decode_pheromone,
     schemas.TF_MESSAGE: decode_and_look,
+    schemas.BATTERY_STATE: decode_battery,
     **{schema: partial(decode_pose, schema=schema) for schema in POSE_SCHEMAS},
     **{schema: partial(decode_velocity, schema=schema) for schema in TWIST_SCHEMAS},
 }

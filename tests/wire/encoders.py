@@ -12,6 +12,7 @@ from typing import Any
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import schemas
+from fasaco_edge.wire.battery import encode_battery
 from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
 from fasaco_edge.wire.paths import PathMessage, encode_path
 from fasaco_edge.wire.pheromone import PheromoneMessage, encode_pheromone
@@ -48,5 +49,6 @@ ENCODERS: dict[str, Callable[[Any], bytes]] = {
     schemas.POSE_STAMPED: encode_pose_stamped,
     schemas.POSE_WITH_COVARIANCE_STAMPED: encode_pose_with_covariance_stamped,
     schemas.ODOMETRY: encode_odometry,
+    schemas.BATTERY_STATE: encode_battery,
     **{schema: partial(encode_velocity, schema=schema) for schema in TWIST_SCHEMAS},
 }

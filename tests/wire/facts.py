@@ -6,6 +6,7 @@ from typing import Any
 
 from fasaco_edge.grid.geometry import GridGeometry, StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.wire.battery import BatteryState
 from fasaco_edge.wire.paths import PathMessage
 from fasaco_edge.wire.pheromone import PheromoneMessage
 from fasaco_edge.wire.twists import Velocity
@@ -43,6 +44,8 @@ def facts_of(message: Any) -> dict[str, Any]:
             facts["pose"] = [message.pose.x, message.pose.y, message.pose.yaw]
         case Velocity():
             facts["twist"] = [message.speed_m_s, message.turn_rad_s]
+        case BatteryState():
+            facts |= {"level": message.level, "power": message.power}
         case PathMessage():
             facts |= {"xy": message.xy.tolist(), "yaw": message.yaw.tolist()}
         case PheromoneMessage():

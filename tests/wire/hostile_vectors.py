@@ -33,6 +33,7 @@ def hostile_vectors() -> list[Vector]:
         *_hostile_grids(),
         *_hostile_poses(),
         *_hostile_twists(),
+        *_hostile_batteries(),
         *_hostile_tf(),
         *_hostile_others(),
     ]
@@ -217,6 +218,28 @@ def _hostile_twists() -> list[Vector]:
             for name, schema, at, good, value, why, field in cases
         ),
         _hostile("twist_trailing", schemas.TWIST, plain + b"junk", "bytes after it", "payload"),
+    ]
+
+
+def _hostile_batteries() -> list[Vector]:
+    schema = schemas.BATTERY_STATE
+
+    def state(percentage: float, power: int = 2, cells: int = 0) -> bytes:
+        return oracle.to_bytes(schema, oracle.battery(percentage, power, cells=cells))
+
+    return [
+        _hostile("battery_in_percent", schema, state(85.0), "not a share", "percentage"),
+        _hostile("battery_negative", schema, state(-1.0), "below empty", "percentage"),
+        _hostile("battery_infinite", schema, state(np.inf), "infinite", "percentage"),
+        _hostile("battery_power", schema, state(0.5, 5), "no such status", "power_supply_status"),
+        _hostile(
+            "battery_cells",
+            schema,
+            _at(state(0.5), 52, b"\xff\xff\xff\x7f"),
+            "more cells than bytes",
+            "cell_voltage",
+        ),
+        _hostile("battery_trailing", schema, state(0.5) + b"junk", "bytes after it", "payload"),
     ]
 
 

@@ -129,6 +129,33 @@ def twist_stamped(frame: str, stamp_ns: int, numbers: Any) -> Any:
     return make(schemas.TWIST_STAMPED, header=header(frame, stamp_ns), twist=twist(numbers))
 
 
+def battery(
+    percentage: float,
+    power: int,
+    stamp_ns: int = 0,
+    cells: int = 0,
+    frame: str = "",
+    name: str = "",
+) -> Any:
+    """Return a sensor_msgs/BatteryState, of so many cells."""
+    floats = ("voltage", "temperature", "current", "charge", "capacity", "design_capacity")
+    each = np.linspace(3.0, 4.0, cells, dtype=np.float32)
+    return make(
+        schemas.BATTERY_STATE,
+        header=header(frame, stamp_ns),
+        **dict.fromkeys(floats, np.nan),
+        percentage=percentage,
+        power_supply_status=power,
+        power_supply_health=0,
+        power_supply_technology=0,
+        present=True,
+        cell_voltage=each,
+        cell_temperature=each,
+        location=name,
+        serial_number=name,
+    )
+
+
 def odometry(
     frame: str, stamp_ns: int, child: str, where: Any, covariance: Any, numbers: Any, spread: Any
 ) -> Any:

@@ -39,6 +39,7 @@ def valid_vectors() -> list[Vector]:
         *_valid_grids(),
         *_valid_poses(),
         *_valid_twists(),
+        *_valid_batteries(),
         *_valid_paths(),
         *_valid_tf(),
         *_valid_pheromone(),
@@ -111,6 +112,32 @@ def _valid_twists() -> list[Vector]:
             payload,
             {**facts, "frame": "base_link", "stamp_ns": STAMP_NS},
         ),
+    ]
+
+
+def _valid_batteries() -> list[Vector]:
+    schema = schemas.BATTERY_STATE
+    cases = [
+        ("battery", (0.75, 2, STAMP_NS), {"level": 0.75, "power": "discharging"}),
+        (
+            "battery_of_cells",
+            (1.0, 1, STAMP_NS, 7, "base", "B7"),
+            {"level": 1.0, "power": "charging"},
+        ),
+        ("battery_unknown", (np.nan, 0), {"level": None, "power": "unknown"}),
+    ]
+    return [
+        Vector(
+            name,
+            schema,
+            oracle.to_bytes(schema, oracle.battery(*told)),
+            {
+                "frame": told[4] if len(told) > 4 else "",
+                "stamp_ns": told[2] if len(told) > 2 else 0,
+                **facts,
+            },
+        )
+        for name, told, facts in cases
     ]
 
 

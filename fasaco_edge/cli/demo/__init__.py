@@ -49,6 +49,14 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="what drives the robot: a driver without delay, or `fasaco-edge follow`, a process of "
         "its own as on a real one (default: %(default)s)",
     )
+    parser.add_argument(
+        "--battery-min",
+        type=float,
+        default=0.0,
+        metavar="MIN",
+        help="how long the robot's battery lasts [simulated min], charged where it started; 0 for "
+        "ever (default: %(default)g)",
+    )
     parser.add_argument("--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="[m]")
     parser.add_argument(
         "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="[m]"

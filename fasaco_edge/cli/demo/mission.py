@@ -23,8 +23,9 @@ from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.errors import BusUnavailable, ProcessEnded
-from fasaco_edge.grid.map_files import find_map
+from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.host.processes import python_program
+from fasaco_edge.planners.grids import start_point
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.watch import phrases
 from fasaco_edge.wire import topics
@@ -151,6 +152,7 @@ class DemoMission:
         robot = ["--speed", str(self._args.speed), "--robot-radius", str(self._args.robot_radius)]
         trail = ["--trail-out", str(self._out / "trail.csv")]
         driver = ["--connect", self._endpoint, "--driver", self._args.driver]
+        driver += ["--battery-min", str(self._args.battery_min)]
         self._spawn("robot", ["simulate", str(self._map), *driver, *robot, *trail])
         if self._args.driver == "follow":
             speed = ["--speed", str(self._args.speed)]
@@ -158,7 +160,13 @@ class DemoMission:
 
     def _config(self) -> dict[str, object]:
         simulated = SimulationConfig()
-        return {
+        charging: dict[str, object] = {}
+        if self._args.battery_min:
+            truth = read_map(self._map)
+            x_m, y_m = start_point(self._map, truth, self._args.robot_radius)
+            charging["mission"] = {"dock": {"x_m": x_m, "y_m": y_m, "approach_m": 0.0}}
+            charging["battery"] = {}
+        return charging | {
             "robot": {
                 "radius_m": self._args.robot_radius,
                 "tool_width_m": self._args.cell,

@@ -16,6 +16,7 @@ from fasaco_edge.daemon.memory import most_bytes, queues
 from fasaco_edge.errors import CommandError, FasacoError, MalformedMessage, MapTooLarge
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import (
+    BatteryReceived,
     Event,
     MapReceived,
     PatchesLost,
@@ -25,6 +26,7 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.wire import topics
+from fasaco_edge.wire.battery import decode_battery
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.poses import PoseDecoder
@@ -189,7 +191,7 @@ class Inbox:
             bus.listen(keys, topics.MAP, poster(mailbox, "map", max_pixels)),
             *maps,
         ]
-        for topic in (topics.MAP_UPDATE, topics.POSE):
+        for topic in (topics.MAP_UPDATE, topics.POSE, topics.BATTERY):
             bus.listen(keys, topic, poster(mailbox, topic.name, max_pixels))
         if fleet is not None:
             fleet.listen(bus, mailbox)
@@ -261,6 +263,9 @@ class Inbox:
             return self._fleet.event(received) if self._fleet else None
         if kind == "map_update":
             return PatchReceived(decode_map_update(sample.payload, self._max_pixels))
+        if kind == "battery":
+            state = decode_battery(sample.payload)
+            return BatteryReceived(state.level, state.power, state.stamp_ns)
         is_static = kind == "tf_static"
         pose = self._poses.decode(sample.payload, sample.schema, is_static=is_static)
         return None if pose is None else PoseReceived(pose)

@@ -24,6 +24,7 @@ from fasaco_edge.host.processes import release_unused
 from fasaco_edge.mission.config import MissionConfig, Sweeping
 from fasaco_edge.mission.core.events import (
     Answer,
+    BatteryReceived,
     CommandReceived,
     Event,
     MapReceived,
@@ -76,7 +77,7 @@ class HeldEvents:
                 case MapReceived():
                     self._held.pop(_LOST, None)
                     self._hold(event)
-                case PoseReceived():
+                case PoseReceived() | BatteryReceived():
                     self._hold(event)
                 case PatchRun(patches):
                     faults += self._apply(patches)
@@ -322,6 +323,7 @@ def mission_config(config: DaemonConfig, chosen: CoveragePlanner) -> MissionConf
         TrailRules(planner.alpha, planner.tau0),
         isinstance(chosen, Fasaco),
         robot.name if config.fleet else "",
+        config.battery or None,
     )
 
 

@@ -29,6 +29,7 @@ from fasaco_edge.wire.replies import (
     ZoneReport,
 )
 from fasaco_edge.wire.status import (
+    BatteryReport,
     ClaimReport,
     DriveReport,
     FleetReport,
@@ -117,6 +118,7 @@ class StatusBoard:
             latency_ms=Latencies(_ms(self.ingest_s), _ms(self.plan_s), _ms(self.map_to_path_s)),
             loop_ms=self.turns.report(),
             drive=self._drive(mission),
+            battery=_battery(mission, now),
             errors=self.faults.counts(),
             ledger=self.ledger,
             recorder=self.recorder,
@@ -215,6 +217,22 @@ def _pose(mission: Mission | None) -> PoseReport | None:
         return None
     pose = mission.pose.pose
     return PoseReport(x=round(pose.x, 3), y=round(pose.y, 3), yaw=round(pose.yaw, 4))
+
+
+def _battery(mission: Mission | None, now: float) -> BatteryReport | None:
+    if mission is None or not mission.charging.gauge.power:
+        return None
+    charging, gauge = mission.charging, mission.charging.gauge
+    drain = gauge.drain_per_s
+    is_charging = mission.order_state.errand == "charge"
+    return BatteryReport(
+        _rounded(gauge.level),
+        gauge.power,
+        round(gauge.silent_s(now), 1),
+        _rounded(None if drain is None else 3600.0 * drain),
+        _rounded(charging.turns_back_at if charging.policy else None),
+        _rounded(charging.goes_on_at if charging.policy and is_charging else None),
+    )
 
 
 def _coverage(mission: Mission | None) -> CoverageReport | None:

@@ -52,7 +52,8 @@ PERIOD_S = 0.5
 WAITING_TURNS = 2048
 # Earlier samples go into the log itself, deflated, up to this size; more would delay the loop.
 EMBEDDED_BYTES, DEFLATED_BYTES = 8_000_000, 500_000
-# Longer poses are only named; the log waits for a recorder no longer than this many bytes of poses.
+# Longer poses and batteries are only named; the log waits for a recorder no longer than this many
+# bytes of them.
 POSE_BYTES, POSES_BYTES = 1024, 500_000
 # A busy link drops maps, too. Larger ones are only named: to copy them costs the loop time.
 MAP_BYTES = 100_000
@@ -61,6 +62,7 @@ FULL_BYTES = 4_000_000
 # Time until a new listener surely gets all samples itself [s].
 MARGIN_S = 0.2
 POSE = "pose"
+TOLD = (POSE, "battery")
 NOBODY = "nobody listens to it"
 
 
@@ -187,7 +189,7 @@ class TurnLog:
 
     def _taken(self, received: Received) -> TakenSample:
         kind, sample, at = received.kind, received.sample, received.at
-        if kind == FLEET.name or (kind == POSE and len(sample.payload) <= POSE_BYTES):
+        if kind == FLEET.name or (kind in TOLD and len(sample.payload) <= POSE_BYTES):
             self._samples.add(Arrival(kind, sample, 0, 0))
             return TakenSample(kind, 0)
         if kind == "map" and len(sample.payload) <= MAP_BYTES and at >= self._embed_until:

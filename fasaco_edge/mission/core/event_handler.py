@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from fasaco_edge.errors import CommandError, FasacoError, LedgerMismatchError
 from fasaco_edge.grid.geometry import Polygon, StampedPose
 from fasaco_edge.mission.config import MissionPolicy
+from fasaco_edge.mission.core.charging import BatteryGauge
 from fasaco_edge.mission.core.events import (
     Answer,
+    BatteryReceived,
     CommandReceived,
     Decision,
     Event,
@@ -50,6 +52,7 @@ class EventHandler:
     trail: TrailLayer
     drive: DriveMeter
     fleet: FleetLayer
+    battery: BatteryGauge
     policy: MissionPolicy
     _now: float = field(default=0.0, init=False)
     # What the events of a step lead to.
@@ -119,6 +122,9 @@ class EventHandler:
                 self.map.lose_patches(count)
             case PoseReceived(pose):
                 self._take_pose(pose)
+            case BatteryReceived():
+                drives = len(self.route.path.ahead) > 1
+                self.battery.note(event, self._now, drives=drives)
             case PlanReady():
                 self._take_plan(event)
             case PlanBroken():

@@ -51,6 +51,21 @@ class PoseReceived:
 
 
 @dataclass(frozen=True, slots=True)
+class BatteryReceived:
+    """What the battery says.
+
+    Attributes:
+        level: its charge from 0 to 1; None where that is not known.
+        power: what the supply does, as ``wire.battery.POWERS`` has it.
+        stamp_ns: when that was measured [ns]; 0 where that is not known.
+    """
+
+    level: float | None
+    power: str = "unknown"
+    stamp_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class PlanReady:
     """The plan for request ``number``.
 
@@ -119,6 +134,7 @@ Event = (
     | PatchReceived
     | PatchesLost
     | PoseReceived
+    | BatteryReceived
     | PlanReady
     | PlanBroken
     | CommandReceived
@@ -229,6 +245,7 @@ class State(StrEnum):
     PLANNING = "planning"
     COVERING = "covering"
     RETURNING = "returning"
+    CHARGING = "charging"
     PAUSED = "paused"
     BLOCKED = "blocked"
     DEGRADED = "degraded"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.config import MissionPolicy
+from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
@@ -31,6 +32,8 @@ STANDING_S, STANDING_M = 30.0, 0.1
 # An errand ends once the robot was so long in the last cell of its way [s]: its path leads to the
 # middle of it, and turns it there.
 ARRIVAL_S = 2.0
+# A robot in its dock is so near to the dock's pose, or to where it was led to [m].
+DOCKED_M, NEAR_M = 0.1, 0.5
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
 # The states of a robot that drives, or soon will.
@@ -48,6 +51,7 @@ class Executive:
     route: Route
     trail: TrailLayer
     fleet: FleetLayer
+    charging: Charging
     policy: MissionPolicy
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
@@ -65,11 +69,14 @@ class Executive:
         if trouble and self._state in DRIVING:
             lost = self.monitor.is_pose_lost(self._now)
             return State.DEGRADED, trouble + (self.map.why_other_frame() if lost else "")
+        if self._state in DRIVING and (silence := self.charging.silence(self._now)):
+            return State.DEGRADED, f"{silence}: when to charge is not known"
         return self._state, self._reason
 
     def decide(self, now: float) -> Decision:
         """Return what is to be done at ``now`` [s]."""
         self._now = now
+        self._consider_charging()
         if resting := self._why_resting():
             return self._rest(*resting)
         route = self.route
@@ -117,10 +124,11 @@ class Executive:
         order = self.orders.order_state
         if order.paused:
             return State.PAUSED, order.why_paused
-        if not order.errand and order.order is None:
-            return State.IDLE, order.why
+        if order.errand == "charge" and self._is_docked():
+            return State.CHARGING, self.charging.why(self._now)
         if not order.errand and not order.is_open:
-            return State.DONE, self.orders.ending
+            is_idle = order.order is None
+            return (State.IDLE, order.why) if is_idle else (State.DONE, self.orders.ending)
         if self.map.lattice is None:
             return State.WAITING_FOR_MAP, self.map.why_no_map()
         if self.map.pose is None:
@@ -256,6 +264,8 @@ class Executive:
         route.drop()
         goal = orders.goal(errand)
         if cell == goal and not is_new and self._now - self._entered_at >= ARRIVAL_S:
+            if errand == "charge":
+                return self._rest(State.CHARGING, self.charging.why(self._now))
             return self._arrive()
         is_off = path.finished or path.is_far(cell) or bool(self.monitor.doubt)
         is_lost = cell != goal and is_off and self._has_waited()
@@ -267,6 +277,32 @@ class Executive:
             update = self._lead(area.shortest_path(cell, goal), f"drives {to}", errand)
         self._state, self._reason = State.RETURNING, f"on the way {to}"
         return Decision(path=update)
+
+    def _consider_charging(self) -> None:
+        """Begin to charge where that is due, and end it where it is enough."""
+        orders, charging = self.orders, self.charging
+        charging.look(self._now)
+        errand = orders.order_state.errand
+        if errand == "charge" and charging.is_enough(self._now):
+            orders.set_state(replace(orders.order_state, errand=""))
+        elif not errand and charging.is_due(self._now):
+            orders.set_state(replace(orders.order_state, errand="charge"))
+
+    def _is_docked(self) -> bool:
+        """Tell whether the robot is where it charges, moved by its base from before the dock, too.
+
+        There no cell need be coverable.
+        """
+        place, stamped = self.policy.dock or self.policy.home, self.map.pose
+        if place is None or stamped is None:
+            return False
+        pose, stand = stamped.pose, place.stand
+        if math.hypot(pose.x - place.x_m, pose.y - place.y_m) <= DOCKED_M:
+            return True
+        reach_m = math.hypot(place.x_m - stand.x, place.y_m - stand.y) + NEAR_M
+        is_near = math.hypot(pose.x - stand.x, pose.y - stand.y) <= reach_m
+        charges = self._state is State.CHARGING or self.charging.gauge.power == "charging"
+        return is_near and charges
 
     def _arrive(self) -> Decision:
         """End the way of an errand."""

@@ -13,6 +13,7 @@ from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.event_handler import EventHandler
 from fasaco_edge.mission.core.events import Decision, Event
 from fasaco_edge.mission.core.executive import Executive
@@ -43,6 +44,7 @@ class Mission:
         state, reason: what it is doing, and why.
         route: the path, the plan under way, and counts of both; to be read only.
         fleet: the other robots; to be read only.
+        charging: the battery, and when to charge; to be read only.
     """
 
     def __init__(self, config: MissionConfig, order: OrderState | None = None) -> None:
@@ -58,10 +60,11 @@ class Mission:
         self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
         self._trail = TrailLayer(config, self._map, self.route)
         self._drive = DriveMeter()
-        self._handler = EventHandler(
-            *owners, self._line, self._trail, self._drive, self.fleet, config.policy
-        )
-        self._executive = Executive(*owners, self._trail, self.fleet, config.policy)
+        self.charging = Charging(config, self._map, self._orders, self.route)
+        measured = self._drive, self.fleet, self.charging.gauge
+        self._handler = EventHandler(*owners, self._line, self._trail, *measured, config.policy)
+        decided_by = self._trail, self.fleet, self.charging
+        self._executive = Executive(*owners, *decided_by, config.policy)
         self.restore_order(order or OrderState.autostart())
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:

@@ -121,6 +121,11 @@ class Route:
         self._is_abandoned = self.pending is not None
         self._kept, self._before_motion, self._aside = PathProgress(NO_CELLS), None, None
 
+    @property
+    def aside(self) -> NDArray[np.int32] | None:
+        """What was left of the path before an errand, int32 (n, 2); None without one."""
+        return self._aside
+
     def set_aside(self) -> bool:
         """Keep the path for after an errand, unless that was done; return whether it was now."""
         if self._aside is not None:

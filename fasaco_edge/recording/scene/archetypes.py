@@ -276,6 +276,7 @@ STATES: dict[str, dict[str, int]] = {
         "planning": VIOLET,
         "covering": GREEN,
         "returning": GREEN,
+        "charging": BLUE,
         "paused": AMBER,
         "blocked": RED,
         "degraded": AMBER,

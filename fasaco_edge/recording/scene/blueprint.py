@@ -90,7 +90,7 @@ def _figures() -> rrb.Vertical:
     return rrb.Vertical(
         _plot("Coverage [share of the cells known]", "metrics/coverage", left, 1.1),
         _plot("Latency [ms]", entities.LATENCY, right),
-        _plot("Memory [MB], processor [% of a core]", "metrics/resources", right),
+        _plot("Memory [MB], processor [% of a core], battery [%]", "metrics/resources", right),
     )
 
 

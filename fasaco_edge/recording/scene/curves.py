@@ -23,6 +23,7 @@ from fasaco_edge.wire.status import Status
 PERIOD_NS = 60_000_000_000
 # Latencies and memory: relative changes below this are ignored.
 NOISE = 0.1
+BATTERY_NOISE = 0.02
 
 # Entity, name in the legend, colour; a curve that is in no plot needs none.
 CURVES: tuple[tuple[str, str, Colour], ...] = (
@@ -39,6 +40,7 @@ CURVES: tuple[tuple[str, str, Colour], ...] = (
     (f"{entities.MEMORY}/planner", "planner MB", (167, 139, 250)),
     (f"{entities.MEMORY}/recorder", "recorder MB", (156, 163, 175)),
     (entities.PROCESSOR, "planner %", (245, 140, 40)),
+    (entities.BATTERY, "battery %", (52, 211, 153)),
 )
 
 
@@ -132,6 +134,8 @@ class StatusFigures:
         if status.coverage is not None:
             for name in CELLS:
                 self._draw(f"{entities.CELLS}/{name}", getattr(status.coverage, name))
+        if status.battery is not None and status.battery.level is not None:
+            self._curves.draw(entities.BATTERY, 100 * status.battery.level, BATTERY_NOISE)
         if status.floor is not None:
             self._curves.draw(entities.SWEPT, status.floor.swept_m2, spacing_ns=COUNT_SPACING_NS)
         if status.path is not None:

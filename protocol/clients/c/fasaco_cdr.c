@@ -318,6 +318,31 @@ bool fasaco_read_twist_stamped(const uint8_t *payload, size_t size, fasaco_twist
     return read_twist(&r, "twist.", twist);
 }
 
+bool fasaco_read_battery(const uint8_t *payload, size_t size, fasaco_battery *battery,
+                         fasaco_error *error)
+{
+    static const char *const CELLS[] = {"cell_voltage", "cell_temperature"};
+    static const char *const NAMES[] = {"location", "serial_number"};
+    reader r = begin(payload, size, error);
+    battery->header = read_header(&r, "header");
+    (void)take(&r, 4, 24, "voltage");
+    battery->level = read_float32(&r, "percentage");
+    if (r.ok && !isnan(battery->level) && !(battery->level >= 0 && battery->level <= 1))
+        refuse(&r, "percentage must be in 0..1, or NaN where it is not known, got %g",
+               (double)battery->level);
+    const uint8_t *status = take(&r, 1, 4, "power_supply_status");
+    battery->power = status ? *status : 0;
+    if (battery->power > 4)
+        refuse(&r, "power_supply_status must be below 5, got %u", battery->power);
+    for (int i = 0; i < 2; i++) {
+        uint32_t count = read_uint32(&r, CELLS[i]);
+        (void)take(&r, 4, 4 * (size_t)count, CELLS[i]);
+    }
+    for (int i = 0; i < 2; i++)
+        (void)read_string(&r, NAMES[i]);
+    return end(&r);
+}
+
 bool fasaco_read_pose_stamped(const uint8_t *payload, size_t size, fasaco_pose_stamped *pose,
                               fasaco_error *error)
 {

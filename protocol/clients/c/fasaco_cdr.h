@@ -59,6 +59,13 @@ typedef struct {
     double turn_rate; /* angular z [rad/s], counter-clockwise */
 } fasaco_twist;
 
+/* sensor_msgs/BatteryState; level is NaN where it is not known. */
+typedef struct {
+    fasaco_header header;
+    float level;   /* charge, from 0 to 1 */
+    uint8_t power; /* power_supply_status */
+} fasaco_battery;
+
 /* Placement of a grid: origin is the outer corner of cell (0, 0), resolution [m]. */
 typedef struct {
     uint32_t rows, cols;
@@ -125,6 +132,8 @@ bool fasaco_read_twist(const uint8_t *payload, size_t size, fasaco_twist *twist,
                        fasaco_error *error);
 bool fasaco_read_twist_stamped(const uint8_t *payload, size_t size, fasaco_twist *twist,
                                fasaco_error *error);
+bool fasaco_read_battery(const uint8_t *payload, size_t size, fasaco_battery *battery,
+                         fasaco_error *error);
 bool fasaco_read_grid(const uint8_t *payload, size_t size, fasaco_grid *grid,
                       fasaco_error *error);
 bool fasaco_read_grid_update(const uint8_t *payload, size_t size, fasaco_grid_update *update,

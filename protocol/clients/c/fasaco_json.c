@@ -12,6 +12,7 @@
 #include "fasaco_cdr.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -120,6 +121,22 @@ static bool show_twist_stamped(const uint8_t *payload, size_t size, fasaco_error
     return fasaco_read_twist_stamped(payload, size, &twist, error) && print_twist(&twist);
 }
 
+static bool show_battery(const uint8_t *payload, size_t size, fasaco_error *error)
+{
+    static const char *const POWERS[] = {"unknown", "charging", "discharging", "not charging",
+                                         "full"};
+    fasaco_battery battery;
+    if (!fasaco_read_battery(payload, size, &battery, error))
+        return false;
+    print_header(&battery.header);
+    if (isnan(battery.level))
+        printf(", \"level\": null");
+    else
+        printf(", \"level\": %.17g", (double)battery.level);
+    printf(", \"power\": \"%s\"", POWERS[battery.power]);
+    return true;
+}
+
 static bool show_grid(const uint8_t *payload, size_t size, fasaco_error *error)
 {
     fasaco_grid grid;
@@ -212,6 +229,7 @@ static const struct {
     {"nav_msgs/msg/Odometry", show_odometry},
     {"geometry_msgs/msg/Twist", show_twist},
     {"geometry_msgs/msg/TwistStamped", show_twist_stamped},
+    {"sensor_msgs/msg/BatteryState", show_battery},
     {"nav_msgs/msg/OccupancyGrid", show_grid},
     {"map_msgs/msg/OccupancyGridUpdate", show_grid_update},
     {"nav_msgs/msg/Path", show_path},

@@ -1,0 +1,263 @@
+"""A robot with a battery: when it goes to its dock, what it believes, and when it goes on."""
+
+from dataclasses import replace
+
+import pytest
+
+from fasaco_edge.mission.config import BatteryPolicy, Dock
+from fasaco_edge.mission.core.charging import BatteryGauge
+from fasaco_edge.mission.core.events import BatteryReceived, MapReceived, State
+from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
+from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, with_policy
+
+ROOM = ("........",) * 6
+DOCK = Dock(x_m=0.5 * CELL, y_m=5.5 * CELL, approach_m=0.0)
+AT_DOCK = (5, 0)
+POLICY = BatteryPolicy()
+
+
+class Battery(Drive):
+    """A robot whose battery says once a tick how full it is."""
+
+    def __init__(self, level, cell=(0, 0), order_state=None, battery=POLICY, **policy):
+        config = replace(with_policy(CONFIG, **{"dock": DOCK} | policy), battery=battery)
+        self.level, self.power = level, "discharging"
+        events = MapReceived(building(*ROOM)), pose_at(*cell)
+        super().__init__(cell, *events, config=config, order_state=order_state)
+
+    def tell(self, *events, after=1.0):
+        heard = [] if self.level is None else [BatteryReceived(self.level, self.power)]
+        return super().tell(*heard, *events, after=after)
+
+    def run(self, until, ticks=200):
+        """Drive on until the mission is in a state."""
+        for _ in range(ticks):
+            if self.mission.state is until:
+                return
+            if self.request is not None:
+                self.plan()
+            self.go()
+        raise AssertionError(f"{self.mission.state}: {self.mission.reason}")
+
+    def charge(self, to):
+        while self.mission.state is State.CHARGING and self.level < to:
+            self.level, self.power = min(self.level + 0.02, 1.0), "charging"
+            self.go()
+
+
+def test_below_its_level_it_drives_to_the_dock_charges_and_goes_on_where_it_was():
+    drive = Battery(0.21)
+    drive.run(State.COVERING)
+    for _ in range(20):
+        drive.go()
+    assert drive.mission.state is State.COVERING
+    drive.level = 0.2
+    drive.go()
+    assert (drive.mission.state, drive.mission.reason) == (
+        State.RETURNING,
+        "on the way to the dock",
+    )
+    drive.run(State.CHARGING)
+    assert (drive.cell, drive.walk) == (AT_DOCK, [])
+    assert drive.mission.reason == "battery at 20%, but discharging, goes on at 90%"
+    before = drive.visited
+    drive.charge(to=0.87)
+    assert drive.mission.state is State.CHARGING
+    drive.charge(to=0.95)
+    assert drive.mission.state in (State.PLANNING, State.COVERING)
+    assert drive.visited == before
+    assert len(drive.request.problem.before) > 0, "what is left of the path is kept"
+    drive.finish()
+    assert len(drive.visited) == 48
+
+
+def test_the_way_back_counts_and_so_does_what_driving_drains():
+    gauge = BatteryGauge()
+    for second in range(100):
+        level = 0.8 - 0.002 * second
+        gauge.note(BatteryReceived(level), float(second), drives=True)
+    assert gauge.drain_per_s == pytest.approx(0.002)
+    # Standing and charging show nothing of it, nor does a jump.
+    for second in range(100, 200):
+        gauge.note(BatteryReceived(0.2), float(second), drives=second % 2 == 0)
+    assert gauge.drain_per_s == pytest.approx(0.002)
+    drive = Battery(0.9)
+    drive.mission.charging.gauge._drains.extend([0.01] * 5)
+    drive.run(State.COVERING)
+    far = max(drive.mission.charging.turns_back_at for _ in range(20) if drive.go())
+    # Ten cells, with some to spare, at a hundredth each, and what is to be left then.
+    assert 0.2 < far <= 0.1 + 1.2 * 0.01 * 12
+
+
+def test_it_goes_on_at_what_the_rest_needs_where_that_is_less():
+    drive = Battery(0.19)
+    drive.mission.charging.gauge._drains.extend([0.001] * 5)
+    drive.run(State.CHARGING)
+    for _ in range(8):
+        drive.go()
+    assert drive.mission.charging.goes_on_at == pytest.approx(0.3, abs=0.03)
+    drive.charge(to=0.4)
+    assert drive.level < 0.36
+    drive.finish()
+
+
+@pytest.mark.parametrize("lie", [0.0, 1.0])
+def test_a_charge_that_jumps_and_comes_back_is_not_believed(lie):
+    drive = Battery(0.6 if lie == 0.0 else 0.19)
+    drive.run(State.COVERING if lie == 0.0 else State.CHARGING)
+    for _ in range(8):
+        drive.go()
+    state, truth = drive.mission.state, drive.level
+    for _ in range(5):
+        drive.level = lie
+        drive.go()
+        drive.go()
+        drive.level = truth
+        drive.go()
+        assert drive.mission.state is state
+        assert drive.mission.charging.gauge.level == truth
+    drive.level = lie
+    for _ in range(8):
+        drive.go()
+    assert drive.mission.charging.gauge.level == lie, "what stays is true"
+
+
+def test_a_battery_that_is_silent_is_told_of_and_not_waited_for_on_the_way():
+    drive = Battery(0.8)
+    drive.run(State.COVERING)
+    drive.level = None
+    drive.tell(pose_at(*drive.cell), after=61.0)
+    assert drive.mission.state is State.DEGRADED
+    assert drive.mission.reason == "no charge of the battery for 60 s: when to charge is not known"
+    drive.finish()
+
+
+def test_one_that_never_speaks_is_told_of_too():
+    drive = Battery(None)
+    drive.plan()
+    drive.tell(pose_at(0, 0), after=61.0)
+    assert drive.mission.state is State.DEGRADED
+
+
+def test_silent_while_it_charges_it_stays_where_it_is():
+    drive = Battery(0.15)
+    drive.run(State.CHARGING)
+    drive.level = None
+    drive.tell(pose_at(*drive.cell), after=100.0)
+    assert drive.mission.state is State.CHARGING
+    assert drive.mission.reason == "no charge of the battery for 60 s: waits for one"
+    drive.level = 0.95
+    for _ in range(8):
+        drive.go()
+    drive.finish()
+
+
+def test_a_charge_that_is_not_known_is_none():
+    drive = Battery(0.8)
+    for _ in range(100):
+        drive.tell(pose_at(0, 0), BatteryReceived(None), after=1.0)
+    assert drive.mission.charging.gauge.level == 0.8
+
+
+def test_a_full_battery_is_enough_whatever_its_gauge_says():
+    drive = Battery(0.15)
+    drive.run(State.CHARGING)
+    drive.power = "full"
+    drive.go()
+    assert drive.mission.state is State.CHARGING, "full at 15 % is nothing to set out with"
+    drive.charge(to=0.5)
+    drive.power = "full"
+    drive.go()
+    assert drive.mission.order_state.errand == ""
+
+
+def test_a_dock_out_of_reach_is_named():
+    drive = Battery(0.6)
+    drive.run(State.COVERING)
+    drive.tell(patch(*["##"] * 2, at=(4, 0)))
+    drive.level = 0.1
+    for _ in range(8):
+        drive.tell(pose_at(*drive.cell))
+    assert drive.mission.state is State.BLOCKED
+    assert drive.mission.reason == "no way to the dock: waits for a map that shows one"
+
+
+def test_without_an_order_it_charges_only_below_its_level():
+    for level, state in ((0.25, State.IDLE), (0.15, State.RETURNING)):
+        drive = Battery(level, order_state=OrderState.idle(NO_ORDER))
+        for _ in range(8):
+            drive.tell(pose_at(*drive.cell))
+        assert drive.mission.state is state
+    drive.run(State.CHARGING)
+    drive.charge(to=0.95)
+    assert (drive.mission.state, drive.mission.reason) == (State.IDLE, NO_ORDER)
+
+
+def test_cancelled_on_the_way_it_stays_where_it_stands():
+    drive = Battery(0.15)
+    drive.run(State.RETURNING)
+    decision = drive.command("cancel")
+    assert len(decision.path.cells) == 0
+    for _ in range(20):
+        drive.go()
+    assert (drive.mission.state, drive.walk) == (State.IDLE, [])
+    drive.command("home")
+    drive.run(State.IDLE)
+    assert drive.cell == AT_DOCK
+
+
+def test_paused_it_stands_and_once_it_goes_on_it_charges_on():
+    drive = Battery(0.15)
+    drive.run(State.CHARGING)
+    drive.command("pause")
+    assert drive.mission.state is State.PAUSED
+    drive.command("resume")
+    drive.run(State.CHARGING)
+    drive.command("pause")
+    drive.level, drive.power = 0.95, "charging"
+    for _ in range(8):
+        drive.go()
+    assert drive.mission.state is State.PAUSED
+    drive.command("resume")
+    drive.finish()
+
+
+def test_started_again_while_it_charges_it_stays_in_its_dock():
+    drive = Battery(0.15)
+    drive.run(State.CHARGING)
+    note = drive.mission.snapshot().note
+    again = Battery(None, drive.cell, OrderState.from_json(note))
+    assert again.mission.state is State.CHARGING
+    assert again.mission.reason == "waits for the charge of the battery"
+    again.level = 0.95
+    for _ in range(8):
+        again.go()
+    again.finish()
+
+
+def test_in_its_dock_it_need_not_stand_where_paths_lead():
+    dock = Dock(x_m=0.5 * CELL, y_m=5.5 * CELL, yaw_deg=180.0, approach_m=4 * CELL)
+    drive = Battery(0.15, dock=dock)
+    drive.run(State.CHARGING)
+    assert drive.cell == (5, 4)
+    # Its base takes it in; the scanner sees the dock.
+    drive.cell = (5, 0)
+    for _ in range(5):
+        drive.tell(pose_at(5, 0), patch("###", at=(5, 0)))
+    assert drive.mission.state is State.CHARGING
+
+
+def test_without_a_dock_it_charges_where_the_order_began():
+    drive = Battery(0.6, (2, 3), dock=None)
+    drive.run(State.COVERING)
+    for _ in range(4):
+        drive.go()
+    drive.level = 0.1
+    drive.run(State.CHARGING)
+    assert drive.cell == (2, 3)
+
+
+def test_without_the_block_it_only_listens():
+    drive = Battery(0.01, battery=None)
+    drive.finish()
+    assert drive.mission.charging.gauge.level == 0.01
