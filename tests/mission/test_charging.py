@@ -122,6 +122,13 @@ def test_a_charge_that_jumps_and_comes_back_is_not_believed(lie):
     assert drive.mission.charging.gauge.level == lie, "what stays is true"
 
 
+def test_a_charge_that_drains_fast_is_believed_all_the_same():
+    gauge = BatteryGauge()
+    for second in range(8):
+        gauge.note(BatteryReceived(0.9 - 0.02 * second), float(second), drives=True)
+    assert gauge.level == pytest.approx(0.76)
+
+
 def test_a_battery_that_is_silent_is_told_of_and_not_waited_for_on_the_way():
     drive = Battery(0.8)
     drive.run(State.COVERING)

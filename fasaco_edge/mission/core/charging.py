@@ -69,8 +69,10 @@ class BatteryGauge:
             return
         self._told_at = now
         if self.level is None or abs(event.level - self.level) > JUMP:
-            if self._claim is None or abs(event.level - self._claim[0]) > JUMP:
-                self._claim = event.level, now
+            claim = self._claim
+            is_new = claim is None or abs(event.level - claim[0]) > JUMP
+            # It may drain on meanwhile.
+            self._claim = event.level, now if is_new or claim is None else claim[1]
             if now - self._claim[1] < HOLD_S:
                 return
             self._since = None

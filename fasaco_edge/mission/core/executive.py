@@ -268,7 +268,7 @@ class Executive:
                 return self._rest(State.CHARGING, self.charging.why(self._now))
             return self._arrive()
         is_off = path.finished or path.is_far(cell) or bool(self.monitor.doubt)
-        is_lost = cell != goal and is_off and self._has_waited()
+        is_lost = cell != goal and ((is_off and self._has_waited()) or self._stands_on_path())
         to = PLACES[errand]
         if is_new or is_lost or not len(path.cells) or tuple(path.cells[-1].tolist()) != goal:
             self.monitor.clear_doubt()
