@@ -389,6 +389,26 @@ def test_a_pause_leaves_the_line_as_it_was():
     robot.finish()
 
 
+def test_on_its_way_home_it_sweeps_nothing_beside_it():
+    mission = Mission(CONFIG)
+    robot = Robot(mission)
+    robot.tell(MapReceived(room(4.5, 3.5)))
+    robot.drive(60)
+    robot.tell(CommandReceived(1, "home"))
+    assert robot.reasons[-1] == "drives home"
+    way_m = sum(math.dist(*leg) for leg in pairwise([robot.at, *robot.line]))
+    told = len(robot.reasons)
+    for _ in range(200):
+        if mission.state is State.PAUSED:
+            break
+        robot.drive()
+    assert robot.reasons[told:] == ["at home, paused by command"]
+    assert math.dist(robot.at, START) < CELL_M
+    assert way_m < 2 * math.dist((0.0, 0.0), (4.5, 3.5))
+    robot.tell(CommandReceived(2, "resume"))
+    robot.finish()
+
+
 def test_a_second_pass_sweeps_again():
     grid = room(2.0, 1.6)
     zone = [[1.9, 0.9], [4.1, 0.9], [4.1, 2.7], [1.9, 2.7]]

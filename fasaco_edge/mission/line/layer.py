@@ -139,7 +139,11 @@ class LineLayer:
         is_waited_for = update is not None or reason or is_further
         if not is_waited_for:
             self._explain()
-            if self._polisher.polish(ahead, self._map.floor, is_settled=self._is_settled):
+            # On the way home or to its dock the robot sweeps nothing beside it.
+            is_errand = bool(self._orders.order_state.errand)
+            if not is_errand and self._polisher.polish(
+                ahead, self._map.floor, is_settled=self._is_settled
+            ):
                 reason = "line polished"
         if update is None and reason and len(path.ahead):
             update = self._route.publish_line(reason, now)
