@@ -131,11 +131,13 @@ class Request:
         key: the key expression asked for; it may have wildcards.
         parameters: those behind ``?``, without Zenoh's own, which begin with ``_``.
         payload: of the query, b"" for none.
+        attachment: what came beside it, b"" for nothing.
     """
 
     key: str
     parameters: Mapping[str, str] = field(default_factory=dict)
     payload: bytes = b""
+    attachment: bytes = b""
 
 
 class Question:
@@ -151,10 +153,10 @@ class Question:
         self.request = request_of(query)
         self._query = query
 
-    def answer(self, reply: Reply) -> None:
-        """Answer; the other side may be gone by now."""
+    def answer(self, reply: Reply, key: str = "") -> None:
+        """Answer, on the queryable's key or another; the other side may be gone by now."""
         with contextlib.suppress(zenoh.ZError):
-            send(self._query, self.key, reply)
+            send(self._query, key or self.key, reply)
         query: Any = self._query  # drop() has no annotation
         query.drop()
 
@@ -170,7 +172,8 @@ def request_of(query: zenoh.Query) -> Request:
     parameters = {str(name): str(value) for name, value in listed}
     own = {name: value for name, value in parameters.items() if not name.startswith("_")}
     payload = query.payload.to_bytes() if query.payload is not None else b""
-    return Request(str(query.key_expr), own, payload)
+    beside = query.attachment.to_bytes() if query.attachment is not None else b""
+    return Request(str(query.key_expr), own, payload, beside)
 
 
 def size_of(query: zenoh.Query) -> int:

@@ -12,7 +12,8 @@ from fasaco_edge.bus.access import Role, ros_rights
 from fasaco_edge.config.reading import Section
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
-from fasaco_edge.wire.ros_keys import RosTopic, graph_key
+from fasaco_edge.wire.ros_keys import TRIGGER, RosTopic, graph_key
+from fasaco_edge.wire.ros_services import TRIGGERED, Triggered
 from fasaco_edge.wire.schemas import TWIST_SCHEMAS
 from fasaco_edge.wire.topics import ROS_TOPICS, TF_STATIC
 
@@ -21,8 +22,11 @@ _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 _NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 # rmw/validate_full_topic_name.h, RMW_TOPIC_MAX_NAME_LENGTH.
 _MAX_TOPIC_LENGTH = 247
+_MAX_PREFIX_LENGTH = _MAX_TOPIC_LENGTH - len("/resume")
 
 DEFAULT_NODE = "fasaco_edge"
+# As rclcpp's services have it.
+SERVICE_DEPTH = 10
 # What a follower hears of them.
 POSES = ("pose", TF_STATIC)
 
@@ -38,6 +42,7 @@ class RosTopicNames(Section, frozen=True):
     tf_static: str = "/tf_static"
     coverage_path: str = "/coverage_path"
     coverage_grid: str = "/coverage_grid"
+    diagnostics: str = "/diagnostics"
     cmd_vel: str = "/cmd_vel"
 
 
@@ -53,7 +58,8 @@ class RosConfig(Section, frozen=True):
 
     ``kind`` says how ROS comes to Zenoh: its middleware is rmw_zenoh, or zenoh-bridge-ros2dds
     stands between. ``domain`` and ``node`` are for rmw_zenoh alone: a bridge has its own.
-    ``pose`` is the type of the pose's topic, or "tf".
+    ``pose`` is the type of the pose's topic, or "tf"; the mission's commands are services
+    below ``services``.
     """
 
     kind: Literal["bridge", "rmw_zenoh"]
@@ -61,6 +67,7 @@ class RosConfig(Section, frozen=True):
     namespace: str = "/"
     node: str = DEFAULT_NODE
     topics: RosTopicNames = RosTopicNames()
+    services: str = "/coverage"
     pose: Literal[
         "tf",
         "geometry_msgs/msg/PoseStamped",
@@ -79,8 +86,16 @@ class RosConfig(Section, frozen=True):
     @property
     def outputs(self) -> dict[str, RosTopic]:
         """What the daemon publishes, by the native topic that is like it."""
-        names = ("coverage_path", "coverage_grid")
+        names = ("coverage_path", "coverage_grid", "diagnostics")
         return {ROS_TOPICS[name].topic: self._topic(name) for name in names}
+
+    @property
+    def commands(self) -> dict[Triggered, RosTopic]:
+        """The services by which the mission is commanded, by the command."""
+        return {
+            name: RosTopic(self._name(f"{self.services}/{name}"), TRIGGER, depth=SERVICE_DEPTH)
+            for name in TRIGGERED
+        }
 
     def velocities(self, schema: str) -> RosTopic:
         """Return what the follower publishes, of type ``schema``."""
@@ -104,6 +119,7 @@ class RosConfig(Section, frozen=True):
     def rights(self) -> Role:
         """Return what those may do that have the role ``ros``."""
         said = [*map(self.output_key, self.outputs.values()), *self._driven_by]
+        said += map(self.input_key, self.commands.values())
         return ros_rights([*map(self.input_key, self.inputs.values())], said, self._graph)
 
     def driver_rights(self) -> Role:
@@ -127,6 +143,11 @@ class RosConfig(Section, frozen=True):
         """
         if self.namespace != "/" and not _TOPIC.fullmatch(self.namespace):
             yield BadConfiguration(f"namespace must be / or like /robot1, got {self.namespace!r}")
+        if (
+            not _TOPIC.fullmatch(self.services)
+            or len(self._name(self.services)) > _MAX_PREFIX_LENGTH
+        ):
+            yield BadConfiguration(f"services must be like /coverage, got {self.services!r}")
         if not _NODE.fullmatch(self.node):
             yield BadConfiguration(f"node must be letters, digits and _, got {self.node!r}")
         if self.kind == "bridge" and (self.domain != 0 or self.node != DEFAULT_NODE):

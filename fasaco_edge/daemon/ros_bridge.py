@@ -7,18 +7,25 @@ changes keys, attachments and tokens alone.
 
 from __future__ import annotations
 
-from typing import Literal
+import time
+from functools import partial
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.ros_publisher import RosPublisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.daemon.loop.inbox import poster
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.ros_keys import RosNode, RosTopic, gid_of
+from fasaco_edge.wire.diagnostics import encode_diagnostics
+from fasaco_edge.wire.ros_keys import Endpoint, RosNode, RosTopic, gid_of
+from fasaco_edge.wire.status import Status
 from fasaco_edge.wire.topic_types import VOLATILE, Topic
+
+# The request of a Trigger has five bytes.
+MOST_REQUEST_BYTES = 1024
 
 
 class RosBridge:
@@ -26,7 +33,8 @@ class RosBridge:
 
     Attributes:
         map: the map's subscription, to ask where the map is lacking.
-        path, coverage: where to publish them.
+        path, coverage, diagnostics: where to publish them.
+        commands: the commands of services, by the keys of these.
     """
 
     def __init__(
@@ -42,10 +50,14 @@ class RosBridge:
             bus.token(self._node.token)
         inputs = {name: self._subscribe(name, topic) for name, topic in config.inputs.items()}
         self.map = inputs["map"]
-        self.path, self.coverage = (
-            self._publisher(config.outputs[like.name], like)
-            for like in (topics.PATH, topics.COVERAGE)
+        likes = (topics.PATH, topics.COVERAGE, topics.COMMAND)
+        self.path, self.coverage, self.diagnostics = (
+            self._publisher(topic, like)
+            for topic, like in zip(config.outputs.values(), likes, strict=True)
         )
+        self.commands = {
+            self._serve(service): command for command, service in config.commands.items()
+        }
 
     def _subscribe(self, kind: str, topic: RosTopic) -> Subscription:
         take = poster(self._mailbox, kind, self._max_pixels)
@@ -58,6 +70,20 @@ class RosBridge:
         self._announce("MS", topic)
         return subscription
 
+    def diagnose(self, status: Status) -> None:
+        """Publish a status as diagnostics."""
+        payload = encode_diagnostics(status, self._node.name, time.time_ns())
+        self.diagnostics.put(payload)
+
+    def _serve(self, service: RosTopic) -> str:
+        """Take the requests of a service; return its key, whatever hash a client puts behind."""
+        key = self._config.input_key(service)
+        post = partial(self._mailbox.post, "command")
+        too_long = Reply(b"the request is too long", is_error=True)
+        self._bus.take_questions(key, post, MOST_REQUEST_BYTES, too_long)
+        self._announce("SS", service)
+        return key
+
     def _publisher(self, topic: RosTopic, like: Topic) -> RosPublisher:
         """Publish ``topic`` with the quality of service of the native key ``like``."""
         key = self._config.output_key(topic)
@@ -65,7 +91,7 @@ class RosBridge:
         token = self._announce("MP", topic)
         return RosPublisher(publisher, gid_of(token) if token else b"")
 
-    def _announce(self, kind: Literal["MS", "MP"], topic: RosTopic) -> str:
+    def _announce(self, kind: Endpoint, topic: RosTopic) -> str:
         """Return the liveliness token of a new endpoint; "" with a bridge, which has its own."""
         if self._config.kind == "bridge":
             return ""

@@ -194,7 +194,7 @@ def _serve(
         inbox=Inbox(
             bus, keys, mailbox, config.poses(), max_pixels, [ros.map] if ros else [], _ear(config)
         ),
-        commands=Commands(bus, keys, mailbox),
+        commands=Commands(bus, keys, mailbox, ros.commands if ros else {}),
         outbox=Outbox(bus, keys, ros),
         fleet=_voice(config, bus),
         turns=TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored),

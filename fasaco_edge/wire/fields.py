@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.text import one_line
 from fasaco_edge.wire.cdr import CdrReader, CdrWriter, encoded_string, refuse
-from fasaco_edge.wire.limits import MAX_COORDINATE_M, QUATERNION_TOLERANCE
+from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_STRING_BYTES, QUATERNION_TOLERANCE
 
 SECOND_NS = 1_000_000_000
 POSE = struct.Struct("<7d")
@@ -33,6 +34,11 @@ def write_header(writer: CdrWriter, frame: str, stamp_ns: int) -> None:
     text = encoded_string(frame, writer.message, "header.frame_id")
     writer.words(_HEADER, _SENT_HEADER_NAMES, *divmod(stamp_ns, SECOND_NS), len(text))
     writer.octets(text)
+
+
+def clipped(text: str) -> str:
+    """Return a text as one line that a message's string can hold."""
+    return one_line(text).encode(errors="replace")[:MAX_STRING_BYTES].decode(errors="ignore")
 
 
 def yaw_of(x: float, y: float, z: float, w: float) -> float:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import struct
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from fasaco_edge.wire import schemas
 
@@ -31,9 +31,16 @@ TYPE_HASHES = {
     schemas.TWIST: "9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
     schemas.TWIST_STAMPED: "5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
     schemas.BATTERY_STATE: "4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741",
+    schemas.DIAGNOSTIC_ARRAY: "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
     schemas.PATH: "1957a5bb3cee5da65c4e52e52b65a93df227efce4c20f8458b36e73066ca334b",
 }
 """Of each type its definition's hash in hexadecimal, version 1 (REP 2016)."""
+
+TRIGGER: Final = "std_srvs/srv/Trigger"
+SERVICE_HASHES = {
+    TRIGGER: "eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
+}
+"""The same of services: of request, response and event together."""
 
 GID_BYTES = 16
 
@@ -42,13 +49,16 @@ GID_BYTES = 16
 _ATTACHMENT = struct.Struct(f"<qqB{GID_BYTES}s")
 
 
+Endpoint = Literal["MP", "MS", "SS"]
+
+
 @dataclass(frozen=True, slots=True)
 class RosTopic:
-    """A topic, what it carries and how.
+    """A topic or a service, what it carries and how.
 
     Attributes:
         name: with its namespace, ``/robot1/map``.
-        schema: type of its messages, one of ``TYPE_HASHES``.
+        schema: type of its messages, one of ``TYPE_HASHES`` or ``SERVICE_HASHES``.
         latched: whether who joins late gets the last sample: transient local.
         depth: how many samples are kept.
     """
@@ -99,8 +109,8 @@ class RosNode:
         """Liveliness token of the node: it is number 0 of its session."""
         return f"{self._prefix(0)}/NN/{self._name}"
 
-    def endpoint_token(self, number: int, kind: Literal["MP", "MS"], topic: RosTopic) -> str:
-        """Return the liveliness token of a publisher (MP) or a subscriber (MS).
+    def endpoint_token(self, number: int, kind: Endpoint, topic: RosTopic) -> str:
+        """Return the liveliness token of a publisher (MP), a subscriber (MS) or a service (SS).
 
         ``number`` is its own among those of the node, from 1 on.
         """
@@ -141,13 +151,21 @@ def attachment(sequence: int, time_ns: int, gid: bytes) -> bytes:
     return _ATTACHMENT.pack(sequence, time_ns, GID_BYTES, gid)
 
 
+def attachment_of(beside: bytes) -> tuple[int, bytes] | None:
+    """Return number and gid in what came beside a sample; None where it is none of rmw_zenoh's."""
+    if len(beside) != _ATTACHMENT.size:
+        return None
+    sequence, _, size, gid = _ATTACHMENT.unpack(beside)
+    return (sequence, gid) if size == GID_BYTES else None
+
+
 def _dds_type(schema: str) -> str:
     package, kind, name = schema.split("/")
     return f"{package}::{kind}::dds_::{name}_"
 
 
 def _type_hash(schema: str) -> str:
-    return f"RIHS01_{TYPE_HASHES[schema]}"
+    return f"RIHS01_{(TYPE_HASHES | SERVICE_HASHES)[schema]}"
 
 
 def _mangled(name: str) -> str:

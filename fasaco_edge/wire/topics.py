@@ -286,6 +286,9 @@ _ROS_ROWS = (
     RosRow("tf_static", TF_STATIC, "in", TF, latched=True, depth=TF_DEPTH),
     RosRow("coverage_path", "path", "out", PATH.schemas, latched=True, depth=1),
     RosRow("coverage_grid", "coverage", "out", COVERAGE.schemas, latched=True, depth=1),
+    RosRow(
+        "diagnostics", "diagnostics", "out", (schemas.DIAGNOSTIC_ARRAY,), latched=False, depth=10
+    ),
     RosRow("cmd_vel", "cmd_vel", "out", CMD_VEL.schemas, latched=False, depth=1),
 )
 ROS_TOPICS = {row.name: row for row in _ROS_ROWS}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import time
 from contextlib import contextmanager
 
@@ -14,6 +15,8 @@ from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint, resident_mb
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, two_rooms, update_bytes
 from tests.support.ros_robot import (
+    CLIENT,
+    DIAGNOSTICS,
     GRID,
     PATH,
     POSE,
@@ -165,7 +168,11 @@ def test_the_graph_shows_node_publishers_and_subscribers(tmp_path):
         assert [parts[6:] for parts in nodes] == [["%", "%robot1", "fasaco_edge"]]
         session = nodes[0][2]
         endpoints = [parts for parts in tokens if parts[5] in ("MP", "MS")]
-        assert len(endpoints) == len(tokens) - 1
+        services = {parts[9].replace("%", "/") for parts in tokens if parts[5] == "SS"}
+        assert services == {
+            f"/robot1/coverage/{name}" for name in ("start", "pause", "resume", "home", "cancel")
+        }
+        assert len(endpoints) + len(services) == len(tokens) - 1
         found = {}
         for parts in endpoints:
             assert parts[:4] == ["@ros2_lv", "7", session, "0"]
@@ -188,7 +195,43 @@ def test_the_graph_shows_node_publishers_and_subscribers(tmp_path):
             "/robot1/tf_static": ("MS", TF, True),
             "/robot1/coverage_path": ("MP", PATH, True),
             "/robot1/coverage_grid": ("MP", GRID, True),
+            "/robot1/diagnostics": ("MP", DIAGNOSTICS, False),
         }
+
+
+@pytest.mark.parametrize("naming", [Naming(0, "/robot1"), BRIDGE], ids=["rmw_zenoh", "bridge"])
+def test_the_mission_is_commanded_by_services_and_shown_as_diagnostics(naming, tmp_path):
+    with ros_graph(tmp_path, naming) as (running, robot):
+        shown = robot.listen("diagnostics", DIAGNOSTICS)
+        put_map(robot)
+        robot.put_tf("map", "base_link", Pose2D(1.0, 1.0))
+        with Outsider(running.endpoint) as native:
+            native.wait_status(lambda status: status["state"] == "covering")
+            done, message, beside = robot.call("coverage/pause")
+            assert (done, message) == (True, "paused: paused by command")
+            if naming.domain is not None:
+                sequence, _, size = struct.unpack_from("<qqB", beside)
+                assert (sequence, size, beside[17:]) == (7, 16, CLIENT)
+            assert robot.call("coverage/pause")[0], "told twice is told once"
+            assert robot.call("coverage/home")[0]
+            native.wait_status(lambda status: status["reason"] == "at home, paused by command")
+            assert robot.call("coverage/resume")[0]
+            assert robot.call("coverage/cancel")[:2] == (True, "idle: cancelled")
+            done, message, _ = robot.call("coverage/resume")
+            assert not done
+            assert message.startswith("there is no mission to resume (")
+            assert robot.call("coverage/start")[0]
+
+    def levels():
+        told = [oracle.from_bytes(DIAGNOSTICS, each.payload).status[0] for each in shown.heard]
+        return {one.values[0].value: one.level for one in told}
+
+    found = levels()
+    assert {state: found.get(state) for state in ("covering", "paused", "idle")} == {
+        "covering": 0,
+        "paused": 1,
+        "idle": 0,
+    }
 
 
 def test_two_robots_on_one_router_do_not_hear_each_other(tmp_path):

@@ -45,6 +45,7 @@ def test_a_robot_made_with_a_library_of_somebody_else_gets_its_path(tmp_path):
             "/tf_static": ["tf2_msgs/msg/TFMessage"],
             "/coverage_path": [PATH],
             "/coverage_grid": [GRID],
+            "/diagnostics": ["diagnostic_msgs/msg/DiagnosticArray"],
         }
         assert found["publishers"] == [["/", "fasaco_edge"]]
         path = oracle.from_bytes(PATH, native.ask("path").payload)

@@ -27,6 +27,11 @@ GRID, PATH, POSE = (
     "nav_msgs/msg/Path",
     "geometry_msgs/msg/PoseStamped",
 )
+DIAGNOSTICS, TRIGGER = "diagnostic_msgs/msg/DiagnosticArray", "std_srvs/srv/Trigger"
+# As published by std_srvs of Iron and later; rosbags hashes no services.
+TRIGGER_HASH = "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"
+CLIENT = bytes(range(16))
+EMPTY_REQUEST = b"\0\1\0\0\0"
 UPDATE, TF = "map_msgs/msg/OccupancyGridUpdate", "tf2_msgs/msg/TFMessage"
 
 
@@ -43,7 +48,8 @@ class Naming:
         if self.domain is None:
             return name
         package, kind, type_name = schema.split("/")
-        type_hash = oracle.STORE.hash_rihs01(schema)
+        is_service = schema == TRIGGER
+        type_hash = TRIGGER_HASH if is_service else oracle.STORE.hash_rihs01(schema)
         return f"{self.domain}/{name}/{package}::{kind}::dds_::{type_name}_/{type_hash}"
 
 
@@ -115,6 +121,32 @@ class RosRobot:
             subscriber_detection=True,
         )
         return ear
+
+    def call(self, service: str) -> tuple[bool, str, bytes]:
+        """Call a Trigger as a client does: ask whoever answers for all.
+
+        Returns:
+            Success and message of the response, and what came beside it.
+        """
+        key, beside = self.naming.key(service, TRIGGER), None
+        if self.naming.domain is not None:
+            serial, number = zenoh.ext.z_serialize, zenoh.ext.Int64
+            parts = serial(number(7)), serial(number(time.time_ns())), serial(CLIENT)
+            beside = b"".join(bytes(part) for part in parts)
+        replies = self.session.get(
+            key,
+            payload=EMPTY_REQUEST,
+            attachment=beside,
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=TIMEOUT_S,
+        )
+        (reply,) = replies
+        assert reply.ok is not None
+        assert str(reply.ok.key_expr) == key
+        response = oracle.from_bytes(oracle.TRIGGER_RESPONSE, reply.ok.payload.to_bytes())
+        attached = reply.ok.attachment.to_bytes() if reply.ok.attachment is not None else b""
+        return response.success, response.message, attached
 
     def tokens(self) -> list[list[str]]:
         """Return the parts of all liveliness tokens of the domain."""

@@ -17,6 +17,9 @@ for _schema in (schemas.OCCUPANCY_GRID_UPDATE, schemas.PHEROMONE_GRID):
     _definition = folder("protocol") / "msg" / f"{_schema.rsplit('/', 1)[1]}.msg"
     STORE.register(get_types_from_msg(_definition.read_text(), _schema))
 
+TRIGGER_RESPONSE = "std_srvs/msg/Trigger_Response"
+STORE.register(get_types_from_msg("bool success\nstring message\n", TRIGGER_RESPONSE))
+
 SECOND_NS = 1_000_000_000
 FRAMES = ("", "m", "ma", "map", "odom", "robot1", "robot1/map", "Fußboden", "地図", "x" * 256)
 

@@ -14,6 +14,8 @@ from fasaco_edge.host.resources import folder
 from fasaco_edge.wire import schemas, topics
 from fasaco_edge.wire.ros_keys import (
     GID_BYTES,
+    SERVICE_HASHES,
+    TRIGGER,
     TYPE_HASHES,
     RosNode,
     RosTopic,
@@ -34,7 +36,21 @@ def test_hashes_are_those_of_the_definitions(schema: str) -> None:
 
 
 def test_hashes_are_those_of_the_table() -> None:
-    assert {schema: f"RIHS01_{value}" for schema, value in TYPE_HASHES.items()} == TABLE["hashes"]
+    ours = TYPE_HASHES | SERVICE_HASHES
+    assert {schema: f"RIHS01_{value}" for schema, value in ours.items()} == TABLE["hashes"]
+
+
+def test_services_are_those_of_the_table() -> None:
+    commands = RosConfig(kind="rmw_zenoh", namespace="/robot1").commands
+    assert list(commands) == TABLE["services"]
+    home = commands["home"]
+    hash_ = TABLE["hashes"][TRIGGER]
+    key = f"3/robot1/coverage/home/std_srvs::srv::dds_::Trigger_/{hash_}"
+    assert (home.bridge_key, home.rmw_key(3)) == ("robot1/coverage/home", key)
+    assert NODE.endpoint_token(5, "SS", home).endswith(
+        f"/5/SS/%/%robot1/fasaco_edge/%robot1%coverage%home/std_srvs::srv::dds_::Trigger_/{hash_}"
+        "/::,10:,:,:,,"
+    )
 
 
 def test_topics_are_those_of_the_table() -> None:

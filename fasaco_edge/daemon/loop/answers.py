@@ -7,7 +7,8 @@ are answered once the mission has decided.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib import metadata
 from typing import cast
@@ -32,6 +33,12 @@ from fasaco_edge.wire.json_text import decode_json, encode_json
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
 from fasaco_edge.wire.replies import Version, encode_error
+from fasaco_edge.wire.ros_services import (
+    Triggered,
+    check_request,
+    encode_response,
+    response_attachment,
+)
 from fasaco_edge.wire.settings import Settings
 
 # Least period of replans by request: a path that keeps changing is hard to follow [s].
@@ -127,10 +134,21 @@ def _unknown(keys: Keys, request: Request) -> Reply | None:
 
 
 class Commands:
-    """Serves ``@rpc/mission`` and ``@rpc/replan``; a query waits until the loop answers."""
+    """Serves ``@rpc/mission`` and ``@rpc/replan``; a query waits until the loop answers.
 
-    def __init__(self, bus: Bus, keys: Keys, mailbox: Mailbox[object]) -> None:
+    ``services`` are the commands of ROS 2 services, by the keys of these: their requests come into
+    the mailbox, too.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        keys: Keys,
+        mailbox: Mailbox[object],
+        services: Mapping[str, Triggered] | None = None,
+    ) -> None:
         self._count = 0
+        self._services = services or {}
         # Queries that the mission decides on, by number, and those for the status alone.
         self._open: dict[int, Question] = {}
         self._status_questions: list[Question] = []
@@ -149,7 +167,7 @@ class Commands:
             try:
                 name, order = self._read(question, now)
             except FasacoError as error:
-                question.answer(error_reply(error))
+                self._refuse(question, error)
                 continue
             if name == "status":
                 self._status_questions.append(question)
@@ -161,6 +179,9 @@ class Commands:
 
     def _read(self, question: Question, now: float) -> tuple[CommandName, MissionOrder]:
         request = question.request
+        if (triggered := self._services.get(question.key)) is not None:
+            check_request(request.payload)
+            return triggered, EVERYTHING_ONCE
         if question.key == self._replan_key:
             check(request)
             if request.key.endswith("*"):
@@ -201,7 +222,9 @@ class Commands:
         for answer in self._decided:
             question = self._open.pop(answer.number)
             if answer.error is not None:
-                question.answer(error_reply(answer.error))
+                self._refuse(question, answer.error)
+            elif question.key in self._services:
+                self._respond(question, f"{report.state}: {report.reason}", success=True)
             elif question.key == self._replan_key:
                 assert answer.plan is not None
                 accepted = replies.Replan(report.robot, answer.plan)
@@ -209,3 +232,17 @@ class Commands:
             else:
                 question.answer(Reply(payload))
         self._decided.clear()
+
+    def _refuse(self, question: Question, error: FasacoError) -> None:
+        if question.key in self._services:
+            hint = f" ({error.hint})" if error.hint else ""
+            self._respond(question, f"{error}{hint}", success=False)
+        else:
+            question.answer(error_reply(error))
+
+    def _respond(self, question: Question, message: str, *, success: bool) -> None:
+        """Answer the request of a service, under the very key that it came by."""
+        request = question.request
+        beside = response_attachment(request.attachment, time.time_ns())
+        payload = encode_response(message, success=success)
+        question.answer(Reply(payload, attachment=beside), request.key)

@@ -121,6 +121,8 @@ class Outbox:
         payload = encode_json(status)
         self._last.keep("status", Reply(payload))
         self._status.put(payload)
+        if self._ros is not None:
+            self._ros.diagnose(status)
 
     def commands(self, commands: Sequence[CommandReceived], answers: Sequence[Answer]) -> None:
         """Publish the commands that were taken, for all who did not see the query."""

@@ -1,0 +1,68 @@
+"""The daemon's status as ROS 2 shows it: diagnostic_msgs/DiagnosticArray of one status."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from fasaco_edge.wire.cdr import CdrWriter
+from fasaco_edge.wire.fields import clipped, write_header
+from fasaco_edge.wire.schemas import DIAGNOSTIC_ARRAY
+from fasaco_edge.wire.status import Status
+
+OK, WARN, ERROR, STALE = range(4)
+LEVELS: Final = {
+    "waiting for map": WARN,
+    "waiting for pose": WARN,
+    "paused": WARN,
+    "degraded": WARN,
+    "blocked": ERROR,
+}
+"""Of the states that are not in order; a daemon that does not plan is stale."""
+
+
+def level_of(status: Status) -> int:
+    """Return how a status is: ``OK``, ``WARN``, ``ERROR`` or ``STALE``."""
+    if status.claim.stand != "plans":
+        return STALE
+    level = LEVELS.get(status.state, OK)
+    return max(level, WARN) if status.ledger.fault else level
+
+
+def values_of(status: Status) -> dict[str, str]:
+    """Return the figures of a status by their names."""
+    values = {"state": status.state, "reason": status.reason}
+    if status.coverage is not None:
+        values["covered"] = f"{status.coverage.fraction:.4f}"
+        values["cells left"] = str(status.coverage.remaining)
+    if status.floor is not None:
+        values["swept [m2]"] = f"{status.floor.swept_m2:.1f}"
+    if status.path is not None:
+        values["steps to drive"] = str(status.path.remaining_steps)
+    if status.battery is not None and status.battery.level is not None:
+        values["battery"] = f"{status.battery.level:.3f}"
+    values["refused messages"] = str(status.errors.total)
+    if status.errors.last:
+        values["last refused"] = status.errors.last
+    if status.ledger.fault:
+        values["ledger"] = status.ledger.fault
+    return values
+
+
+def encode_diagnostics(status: Status, node: str, stamp_ns: int) -> bytes:
+    """Return a status as a diagnostic_msgs/DiagnosticArray of the node ``node``, at a time [ns]."""
+    writer = CdrWriter(DIAGNOSTIC_ARRAY)
+    write_header(writer, "", stamp_ns)
+    writer.uint32(1, "length of status")
+    writer.octets(bytes((level_of(status),)))
+    values = values_of(status)
+    for name, text in (
+        ("name", f"{node}: mission"),
+        ("message", f"{status.state}: {status.reason}"),
+        ("hardware_id", status.robot),
+    ):
+        writer.string(clipped(text), name)
+    writer.uint32(len(values), "length of values")
+    for key, value in values.items():
+        writer.string(key, "key")
+        writer.string(clipped(value), "value")
+    return writer.payload()

@@ -1,0 +1,45 @@
+"""The mission's commands as ROS 2 services: std_srvs/srv/Trigger, requests in, responses out.
+
+Sources: rmw_zenoh_cpp at commit 5347477 (``rmw_service_data.cpp``: a response carries the number
+and the gid of its request), std_srvs of Jazzy. A type without members takes one byte in CDR.
+"""
+
+from __future__ import annotations
+
+from typing import Final, Literal
+
+from fasaco_edge.wire.cdr import CdrReader, CdrWriter
+from fasaco_edge.wire.fields import clipped
+from fasaco_edge.wire.ros_keys import TRIGGER, attachment, attachment_of
+
+Triggered = Literal["start", "pause", "resume", "home", "cancel"]
+TRIGGERED: Final[tuple[Triggered, ...]] = ("start", "pause", "resume", "home", "cancel")
+"""Commands that need no more than their name; ``start`` is for all that can be reached."""
+
+
+def check_request(payload: bytes) -> None:
+    """Check the request of a Trigger.
+
+    Raises:
+        MalformedMessage: it is none.
+    """
+    reader = CdrReader(payload, TRIGGER)
+    reader.octets(1, "request")
+    reader.end()
+
+
+def encode_response(message: str, *, success: bool) -> bytes:
+    """Return the response of a Trigger."""
+    writer = CdrWriter(TRIGGER)
+    writer.octets(bytes((success,)))
+    writer.string(clipped(message), "message")
+    return writer.payload()
+
+
+def response_attachment(asked: bytes, time_ns: int) -> bytes:
+    """Return what rmw_zenoh demands beside a response, at a time [ns]; b"" for others' requests.
+
+    ``asked``: what came beside the request.
+    """
+    parts = attachment_of(asked)
+    return attachment(parts[0], time_ns, parts[1]) if parts else b""
