@@ -24,6 +24,7 @@ from fasaco_edge.host.processes import end_with_parent
 COMMANDS = {
     "demo": "watch a simulated robot map and cover a building",
     "plan": "plan a coverage path offline",
+    "init": "write a first configuration: some questions, tried on the bus",
     "run": "run the daemon: maps come in over Zenoh, paths go out",
     "follow": "drive a robot's base along the path: velocities, 20 times a second",
     "mission": "command a running daemon: start, pause, resume, cancel, replan, reset, status",

@@ -149,18 +149,18 @@ def session(context: CheckContext) -> Finding:
         return fail(found, to_do, details)
 
 
-def peers(context: CheckContext) -> Finding:
-    """Check who is on the bus: the daemon, other robots, maps and poses."""
+def peers(context: CheckContext, listen_s: float = LISTEN_S) -> Finding:
+    """Check who is on the bus: the daemon, other robots, maps and poses within a time [s]."""
     if not any(answers(endpoint) is not False for endpoint in _ways(context)):
         return ok("neither a daemon nor a router answers")
     try:
         with _joined(context) as bus:
-            return _seen(context, bus)
+            return _seen(context, bus, listen_s)
     except (BadConfiguration, BusUnavailable) as error:
         return warn(f"could not connect: {error}", error.hint)
 
 
-def _seen(context: CheckContext, bus: Bus) -> Finding:
+def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
     keys, ros = context.config.keys(), context.config.ros2
     wanted = {"map": [keys.of(topics.MAP)], "pose": [keys.of(topics.POSE)]}
     if ros:
@@ -168,7 +168,7 @@ def _seen(context: CheckContext, bus: Bus) -> Finding:
         wanted["map"].append(ros.input_key(ros.inputs["map"]))
         wanted["pose"] += map(ros.input_key, poses)
     elsewhere = MapsElsewhere(bus, wanted["map"])
-    heard = _listen(bus, wanted)
+    heard = _listen(bus, wanted, listen_s)
     alive = bus.alive(f"{keys.base}/{VERSION}/*/alive", ASK_S)
     others = sorted(key.split("/")[-2] for key in alive if key != keys.of(topics.ALIVE))
     details = [f"other robots: {', '.join(others)}"] if others else []
@@ -177,7 +177,7 @@ def _seen(context: CheckContext, bus: Bus) -> Finding:
     details += [f"daemon {own} {stand}" for own, stand in sorted(claims.items())]
     status = _status(bus, keys.rpc("status")) if keys.of(topics.ALIVE) in alive else None
     for kind, count in heard.items():
-        details.append(f"{kind}: {f'{count} in {LISTEN_S:g} s' if count else 'nothing received'}")
+        details.append(f"{kind}: {f'{count} in {listen_s:g} s' if count else 'nothing received'}")
     if keys.of(topics.ALIVE) not in alive:
         found = f"no daemon of robot {keys.robot!r}; {_in_words(heard)}"
         return ok(found, details)
@@ -236,7 +236,7 @@ class MapsElsewhere:
         return sorted(one_line(place) for place in found)[:MOST_PLACES]
 
 
-def _listen(bus: Bus, wanted: dict[str, list[str]]) -> dict[str, int]:
+def _listen(bus: Bus, wanted: dict[str, list[str]], listen_s: float) -> dict[str, int]:
     """Return how many samples of each kind came."""
     heard, lock = Counter[str](), threading.Lock()
 
@@ -250,7 +250,7 @@ def _listen(bus: Bus, wanted: dict[str, list[str]]) -> dict[str, int]:
     for kind, kinds_keys in wanted.items():
         for key in kinds_keys:
             bus.subscribe(key, counting(kind), latched=True)
-    time.sleep(LISTEN_S)
+    time.sleep(listen_s)
     with lock:
         return {kind: heard[kind] for kind in wanted}
 

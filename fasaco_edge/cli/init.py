@@ -1,0 +1,208 @@
+"""``fasaco-edge init``: a first configuration, by some questions, tried on the bus."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import yaml
+
+from fasaco_edge.bus import DEFAULT_ENDPOINT
+from fasaco_edge.cli.console.arguments import (
+    DEFAULT_CELL_M,
+    DEFAULT_RADIUS_M,
+    Command,
+    Exit,
+    add_json,
+    check_output,
+    seconds,
+    writing,
+)
+from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.console.terminal import err, out
+from fasaco_edge.errors import BadConfiguration
+
+if TYPE_CHECKING:
+    from fasaco_edge.config.config import DaemonConfig
+    from fasaco_edge.doctor.finding import Finding
+
+WAYS = {
+    "zenoh": "plain Zenoh",
+    "rmw_zenoh": "ROS 2 whose middleware is rmw_zenoh",
+    "bridge": "ROS 2 behind zenoh-bridge-ros2dds",
+}
+HEAD = "# Every key, with its default and what it means: deploy/fasaco-edge.yaml\n"
+EPILOG = """\
+What is not given is asked for at a terminal; elsewhere the radius, the width and --map-by have to
+be given. The file has what differs from the defaults, and is checked as `check-config` does.
+
+examples:
+  fasaco-edge init
+  fasaco-edge init robot.yaml --robot-radius 0.22 --tool-width 0.3 --map-by rmw_zenoh \\
+      --connect tcp/127.0.0.1:7447
+exit codes: 0 written, whether or not maps were heard; 78 not written (EX_CONFIG)
+"""
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "file",
+        nargs="?",
+        type=Path,
+        default=Path("fasaco-edge.yaml"),
+        metavar="FILE",
+        help="where to write (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--robot-radius", type=float, metavar="M", help="of the disc around the robot [m]"
+    )
+    parser.add_argument(
+        "--tool-width", type=float, metavar="M", help="of the brush, mop or mower [m]"
+    )
+    parser.add_argument(
+        "--map-by",
+        choices=WAYS,
+        help="how the map comes: " + "; ".join(f"{way}: {what}" for way, what in WAYS.items()),
+    )
+    parser.add_argument(
+        "--connect",
+        metavar="ENDPOINT",
+        help="router or bridge to connect to, tcp/127.0.0.1:7447 say; without one the daemon "
+        "listens there itself",
+    )
+    parser.add_argument("--name", metavar="NAME", help="of the robot on the bus (default: robot)")
+    parser.add_argument("--domain", type=int, metavar="N", help="ROS_DOMAIN_ID of rmw_zenoh")
+    parser.add_argument("--namespace", metavar="NS", help="before all ROS topics, /robot1 say")
+    parser.add_argument(
+        "--listen", type=seconds, default=5.0, metavar="S", help="for maps (default: %(default)g s)"
+    )
+    parser.add_argument("--no-try", action="store_true", help="do not look for maps on the bus")
+    parser.add_argument("--force", action="store_true", help="replace the file if there is one")
+    add_json(parser, "the configuration and what was heard")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Ask for what is missing, write the file, and tell what is heard on the bus."""
+    file: Path = args.file
+    if file.exists() and not args.force:
+        raise BadConfiguration(
+            f"{file} is there already", hint="name another file, or replace it with --force"
+        )
+    check_output(file)
+    _ask(args)
+    document = document_of(args)
+    text = HEAD + (yaml.safe_dump(document, sort_keys=False) if document else "")
+    config = _checked(text)
+    with writing(file):
+        file.write_text(text, encoding="utf-8")
+    heard = None if args.no_try else _listen(config, args.listen)
+    if args.json:
+        print_json({"file": str(file), "config": document, "heard": heard and asdict(heard)})
+    else:
+        _print(file, text, heard)
+    return Exit.OK
+
+
+def document_of(args: argparse.Namespace) -> dict[str, object]:
+    """Return what differs from the defaults."""
+    robot = {"name": args.name, "radius_m": args.robot_radius, "tool_width_m": args.tool_width}
+    usual = {"name": "robot", "radius_m": DEFAULT_RADIUS_M, "tool_width_m": DEFAULT_CELL_M}
+    ros = {"domain": args.domain, "namespace": args.namespace}
+    parts: dict[str, dict[str, object]] = {
+        "robot": {k: v for k, v in robot.items() if v not in (None, usual[k])},
+        "bus": {},
+        "ros2": {},
+    }
+    if args.connect:
+        parts["bus"] = {"mode": "client", "listen": [], "connect": [args.connect]}
+    if args.map_by != "zenoh":
+        given = {k: v for k, v in ros.items() if v not in (None, 0, "/")}
+        parts["ros2"] = {"kind": args.map_by} | given
+    elif args.domain is not None or args.namespace is not None:
+        raise BadConfiguration("--domain and --namespace are for maps from ROS 2, see --map-by")
+    return {name: part for name, part in parts.items() if part}
+
+
+def _ask(args: argparse.Namespace) -> None:
+    """Ask for what was not given, where there is somebody to ask.
+
+    Raises:
+        BadConfiguration: there is nobody, or an answer is no number.
+    """
+    needed = ("robot_radius", "tool_width", "map_by")
+    missing = [name for name in needed if getattr(args, name) is None]
+    if not missing:
+        return
+    if not (sys.stdin.isatty() and err().is_terminal):
+        options = ", ".join(f"--{name.replace('_', '-')}" for name in missing)
+        raise BadConfiguration(f"{options} must be given: there is no terminal to ask at")
+    if args.robot_radius is None:
+        args.robot_radius = _number("Radius of the disc around the robot [m]", DEFAULT_RADIUS_M)
+    if args.tool_width is None:
+        args.tool_width = _number("Width of its tool [m]", DEFAULT_CELL_M)
+    if args.map_by is None:
+        ways = "; ".join(f"{way}: {what}" for way, what in WAYS.items())
+        args.map_by = _answer(f"How does the map come? {ways}", "zenoh")
+        if args.map_by not in WAYS:
+            raise BadConfiguration(f"the map comes by {', '.join(WAYS)}, got {args.map_by!r}")
+    if args.connect is None:
+        question = f"Router to connect to, {DEFAULT_ENDPOINT} say; none: the daemon listens there"
+        args.connect = _answer(question, "")
+
+
+def _number(question: str, default: float) -> float:
+    text = _answer(question, f"{default:g}")
+    try:
+        return float(text)
+    except ValueError as error:
+        raise BadConfiguration(f"{question} must be a number, got {text!r}") from error
+
+
+def _answer(question: str, default: str) -> str:
+    # Past standard output, which may be JSON for somebody else.
+    err().print(f"{question} [{default or 'none'}]: ", end="", markup=False, soft_wrap=True)
+    return sys.stdin.readline().strip() or default
+
+
+def _checked(text: str) -> DaemonConfig:
+    """Return the configuration in a text; raise the first of its faults."""
+    from fasaco_edge.config.config import inspect_config
+
+    with TemporaryDirectory() as folder:
+        file = Path(folder, "config.yaml")
+        file.write_text(text, encoding="utf-8")
+        config, faults = inspect_config(file)
+    if config is None:
+        raise faults[0].error
+    return config
+
+
+def _listen(config: DaemonConfig, listen_s: float) -> Finding:
+    from fasaco_edge.doctor.finding import CheckContext
+    from fasaco_edge.doctor.session import peers
+
+    return peers(CheckContext(config), listen_s)
+
+
+def _print(file: Path, text: str, heard: Finding | None) -> None:
+    console = out()
+    console.print(f"{file}:", soft_wrap=True)
+    console.print(text.rstrip(), markup=False, highlight=False, soft_wrap=True)
+    if heard is not None:
+        console.print(f"on the bus: {heard.found}", soft_wrap=True)
+        for line in heard.details:
+            console.print(f"  {line}", soft_wrap=True, markup=False)
+    console.print(f"start it:   fasaco-edge run --config {file}", soft_wrap=True)
+
+
+COMMAND = Command(
+    description="Write a first configuration for a robot: its size, its tool, how the map comes. "
+    "Looks for the map on the bus, and says what it has heard.",
+    run=run,
+    add_options=_add_options,
+    epilog=EPILOG,
+)

@@ -1,0 +1,101 @@
+"""``init`` writes what differs from the defaults, refuses what is wrong, tells what it heard."""
+
+from __future__ import annotations
+
+import io
+import json
+
+import pytest
+
+from fasaco_edge.cli import main
+from fasaco_edge.cli.console import terminal
+from fasaco_edge.config.config import DaemonConfig, load_config
+from tests.support.processes import free_endpoint
+from tests.support.ros_robot import GRID, Naming, ros_robot, ros_router
+
+GIVEN = ["--robot-radius", "0.2", "--tool-width", "0.3", "--map-by", "zenoh"]
+
+
+def init(file, *words):
+    return main(["init", str(file), "--no-try", *words])
+
+
+def test_it_has_nothing_in_it_but_what_differs_from_the_defaults(tmp_path, capsys):
+    file = tmp_path / "robot.yaml"
+    assert init(file, *GIVEN) == 0
+    assert file.read_text().splitlines()[1:] == ["robot:", "  radius_m: 0.2"]
+    assert f"fasaco-edge run --config {file}" in capsys.readouterr().out
+    default = ["--robot-radius", "0.18", "--tool-width", "0.3", "--map-by", "zenoh"]
+    assert init(file, *default, "--force") == 0
+    assert load_config(file) == DaemonConfig()
+
+
+def test_ros_and_a_router(tmp_path, capsys):
+    file = tmp_path / "robot.yaml"
+    words = ["--robot-radius", "0.18", "--tool-width", "0.4", "--map-by", "rmw_zenoh"]
+    words += ["--domain", "7", "--namespace", "/left", "--connect", "tcp/127.0.0.1:7447"]
+    assert init(file, *words, "--json") == 0
+    config = load_config(file)
+    assert (config.ros2.kind, config.ros2.domain, config.ros2.namespace) == (
+        *("rmw_zenoh", 7, "/left"),
+    )
+    assert (config.bus.mode, config.bus.listen) == ("client", ())
+    told = json.loads(capsys.readouterr().out)
+    assert (told["file"], told["heard"]) == (str(file), None)
+    assert told["config"]["robot"] == {"tool_width_m": 0.4}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (GIVEN[:4], "--map-by must be given: there is no terminal to ask at"),
+        ([], "--robot-radius, --tool-width, --map-by must be given"),
+        ([*GIVEN, "--domain", "7"], "--domain and --namespace are for maps from ROS 2"),
+        ([*GIVEN, "--robot-radius", "20"], "robot.radius_m: expected float <= 10.0, got 20"),
+        ([*GIVEN, "--name", "a/b"], "robot.name: "),
+    ],
+)
+def test_what_is_wrong_is_told_and_not_written(words, said, tmp_path, capsys):
+    file = tmp_path / "robot.yaml"
+    assert init(file, *words) == 78
+    assert said in capsys.readouterr().err
+    assert not file.exists()
+
+
+def test_a_file_that_is_there_is_kept(tmp_path, capsys):
+    file = tmp_path / "robot.yaml"
+    file.write_text("robot: {name: mine}\n")
+    assert init(file, *GIVEN) == 78
+    assert "is there already" in capsys.readouterr().err
+    assert file.read_text() == "robot: {name: mine}\n"
+
+
+def test_at_a_terminal_it_asks(tmp_path, capsys, monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    console = terminal.err()
+    monkeypatch.setattr("sys.stdin", Terminal("0.25\n\nbridge\n\n"))
+    monkeypatch.setattr("fasaco_edge.cli.init.err", lambda: console)
+    monkeypatch.setattr(type(console), "is_terminal", property(lambda _: True))
+    file = tmp_path / "robot.yaml"
+    assert init(file) == 0
+    config = load_config(file)
+    assert (config.robot.radius_m, config.robot.tool_width_m) == (0.25, 0.3)
+    assert (config.ros2.kind, config.bus.mode) == ("bridge", "peer")
+
+
+def test_it_tells_which_maps_it_heard(tmp_path, capsys):
+    file, naming = tmp_path / "robot.yaml", Naming(3)
+    words = [*GIVEN[:4], "--map-by", "rmw_zenoh", "--json", "--listen", "2", "--force"]
+    endpoint = free_endpoint()
+    words += ["--connect", endpoint]
+    with ros_router(endpoint), ros_robot(endpoint, naming) as robot:
+        robot.put("map", GRID, b"any", latched=True)
+        assert main(["init", str(file), *words, "--domain", "3"]) == 0
+        heard = json.loads(capsys.readouterr().out)["heard"]
+        assert heard["found"] == "no daemon of robot 'robot'; maps received"
+    assert main(["init", str(file), *words[:-1], free_endpoint()]) == 0
+    heard = json.loads(capsys.readouterr().out)["heard"]
+    assert heard["found"] == "neither a daemon nor a router answers"
