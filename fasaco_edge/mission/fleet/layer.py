@@ -29,9 +29,10 @@ GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
 # How often the division is looked at, and how long one holds at least that nobody has left [s].
 LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
 # Parts that differ by less than this share and time [s] are left alone.
-UNEVEN, UNEVEN_S = 1.25, 20.0
-# Another robot that sweeps so many cells of this one's part changes its path.
-MANY_TAKEN = 4
+UNEVEN, UNEVEN_S = 1.25, 40.0
+# Another robot that has swept so many cells of this one's part changes its path: one that only
+# comes through does not. In unknown buildings 4 cost 7 % of two robots' time.
+MANY_TAKEN = 30
 MOST_NUMBER = 2**31 - 1
 LATER = "another robot has divided anew"
 
