@@ -309,7 +309,7 @@ def read_client_security(file: str, connect: Sequence[str]) -> SecurityConfig:
     except OSError as error:
         raise BadConfiguration(f"--security: {file}: {error.strerror}") from error
     except ValueError as error:
-        raise BadConfiguration(f"--security: {error}") from error
+        raise BadConfiguration(f"--security: {file}: {error}") from error
     except BadConfiguration as error:
         raise BadConfiguration(f"--security, --connect: {error}", hint=error.hint) from error
     return security
