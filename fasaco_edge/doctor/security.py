@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import stat
 from datetime import UTC, datetime, timedelta
+from ipaddress import ip_address
 from pathlib import Path
 
 from fasaco_edge.bus.access import ROLES
@@ -27,6 +28,10 @@ def endpoints(context: CheckContext) -> Finding:
     kind = bus.security.kind
     details = [f"{endpoint}: {_reach(endpoint)}, {SHOWS[kind]}" for endpoint in bus.listen]
     details += [f"{endpoint}: connects there" for endpoint in bus.connect]
+    metrics = context.config.metrics
+    if (address := metrics.address()) is not None:
+        where = "this computer" if ip_address(address.host).is_loopback else "other computers"
+        details.append(f"http://{metrics.listen}/metrics: figures, from {where}, by anybody there")
     beyond = [endpoint for endpoint in bus.listen if not is_local(endpoint)]
     if not beyond:
         where = "on this computer only" if bus.listen else "nowhere"

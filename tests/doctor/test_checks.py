@@ -14,7 +14,8 @@ import pytest
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import BusConfig, DaemonConfig, MissionSettings, RobotConfig
-from fasaco_edge.doctor import machine, report, session
+from fasaco_edge.config.metrics import MetricsConfig
+from fasaco_edge.doctor import machine, report, security, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
 from fasaco_edge.kernels.sealed import write_sealed
 from fasaco_edge.wire import topics
@@ -44,6 +45,20 @@ def at(
 ) -> CheckContext:
     bus = BusConfig(listen=listen, connect=connect, mode=mode)
     return CheckContext(DaemonConfig(bus=bus, robot=RobotConfig(name=name)))
+
+
+@pytest.mark.parametrize(
+    ("metrics", "where"),
+    [
+        (MetricsConfig("[::1]:9465", open_to_everyone=True), "this computer"),
+        (MetricsConfig("10.0.0.7:9465", open_to_everyone=True), "other computers"),
+    ],
+)
+def test_who_may_read_the_figures_is_told(metrics, where):
+    details = security.endpoints(CheckContext(DaemonConfig(metrics=metrics))).details
+    assert details[-1] == (
+        f"http://{metrics.listen}/metrics: figures, from {where}, by anybody there"
+    )
 
 
 def test_a_raspberry_pi_without_the_memory_controller_is_told_how_to_have_it(tmp_path):
