@@ -75,7 +75,10 @@ ROLES: Mapping[str, Role] = {
     "recorder": _role("recorder", "receives everything, publishes its status", includes="viewer"),
     "driver": _role("driver", "drives the robot: publishes cmd_vel, and views", includes="viewer"),
     # Topics that the configuration names: see ``ros_rights``.
-    "ros": Role("publishes maps, updates and poses on ROS 2 topics, sees path and coverage"),
+    "ros": Role(
+        "publishes maps, updates, poses and battery on ROS 2 topics, sees path, coverage and "
+        "diagnostics, commands by services"
+    ),
     # A daemon connects to it: what others may do there, the router itself has to restrict.
     "router": Role("forwards everything, both ways", speaks=EVERYTHING, listens=EVERYTHING),
     "fleet": _role("fleet", "another robot of the fleet, beside its own role"),

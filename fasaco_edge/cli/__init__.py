@@ -27,7 +27,7 @@ COMMANDS = {
     "init": "write a first configuration: some questions, tried on the bus",
     "run": "run the daemon: maps come in over Zenoh, paths go out",
     "follow": "drive a robot's base along the path: velocities, 20 times a second",
-    "mission": "command a running daemon: start, pause, resume, cancel, replan, reset, status",
+    "mission": "command a running daemon: start, pause, resume, home, cancel, replan, status ...",
     "ask": "query a running daemon: status, path, coverage, pheromone, config, replan ...",
     "watch": "watch a robot's mission live in this terminal",
     "record": "record a robot's mission into a Rerun recording (.rrd)",
