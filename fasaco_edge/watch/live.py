@@ -28,6 +28,8 @@ END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # At most ten pages a second, and only where something changed or the clock did [s].
 FRAME_S = 0.1
 LINE_EVERY_S = 1.0
+# The largest page. A terminal may say that it is of 65,535 x 65,535, and a page take gigabytes.
+MOST_COLUMNS, MOST_LINES = 800, 400
 # How long to wait for the rest once a status is there [s].
 REST_S = 1.0
 
@@ -167,12 +169,12 @@ class Screen:
         self._end()
 
     def size(self) -> tuple[int, int]:
-        """Return columns and lines, as they are now."""
+        """Return columns and lines that are shown, as they are now."""
         try:
             size = os.get_terminal_size(self._terminal.fileno())
         except OSError:
             return 80, 24
-        return max(size.columns, 1), max(size.lines, 1)
+        return min(max(size.columns, 1), MOST_COLUMNS), min(max(size.lines, 1), MOST_LINES)
 
     def show(self, lines: list[str], size: tuple[int, int]) -> None:
         """Show a page of ``size``, columns and lines.

@@ -7,11 +7,13 @@ import os
 import signal
 import socket
 import subprocess
+import termios
 import time
 from collections.abc import Iterator
 
 import pytest
 
+from fasaco_edge.watch.live import Screen
 from tests.support.outsider import Outsider
 from tests.support.processes import (
     ENVIRONMENT,
@@ -111,6 +113,14 @@ def test_another_size_is_another_page(covering):
             terminal.resize(columns, lines)
             terminal.wait(lambda seen, lines=lines: seen.count("\n") == lines - 1)
             assert {len(line) for line in terminal.screen()} == {columns}
+
+
+def test_a_page_is_no_larger_than_a_screen_whatever_the_terminal_says():
+    master, slave = os.openpty()
+    with open(master, "rb"), open(slave, "w", encoding="utf-8") as terminal:
+        for columns, lines, shown in ((65535, 65535, (800, 400)), (0, 0, (1, 1)), (9, 5, (9, 5))):
+            termios.tcsetwinsize(terminal.fileno(), (lines, columns))
+            assert Screen(terminal).size() == shown
 
 
 def test_a_terminal_without_colours_gets_none(covering):
