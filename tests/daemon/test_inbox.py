@@ -6,6 +6,7 @@ import gc
 import json
 import weakref
 
+import numpy as np
 import pytest
 
 from fasaco_edge.bus.arrival import Sample
@@ -20,9 +21,11 @@ from fasaco_edge.daemon.loop.inbox import (
     make_mailbox,
     take_batch,
 )
+from fasaco_edge.daemon.loop.mission_runner import HeldEvents
 from fasaco_edge.errors import MalformedMessage, PatchWithoutBase, PlanFailed
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.core.events import (
+    BatteryReceived,
     MapReceived,
     PatchesLost,
     PatchReceived,
@@ -30,6 +33,7 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
+from fasaco_edge.wire.battery import BatteryState, encode_battery
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
@@ -46,6 +50,7 @@ from tests.support.rooms import (
 )
 
 MAP = map_bytes(pillared_room())
+f32 = np.float32
 MAX_PIXELS = 1_000_000
 UPDATE = update_bytes(pillared_room(), 1.0, 1.0, 2.0, 2.0)
 
@@ -88,6 +93,18 @@ def test_a_map_does_not_wait_for_a_thousand_poses(arrivals):
     while taken[-1]:
         taken.append(arrivals.decode()[0])
     assert sum(map(len, taken)) == 1001, "none is lost"
+
+
+def test_a_battery_is_heard_and_held_until_there_is_a_mission(arrivals):
+    for level in (0.5, 0.4):
+        arrivals.post("battery", encode_battery(BatteryState(level, "discharging", "", 7)))
+    arrivals.post("battery", b"no battery")
+    events, faults = arrivals.events()
+    assert events == [BatteryReceived(level, "discharging", 7) for level in map(f32, (0.5, 0.4))]
+    assert [type(fault) for fault in faults] == [MalformedMessage]
+    held = HeldEvents()
+    assert held.take([*events, *events]) == []
+    assert held.events == events[-1:]
 
 
 def test_a_command_waits_for_the_poses_before_it_and_takes_them_in_no_larger_cycles(arrivals):

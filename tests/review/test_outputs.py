@@ -28,9 +28,10 @@ from fasaco_edge.review.moments import Span
 from fasaco_edge.review.page import page_of
 from fasaco_edge.review.pictures import SIZE, draw_review
 from fasaco_edge.review.review import CoverageCounts, read_review, review_of
+from fasaco_edge.review.rows import charge_rows, screen_rows
 from fasaco_edge.review.run_data import StatusSample
 from fasaco_edge.wire.replies import MissionReport, ZoneReport
-from fasaco_edge.wire.status import LedgerReport, Status
+from fasaco_edge.wire.status import BatteryReport, LedgerReport, Status
 from tests.review.test_parts import run_told
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge
 from tests.support.reviews import document
@@ -343,3 +344,15 @@ def test_a_file_is_no_folder_to_export_to(parts, tmp_path, capsys):
     (tmp_path / "file").touch()
     assert main(["review", *map(str, parts), "--export", str(tmp_path / "file")]) == 78
     assert "cannot write" in capsys.readouterr().err
+
+
+def test_each_time_it_charged_is_a_line(parts):
+    review = read_review(parts)
+    since = review.duration_s
+    spans = (Span("charging", since, since + 60.0, "battery"), Span("covering", since + 60.0, 99.0))
+    levels = [(since - 1.0, 0.14), (since + 59.0, 0.9)]
+    told = [StatusSample(at_s, Status(battery=BatteryReport(level))) for at_s, level in levels]
+    data = replace(review.data, statuses=[*review.data.statuses, *told])
+    found = document_of(replace(review, states=(*review.states, *spans), data=data))
+    assert [row[1:] for row in charge_rows(found)] == [("1:00.0", "14% to 90%")]
+    assert "14% to 90%" in dict(screen_rows(review, found))["charges"]
