@@ -135,6 +135,17 @@ def test_a_pipe_in_place_of_the_lock_holds_nobody_up(tmp_path):
         second.lock()
 
 
+def test_a_lock_that_was_deleted_is_taken_again(tmp_path):
+    folder = tmp_path / "state"
+    first, second = LedgerFile(folder, "robot"), LedgerFile(folder, "robot")
+    first.lock()
+    first.write(lane(3))
+    shutil.rmtree(folder)
+    first.write(lane(4))
+    with pytest.raises(LedgerFileError, match="another daemon"):
+        second.lock()
+
+
 def test_nothing_kept_aside_overwrites_another(written):
     for count in range(4):
         (written / NAMES[0]).write_bytes(bytes([count]))

@@ -109,6 +109,10 @@ class LedgerFile:
         """
         payload = encode_ledger(ledger)
         make_folder(self.path.parent)
+        if self._lock is not None and not os.fstat(self._lock).st_nlink:
+            # Somebody deleted it, perhaps with its folder: another process could take a new one.
+            os.close(self._lock)
+            self._lock = None
         if self._exclusive and self._lock is None:
             self._take_lock()
         kept = self._rename_unwanted()
