@@ -48,12 +48,15 @@ class Role:
         description: the same for people.
         speaks: topics it may publish and answer for.
         listens: topics it may subscribe to and ask.
+        asked: topics that it is told of who listens to, by key expressions for all robots too: else
+            it would not publish its own.
         includes: another role whose rights it has too; "" for none.
     """
 
     description: str
     speaks: tuple[str, ...] = ()
     listens: tuple[str, ...] = ()
+    asked: tuple[str, ...] = ()
     includes: str = ""
 
 
@@ -81,7 +84,9 @@ ROLES: Mapping[str, Role] = {
     ),
     # A daemon connects to it: what others may do there, the router itself has to restrict.
     "router": Role("forwards everything, both ways", speaks=EVERYTHING, listens=EVERYTHING),
-    "fleet": _role("fleet", "another robot of the fleet, beside its own role"),
+    "fleet": replace(
+        _role("fleet", "another robot of the fleet, beside its own role"), asked=("fleet",)
+    ),
     # The daemon itself, as a router sees it.
     "robot": _role("robot", "plans: receives maps, publishes paths"),
 }
@@ -248,6 +253,7 @@ def _rules(grant: Grant) -> Iterator[dict[str, Any]]:
         ("is heard", "egress", LISTEN, role.speaks),
         ("listens", "ingress", LISTEN, role.listens),
         ("is told", "egress", SPEAK, role.listens),
+        ("is asked", "egress", LISTEN, role.asked),
     ):
         if topics:
             yield {

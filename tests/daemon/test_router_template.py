@@ -17,7 +17,7 @@ from tests.support.secured import authority, needs_openssl, transport
 
 pytestmark = needs_openssl
 FLEET = ("r1", "r2")
-NAMES = ("router", *FLEET, "slam-r1", "tablet", "office")
+NAMES = ("router", *FLEET, "slam-r1", "slam-r2", "tablet", "office")
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,8 @@ def endpoint(ca, tmp_path_factory):
             security = {"kind": "tls", "tls": ca.files(name), "roles": {"router": ["router"]}}
             bus = {"mode": "client", "listen": [], "connect": [connects], "security": security}
             place = tmp_path_factory.mktemp(name)
-            stack.enter_context(daemon_process(place, bus=bus, robot={"name": name}))
+            fleet = {"name": "hall"}
+            stack.enter_context(daemon_process(place, bus=bus, robot={"name": name}, fleet=fleet))
         yield connects
 
 
@@ -93,6 +94,27 @@ def test_a_robot_does_not_pass_for_another_nor_command_it(office, voice):
     assert ear.heard
     assert all(heard.json()["robot"] == "r2" for heard in ear.heard)
     assert status(second)["map"] == before["map"]
+
+
+def test_robots_of_a_fleet_hear_each_other_and_nobody_speaks_for_another(office, voice):
+    for seat, name in zip(office, FLEET, strict=True):
+        slam, deadline = voice(f"slam-{name}"), time.monotonic() + 60.0
+        # Another session at once: what it says first may come before who listens is known to it.
+        while not (told := status(seat))["map"] or not told["pose"]:
+            assert time.monotonic() < deadline, told
+            slam.put(f"fasaco/@v1/{name}/map", map_bytes(pillared_room()))
+            slam.put(f"fasaco/@v1/{name}/pose", pose_bytes(0.75, 0.75))
+            time.sleep(0.5)
+    ear = office[0].listen("fleet", late=False)
+    for seat, other in zip(office, reversed(FLEET), strict=True):
+        deadline = time.monotonic() + 60.0
+        while [member["name"] for member in status(seat)["fleet"]["members"]] != [other]:
+            assert time.monotonic() < deadline
+    said = ear.wait(lambda heard: True).payload
+    for name in ("r1", "slam-r1", "tablet"):
+        voice(name).put("fasaco/@v1/r3/fleet", said)
+    time.sleep(SILENCE_S)
+    assert [m["name"] for m in status(office[1])["fleet"]["members"]] == ["r1"]
 
 
 def test_a_viewer_views_both(ca, endpoint):
