@@ -111,6 +111,9 @@ def test_shares_are_reached_when_they_were(told, review, truth, recording):
     cells = list(dict.fromkeys(cell for cell, _ in truth))
     assert len(review.first_s) == len(cells)
     began = _began(recording, review)
+    arrived = [at for at, _ in recording.statuses]
+    # A slow computer brings statuses late.
+    late_s = max(0.3, *np.diff(arrived))
     for percent in (50, 90, 99, 100):
         needed = -(-len(cells) * percent // 100)
         at_s = told["reached_s"][str(percent)]
@@ -119,8 +122,8 @@ def test_shares_are_reached_when_they_were(told, review, truth, recording):
             for at, status in recording.statuses
             if status["coverage"]
         ]
-        assert all(count < needed for at, count in counts if at < at_s - 0.3)
-        assert all(count >= needed for at, count in counts if at > at_s + 0.3)
+        assert all(count < needed for at, count in counts if at < at_s - late_s)
+        assert all(count >= needed for at, count in counts if at > at_s + late_s)
 
 
 def test_the_curve_ends_with_all(review):

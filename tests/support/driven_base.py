@@ -29,6 +29,8 @@ from fasaco_edge.wire.poses import encode_pose_stamped
 from fasaco_edge.wire.twists import decode_velocity
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
 
+# Whoever has not stopped by then will not [s].
+LONGEST_S = 5.0
 POSE_S = 0.05
 
 
@@ -93,9 +95,13 @@ class DrivenBase:
 
     def stopped_after(self, since: float, watch_s: float = 0.4) -> float:
         """Return how long after ``since`` the base was told to stand, for good [s]."""
-        time.sleep(max(since + watch_s - time.monotonic(), 0.0))
-        later = [(at, command) for at, command in list(self.heard) if at >= since]
-        stands = [at for at, command in later if command == Command()]
+        until = since + watch_s
+        while True:
+            time.sleep(max(until - time.monotonic(), 0.01))
+            later = [(at, command) for at, command in list(self.heard) if at >= since]
+            stands = [at for at, command in later if command == Command()]
+            if stands or time.monotonic() > since + LONGEST_S:
+                break
         if not stands or any(command != Command() for at, command in later if at > stands[0]):
             return math.inf
         return stands[0] - since
