@@ -60,7 +60,8 @@ def fine_geometry(
         raise MapTooLarge(
             f"a raster of {rows} x {cols} pixels of {unit:g} m exceeds {most_pixels} pixels"
         )
-    x, y = coarse.to_map(-frame / parts, -frame / parts)
+    # Two maps on the same pixels have one raster, however their origins are rounded.
+    x, y = coarse.snapped().to_map(-frame / parts, -frame / parts)
     return GridGeometry(rows, cols, unit, Pose2D(x, y, coarse.origin.yaw)), parts
 
 

@@ -203,6 +203,19 @@ class GridGeometry:
         raster = Raster(self.resolution, self.origin.yaw, right / RASTER_STEPS, up / RASTER_STEPS)
         return raster, window
 
+    def snapped(self) -> GridGeometry:
+        """Return this grid exactly on its raster, see ``on_raster``.
+
+        Of two grids on one raster that lie on the same pixels both are the same then: origins that
+        are rounded now and then, as float32 or by a transform, make no difference.
+        """
+        raster, window = self.on_raster()
+        cos, sin = math.cos(raster.yaw), math.sin(raster.yaw)
+        u = (window.col0 + raster.right) * raster.resolution
+        v = (window.row0 + raster.up) * raster.resolution
+        origin = Pose2D(cos * u - sin * v, sin * u + cos * v, raster.yaw)
+        return GridGeometry(self.rows, self.cols, raster.resolution, origin)
+
     def bounds(self, window: Window | None = None) -> Bounds:
         """Return the bounds of the grid, or of a window of its pixels, in the map frame."""
         part = window or Window(0, 0, self.rows, self.cols)

@@ -31,6 +31,8 @@ __all__ = ["BLOCKED", "COVERABLE", "UNKNOWN", "Cell", "CoverageLattice", "Footpr
 
 Cell = tuple[int, int]
 
+# A map that reaches so little into a cell does not reach into it [cells]: coordinates are rounded.
+ROUNDING = 1e-6
 # Indices of cells are int32, and sums of two of them, too.
 MOST_INDEX = 2**30
 
@@ -162,11 +164,12 @@ def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Win
             f"a lattice of {rows:.0f} x {cols:.0f} cells of {cell_m} m over a map of "
             f"{x1 - x0:.0f} x {y1 - y0:.0f} m exceeds {max_cells} cells"
         )
+    x0, y0, x1, y1 = geometry.snapped().bounds()
     window = Window(
-        math.floor(y0 / cell_m),
-        math.floor(x0 / cell_m),
-        math.ceil(y1 / cell_m),
-        math.ceil(x1 / cell_m),
+        math.floor(y0 / cell_m + ROUNDING),
+        math.floor(x0 / cell_m + ROUNDING),
+        math.ceil(y1 / cell_m - ROUNDING),
+        math.ceil(x1 / cell_m - ROUNDING),
     )
     farthest = min(FARTHEST_M, MOST_INDEX * cell_m)
     edges = [index * cell_m for index in (window.col0, window.row0, window.col1, window.row1)]

@@ -79,6 +79,31 @@ def test_changes_lead_where_a_new_look_does(yaw):
     assert seen > 100
 
 
+@pytest.mark.parametrize("cell_m", [0.276, 0.3])
+def test_how_an_origin_is_rounded_makes_no_difference(cell_m):
+    """As of a mapper that computes it anew for each map, about the edges of cells."""
+    footprint = Footprint(cell_m, DISCS.radius_m)
+    hairs = [0.0, 1e-17, -1e-17, 1e-9, -1e-9, 1e-6, -1e-6, 9e-6, -9e-6]
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        cells = np.zeros(rng.integers(20, 70, 2), np.int8)
+        cells[rng.random(cells.shape) < 0.02] = 100
+        edge, (rows, cols) = int(rng.integers(-3, 4)) * cell_m, cells.shape
+        grids = []
+        for hair in rng.choice(hairs, (2, 2)).tolist():
+            origin = Pose2D(edge + hair[0], edge + hair[1], 0.0)
+            grids.append(OccupancyGrid(GridGeometry(rows, cols, 0.05, origin), cells.copy()))
+            if seed % 2:
+                cells[rng.integers(rows), rng.integers(cols)] ^= 100
+        plains = [CoverageLattice.from_map(grid, footprint) for grid in grids]
+        if grids[0].geometry.on_raster() != grids[1].geometry.on_raster():
+            continue
+        assert plains[0].window == plains[1].window
+        floor = FloorMap(grids[0], plains[0], footprint, DISCS, PLENTY)
+        floor.change((grids[0], grids[1]), plains[1])
+        assert_same(floor, FloorMap(grids[1], plains[1], footprint, DISCS, PLENTY))
+
+
 def test_a_map_on_another_raster_is_looked_at_as_a_whole():
     first, other = room(3.0, 2.0), room(3.0, 2.0, yaw=0.01)
     floor = over(first)

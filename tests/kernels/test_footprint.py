@@ -60,7 +60,9 @@ def test_twin_is_hardly_ever_unsure():
     for yaw in (0.0, math.pi / 4, 1.0):
         _, twin = assert_agrees(grid(cells, 0.1, yaw=yaw), Footprint(0.3, 0.15))
         assert twin.sure.all()
-        assert set(np.unique(twin.states)) == {UNKNOWN, BLOCKED, COVERABLE}
+        # A map that lies along the lattice has no cells in its corners that it does not show.
+        outside = {UNKNOWN} if yaw else set()
+        assert set(np.unique(twin.states)) == {BLOCKED, COVERABLE} | outside
 
 
 def test_a_robot_flush_with_both_walls_fits_the_corridor():
