@@ -23,11 +23,11 @@ from fasaco_edge.errors import BusUnavailable, NotYet
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import decode_tolerant
-from fasaco_edge.wire.maps import encode_occupancy_grid
-from fasaco_edge.wire.path_documents import PathAttachment
-from fasaco_edge.wire.paths import decode_path
-from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.documents.json_text import decode_tolerant
+from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.messages.maps import encode_occupancy_grid
+from fasaco_edge.wire.messages.paths import decode_path
+from fasaco_edge.wire.messages.poses import encode_pose_stamped
 
 RESOLUTION_M = 0.05
 HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16

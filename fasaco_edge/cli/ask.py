@@ -27,11 +27,12 @@ from fasaco_edge.cli.console.terminal import figures, out
 from fasaco_edge.errors import FasacoError, NobodyAnswersError
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import phrases
-from fasaco_edge.wire import replies, schemas
-from fasaco_edge.wire.json_text import decode_json, decode_tolerant
-from fasaco_edge.wire.maps import CoverageValue, decode_occupancy_grid
-from fasaco_edge.wire.paths import decode_path
-from fasaco_edge.wire.pheromone import decode_pheromone
+from fasaco_edge.wire import schemas
+from fasaco_edge.wire.documents import replies
+from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
+from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
+from fasaco_edge.wire.messages.paths import decode_path
+from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from fasaco_edge.wire.topics import RPC_NAMES
 
 if TYPE_CHECKING:

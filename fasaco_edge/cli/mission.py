@@ -12,7 +12,7 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.errors import OrderError
 from fasaco_edge.host.plain_yaml import load, read_bounded
 from fasaco_edge.mission.orders.order import order_document, read_order
-from fasaco_edge.wire.json_text import decode_json, encode_json
+from fasaco_edge.wire.documents.json_text import decode_json, encode_json
 
 EPILOG = """\
 examples:

@@ -14,9 +14,9 @@ import numpy as np
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, check_output, writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.plan_options import EPILOG, add_options
-from fasaco_edge.cli.plan_progress import watching
-from fasaco_edge.cli.plan_request import read_request
+from fasaco_edge.cli.planning.options import EPILOG, add_options
+from fasaco_edge.cli.planning.progress import watching
+from fasaco_edge.cli.planning.request import read_request
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map
@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     for output in (args.path_out, args.xy_out, args.png, args.pheromone_png):
         check_output(output)
     if args.robots or args.robots_xy:
-        from fasaco_edge.cli.plan_fleet import plan_fleet
+        from fasaco_edge.cli.planning.fleet import plan_fleet
 
         return plan_fleet(args, request)
     if args.pheromone_png and (request.own or search.planner not in WITH_PHEROMONE):

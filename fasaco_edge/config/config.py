@@ -41,7 +41,7 @@ from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
-from fasaco_edge.wire.poses import PoseDecoder
+from fasaco_edge.wire.messages.poses import PoseDecoder
 
 if TYPE_CHECKING:
     PlannerName = str

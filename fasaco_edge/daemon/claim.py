@@ -15,8 +15,8 @@ from enum import StrEnum
 
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.wire import topics
+from fasaco_edge.wire.documents.status import ClaimReport
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.status import ClaimReport
 
 LOG = logging.getLogger(__name__)
 

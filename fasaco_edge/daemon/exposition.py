@@ -8,8 +8,8 @@ from typing import NamedTuple
 from msgspec import UnsetType
 
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.replies import STATES
-from fasaco_edge.wire.status import Status
+from fasaco_edge.wire.documents.replies import STATES
+from fasaco_edge.wire.documents.status import Status
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 PREFIX = "fasaco_edge"

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.wire.status import ErrorCounts, LoopTimes
+from fasaco_edge.wire.documents.status import ErrorCounts, LoopTimes
 
 LOG = logging.getLogger(__name__)
 

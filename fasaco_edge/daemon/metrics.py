@@ -14,7 +14,7 @@ import time
 
 from fasaco_edge.config.metrics import Address
 from fasaco_edge.daemon.exposition import CONTENT_TYPE, exposition
-from fasaco_edge.wire.status import Status
+from fasaco_edge.wire.documents.status import Status
 
 LOG = logging.getLogger(__name__)
 

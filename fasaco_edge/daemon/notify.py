@@ -15,7 +15,7 @@ from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker
-    from fasaco_edge.wire.status import Status
+    from fasaco_edge.wire.documents.status import Status
 
 LOG = logging.getLogger(__name__)
 

@@ -18,8 +18,8 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.host.processes import cpu_seconds, python_program
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import decode_tolerant
-from fasaco_edge.wire.status import Recorder, SupervisedRecorder
+from fasaco_edge.wire.documents.json_text import decode_tolerant
+from fasaco_edge.wire.documents.status import Recorder, SupervisedRecorder
 
 LOG = logging.getLogger(__name__)
 

@@ -23,9 +23,9 @@ from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 from fasaco_edge.errors import BadConfiguration, BusUnavailable, MalformedMessage
 from fasaco_edge.text import one_line
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import decode_tolerant
+from fasaco_edge.wire.documents.json_text import decode_tolerant
+from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import VERSION
-from fasaco_edge.wire.status import Status
 
 ANSWER_S = 0.5
 LISTENING = "0A"  # proc(5), /proc/net/tcp

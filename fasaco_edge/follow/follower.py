@@ -15,8 +15,8 @@ from fasaco_edge.follow.grip import Grip
 from fasaco_edge.follow.pursuit import Pursuit
 from fasaco_edge.follow.route import Joining, Route
 from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.wire.path_points import PathPoints
-from fasaco_edge.wire.poses import Link
+from fasaco_edge.wire.messages.path_points import PathPoints
+from fasaco_edge.wire.messages.poses import Link
 
 # Commands a second.
 RATE_HZ = 20.0

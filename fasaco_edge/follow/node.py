@@ -20,10 +20,10 @@ from fasaco_edge.follow.follower import LINK_S, RATE_HZ, Follower, Patience, Sta
 from fasaco_edge.follow.settings import FollowSettings, PoseSource
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.poses import PoseDecoder
+from fasaco_edge.wire.messages.poses import PoseDecoder
+from fasaco_edge.wire.messages.twists import Velocity, encode_velocity
 from fasaco_edge.wire.schemas import TWIST_STAMPED
 from fasaco_edge.wire.topic_types import VOLATILE
-from fasaco_edge.wire.twists import Velocity, encode_velocity
 
 log = logging.getLogger(__name__)
 

@@ -28,8 +28,7 @@ from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.planners.planner import StopAt, ignore
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
 from fasaco_edge.samples import SampleDecoder
-from fasaco_edge.wire.topics import TURNS
-from fasaco_edge.wire.turns import (
+from fasaco_edge.wire.documents.turns import (
     Cycle,
     Decided,
     EarlySample,
@@ -39,6 +38,7 @@ from fasaco_edge.wire.turns import (
     TurnBatch,
     decode_turns,
 )
+from fasaco_edge.wire.topics import TURNS
 
 # A sample that waits longer than this was taken by nobody [ns].
 KEPT_NS = 60_000_000_000

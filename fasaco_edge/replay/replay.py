@@ -26,11 +26,11 @@ from fasaco_edge.mission.core.events import CommandReceived, PathUpdate, PlanRea
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.planners.planner import AnyOf, CoveragePlanner, SearchWork, WorkLimit, ignore
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
-from fasaco_edge.wire.json_text import decode_json, decode_tolerant
-from fasaco_edge.wire.path_digest import PATH_DIGEST, digest
-from fasaco_edge.wire.path_documents import PathAttachment
-from fasaco_edge.wire.settings import Settings
-from fasaco_edge.wire.status import Status
+from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
+from fasaco_edge.wire.documents.path_digest import PATH_DIGEST, digest
+from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.documents.settings import Settings
+from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.topics import COMMAND, RECORDED_INPUTS, TURNS
 
 # How long the mission runs after the last sample [s]: plans finish, timeouts expire.

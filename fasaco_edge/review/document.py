@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from fasaco_edge.review.moments import Moment
     from fasaco_edge.review.orders import CommandThen, OrderChapter
     from fasaco_edge.review.spot import LeftPatch
-    from fasaco_edge.wire.path_documents import Rectangle
+    from fasaco_edge.wire.documents.path_documents import Rectangle
 
 
 MILESTONES = (50, 90, 99, 100)

@@ -26,7 +26,7 @@ from fasaco_edge.review.spot import left_patches
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
     from fasaco_edge.review.run_data import PublishedPath
-    from fasaco_edge.wire.replies import FloorLeft
+    from fasaco_edge.wire.documents.replies import FloorLeft
 
 
 def document_of(review: Review) -> ReviewDocument:

@@ -14,7 +14,7 @@ from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.orders.zones import with_kept_out
 from fasaco_edge.review.run_data import RunData
-from fasaco_edge.wire.settings import known_settings
+from fasaco_edge.wire.documents.settings import known_settings
 
 
 def swept_floor(

@@ -23,7 +23,7 @@ from fasaco_edge.recording.read.run import RecordedSamples, RunRecord
 from fasaco_edge.review.orders import CommandThen, commands_of, order_words
 from fasaco_edge.review.rows import clock
 from fasaco_edge.review.run_data import maps_of
-from fasaco_edge.wire.path_documents import Rectangle
+from fasaco_edge.wire.documents.path_documents import Rectangle
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review

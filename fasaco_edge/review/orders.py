@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fasaco_edge.mission.orders.order import MissionOrder, OrderDocument, order_document
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.run_data import RunData, StatusSample
-from fasaco_edge.wire.replies import UnreachedArea
+from fasaco_edge.wire.documents.replies import UnreachedArea
 
 # What comes so soon after a status [s] is still of the same step.
 SAME_STEP_S = 1.5

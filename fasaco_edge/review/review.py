@@ -44,7 +44,7 @@ from fasaco_edge.review.moments import (
 )
 from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_still_true
 from fasaco_edge.review.run_data import RunData, first_counted, gather
-from fasaco_edge.wire.settings import known_settings
+from fasaco_edge.wire.documents.settings import known_settings
 
 # Progress is reported with each so many-th sample.
 REPORT_EVERY = 200

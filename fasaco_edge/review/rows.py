@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
     from fasaco_edge.review.run_data import PublishedPath
     from fasaco_edge.review.spot import Spot
-    from fasaco_edge.wire.path_documents import Rectangle
+    from fasaco_edge.wire.documents.path_documents import Rectangle
 
 NOT_KNOWN = "not known"
 NUMBERS = (

@@ -19,16 +19,16 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder, Zone, read_command
-from fasaco_edge.wire.json_text import decode_json, decode_tolerant
-from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
-from fasaco_edge.wire.path_digest import PATH_DIGEST
-from fasaco_edge.wire.path_documents import PathAttachment
-from fasaco_edge.wire.poses import PoseDecoder
-from fasaco_edge.wire.replies import FloorReport
+from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
+from fasaco_edge.wire.documents.path_digest import PATH_DIGEST
+from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.documents.replies import FloorReport
+from fasaco_edge.wire.documents.settings import Settings, known_settings
+from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.documents.turns import Cycle, TurnBatch, decode_turns
+from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
-from fasaco_edge.wire.settings import Settings, known_settings
-from fasaco_edge.wire.status import Status
-from fasaco_edge.wire.turns import Cycle, TurnBatch, decode_turns
 
 # The reasons that the mission gives when it asks for a better path, and when it takes one.
 SPARE, BETTER = "spare time", "better further on"

@@ -27,7 +27,7 @@ from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.review.floor import swept_floor
 from fasaco_edge.review.rows import clock
 from fasaco_edge.review.run_data import BETTER, maps_of
-from fasaco_edge.wire.settings import known_settings
+from fasaco_edge.wire.documents.settings import known_settings
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review

@@ -17,12 +17,12 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.host.processes import stop_event
 from fasaco_edge.simulation.world import Activity, Emission, World
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.battery import BatteryState, Power, encode_battery
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import encode_occupancy_grid
-from fasaco_edge.wire.paths import decode_path
-from fasaco_edge.wire.poses import encode_pose_stamped
-from fasaco_edge.wire.twists import decode_velocity
+from fasaco_edge.wire.messages.battery import BatteryState, Power, encode_battery
+from fasaco_edge.wire.messages.maps import encode_occupancy_grid
+from fasaco_edge.wire.messages.paths import decode_path
+from fasaco_edge.wire.messages.poses import encode_pose_stamped
+from fasaco_edge.wire.messages.twists import decode_velocity
 
 log = logging.getLogger(__name__)
 

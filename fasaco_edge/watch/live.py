@@ -22,7 +22,7 @@ from fasaco_edge.watch import phrases
 from fasaco_edge.watch.feed import Feed
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.robot_view import RobotView
-from fasaco_edge.wire.json_text import decode_json
+from fasaco_edge.wire.documents.json_text import decode_json
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # At most ten pages a second, and only where something changed or the clock did [s].

@@ -15,9 +15,9 @@ from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.phrases import age, clock, percent
 from fasaco_edge.watch.picture import MissionPicture
 from fasaco_edge.watch.robot_view import BAD, GOOD, ORDER, PLAIN, Event, RobotView
-from fasaco_edge.wire.path_documents import PathReport
-from fasaco_edge.wire.replies import CoverageReport, FloorReport, MissionReport
-from fasaco_edge.wire.status import BatteryReport, FleetReport, Status, SupervisedRecorder
+from fasaco_edge.wire.documents.path_documents import PathReport
+from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport, MissionReport
+from fasaco_edge.wire.documents.status import BatteryReport, FleetReport, Status, SupervisedRecorder
 
 Row = tuple[str, Text]
 

@@ -5,8 +5,13 @@ from __future__ import annotations
 import time
 
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.replies import CoverageReport, FloorReport, MissionReport, ZoneReport
-from fasaco_edge.wire.status import DriveReport, Status
+from fasaco_edge.wire.documents.replies import (
+    CoverageReport,
+    FloorReport,
+    MissionReport,
+    ZoneReport,
+)
+from fasaco_edge.wire.documents.status import DriveReport, Status
 
 # Of the wall clock to the monotonic one, when this module was imported [s].
 _OFFSET_S = time.time() - time.monotonic()

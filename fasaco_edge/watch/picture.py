@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Bounds, Pose2D, union_bounds
 from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
 from fasaco_edge.watch.robot_view import FIELD_LEVELS, RobotView
-from fasaco_edge.wire.maps import CoverageValue
-from fasaco_edge.wire.settings import known_settings
+from fasaco_edge.wire.documents.settings import known_settings
+from fasaco_edge.wire.messages.maps import CoverageValue
 
 LEAST_PIXEL_M = 0.01
 # Pictures grow by so much at once [m]: with every row of a growing map they would jump.

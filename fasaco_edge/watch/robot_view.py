@@ -14,16 +14,16 @@ from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.json_text import decode_document, decode_json
+from fasaco_edge.wire.documents.json_text import decode_document, decode_json
+from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.documents.settings import known_settings
+from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.limits import MAX_COORDINATE_M
-from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
-from fasaco_edge.wire.path_documents import PathAttachment
-from fasaco_edge.wire.paths import decode_path
-from fasaco_edge.wire.pheromone import decode_pheromone
-from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.messages.paths import decode_path
+from fasaco_edge.wire.messages.pheromone import decode_pheromone
+from fasaco_edge.wire.messages.poses import decode_pose
 from fasaco_edge.wire.schemas import POSE_STAMPED
-from fasaco_edge.wire.settings import known_settings
-from fasaco_edge.wire.status import Status
 
 KEPT = 200
 # Number of levels that the field is shown in.

@@ -24,14 +24,14 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.host.resources import folder
 from fasaco_edge.wire import schemas
-from fasaco_edge.wire.maps import (
+from fasaco_edge.wire.messages.maps import (
     decode_map_update,
     decode_occupancy_grid,
     encode_map_update,
     encode_occupancy_grid,
 )
-from fasaco_edge.wire.paths import decode_path, encode_path
-from fasaco_edge.wire.poses import decode_pose, encode_pose_stamped
+from fasaco_edge.wire.messages.paths import decode_path, encode_path
+from fasaco_edge.wire.messages.poses import decode_pose, encode_pose_stamped
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID_UPDATE, PHEROMONE_GRID, POSE_SCHEMAS
 from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 

@@ -20,7 +20,7 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.wire.maps import (
+from fasaco_edge.wire.messages.maps import (
     decode_map_update,
     decode_occupancy_grid,
     encode_map_update,

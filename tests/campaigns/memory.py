@@ -30,7 +30,7 @@ from fasaco_edge.daemon.memory import afforded, needed_bytes
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.host.processes import peak_mb
-from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
+from fasaco_edge.wire.messages.maps import encode_map_update, encode_occupancy_grid
 from tests.support import processes
 from tests.support.outsider import Outsider, open_client
 from tests.support.processes import Daemon, daemon_process

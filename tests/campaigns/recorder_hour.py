@@ -34,14 +34,14 @@ from fasaco_edge.recording.scene.scene import Scene
 from fasaco_edge.recording.write.input_log import InputLog
 from fasaco_edge.recording.write.quota import budget_of
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.wire.json_text import decode_tolerant, encode_json
-from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
-from fasaco_edge.wire.path_documents import PathAttachment
-from fasaco_edge.wire.paths import decode_path, encode_path
-from fasaco_edge.wire.pheromone import decode_pheromone, encode_pheromone
-from fasaco_edge.wire.poses import decode_pose, encode_pose_stamped
+from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
+from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.documents.status import Recorder, Status
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
+from fasaco_edge.wire.messages.paths import decode_path, encode_path
+from fasaco_edge.wire.messages.pheromone import decode_pheromone, encode_pheromone
+from fasaco_edge.wire.messages.poses import decode_pose, encode_pose_stamped
 from fasaco_edge.wire.schemas import POSE_STAMPED
-from fasaco_edge.wire.status import Recorder, Status
 
 SECOND_NS = 1_000_000_000
 BEGAN_NS = 1_700_000_000 * SECOND_NS

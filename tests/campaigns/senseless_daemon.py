@@ -36,9 +36,9 @@ from fasaco_edge.host.processes import peak_mb, resident_mb
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.wire import schemas
-from fasaco_edge.wire.maps import decode_occupancy_grid
-from fasaco_edge.wire.paths import decode_path
-from fasaco_edge.wire.pheromone import decode_pheromone
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid
+from fasaco_edge.wire.messages.paths import decode_path
+from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from tests.campaigns import raw_messages
 from tests.campaigns.senseless import SILENT, Event, pixels_of
 from tests.campaigns.senseless_mission import NEAR_PX

@@ -46,16 +46,16 @@ from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.planners.planner import ColonySnapshot, SearchProgress, StopRecorder
 from fasaco_edge.planners.registry import planner_of
-from fasaco_edge.wire.json_text import encode_json
-from fasaco_edge.wire.maps import (
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.messages.maps import (
     coverage_values,
     decode_map_update,
     decode_occupancy_grid,
     encode_occupancy_grid,
 )
-from fasaco_edge.wire.paths import decode_path, encode_path
-from fasaco_edge.wire.pheromone import encode_pheromone
-from fasaco_edge.wire.poses import PoseDecoder
+from fasaco_edge.wire.messages.paths import decode_path, encode_path
+from fasaco_edge.wire.messages.pheromone import encode_pheromone
+from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import TF_MESSAGE
 from tests.campaigns import raw_messages
 from tests.campaigns.senseless import Event, pixels_of

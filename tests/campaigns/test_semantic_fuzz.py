@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.wire.paths import encode_path
+from fasaco_edge.wire.messages.paths import encode_path
 from tests.campaigns.semantic_fuzz import (
     Findings,
     fuzz_daemon,

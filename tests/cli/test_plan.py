@@ -15,7 +15,7 @@ from PIL import Image
 from fasaco_edge.bench.drive_time import DriveLimits, drive_seconds
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console.arguments import Exit
-from fasaco_edge.cli.plan_turning import LIMITS
+from fasaco_edge.cli.planning.turning import LIMITS
 from fasaco_edge.config.config import RobotConfig
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid

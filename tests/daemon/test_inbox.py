@@ -33,9 +33,9 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
-from fasaco_edge.wire.battery import BatteryState, encode_battery
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.poses import PoseDecoder
+from fasaco_edge.wire.messages.battery import BatteryState, encode_battery
+from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from fasaco_edge.wire.topics import QUEUE_LENGTHS
 from tests.support.outsider import TIMEOUT_S, open_client

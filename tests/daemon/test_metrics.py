@@ -18,9 +18,9 @@ from fasaco_edge.config.metrics import Address, MetricsConfig
 from fasaco_edge.daemon.exposition import CONTENT_TYPE, exposition
 from fasaco_edge.daemon.metrics import MetricsServer, serve_metrics
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.wire.path_documents import PathReport
-from fasaco_edge.wire.replies import STATES, CoverageReport, FloorReport
-from fasaco_edge.wire.status import ErrorCounts, LoopTimes, Status, SupervisedRecorder
+from fasaco_edge.wire.documents.path_documents import PathReport
+from fasaco_edge.wire.documents.replies import STATES, CoverageReport, FloorReport
+from fasaco_edge.wire.documents.status import ErrorCounts, LoopTimes, Status, SupervisedRecorder
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint
 

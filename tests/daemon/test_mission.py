@@ -9,8 +9,8 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.wire.maps import decode_occupancy_grid
-from fasaco_edge.wire.pheromone import decode_pheromone
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid
+from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import (

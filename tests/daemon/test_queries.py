@@ -14,7 +14,7 @@ import zenoh
 from fasaco_edge import __version__
 from fasaco_edge.config.config import BusConfig, DaemonConfig
 from fasaco_edge.daemon.loop.answers import LEFT_OUT, config_document
-from fasaco_edge.wire.pheromone import decode_pheromone
+from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from fasaco_edge.wire.topics import RPC_NAMES
 from tests.daemon.test_mission import about, covers, planned
 from tests.support.outsider import Outsider

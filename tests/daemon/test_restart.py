@@ -14,7 +14,7 @@ import pytest
 
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.writer import PERIOD_S
-from fasaco_edge.wire.pheromone import PheromoneMessage, decode_pheromone
+from fasaco_edge.wire.messages.pheromone import PheromoneMessage, decode_pheromone
 from tests.campaigns.kill_daemon import MOST_LOST_S, run_campaign
 from tests.support.ledgers import CELL_M
 from tests.support.outsider import Outsider

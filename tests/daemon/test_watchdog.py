@@ -17,9 +17,9 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import PlanRequest
 from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.wire.path_documents import PathReport
-from fasaco_edge.wire.replies import CoverageReport, FloorLeft, FloorReport
-from fasaco_edge.wire.status import LedgerReport, LoopTimes, Status
+from fasaco_edge.wire.documents.path_documents import PathReport
+from fasaco_edge.wire.documents.replies import CoverageReport, FloorLeft, FloorReport
+from fasaco_edge.wire.documents.status import LedgerReport, LoopTimes, Status
 
 
 class Told:

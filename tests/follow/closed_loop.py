@@ -13,7 +13,7 @@ from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
-from fasaco_edge.wire.paths import encode_path
+from fasaco_edge.wire.messages.paths import encode_path
 
 CONFIG = SimulationConfig()
 LIMITS = Limits(

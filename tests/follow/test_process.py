@@ -13,7 +13,7 @@ from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.wire import schemas
-from fasaco_edge.wire.twists import decode_velocity
+from fasaco_edge.wire.messages.twists import decode_velocity
 from tests.campaigns import stop_tries
 from tests.campaigns.raw_messages import transform
 from tests.support.driven_base import DrivenBase, follower_process
@@ -208,7 +208,7 @@ def velocity(sample):
 
 def pose_payload():
     from fasaco_edge.grid.geometry import Pose2D, StampedPose
-    from fasaco_edge.wire.poses import encode_pose_stamped
+    from fasaco_edge.wire.messages.poses import encode_pose_stamped
 
     return encode_pose_stamped(StampedPose(Pose2D(0.0, 0.0)))
 

@@ -34,7 +34,7 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import SearchWork, WorkLimit
-from fasaco_edge.wire.replies import FloorReport
+from fasaco_edge.wire.documents.replies import FloorReport
 from tests.grid.test_floor import room
 from tests.grid.test_floor_map import part_of
 

@@ -21,7 +21,7 @@ from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import SearchWork, WorkLimit
 from fasaco_edge.planners.warmup import STAGES, warm_up
-from fasaco_edge.wire.maps import (
+from fasaco_edge.wire.messages.maps import (
     decode_map_update,
     decode_occupancy_grid,
     encode_map_update,

@@ -15,7 +15,7 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.recording.scene.layers import NEAR_M, Anchor
-from fasaco_edge.wire.maps import decode_occupancy_grid
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 from tests.support import scripted_mission as made_up
 from tests.support.recordings import bus_on_free_port, read_column, read_static, recorder_process
 

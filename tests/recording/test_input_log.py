@@ -27,12 +27,12 @@ from fasaco_edge.recording.write.input_log import InputLog
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter, WriterState
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.path_digest import DIGEST_BYTES, PATH_DIGEST, digest
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
-from fasaco_edge.wire.path_digest import DIGEST_BYTES, PATH_DIGEST, digest
-from fasaco_edge.wire.paths import encode_path
-from fasaco_edge.wire.poses import decode_pose, encode_pose_stamped
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
+from fasaco_edge.wire.messages.paths import encode_path
+from fasaco_edge.wire.messages.poses import decode_pose, encode_pose_stamped
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from tests.support.recordings import TEXT, bus_on_free_port, read_column, read_summary
 

@@ -18,11 +18,15 @@ from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.replay.mission_drive import ReplayStep
 from fasaco_edge.replay.replay import Replay, read_run
-from fasaco_edge.wire.json_text import encode_json
-from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid, encode_occupancy_grid
-from fasaco_edge.wire.path_digest import PATH_DIGEST, digest
-from fasaco_edge.wire.path_documents import PlanFigures
-from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.path_digest import PATH_DIGEST, digest
+from fasaco_edge.wire.documents.path_documents import PlanFigures
+from fasaco_edge.wire.messages.maps import (
+    decode_map_update,
+    decode_occupancy_grid,
+    encode_occupancy_grid,
+)
+from fasaco_edge.wire.messages.poses import decode_pose
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, POSE_STAMPED
 from tests import naive
 

@@ -16,7 +16,7 @@ import yaml
 from fasaco_edge.cli import main
 from fasaco_edge.config.config import load_config
 from fasaco_edge.daemon.ledger.file import LedgerFile
-from fasaco_edge.wire.path_digest import digest
+from fasaco_edge.wire.documents.path_digest import digest
 
 pytest.importorskip("rerun")
 

@@ -14,8 +14,8 @@ from fasaco_edge.cli import main
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.cycle_replay import CycleReplay, read_turns
 from fasaco_edge.replay.replay import read_run
-from fasaco_edge.wire.json_text import encode_json
-from fasaco_edge.wire.turns import decode_turns
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.turns import decode_turns
 from tests.replay.scenarios import changed, places, without
 from tests.support.recorded_mission import record_mission
 from tests.wire.schemas import check

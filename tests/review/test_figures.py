@@ -19,9 +19,9 @@ from fasaco_edge.review.moments import (
 from fasaco_edge.review.panels import curve
 from fasaco_edge.review.rows import clock
 from fasaco_edge.review.run_data import PlanLog, RunData, StatusSample, first_counted
-from fasaco_edge.wire.replies import CoverageReport
-from fasaco_edge.wire.status import Status
-from fasaco_edge.wire.turns import Cycle, Decided, LogStart, PlanTaken, TurnBatch
+from fasaco_edge.wire.documents.replies import CoverageReport
+from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.documents.turns import Cycle, Decided, LogStart, PlanTaken, TurnBatch
 
 ALL = Span("under way", 0.0, 100.0)
 

@@ -15,8 +15,8 @@ from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.floor import swept_floor
 from fasaco_edge.review.rows import Figure, figures
 from fasaco_edge.review.run_data import RunData, StatusSample
-from fasaco_edge.wire.replies import FloorLeft, FloorReport
-from fasaco_edge.wire.status import LedgerReport, Status
+from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport
+from fasaco_edge.wire.documents.status import LedgerReport, Status
 from tests.support.rooms import RADIUS_M, RESOLUTION_M, TOOL_M, room
 
 DISC_M2 = math.pi * (TOOL_M / 2) ** 2

@@ -15,8 +15,8 @@ from fasaco_edge.review.moments import spans_of
 from fasaco_edge.review.orders import OrderChapter, chapters
 from fasaco_edge.review.rows import verdicts
 from fasaco_edge.review.run_data import RunData, StatusSample
-from fasaco_edge.wire.replies import CoverageReport
-from fasaco_edge.wire.status import Status
+from fasaco_edge.wire.documents.replies import CoverageReport
+from fasaco_edge.wire.documents.status import Status
 
 ALL = read_order({})
 KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]], "passes": 1}]})

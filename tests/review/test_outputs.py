@@ -30,8 +30,8 @@ from fasaco_edge.review.pictures import SIZE, draw_review
 from fasaco_edge.review.review import CoverageCounts, read_review, review_of
 from fasaco_edge.review.rows import charge_rows, screen_rows
 from fasaco_edge.review.run_data import StatusSample
-from fasaco_edge.wire.replies import MissionReport, ZoneReport
-from fasaco_edge.wire.status import BatteryReport, LedgerReport, Status
+from fasaco_edge.wire.documents.replies import MissionReport, ZoneReport
+from fasaco_edge.wire.documents.status import BatteryReport, LedgerReport, Status
 from tests.review.test_parts import run_told
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge
 from tests.support.reviews import document

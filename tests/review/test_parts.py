@@ -16,9 +16,9 @@ from fasaco_edge.review.comparison import side_by_side
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.paths import encode_path
+from fasaco_edge.wire.messages.paths import encode_path
 from tests.support.recordings import bus_on_free_port, recorder_process
 from tests.support.reviews import document
 from tests.support.rooms import map_bytes, pose_bytes, room

@@ -21,9 +21,9 @@ from fasaco_edge.review.page import page_of
 from fasaco_edge.review.review import read_review
 from fasaco_edge.review.spot import explain, is_inside, spots_left
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.paths import encode_path
+from fasaco_edge.wire.messages.paths import encode_path
 from tests.support.recordings import bus_on_free_port, read_column, recorder_process
 from tests.support.rooms import UNKNOWN, WALL, fill, map_bytes, pose_bytes, room
 

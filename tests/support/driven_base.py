@@ -24,9 +24,9 @@ from fasaco_edge.follow.estimate import Command, moved
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.paths import encode_path
-from fasaco_edge.wire.poses import encode_pose_stamped
-from fasaco_edge.wire.twists import decode_velocity
+from fasaco_edge.wire.messages.paths import encode_path
+from fasaco_edge.wire.messages.poses import encode_pose_stamped
+from fasaco_edge.wire.messages.twists import decode_velocity
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
 
 # Whoever has not stopped by then will not [s].

@@ -6,8 +6,8 @@ import random
 from collections.abc import Callable
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
-from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.messages.poses import decode_pose
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
 from tests.wire import mutations

@@ -23,11 +23,11 @@ from fasaco_edge.planners.warmup import warm_up
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import World
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import decode_json, encode_json
+from fasaco_edge.wire.documents.json_text import decode_json, encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
-from fasaco_edge.wire.paths import decode_path
-from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.messages.maps import encode_map_update, encode_occupancy_grid
+from fasaco_edge.wire.messages.paths import decode_path
+from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from tests.support.processes import daemon_process
 from tests.support.rooms import RESOLUTION_M, WALL, fill, room
 

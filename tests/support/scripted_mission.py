@@ -24,12 +24,12 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import CoverageValue, direction_values, encode_occupancy_grid
-from fasaco_edge.wire.paths import encode_path
-from fasaco_edge.wire.pheromone import encode_pheromone
-from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.messages.maps import CoverageValue, direction_values, encode_occupancy_grid
+from fasaco_edge.wire.messages.paths import encode_path
+from fasaco_edge.wire.messages.pheromone import encode_pheromone
+from fasaco_edge.wire.messages.poses import encode_pose_stamped
 
 RESOLUTION_M = 0.05
 CELL_M = 0.25

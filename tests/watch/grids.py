@@ -12,10 +12,10 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.watch.robot_view import RobotView, Token
-from fasaco_edge.wire.json_text import encode_json
-from fasaco_edge.wire.maps import encode_occupancy_grid
-from fasaco_edge.wire.paths import encode_path
-from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.messages.maps import encode_occupancy_grid
+from fasaco_edge.wire.messages.paths import encode_path
+from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
 NOW = 1_700_000_000.0

@@ -16,7 +16,7 @@ from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
 from fasaco_edge.watch.robot_view import RobotView, Token
-from fasaco_edge.wire.pheromone import encode_pheromone
+from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from tests.watch.grids import NOW, console, mid_mission, plain, status, tell
 
 SIZES = [(80, 24), (120, 40), (200, 60), (64, 14), (63, 13), (30, 10), (12, 4), (1, 1), (400, 5)]

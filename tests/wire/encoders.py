@@ -12,13 +12,13 @@ from typing import Any
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import schemas
-from fasaco_edge.wire.battery import encode_battery
-from fasaco_edge.wire.maps import encode_map_update, encode_occupancy_grid
-from fasaco_edge.wire.paths import PathMessage, encode_path
-from fasaco_edge.wire.pheromone import PheromoneMessage, encode_pheromone
-from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.messages.battery import encode_battery
+from fasaco_edge.wire.messages.maps import encode_map_update, encode_occupancy_grid
+from fasaco_edge.wire.messages.paths import PathMessage, encode_path
+from fasaco_edge.wire.messages.pheromone import PheromoneMessage, encode_pheromone
+from fasaco_edge.wire.messages.poses import encode_pose_stamped
+from fasaco_edge.wire.messages.twists import encode_velocity
 from fasaco_edge.wire.schemas import TWIST_SCHEMAS
-from fasaco_edge.wire.twists import encode_velocity
 from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 
 

@@ -6,10 +6,10 @@ from typing import Any
 
 from fasaco_edge.grid.geometry import GridGeometry, StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.wire.battery import BatteryState
-from fasaco_edge.wire.paths import PathMessage
-from fasaco_edge.wire.pheromone import PheromoneMessage
-from fasaco_edge.wire.twists import Velocity
+from fasaco_edge.wire.messages.battery import BatteryState
+from fasaco_edge.wire.messages.paths import PathMessage
+from fasaco_edge.wire.messages.pheromone import PheromoneMessage
+from fasaco_edge.wire.messages.twists import Velocity
 
 
 def placed(geometry: GridGeometry) -> dict[str, Any]:

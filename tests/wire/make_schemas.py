@@ -17,11 +17,11 @@ import msgspec
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.mission.orders.order import CommandDocument
-from fasaco_edge.wire.fleet import FleetMember
-from fasaco_edge.wire.path_documents import PathAttachment, TrailAttachment
-from fasaco_edge.wire.replies import Error, Replan, Reply, Version
-from fasaco_edge.wire.status import Recorder, Status
-from fasaco_edge.wire.turns import TurnBatch
+from fasaco_edge.wire.documents.fleet import FleetMember
+from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
+from fasaco_edge.wire.documents.replies import Error, Replan, Reply, Version
+from fasaco_edge.wire.documents.status import Recorder, Status
+from fasaco_edge.wire.documents.turns import TurnBatch
 
 HEAD = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",

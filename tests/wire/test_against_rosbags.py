@@ -9,15 +9,20 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import schemas
-from fasaco_edge.wire.maps import (
+from fasaco_edge.wire.messages.maps import (
     decode_map_update,
     decode_occupancy_grid,
     encode_map_update,
     encode_occupancy_grid,
 )
-from fasaco_edge.wire.paths import decode_path, encode_path
-from fasaco_edge.wire.pheromone import decode_pheromone, encode_pheromone
-from fasaco_edge.wire.poses import Transform, decode_pose, decode_transforms, encode_pose_stamped
+from fasaco_edge.wire.messages.paths import decode_path, encode_path
+from fasaco_edge.wire.messages.pheromone import decode_pheromone, encode_pheromone
+from fasaco_edge.wire.messages.poses import (
+    Transform,
+    decode_pose,
+    decode_transforms,
+    encode_pose_stamped,
+)
 from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 from tests.wire import oracle
 

@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, NothingToCover
 from fasaco_edge.host.resources import folder
 from fasaco_edge.wire import limits, schemas, topics
-from fasaco_edge.wire.json_text import decode_json, encode_json
+from fasaco_edge.wire.documents.json_text import decode_json, encode_json
+from fasaco_edge.wire.documents.replies import encode_error
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import CoverageValue
-from fasaco_edge.wire.replies import encode_error
+from fasaco_edge.wire.messages.maps import CoverageValue
 from fasaco_edge.wire.schemas import POSE_SCHEMAS
 
 PROTOCOL = folder("protocol")
@@ -168,7 +168,8 @@ def test_error_reply() -> None:
 def test_reading_the_bus_needs_no_compiler() -> None:
     import subprocess
 
-    modules = ["maps", "poses", "paths", "pheromone", "keys", "json_text"]
+    messages = [f"messages.{name}" for name in ("maps", "poses", "paths", "pheromone")]
+    modules = [*messages, "documents.json_text", "keys"]
     program = "; ".join(f"import fasaco_edge.wire.{module}" for module in modules)
     check = f"{program}; import sys; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0

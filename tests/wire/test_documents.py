@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.mission.core.events import State
 from fasaco_edge.planners.path import CoveragePath, Saved
-from fasaco_edge.wire.json_text import (
+from fasaco_edge.wire.documents.json_text import (
     MAX_INTEGER,
     MAX_TEXT,
     decode_document,
@@ -21,10 +21,10 @@ from fasaco_edge.wire.json_text import (
     encode_json,
     tolerant,
 )
-from fasaco_edge.wire.path_documents import PathAttachment, PlanFigures, Rectangle
-from fasaco_edge.wire.replies import STATES, CoverageReport, ZoneReport
-from fasaco_edge.wire.settings import known_settings
-from fasaco_edge.wire.status import Status, SupervisedRecorder
+from fasaco_edge.wire.documents.path_documents import PathAttachment, PlanFigures, Rectangle
+from fasaco_edge.wire.documents.replies import STATES, CoverageReport, ZoneReport
+from fasaco_edge.wire.documents.settings import known_settings
+from fasaco_edge.wire.documents.status import Status, SupervisedRecorder
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=8),

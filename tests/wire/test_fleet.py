@@ -13,8 +13,8 @@ from fasaco_edge.config.config import DaemonConfig, FleetConfig, RobotConfig
 from fasaco_edge.daemon.loop.fleet import LEAST_SPACING_S, FleetEar
 from fasaco_edge.daemon.loop.inbox import Received
 from fasaco_edge.errors import FleetError, MalformedMessage
-from fasaco_edge.wire.fleet import FleetMember, SweptTile, decode_member
-from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.documents.fleet import FleetMember, SweptTile, decode_member
+from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.limits import MAX_FLEET_TILES, MAX_JSON_BYTES
 from tests.wire.schemas import check
 

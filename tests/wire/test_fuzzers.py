@@ -9,7 +9,7 @@ import pytest
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire import schemas
-from fasaco_edge.wire.poses import encode_pose_stamped
+from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from tests.campaigns import coverage_fuzz_wire as coverage_fuzz
 from tests.campaigns.fuzz_wire import run_campaign
 from tests.wire.decoders import DECODERS

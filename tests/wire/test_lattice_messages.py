@@ -15,14 +15,14 @@ from fasaco_edge.grid import lattice
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.planner import ColonySnapshot
-from fasaco_edge.wire import maps
-from fasaco_edge.wire.maps import (
+from fasaco_edge.wire.messages import maps
+from fasaco_edge.wire.messages.maps import (
     decode_occupancy_grid,
     direction_values,
     directions_of,
     encode_occupancy_grid,
 )
-from fasaco_edge.wire.pheromone import decode_pheromone, encode_pheromone
+from fasaco_edge.wire.messages.pheromone import decode_pheromone, encode_pheromone
 
 # The float32s from the least normal one up: trails do not come smaller.
 trails = hnp.arrays(

@@ -16,9 +16,9 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.wire import limits, schemas
-from fasaco_edge.wire.maps import encode_map_update
-from fasaco_edge.wire.paths import decode_path, encode_path
-from fasaco_edge.wire.poses import decode_transforms
+from fasaco_edge.wire.messages.maps import encode_map_update
+from fasaco_edge.wire.messages.paths import decode_path, encode_path
+from fasaco_edge.wire.messages.poses import decode_transforms
 from fasaco_edge.wire.schemas import POSE_SCHEMAS
 from tests.wire.decoders import DECODERS
 from tests.wire.mutations import mutant, seeds_of

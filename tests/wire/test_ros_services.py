@@ -6,11 +6,28 @@ import pytest
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire import schemas
-from fasaco_edge.wire.diagnostics import ERROR, OK, STALE, WARN, encode_diagnostics, level_of
-from fasaco_edge.wire.replies import STATES, CoverageReport
+from fasaco_edge.wire.documents.replies import STATES, CoverageReport
+from fasaco_edge.wire.documents.status import (
+    BatteryReport,
+    ClaimReport,
+    ErrorCounts,
+    LedgerReport,
+    Status,
+)
+from fasaco_edge.wire.messages.diagnostics import (
+    ERROR,
+    OK,
+    STALE,
+    WARN,
+    encode_diagnostics,
+    level_of,
+)
+from fasaco_edge.wire.messages.ros_services import (
+    check_request,
+    encode_response,
+    response_attachment,
+)
 from fasaco_edge.wire.ros_keys import attachment, attachment_of
-from fasaco_edge.wire.ros_services import check_request, encode_response, response_attachment
-from fasaco_edge.wire.status import BatteryReport, ClaimReport, ErrorCounts, LedgerReport, Status
 from tests.wire import oracle
 
 GID = bytes(range(16))

@@ -10,7 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator, ValidationError
 
 from fasaco_edge.errors import NotYet
-from fasaco_edge.wire.replies import STATES, encode_error
+from fasaco_edge.wire.documents.replies import STATES, encode_error
 from tests.wire.contract_files import PROTOCOL, load
 from tests.wire.make_schemas import files
 from tests.wire.schemas import NAMES, check, schema

@@ -21,8 +21,8 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.resources import folder
 from fasaco_edge.wire import schemas
-from fasaco_edge.wire.maps import decode_occupancy_grid, encode_occupancy_grid
-from fasaco_edge.wire.poses import decode_pose
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
+from fasaco_edge.wire.messages.poses import decode_pose
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fasaco_edge.errors import MalformedMessage, TransformLoop
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.limits import MAX_TRANSFORMS
-from fasaco_edge.wire.poses import Transform, TransformTree
+from fasaco_edge.wire.messages.poses import Transform, TransformTree
 
 
 def link(frame, child, x=0.0, y=0.0, yaw=0.0, stamp_ns=1):

@@ -29,9 +29,9 @@ from fasaco_edge.planners.grids import start_point
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.watch import phrases
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import decode_tolerant
+from fasaco_edge.wire.documents.json_text import decode_tolerant
+from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.status import Status
 
 PLAIN_LINE_EVERY_S = 5.0
 START_TIMEOUT_S = 20.0

@@ -18,7 +18,7 @@ from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger, reason_of
 from fasaco_edge.errors import FasacoError, LedgerFileError, LedgerMismatchError, OrderError
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
-from fasaco_edge.wire.status import LedgerReport
+from fasaco_edge.wire.documents.status import LedgerReport
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission

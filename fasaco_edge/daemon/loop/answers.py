@@ -28,18 +28,19 @@ from fasaco_edge.mission.orders.order import (
     MissionOrder,
     read_command,
 )
-from fasaco_edge.wire import replies, topics
-from fasaco_edge.wire.json_text import decode_json, encode_json
+from fasaco_edge.wire import topics
+from fasaco_edge.wire.documents import replies
+from fasaco_edge.wire.documents.json_text import decode_json, encode_json
+from fasaco_edge.wire.documents.replies import Version, encode_error
+from fasaco_edge.wire.documents.settings import Settings
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
-from fasaco_edge.wire.replies import Version, encode_error
-from fasaco_edge.wire.ros_services import (
+from fasaco_edge.wire.messages.ros_services import (
     Triggered,
     check_request,
     encode_response,
     response_attachment,
 )
-from fasaco_edge.wire.settings import Settings
 
 # Least period of replans by request: a path that keeps changing is hard to follow [s].
 REPLAN_PERIOD_S = 1.0

@@ -16,8 +16,8 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError, FleetError
 from fasaco_edge.mission.core.events import MemberHeard
 from fasaco_edge.mission.fleet.shared import Telling
-from fasaco_edge.wire.fleet import FLEET_VERSION, FleetMember, SweptTile, decode_member
-from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.documents.fleet import FLEET_VERSION, FleetMember, SweptTile, decode_member
+from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.limits import MAX_FLEET_TILES
 from fasaco_edge.wire.topics import FLEET
 

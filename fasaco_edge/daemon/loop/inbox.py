@@ -26,11 +26,11 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.battery import decode_battery
+from fasaco_edge.wire.documents.replies import encode_error
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
-from fasaco_edge.wire.poses import PoseDecoder
-from fasaco_edge.wire.replies import encode_error
+from fasaco_edge.wire.messages.battery import decode_battery
+from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.messages.poses import PoseDecoder
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.fleet import FleetEar

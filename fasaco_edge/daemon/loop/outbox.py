@@ -28,13 +28,13 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import command_document
 from fasaco_edge.wire import schemas, topics
-from fasaco_edge.wire.json_text import encode_json
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
+from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.maps import coverage_values, encode_occupancy_grid
-from fasaco_edge.wire.path_documents import PathAttachment, Rectangle
-from fasaco_edge.wire.paths import encode_path
-from fasaco_edge.wire.pheromone import encode_pheromone
-from fasaco_edge.wire.status import Status
+from fasaco_edge.wire.messages.maps import coverage_values, encode_occupancy_grid
+from fasaco_edge.wire.messages.paths import encode_path
+from fasaco_edge.wire.messages.pheromone import encode_pheromone
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.geometry import Window

@@ -16,8 +16,8 @@ from fasaco_edge.daemon.figures import CycleTimes, Faults
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.host.processes import resident_mb, thread_count
 from fasaco_edge.mission.orders.order_state import OrderState
-from fasaco_edge.wire.path_documents import PathReport
-from fasaco_edge.wire.replies import (
+from fasaco_edge.wire.documents.path_documents import PathReport
+from fasaco_edge.wire.documents.replies import (
     CoverageReport,
     FloorLeft,
     FloorReport,
@@ -28,7 +28,7 @@ from fasaco_edge.wire.replies import (
     UnreachedReport,
     ZoneReport,
 )
-from fasaco_edge.wire.status import (
+from fasaco_edge.wire.documents.status import (
     BatteryReport,
     ClaimReport,
     DriveReport,

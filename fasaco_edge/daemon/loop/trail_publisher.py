@@ -17,10 +17,10 @@ from fasaco_edge.planners.living_trail import (
     strongest_into,
 )
 from fasaco_edge.planners.planner import ColonySnapshot
-from fasaco_edge.wire.json_text import encode_json
-from fasaco_edge.wire.maps import direction_values, encode_occupancy_grid
-from fasaco_edge.wire.path_documents import TrailAttachment
-from fasaco_edge.wire.pheromone import encode_pheromone
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.path_documents import TrailAttachment
+from fasaco_edge.wire.messages.maps import direction_values, encode_occupancy_grid
+from fasaco_edge.wire.messages.pheromone import encode_pheromone
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.outbox import Outbox

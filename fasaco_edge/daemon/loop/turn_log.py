@@ -26,9 +26,8 @@ from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanBroke
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.orders.order import command_document
 from fasaco_edge.samples import SampleEncoder
-from fasaco_edge.wire.json_text import encode_json
-from fasaco_edge.wire.topics import FLEET
-from fasaco_edge.wire.turns import (
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.turns import (
     Cycle,
     Decided,
     EarlySample,
@@ -37,6 +36,7 @@ from fasaco_edge.wire.turns import (
     TakenSample,
     TurnBatch,
 )
+from fasaco_edge.wire.topics import FLEET
 
 if TYPE_CHECKING:
     import numpy as np

@@ -56,7 +56,7 @@ class BatteryReceived:
 
     Attributes:
         level: its charge from 0 to 1; None where that is not known.
-        power: what the supply does, as ``wire.battery.POWERS`` has it.
+        power: what the supply does, as ``wire.messages.battery.POWERS`` has it.
         stamp_ns: when that was measured [ns]; 0 where that is not known.
     """
 

@@ -21,9 +21,9 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.flows import Flows
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.wire.maps import CoverageValue
-from fasaco_edge.wire.path_documents import TrailAttachment
-from fasaco_edge.wire.pheromone import PheromoneMessage
+from fasaco_edge.wire.documents.path_documents import TrailAttachment
+from fasaco_edge.wire.messages.maps import CoverageValue
+from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
 Colour = tuple[int, int, int]
 

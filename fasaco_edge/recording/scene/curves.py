@@ -15,8 +15,8 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.archetypes import COVERED_COLOUR, RECOVERED_COLOUR, Colour
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.wire.path_documents import PathAttachment
-from fasaco_edge.wire.status import Status
+from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.documents.status import Status
 
 # Curves are drawn as staircases (``CURVES``). Each value is repeated at least this often, so
 # that a new part, or the time after a gap, shows every curve within a minute.

@@ -14,8 +14,8 @@ from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.layers import Layers
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.wire.path_documents import PathAttachment, Rectangle
-from fasaco_edge.wire.paths import PathMessage
+from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
+from fasaco_edge.wire.messages.paths import PathMessage
 
 # A point of a line in the file; each path is drawn twice, the second time as the one before.
 POINT_BYTES = 2 * 12

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Bounds, Pose2D
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid, marked_window
 from fasaco_edge.recording import entities
-from fasaco_edge.wire.path_documents import PathAttachment, Rectangle
-from fasaco_edge.wire.paths import PathMessage
-from fasaco_edge.wire.pheromone import PheromoneMessage
+from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
+from fasaco_edge.wire.messages.paths import PathMessage
+from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
 # Nearer to 0 than this float32 resolves a millimetre, and nothing is moved [m].
 NEAR_M = 10_000.0

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.settings import Settings
+from fasaco_edge.wire.documents.settings import Settings
 
 # The most important settings come first, the others by name.
 FIRST = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")

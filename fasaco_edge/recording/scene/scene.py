@@ -23,12 +23,12 @@ from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.maps import directions_of
-from fasaco_edge.wire.path_documents import PathAttachment, TrailAttachment
-from fasaco_edge.wire.paths import PathMessage
-from fasaco_edge.wire.pheromone import PheromoneMessage
-from fasaco_edge.wire.settings import known_settings
-from fasaco_edge.wire.status import ErrorCounts, Recorder, Status
+from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
+from fasaco_edge.wire.documents.settings import known_settings
+from fasaco_edge.wire.documents.status import ErrorCounts, Recorder, Status
+from fasaco_edge.wire.messages.maps import directions_of
+from fasaco_edge.wire.messages.paths import PathMessage
+from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
 DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint

@@ -16,10 +16,10 @@ from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.samples import Numbered, SampleEncoder
-from fasaco_edge.wire.json_text import decode_tolerant
-from fasaco_edge.wire.path_digest import PATH_DIGEST, digest
-from fasaco_edge.wire.paths import decode_path
-from fasaco_edge.wire.status import Status
+from fasaco_edge.wire.documents.json_text import decode_tolerant
+from fasaco_edge.wire.documents.path_digest import PATH_DIGEST, digest
+from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.topics import RECORDED_INPUTS
 
 # These hold for the moment they come alone; all other inputs stay in force.

@@ -33,14 +33,14 @@ from fasaco_edge.recording.write.quota import DiskBudget, next_run
 from fasaco_edge.recording.write.streams import serve_live
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.json_text import decode_json, decode_tolerant, encode_json
-from fasaco_edge.wire.maps import decode_map_update, decode_occupancy_grid
-from fasaco_edge.wire.path_documents import PathAttachment, TrailAttachment
-from fasaco_edge.wire.paths import decode_path
-from fasaco_edge.wire.pheromone import decode_pheromone
-from fasaco_edge.wire.poses import DEFAULT_FRAMES, PoseDecoder
-from fasaco_edge.wire.status import Recorder as RecorderReport
-from fasaco_edge.wire.status import Status
+from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
+from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
+from fasaco_edge.wire.documents.status import Recorder as RecorderReport
+from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
+from fasaco_edge.wire.messages.paths import decode_path
+from fasaco_edge.wire.messages.pheromone import decode_pheromone
+from fasaco_edge.wire.messages.poses import DEFAULT_FRAMES, PoseDecoder
 
 TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000

@@ -7,7 +7,15 @@ from typing import Annotated, Final
 import msgspec
 
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.wire.json_text import Amount, Count, Document, Name, Ordinal, allowed, encode_json
+from fasaco_edge.wire.documents.json_text import (
+    Amount,
+    Count,
+    Document,
+    Name,
+    Ordinal,
+    allowed,
+    encode_json,
+)
 
 STATES: Final = (
     *("idle", "waiting for map", "waiting for pose", "loading", "planning", "covering"),

@@ -12,7 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import FleetError, MalformedMessage
-from fasaco_edge.wire.json_text import Document
+from fasaco_edge.wire.documents.json_text import Document
 from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_FLEET_TILES, MAX_JSON_BYTES
 
 FLEET_VERSION: Final = 1

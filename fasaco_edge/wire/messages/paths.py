@@ -13,16 +13,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter, encoded_string, refuse
-from fasaco_edge.wire.fields import (
+from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_PATH_POSES, QUATERNION_TOLERANCE
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, encoded_string, refuse
+from fasaco_edge.wire.messages.fields import (
     POSE,
     SECOND_NS,
     check_pose,
     read_header,
     write_header,
 )
-from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_PATH_POSES, QUATERNION_TOLERANCE
-from fasaco_edge.wire.path_points import read_path_pose, read_pose_count
+from fasaco_edge.wire.messages.path_points import read_path_pose, read_pose_count
 from fasaco_edge.wire.schemas import PATH
 
 # So many poses are worked out at a time.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from fasaco_edge.wire.cdr import CdrWriter
-from fasaco_edge.wire.fields import clipped, write_header
+from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.messages.cdr import CdrWriter
+from fasaco_edge.wire.messages.fields import clipped, write_header
 from fasaco_edge.wire.schemas import DIAGNOSTIC_ARRAY
-from fasaco_edge.wire.status import Status
 
 OK, WARN, ERROR, STALE = range(4)
 LEVELS: Final = {

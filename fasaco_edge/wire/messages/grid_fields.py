@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Window
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.fields import (
+from fasaco_edge.wire.limits import MAX_GRID_TILT, MAX_RESOLUTION_M, MIN_RESOLUTION_M
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
+from fasaco_edge.wire.messages.fields import (
     POSE,
     SECOND_NS,
     check_pose,
@@ -19,7 +20,6 @@ from fasaco_edge.wire.fields import (
     refuse_nanosec,
     write_pose,
 )
-from fasaco_edge.wire.limits import MAX_GRID_TILT, MAX_RESOLUTION_M, MIN_RESOLUTION_M
 
 _Cell = TypeVar("_Cell", np.int8, np.uint8)
 

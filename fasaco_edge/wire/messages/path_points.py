@@ -7,9 +7,9 @@ seconds, and nobody drives that far before the next one comes.
 from __future__ import annotations
 
 from fasaco_edge.grid.geometry import Point
-from fasaco_edge.wire.cdr import CdrReader, refuse
-from fasaco_edge.wire.fields import POSE, check_pose, read_header
 from fasaco_edge.wire.limits import MAX_PATH_POSES
+from fasaco_edge.wire.messages.cdr import CdrReader, refuse
+from fasaco_edge.wire.messages.fields import POSE, check_pose, read_header
 from fasaco_edge.wire.schemas import PATH
 
 LEAST_POSE_BYTES = 72

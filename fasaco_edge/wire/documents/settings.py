@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fasaco_edge.wire.json_text import Document, tolerant
+from fasaco_edge.wire.documents.json_text import Document, tolerant
 
 Settings = dict[str, object]
 """The configuration in force, without secrets, by sections."""

@@ -9,8 +9,8 @@ from typing import NoReturn
 
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter, encoded_string, refuse
 from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_STRING_BYTES, QUATERNION_TOLERANCE
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, encoded_string, refuse
 
 SECOND_NS = 1_000_000_000
 POSE = struct.Struct("<7d")

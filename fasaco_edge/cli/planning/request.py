@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from fasaco_edge.cli.plan_turning import turning_of
+from fasaco_edge.cli.planning.turning import turning_of
 from fasaco_edge.config.config import DaemonConfig, RobotConfig, load_config
 from fasaco_edge.offline.settings import CELLS, Search, default_line, require
 from fasaco_edge.offline.user_function import load_function

@@ -11,20 +11,20 @@ from dataclasses import dataclass
 
 from fasaco_edge.errors import MalformedMessage, TransformLoop
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.fields import (
+from fasaco_edge.wire.limits import (
+    MAX_COORDINATE_M,
+    MAX_TRANSFORM_TILT,
+    MAX_TRANSFORMS,
+    QUATERNION_TOLERANCE,
+)
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
+from fasaco_edge.wire.messages.fields import (
     POSE,
     read_header,
     read_pose,
     write_header,
     write_pose,
     yaw_of,
-)
-from fasaco_edge.wire.limits import (
-    MAX_COORDINATE_M,
-    MAX_TRANSFORM_TILT,
-    MAX_TRANSFORMS,
-    QUATERNION_TOLERANCE,
 )
 from fasaco_edge.wire.schemas import (
     ODOMETRY,

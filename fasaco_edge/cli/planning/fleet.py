@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Exit, writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.plan_progress import watching
+from fasaco_edge.cli.planning.progress import watching
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import ctrl_c_asks
@@ -25,7 +25,7 @@ from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
 
 if TYPE_CHECKING:
-    from fasaco_edge.cli.plan_request import PlanRequest
+    from fasaco_edge.cli.planning.request import PlanRequest
     from fasaco_edge.grid.lattice import Cell, CoverageLattice
     from fasaco_edge.grid.occupancy import OccupancyGrid
     from fasaco_edge.planners.fleet.division import Division

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Self
 
-from fasaco_edge.wire.json_text import Amount, Count, Document, Name, Ordinal
+from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Name, Ordinal
 
 if TYPE_CHECKING:
     from fasaco_edge.planners.path import CoveragePath

@@ -11,10 +11,16 @@ from typing import Annotated, Final
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from fasaco_edge.wire.json_text import Amount, Count, Document, Name, Ordinal, allowed
-from fasaco_edge.wire.path_documents import PathReport
-from fasaco_edge.wire.replies import CoverageReport, FloorReport, MissionReport, Point, State
-from fasaco_edge.wire.settings import Settings
+from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Name, Ordinal, allowed
+from fasaco_edge.wire.documents.path_documents import PathReport
+from fasaco_edge.wire.documents.replies import (
+    CoverageReport,
+    FloorReport,
+    MissionReport,
+    Point,
+    State,
+)
+from fasaco_edge.wire.documents.settings import Settings
 
 RECORDER_STATES: Final = ("recording", "disk full", "stalled", "stopping")
 SUPERVISED_STATES: Final = ("starting", *RECORDER_STATES, "silent", "restarting")

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from fasaco_edge import kernels as cell
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import OCCUPIED, UNKNOWN, MapPatch, OccupancyGrid
-from fasaco_edge.wire.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.fields import read_header, write_header
-from fasaco_edge.wire.grid_fields import (
+from fasaco_edge.wire.limits import MAX_GRID_CELLS
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
+from fasaco_edge.wire.messages.fields import read_header, write_header
+from fasaco_edge.wire.messages.grid_fields import (
     read_cells,
     read_grid_geometry,
     write_cells,
     write_grid_geometry,
 )
-from fasaco_edge.wire.limits import MAX_GRID_CELLS
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, OCCUPANCY_GRID_UPDATE
 
 # Of a map update: its corner and its size.

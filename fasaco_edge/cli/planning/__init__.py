@@ -1,0 +1,1 @@
+"""The command ``plan``, part by part."""

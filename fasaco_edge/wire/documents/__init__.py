@@ -1,0 +1,1 @@
+"""Documents in JSON: typed, read and written."""

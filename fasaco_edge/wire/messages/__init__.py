@@ -1,0 +1,1 @@
+"""Messages of ROS in CDR: read and written."""
