@@ -191,7 +191,8 @@ def _listen(config: DaemonConfig, listen_s: float) -> Finding:
 def _print(file: Path, text: str, heard: Finding | None) -> None:
     console = out()
     console.print(f"{file}:", soft_wrap=True)
-    console.print(text.rstrip(), markup=False, highlight=False, soft_wrap=True)
+    for line in text.splitlines():
+        console.print(f"  {line}", markup=False, highlight=False, soft_wrap=True)
     if heard is not None:
         console.print(f"on the bus: {heard.found}", soft_wrap=True)
         for line in heard.details:

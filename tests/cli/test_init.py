@@ -24,7 +24,9 @@ def test_it_has_nothing_in_it_but_what_differs_from_the_defaults(tmp_path, capsy
     file = tmp_path / "robot.yaml"
     assert init(file, *GIVEN) == 0
     assert file.read_text().splitlines()[1:] == ["robot:", "  radius_m: 0.2"]
-    assert f"fasaco-edge run --config {file}" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "\n  robot:\n    radius_m: 0.2\n" in printed
+    assert f"fasaco-edge run --config {file}" in printed
     default = ["--robot-radius", "0.18", "--tool-width", "0.3", "--map-by", "zenoh"]
     assert init(file, *default, "--force") == 0
     assert load_config(file) == DaemonConfig()
