@@ -1,12 +1,14 @@
 """A robot with a battery: when it goes to its dock, what it believes, and when it goes on."""
 
+import math
 from dataclasses import replace
 
 import pytest
 
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.mission.config import BatteryPolicy, Dock
-from fasaco_edge.mission.core.charging import BatteryGauge
-from fasaco_edge.mission.core.events import BatteryReceived, MapReceived, State
+from fasaco_edge.mission.core.charging import ALL_AFTER_S, BatteryGauge
+from fasaco_edge.mission.core.events import BatteryReceived, MapReceived, PoseReceived, State
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, with_policy
 
@@ -252,6 +254,56 @@ def test_in_its_dock_it_need_not_stand_where_paths_lead():
     for _ in range(5):
         drive.tell(pose_at(5, 0), patch("###", at=(5, 0)))
     assert drive.mission.state is State.CHARGING
+
+
+def test_out_of_a_dock_where_no_path_leads_it_goes_on_from_before_it():
+    dock = Dock(x_m=-1.5 * CELL, y_m=2.5 * CELL, yaw_deg=180.0, approach_m=2 * CELL)
+    drive = Battery(0.15, dock=dock)
+    drive.run(State.CHARGING)
+    docked = PoseReceived(StampedPose(Pose2D(dock.x_m, dock.y_m, math.pi)))
+    drive.power = "charging"
+    while drive.level < 0.95:
+        drive.level += 0.02
+        drive.tell(docked)
+    for _ in range(10):
+        drive.tell(docked)
+    if drive.request is not None:
+        drive.plan()
+    assert drive.mission.state is State.COVERING
+    assert tuple(drive.mission.route.path.cells[0].tolist()) == drive.cell
+
+
+def test_a_battery_that_takes_no_more_is_enough():
+    drive = Battery(0.15)
+    drive.run(State.CHARGING)
+    drive.level, drive.power = 0.88, "not charging"
+    for _ in range(20):
+        drive.go()
+    assert drive.mission.state is State.CHARGING
+    drive.tell(pose_at(*drive.cell), after=ALL_AFTER_S + 10.0)
+    drive.go()
+    assert drive.mission.state is not State.CHARGING
+
+
+def test_on_its_way_a_battery_that_calls_itself_full_changes_nothing():
+    drive = Battery(0.9)
+    drive.run(State.COVERING)
+    for _ in range(10):
+        drive.go()
+    drive.level, drive.power = 0.15, "full"
+    states = []
+    while drive.mission.state is not State.CHARGING:
+        drive.go()
+        states.append(drive.mission.order_state.errand)
+    assert states.index("charge") < len(states)
+    assert set(states[states.index("charge") :]) == {"charge"}
+
+
+def test_a_charge_that_comes_in_coarse_steps_is_believed():
+    gauge = BatteryGauge()
+    for number in range(8):
+        gauge.note(BatteryReceived(0.9 - 0.06 * number, "discharging"), 50.0 * number, drives=True)
+    assert gauge.level < 0.6
 
 
 def test_without_a_dock_it_charges_where_the_order_began():

@@ -20,6 +20,8 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # A charge further from the last one than this counts once it has come for so long [s].
 JUMP, HOLD_S = 0.05, 5.0
+# The first one counts once another came after so long that is no further from it.
+COARSE = 0.2
 # A piece of driving shows a drain once it took so much, and so long [s].
 STEP, LEAST_S = 0.01, 10.0
 # So many of the last pieces count, and no fewer than these.
@@ -29,6 +31,8 @@ WAY_EVERY_S = 5.0
 # Between the level at which it turns back and that at which it goes on; of the rest's time more
 # than is planned, as lines are longer than walks over cells.
 BETWEEN, SPARE = 0.1, 1.2
+# A charge that has risen by less than this for so long [s] is all that this battery takes.
+RISE, ALL_AFTER_S = 0.005, 1800.0
 
 
 class BatteryGauge:
@@ -69,9 +73,13 @@ class BatteryGauge:
             return
         self._told_at = now
         if self.level is None or abs(event.level - self.level) > JUMP:
-            claim = self._claim
-            is_new = claim is None or abs(event.level - claim[0]) > JUMP
-            # It may drain on meanwhile.
+            claim, level = self._claim, self.level
+            # It may drain on meanwhile, or come in coarse steps: what counts is to which side.
+            is_new = claim is None or (
+                abs(event.level - claim[0]) > COARSE
+                if level is None
+                else (event.level > level) != (claim[0] > level)
+            )
             self._claim = event.level, now if is_new or claim is None else claim[1]
             if now - self._claim[1] < HOLD_S:
                 return
@@ -103,6 +111,8 @@ class Charging:
     _way_s: float = field(default=0.0, init=False)
     _rest_s: float | None = field(default=None, init=False)
     _looked_at: float | None = field(default=None, init=False)
+    # The highest charge since the robot is in its dock, and since when; None elsewhere.
+    _best: tuple[float, float] | None = field(default=None, init=False)
 
     @property
     def policy(self) -> BatteryPolicy | None:
@@ -166,15 +176,20 @@ class Charging:
         needed = max(policy.low, policy.reserve) + drain * SPARE * self._rest_s
         return min(policy.enough, max(needed, policy.low + BETWEEN))
 
-    def is_enough(self, now: float) -> bool:
-        """Tell whether the robot has charged enough."""
+    def is_enough(self, now: float, *, docked: bool) -> bool:
+        """Tell whether the robot, which is in its dock or on the way there, has enough."""
         level = self.gauge.level
         if self.policy is None:
             return True  # the configuration has changed
-        if level is None or self.silence(now):
-            return False
-        is_full = self.gauge.power == "full" and level >= self.policy.low + BETWEEN
-        return is_full or level >= self.goes_on_at
+        if not docked or level is None or self.silence(now):
+            self._best = None
+            return level is not None and not self.silence(now) and level >= self.goes_on_at
+        if self._best is None or level > self._best[0] + RISE:
+            self._best = level, now
+        # Some say that they are full, others only rise no further.
+        power, waited_s = self.gauge.power, now - self._best[1]
+        is_all = power == "full" or (power != "discharging" and waited_s >= ALL_AFTER_S)
+        return level >= self.goes_on_at or (is_all and level >= self.policy.low + BETWEEN)
 
     def why(self, now: float) -> str:
         """Return what the robot in its dock waits for."""

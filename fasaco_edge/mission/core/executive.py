@@ -283,7 +283,8 @@ class Executive:
         orders, charging = self.orders, self.charging
         charging.look(self._now)
         errand = orders.order_state.errand
-        if errand == "charge" and charging.is_enough(self._now):
+        docked = self._state is State.CHARGING
+        if errand == "charge" and charging.is_enough(self._now, docked=docked):
             orders.set_state(replace(orders.order_state, errand=""))
         elif not errand and charging.is_due(self._now):
             orders.set_state(replace(orders.order_state, errand="charge"))

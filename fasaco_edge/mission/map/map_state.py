@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -28,6 +29,9 @@ from fasaco_edge.mission.map.inputs import FrameSelector
 from fasaco_edge.mission.map.loop_closure import has_moved
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.orders.order import MissionOrder
+
+# A robot so near to its dock's pose is in it [m].
+IN_DOCK_M = 0.5
 
 
 class MapState:
@@ -195,7 +199,7 @@ class MapState:
         self.area = None
 
     def robot_cell(self) -> Cell | None:
-        """Return the coverable cell the robot is in, or next to."""
+        """Return the coverable cell the robot is in, or next to; in its dock that before it."""
         lattice, cell = self.lattice, self.path_cell
         if lattice is None or self.pose is None:
             return None
@@ -206,7 +210,13 @@ class MapState:
             and lattice.states[lattice.local(cell)] == COVERABLE
         ):
             return cell
-        return anchor_cell(lattice, self.pose.pose)
+        pose, dock = self.pose.pose, self._config.policy.dock
+        own = anchor_cell(lattice, pose)
+        if own is not None or dock is None:
+            return own
+        # A dock may lie where no path leads: from there the way begins before it.
+        is_docked = math.hypot(pose.x - dock.x_m, pose.y - dock.y_m) <= IN_DOCK_M
+        return anchor_cell(lattice, dock.stand) if is_docked else None
 
     def follow_path(self, cell: Cell | None) -> None:
         """Note at which cell of its path the robot is; None where it is not on its line."""

@@ -157,7 +157,8 @@ class OrderState:
                 return replace(self, errand="home", paused=False, why=why)
             case "replan":
                 if self.errand:
-                    raise CommandError("nothing to plan: the robot is on its way home")
+                    to = "home" if self.errand == "home" else "to charge"
+                    raise CommandError(f"nothing to plan: the robot has gone {to}")
                 if self.order is None or self.paused:
                     why = "the mission is paused" if self.paused else "there is no mission"
                     raise CommandError(f"nothing to plan: {why}")
