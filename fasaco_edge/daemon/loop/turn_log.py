@@ -98,6 +98,8 @@ class TurnLog:
         self._turns: list[Cycle] = []
         self._embed_room, self._deflated_room = EMBEDDED_BYTES, DEFLATED_BYTES
         self._samples = SampleEncoder(run=0)
+        # What is kept of the time before the mission: when, which cycle, what came.
+        self._early: list[tuple[float, Cycle, Sequence[Received]]] = []
         self._news = DecisionFilter()
         self._has_begun = self._kernels_named = False
 
@@ -139,7 +141,7 @@ class TurnLog:
                 )
             )
         self._has_begun = mission is not None
-        self._forget_poses([received.sample for received in batch.samples])
+        self._forget_early(batch.samples)
         is_full = self._samples.waiting_bytes > FULL_BYTES
         if is_full or turn.now - self._published_at >= PERIOD_S:
             self._published_at = turn.now
@@ -209,16 +211,26 @@ class TurnLog:
         self._deflated_room -= len(deflated)
         return EarlySample(sample.key, sample.schema, deflated)
 
-    def _forget_poses(self, samples: Sequence[Sample]) -> None:
-        """Keep only the newest pose as long as there is nothing but poses."""
-        is_early = self._is_waiting and not self._has_begun
-        if is_early and len(self._turns) > 1 and all(map(_is_pose, self._turns)):
-            newest = self._turns[-1]
-            self._times = self._times[-1:]
-            self._turns = [Cycle(self._first, newest.is_begun, newest.samples)]
-            self._samples = SampleEncoder(run=0)
-            for sample in samples:
-                self._samples.add(Arrival(POSE, sample, 0, 0))
+    def _forget_early(self, received: Sequence[Received]) -> None:
+        """Keep only the newest pose and charge as long as there is nothing else."""
+        if not self._is_waiting or self._has_begun or not all(map(_is_told, self._turns)):
+            self._early = []
+            return
+        if not self._turns or not received:
+            return
+        early = [*self._early, (self._times[-1], self._turns[-1], received)]
+        newest = {one.topic: at for at, (_, turn, _) in enumerate(early) for one in turn.samples}
+        self._early = [early[at] for at in sorted(set(newest.values()))]
+        self._times = [time for time, _, _ in self._early]
+        self._turns = [
+            Cycle(self._first + number, turn.is_begun, turn.samples)
+            for number, (_, turn, _) in enumerate(self._early)
+        ]
+        self._samples = SampleEncoder(run=0)
+        for _, _, samples in self._early:
+            for one in samples:
+                if len(one.sample.payload) <= POSE_BYTES:
+                    self._samples.add(Arrival(one.kind, one.sample, 0, 0))
 
 
 def _plan_taken(ready: PlanReady) -> PlanTaken:
@@ -232,9 +244,9 @@ def _plan_taken(ready: PlanReady) -> PlanTaken:
     )
 
 
-def _is_pose(turn: Cycle) -> bool:
+def _is_told(turn: Cycle) -> bool:
     return (
-        not turn.commands and not turn.patches_lost and all(s.topic == POSE for s in turn.samples)
+        not turn.commands and not turn.patches_lost and all(s.topic in TOLD for s in turn.samples)
     )
 
 
