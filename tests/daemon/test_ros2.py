@@ -17,10 +17,12 @@ from tests.support.rooms import map_bytes, pillared_room, pose_bytes, two_rooms,
 from tests.support.ros_robot import (
     CLIENT,
     DIAGNOSTICS,
+    EMPTY_REQUEST,
     GRID,
     PATH,
     POSE,
     TF,
+    TRIGGER,
     UPDATE,
     Naming,
     RosRobot,
@@ -221,6 +223,13 @@ def test_the_mission_is_commanded_by_services_and_shown_as_diagnostics(naming, t
             assert not done
             assert message.startswith("there is no mission to resume (")
             assert robot.call("coverage/start")[0]
+            # Whoever asks for all of them at once means none.
+            every = robot.naming.key("coverage/pause", TRIGGER).replace("pause", "*")
+            told = list(robot.session.get(every, payload=EMPTY_REQUEST, timeout=10.0))
+            assert not any(
+                one.ok and struct.unpack_from("<?", bytes(one.ok.payload), 4)[0] for one in told
+            )
+            assert native.ask_status()["reason"] != "paused by command"
 
     def levels():
         told = [oracle.from_bytes(DIAGNOSTICS, each.payload).status[0] for each in shown.heard]

@@ -182,6 +182,8 @@ class Commands:
         request = question.request
         if (triggered := self._services.get(question.key)) is not None:
             check_request(request.payload)
+            if "*" in request.key:
+                raise BadQuery("a service has to be called by its name")
             return triggered, EVERYTHING_ONCE
         if question.key == self._replan_key:
             check(request)
