@@ -249,11 +249,11 @@ class Bus:
 
 
 def _end(session: zenoh.Session, stand_in: StandIn | None) -> None:
-    ending: Any = session  # close() has no annotation
-    with contextlib.suppress(zenoh.ZError):  # it took too long
-        ending.close()
-        if stand_in is not None:
-            stand_in.close()
+    endings: list[Any] = [session, stand_in]  # close() has no annotation
+    for ending in endings:
+        with contextlib.suppress(zenoh.ZError):  # it took too long
+            if ending is not None:
+                ending.close()
 
 
 def open_bus(settings: BusSettings) -> Bus:

@@ -151,7 +151,7 @@ def _checked(problem: GridProblem, walk: list[Cell], name: str) -> NDArray[np.in
 
 def _cell(given: object) -> Cell | None:
     """Return what was given as a cell of plain integers; None where it is none."""
-    if not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
+    if not isinstance(given, Sequence | np.ndarray):
         return None
     try:
         row, col = (int(at) for at in given)

@@ -90,7 +90,7 @@ def test_at_a_terminal_it_asks(tmp_path, capsys, monkeypatch):
 
 def test_it_tells_which_maps_it_heard(tmp_path, capsys):
     file, naming = tmp_path / "robot.yaml", Naming(3)
-    words = [*GIVEN[:4], "--map-by", "rmw_zenoh", "--json", "--listen", "2", "--force"]
+    words = [*GIVEN[:4], "--map-by", "rmw_zenoh", "--json", "--listen", "6", "--force"]
     endpoint = free_endpoint()
     words += ["--connect", endpoint]
     with ros_router(endpoint), ros_robot(endpoint, naming) as robot:
