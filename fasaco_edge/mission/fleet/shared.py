@@ -15,10 +15,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FleetError
@@ -178,13 +179,16 @@ class SharedProgress:
                 name: _Kept(heard.epoch, _listed(heard.tiles), _listed(heard.disregarded))
                 for name, heard in self._robots.items()
             }
-            self._kept = self.version, msgspec.json.encode(_Note(1, self.epoch, robots))
+            self._kept = self.version, msgspec.json.encode(_Note(_VERSION, self.epoch, robots))
         return self._kept[1]
 
     def resume(self, kept: bytes) -> None:
         """Go on with what ``encode`` returned; what another release kept is heard anew."""
-        note = msgspec.json.decode(kept, type=_Note) if kept else None
-        if note is None or note.version != 1:
+        try:
+            if not kept or msgspec.json.decode(kept, type=_Head).version != _VERSION:
+                return
+            note = msgspec.json.decode(kept, type=_Note)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
             return
         self.epoch, self.version = note.epoch, self.version + 1
         self._robots = {
@@ -197,10 +201,21 @@ class SharedProgress:
             raise FleetError(f"{robot}: {MOST_TILES} tiles of others' progress are kept at most")
 
 
+# Of the note that is kept.
+_VERSION = 1
+_Tile = tuple[int, int, Annotated[bytes, Meta(min_length=TILE_BYTES, max_length=TILE_BYTES)]]
+
+
 class _Kept(msgspec.Struct, frozen=True, array_like=True):
     epoch: int
-    tiles: list[tuple[int, int, bytes]]
-    disregarded: list[tuple[int, int, bytes]]
+    tiles: list[_Tile]
+    disregarded: list[_Tile]
+
+
+class _Head(msgspec.Struct, frozen=True):
+    """What is there in every version."""
+
+    version: int
 
 
 class _Note(msgspec.Struct, frozen=True):
@@ -243,9 +258,9 @@ def _window(place: Cell) -> Window:
     return Window(row, col, row + TILE, col + TILE)
 
 
-def _listed(tiles: Tiles) -> list[tuple[int, int, bytes]]:
+def _listed(tiles: Tiles) -> list[_Tile]:
     return [(*place, tiles[place].tobytes()) for place in sorted(tiles)]
 
 
-def _placed(tiles: list[tuple[int, int, bytes]]) -> Tiles:
+def _placed(tiles: list[_Tile]) -> Tiles:
     return {(row, col): np.frombuffer(bits, np.uint8) for row, col, bits in tiles}
