@@ -11,10 +11,15 @@ MOST_TILES = 4
 
 
 class FleetRobot(Drive):
-    """A robot that plans at once, drives a cell a tick, and tells the others of itself."""
+    """A robot that plans at once, drives a cell a tick, and tells the others of itself.
+
+    Attributes:
+        hangs: whether it stands.
+        cannot: cells that it comes to the edge of: its tool does not sweep them.
+    """
 
     def __init__(self, name, cell, rows, config=CONFIG, before=None):
-        self.name, self.hangs, self.told = name, False, Telling()
+        self.name, self.hangs, self.told, self.cannot = name, False, Telling(), ()
         super().__init__(cell, config=replace(config, robot=name))
         if before is not None:
             self.mission.restore_ledger(before)
@@ -42,7 +47,9 @@ class FleetRobot(Drive):
         if not self.hangs and self.walk:
             self.cell = self.walk.pop(0)
             self.driven.append(self.cell)
-        self.tell(pose_at(*self.cell), after=after)
+        row, col = self.cell
+        short = 0.48 * (self.cell in self.cannot)
+        self.tell(pose_at(row - short, col - short), after=after)
 
 
 class FleetDrive:

@@ -13,7 +13,7 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.layer import GONE_S
 from fasaco_edge.mission.fleet.shared import MOST_TILES, TILE_BYTES, SharedProgress, Telling
 from tests.mission.fleets import FleetDrive, FleetRobot, flaky
-from tests.mission.world import rectangle
+from tests.mission.world import CONFIG, rectangle, with_policy
 
 HALL = ["." * 24] * 12
 ROOMS = [
@@ -154,6 +154,40 @@ def test_what_others_swept_outlives_a_restart():
     restarted = FleetRobot("r1", (0, 0), HALL, before=again.mission.snapshot())
     restarted.tell(fleet.robots["r2"].report())
     assert restarted.mission.shared.cells_of("r2") == 0
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        b'{"version":2,"fleet":{"epoch":"7"}}',
+        b'{"version":1,"epoch":7,"robots":{"r2":[1,[[0,0,"AAAA"]],[]]}}',
+        b'{"version":1,"epoch":7}',
+        b'{"version":1,"epoch":7,"robots":{"\xff":[1,[],[]]}}',
+        b"\x00",
+    ],
+)
+def test_what_cannot_be_read_of_what_was_kept_is_heard_anew(kept):
+    shared = SharedProgress()
+    shared.resume(kept)
+    shared.begin(9)
+    assert shared.epoch == 9
+    assert not shared.swept(Window(0, 0, 9, 9)).any()
+
+
+def test_a_cell_that_cannot_be_swept_is_given_up_while_another_robot_works():
+    fleet = FleetDrive(HALL, TWO, with_policy(CONFIG, retries=1, retry_s=30.0))
+    ours, other = fleet.robots.values()
+    ours.cannot = {(11, 23)}
+    report = replace(other.report(), tiles=())
+    reasons = []
+    for second in range(500):
+        ours.tell(replace(report, x=0.5 + second % 2))
+        ours.tick()
+        reasons.append(ours.mission.reason)
+    assert ours.mission.fleet.has_company
+    assert "1 cell not reached: tried again after 30 s (1 of 1)" in reasons
+    assert reasons[-1] == "1 reachable cell was left over"
+    assert ours.mission.route.plans < 40
 
 
 def test_after_a_loop_closure_nothing_uncertain_is_given_back():

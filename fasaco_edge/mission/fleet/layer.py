@@ -93,6 +93,9 @@ class FleetLayer:
         self._divided_at = self._looked_at = float("-inf")
         self._owners: tuple[ReachableArea | None, NDArray[np.int8]]
         self._owners = None, np.zeros((0, 0), np.int8)
+        # What this robot could not sweep, while others are at work; of an area.
+        self._tried: tuple[ReachableArea | None, NDArray[np.bool_]]
+        self._tried = None, np.zeros((0, 0), np.bool_)
         # How many cells of its own part others had swept when the path was planned.
         self._taken = 0
 
@@ -130,11 +133,24 @@ class FleetLayer:
         return f"{event.robot} has swept cells of this robot's part"
 
     def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
-        """Return which of some cells are this robot's to sweep; all where none of its part are."""
+        """Return which of some cells are this robot's to sweep; all where none of its part are.
+
+        What it has given up is left to the others, as long as there are any.
+        """
         if self._division is None:
             return cells
+        cells = self._untried(cells, area)
         part = cells & self._is_own(self._division, area)
         return part if (part & area.reachable).any() else cells
+
+    def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
+        """Leave cells that this robot has tried in vain to the others."""
+        before = self._tried[1] if self._tried[0] is area else np.False_
+        self._tried = area, cells | before
+
+    def try_again(self) -> None:
+        """Begin anew with what was given up."""
+        self._tried = None, self._tried[1]
 
     def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
         """Divide anew what is left, if that is worth it; return why a plan is wanted, or "".
@@ -150,7 +166,7 @@ class FleetLayer:
             return ""
         self._looked_at = now
         robots, before = self._robots(area, cell, now), self._division
-        left = open_cells(area.lattice.window) & area.reachable
+        left = self._untried(open_cells(area.lattice.window) & area.reachable, area)
         if not (why := self._why_anew(area, left, robots, now, at_once=at_once)):
             return ""
         own = left if before is None else left & self._is_own(before, area)
@@ -214,6 +230,9 @@ class FleetLayer:
         even_s = UNEVEN * cells.sum() / (1.0 / steps_s).sum() + UNEVEN_S
         is_uneven = (cells * steps_s).max() > even_s and now - self._divided_at >= EVEN_S
         return "parts have become uneven" if is_uneven else ""
+
+    def _untried(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+        return cells & ~self._tried[1] if self._tried[0] is area else cells
 
     def _is_own(self, division: Division, area: ReachableArea) -> NDArray[np.bool_]:
         own: NDArray[np.bool_] = self._owners_on(division, area) == division.names.index(

@@ -181,6 +181,7 @@ class Sequencer:
         self.order_state, self._run = state, _Run()
         self._retry_check = (None, False)
         self._unreached.restart()
+        self._fleet.try_again()
 
     def set_state(self, state: OrderState) -> None:
         """Continue with the same order in another state, after a command."""
@@ -209,6 +210,7 @@ class Sequencer:
             self._ledger.forget(partial(in_zones, (zone,)))
         self.order_state = replace(state, begun=True, home=state.home or cell)
         run.left_over, run.same_again = -1, 0
+        self._fleet.try_again()
         if state.pass_number == 1:
             run.exploration.looked.clear()
         return "" if state.automatic else state.title
@@ -287,15 +289,24 @@ class Sequencer:
 
     def note_path_end(self) -> bool:
         """Note the end of a path; return whether what it left over has to wait."""
-        run, cells = self._run, self.left()
+        run, cells = self._run, self._left_to_me()
         if cells > 0:
             self._unreached.note_failure()
         run.same_again = run.same_again + 1 if cells == run.left_over else 1
         run.left_over = cells
         is_given_up = cells > 0 and run.same_again > MAX_SAME_LEFTOVERS
-        # Who is with others stays: they may leave before what they have taken on is swept.
-        is_given_up = is_given_up and not self._fleet.has_company
+        if is_given_up and self._fleet.has_company:
+            # Others may leave before what they have taken on is swept: that is tried before.
+            is_given_up, run.same_again = self._leave_to_others(), 0
         return is_given_up and not run.exploration.skip_viewpoint()
+
+    def _leave_to_others(self) -> bool:
+        """Give up what this robot has tried in vain; tell whether nothing untried is left."""
+        area = self._map.area
+        assert area is not None
+        unswept = self._unswept(area.lattice.window) & area.reachable
+        self._fleet.give_up(self._fleet.mine(unswept, area), area)
+        return not self._fleet.mine(unswept, area).any()
 
     def advance(self, now: float) -> None:
         """Continue with what is next: all that could be done now is done."""
@@ -342,8 +353,9 @@ class Sequencer:
         run = self._run
         run.retry_at = None
         run.exploration.aim_at(self._viewpoints() - {cell})
+        self._fleet.try_again()
         # In a retry, one path without progress is enough to give up.
-        run.left_over, run.same_again = self.left(), MAX_SAME_LEFTOVERS
+        run.left_over, run.same_again = self._left_to_me(), MAX_SAME_LEFTOVERS
         return f"tried again, {self.order_state.tries + 1} of {self._config.policy.retries}"
 
     def _end(self) -> None:
@@ -370,6 +382,10 @@ class Sequencer:
         if area is None:
             return 0
         return int(np.count_nonzero(self.open_cells(area.lattice.window) & area.reachable))
+
+    def _left_to_me(self) -> int:
+        area = self._map.area
+        return 0 if area is None else int(np.count_nonzero(self._open_to_me(area) & area.reachable))
 
     def _viewpoints(self) -> set[Cell]:
         """Return the cells to look at closed areas from."""
