@@ -7,11 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fasaco_edge.errors import FleetError
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.layer import GONE_S
-from fasaco_edge.mission.fleet.shared import MOST_TILES, TILE_BYTES, SharedProgress, Telling
+from fasaco_edge.mission.fleet.shared import (
+    MOST_ROBOTS,
+    MOST_TILES,
+    TILE_BYTES,
+    SharedProgress,
+    Telling,
+)
 from tests.mission.fleets import FleetDrive, FleetRobot, flaky
 from tests.mission.world import CONFIG, rectangle, with_policy
 
@@ -217,6 +224,49 @@ def test_no_more_is_kept_of_a_robot_that_lies_than_there_is_room_for():
     assert [fault.code for fault in decision.faults] == ["fleet_member"]
     ours.tick()
     assert ours.mission.state == "covering"
+    assert ours.mission.fleet.members["r2"].absence(ours.now).endswith("are kept at most")
+    # There is room for others.
+    assert not ours.tell(replace(other.report(), robot="r3", tiles=tiles[:2])).faults
+
+
+def test_of_many_robots_those_that_are_gone_and_swept_least_make_room():
+    shared, members = SharedProgress(), [f"r{number}" for number in range(MOST_ROBOTS)]
+    for number, robot in enumerate(members):
+        shared.hear(robot, 1, tiles_of({(number, col) for col in range(9 - number % 8)}))
+    with pytest.raises(FleetError, match="32 robots"):
+        shared.hear("new", 1, (), members)
+    assert shared.hear("new", 1, (), members[8:])
+    assert [shared.cells_of(robot) for robot in members[6:9]] == [3, 0, 9]
+    assert not shared.hear("newer", 1, (), members)
+
+
+def test_what_is_disregarded_is_dropped_with_the_cells_and_where_it_is_too_much():
+    shared, everywhere = SharedProgress(), lambda rows, _: np.ones(len(rows), bool)
+    for epoch in range(1, 120):
+        places = range(100 * epoch, 100 * epoch + 100)
+        shared.hear("r2", epoch, [((row, 0), b"\xff" * TILE_BYTES) for row in places])
+        shared.disregard(everywhere)
+    assert len(shared.encode()) < 2 * MOST_TILES * 700
+    shared.hear("r2", 120, [((row, 0), bytes(TILE_BYTES)) for row in places])
+    shared.hear("r2", 120, [((row, 0), b"\xff" * TILE_BYTES) for row in places])
+    assert shared.cells_of("r2") == 100 * 8 * TILE_BYTES
+
+
+@pytest.mark.parametrize("begun", [0, 4])
+def test_a_number_that_no_count_leads_to_is_nobodys_division(begun):
+    fleet = FleetDrive(HALL, TWO)
+    fleet.run(begun)
+    ours, other = fleet.robots.values()
+    liar = replace(other.report(), robot="r0", division=2**31 - 1, state="idle")
+    for _ in range(6):
+        ours.tell(liar)
+        fleet.tick()
+    assert 0 < ours.mission.fleet.number < 10
+    assert abs(ours.mission.fleet.number - other.mission.fleet.number) <= 1
+    del fleet.robots["r2"]
+    before = ours.mission.fleet.number
+    fleet.run(int(GONE_S) + 3)
+    assert ours.mission.fleet.number > before
 
 
 @settings(max_examples=60, deadline=None)

@@ -98,3 +98,8 @@ def test_a_robot_that_floods_is_heard_at_its_rate():
         ear._is_due(f"{key}{number}", 5.0)
     assert ear._is_due(key, 6.0)
     assert not ear._is_due("fasaco/@v1/another/fleet", 6.0)
+    # Room for another is there once one of them is silent, but not at the cost of one that is not.
+    for at in (30.0, 65.0):
+        assert ear._is_due(key, at)
+    assert all(ear._is_due(f"fasaco/@v1/other{number}/fleet", 65.0) for number in range(63))
+    assert not ear._is_due("fasaco/@v1/another/fleet", 65.0)

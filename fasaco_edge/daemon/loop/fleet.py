@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
 # Of one robot no more is taken than one message in this time [s], of no more than so many robots.
 LEAST_SPACING_S, MOST_ROBOTS = 0.2, 64
+# One that was not heard for so long makes room for another [s].
+FORGOTTEN_S = 60.0
 # Tiles in a message that comes once a second, and in one on change: 12 kB a second in all.
 TILES, FEW_TILES = MAX_FLEET_TILES // 2, 2
 
@@ -92,8 +94,13 @@ class FleetEar:
         """Tell whether a message on a key may be taken now; on a Zenoh thread."""
         if now - self._heard_at.get(key, float("-inf")) < LEAST_SPACING_S:
             return False
+        # Whoever was heard longest ago is first.
         if len(self._heard_at) >= MOST_ROBOTS and key not in self._heard_at:
-            return False
+            longest = next(iter(self._heard_at))
+            if now - self._heard_at[longest] < FORGOTTEN_S:
+                return False
+            del self._heard_at[longest]
+        self._heard_at.pop(key, None)
         self._heard_at[key] = now
         return True
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.errors import FleetError
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.events import MemberHeard, State
@@ -33,7 +34,8 @@ UNEVEN, UNEVEN_S = 1.25, 40.0
 # Another robot that has swept so many cells of this one's part changes its path: one that only
 # comes through does not. In unknown buildings 4 cost 7 % of two robots' time.
 MANY_TAKEN = 30
-MOST_NUMBER = 2**31 - 1
+# A division is numbered no further ahead of the own, nor of a newcomer's first, but in error.
+MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**10, 2**24
 LATER = "another robot has divided anew"
 
 AT_WORK = (State.PLANNING, State.COVERING, State.DEGRADED)
@@ -124,8 +126,14 @@ class FleetLayer:
         self.members[event.robot] = Member(event, now, left_out, place, moved_at)
         if left_out:
             return ""
-        if self._ledger.shared.hear(event.robot, event.epoch, event.tiles):
-            return f"{event.robot} has forgotten what it swept"
+        told = event.robot, event.epoch, event.tiles
+        try:
+            is_open_again = self._ledger.shared.hear(*told, self.members)
+        except FleetError as error:
+            self.members[event.robot].left_out = str(error)
+            raise
+        if is_open_again:
+            return f"{event.robot}: cells are to be swept again"
         taken = self._count_taken()
         if taken < self._taken + MANY_TAKEN:
             return ""
@@ -170,8 +178,8 @@ class FleetLayer:
         if not (why := self._why_anew(area, left, robots, now, at_once=at_once)):
             return ""
         own = left if before is None else left & self._is_own(before, area)
-        heard = [member.told.division for member in self.members.values() if not member.left_out]
-        self.number = min(max([self.number + (why != LATER), *heard]), MOST_NUMBER)
+        heard = self._newest_heard()
+        self.number = min(max(self.number + (why != LATER), heard), MOST_NUMBER)
         self._division = divide(area.lattice, left, robots) if len(robots) > 1 else None
         self._divided_at, self._owners = now, (None, self._owners[1])
         self._taken = self._count_taken()
@@ -184,6 +192,13 @@ class FleetLayer:
             return None
         area = self._map.area
         return int(np.count_nonzero(self._is_own(self._division, area) & area.reachable))
+
+    def _newest_heard(self) -> int:
+        """Return the number of the newest division that others know, and that can be."""
+        told = [member.told.division for member in self.members.values() if not member.left_out]
+        first = min((number for number in told if number), default=0)
+        most = (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
+        return max((number for number in told if number <= most), default=0)
 
     def _robots(self, area: ReachableArea, cell: Cell, now: float) -> list[Robot]:
         """Return who is at work where this robot can come to."""
@@ -216,8 +231,8 @@ class FleetLayer:
         if more := sorted(names - known - {self._robot}):
             return f"shared with {', '.join(more)}"
         assert division is not None
-        heard = max(self.members[name].told.division for name in names - {self._robot})
-        return LATER if heard > self.number else self._why_by_parts(division, area, left, now)
+        is_later = self._newest_heard() > self.number
+        return LATER if is_later else self._why_by_parts(division, area, left, now)
 
     def _why_by_parts(
         self, division: Division, area: ReachableArea, left: NDArray[np.bool_], now: float

@@ -12,7 +12,7 @@ moved), are disregarded until the robot that swept them has forgotten them itsel
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 TILE_BYTES = TILE * TILE // 8
 # Of how many robots something is kept, and how many tiles of all of them: 16 million cells.
 MOST_ROBOTS, MOST_TILES = 32, 4096
+MOST_TILES_OF_ONE = MOST_TILES // 8
 
 Bits = NDArray[np.uint8]
 Tiles = dict["Cell", Bits]
@@ -50,6 +51,11 @@ class _Heard:
 
     def begin(self, epoch: int) -> None:
         self.epoch, self.tiles = epoch, {}
+
+    @property
+    def count(self) -> int:
+        """How many cells count."""
+        return sum(int(_cells(self.counted(place)).sum()) for place in self.tiles)
 
     def counted(self, place: Cell) -> Bits:
         tile, without = self.tiles[place], self.disregarded.get(place)
@@ -85,32 +91,42 @@ class SharedProgress:
             self.epoch += 1
             self.version += 1
 
-    def hear(self, robot: str, epoch: int, tiles: Iterable[tuple[Cell, bytes]]) -> bool:
+    def hear(
+        self,
+        robot: str,
+        epoch: int,
+        tiles: Iterable[tuple[Cell, bytes]],
+        members: Collection[str] = (),
+    ) -> bool:
         """Take in what a robot says of itself; tell whether cells are to be swept again by that.
 
         Args:
             robot: its name.
             epoch: of its cells.
             tiles: places, and TILE_BYTES of bits each.
+            members: names of the robots that make no room for another.
 
         Raises:
             FleetError: there is no room for it.
         """
-        heard = self._robots.get(robot)
+        heard, has_lost = self._robots.get(robot), False
         if heard is None:
-            if len(self._robots) >= MOST_ROBOTS:
-                raise FleetError(f"{robot}: progress of {MOST_ROBOTS} robots is kept at most")
+            has_lost = self._make_room(robot, members)
             heard = self._robots[robot] = _Heard(epoch)
-        has_lost = heard.epoch != epoch and bool(heard.tiles)
         if heard.epoch != epoch:
+            has_lost = bool(heard.tiles)
+            if sum(len(one.disregarded) for one in self._robots.values()) > MOST_TILES:
+                known = heard.disregarded.items()
+                heard.disregarded = {at: bits for at, bits in known if at in heard.tiles}
             heard.begin(epoch)
             self.version += 1
         for place, told in tiles:
             bits, before = np.frombuffer(told, np.uint8), heard.tiles.get(place)
             if before is None:
                 self._check_room(robot)
-                if (without := heard.disregarded.get(place)) is not None:
-                    heard.disregarded[place] = without & bits
+                without = heard.disregarded.pop(place, np.uint8(0)) & bits
+                if without.any():
+                    heard.disregarded[place] = without
             after = bits if before is None else before | bits
             if before is None or not np.array_equal(before, after):
                 heard.tiles[place] = after
@@ -168,9 +184,7 @@ class SharedProgress:
     def cells_of(self, robot: str) -> int:
         """Return how many cells of a robot's count."""
         heard = self._robots.get(robot)
-        if heard is None:
-            return 0
-        return sum(int(_cells(heard.counted(place)).sum()) for place in heard.tiles)
+        return 0 if heard is None else heard.count
 
     def encode(self) -> bytes:
         """Return all of it, to be kept with the ledger; b"" where there is nothing."""
@@ -196,7 +210,20 @@ class SharedProgress:
             for name, one in note.robots.items()
         }
 
+    def _make_room(self, robot: str, members: Collection[str]) -> bool:
+        """Make room for another robot; tell whether cells are to be swept again by that."""
+        if len(self._robots) < MOST_ROBOTS:
+            return False
+        gone = sorted(self._robots.keys() - set(members))
+        if not gone:
+            raise FleetError(f"{robot}: progress of {MOST_ROBOTS} robots is kept at most")
+        least = self._robots.pop(min(gone, key=self.cells_of))
+        self.version += 1
+        return least.count > 0
+
     def _check_room(self, robot: str) -> None:
+        if len(self._robots[robot].tiles) >= MOST_TILES_OF_ONE:
+            raise FleetError(f"{robot}: {MOST_TILES_OF_ONE} tiles of a robot are kept at most")
         if sum(len(heard.tiles) for heard in self._robots.values()) >= MOST_TILES:
             raise FleetError(f"{robot}: {MOST_TILES} tiles of others' progress are kept at most")
 
