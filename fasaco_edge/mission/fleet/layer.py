@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,14 +126,15 @@ class FleetLayer:
             self._make_room()
         elif not before.has_moved(event):
             place, moved_at = before.place, before.moved_at
-        self.members[event.robot] = Member(event, now, left_out, place, moved_at)
+        member = Member(event, now, left_out, place, moved_at)
+        self.members[event.robot] = member
         if left_out:
             return ""
         told = event.robot, event.epoch, event.tiles
         try:
             is_open_again = self._ledger.shared.hear(*told, self.members)
         except FleetError as error:
-            self.members[event.robot].left_out = str(error)
+            self.members[event.robot] = replace(member, left_out=str(error))
             raise
         taken = self._count_taken()
         self._taken = min(self._taken, taken)

@@ -52,6 +52,11 @@ class _Heard:
     def begin(self, epoch: int) -> None:
         self.epoch, self.tiles = epoch, {}
 
+    def drop_gone(self) -> None:
+        """Keep nothing of tiles that were not heard again in this epoch."""
+        known = self.disregarded.items()
+        self.disregarded = {place: bits for place, bits in known if place in self.tiles}
+
     @property
     def count(self) -> int:
         """How many cells count."""
@@ -116,8 +121,7 @@ class SharedProgress:
         if heard.epoch != epoch:
             has_lost = bool(heard.tiles)
             if sum(len(one.disregarded) for one in self._robots.values()) > MOST_TILES:
-                known = heard.disregarded.items()
-                heard.disregarded = {at: bits for at, bits in known if at in heard.tiles}
+                heard.drop_gone()
             heard.begin(epoch)
             self.version += 1
         for place, told in tiles:
