@@ -135,18 +135,6 @@ def test_a_pipe_in_place_of_the_lock_holds_nobody_up(tmp_path):
         second.lock()
 
 
-@pytest.mark.parametrize("make", [Path.mkdir, lambda path: path.symlink_to("nowhere")])
-def test_what_lies_in_place_of_the_lock_is_set_aside(tmp_path, make):
-    make(tmp_path / "robot.ledger.lock")
-    first, second = LedgerFile(tmp_path, "robot"), LedgerFile(tmp_path, "robot")
-    first.lock()
-    with pytest.raises(LedgerFileError, match="another daemon"):
-        second.lock()
-    first.write(lane(4))
-    assert contents(load(tmp_path).ledger) == contents(lane(4))
-    assert list(tmp_path.glob("robot.ledger.lock.unusable-*"))
-
-
 def test_a_lock_that_was_deleted_is_taken_again(tmp_path):
     folder = tmp_path / "state"
     first, second = LedgerFile(folder, "robot"), LedgerFile(folder, "robot")

@@ -144,10 +144,7 @@ class LedgerFile:
         make_folder(self.path.parent)
         # Not open for writing: that would keep the disk from turning read-only.
         # Whatever lies under its name: to open a pipe would wait for somebody who writes to it.
-        name = Path(f"{self.path}.lock")
-        if name.is_symlink() or name.is_dir():
-            name.rename(_free_name(name, "unusable"))
-        lock = open_own(name, os.O_RDONLY | os.O_NONBLOCK)
+        lock = open_own(f"{self.path}.lock", os.O_RDONLY | os.O_NONBLOCK)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
