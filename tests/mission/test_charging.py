@@ -295,7 +295,6 @@ def test_on_its_way_a_battery_that_calls_itself_full_changes_nothing():
     while drive.mission.state is not State.CHARGING:
         drive.go()
         states.append(drive.mission.order_state.errand)
-    assert states.index("charge") < len(states)
     assert set(states[states.index("charge") :]) == {"charge"}
 
 
