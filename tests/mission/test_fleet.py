@@ -11,7 +11,7 @@ from fasaco_edge.errors import FleetError
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.fleet.layer import GONE_S
+from fasaco_edge.mission.fleet.layer import GONE_S, MANY_TAKEN
 from fasaco_edge.mission.fleet.shared import (
     MOST_ROBOTS,
     MOST_TILES,
@@ -250,6 +250,48 @@ def test_what_is_disregarded_is_dropped_with_the_cells_and_where_it_is_too_much(
     shared.hear("r2", 120, [((row, 0), bytes(TILE_BYTES)) for row in places])
     shared.hear("r2", 120, [((row, 0), b"\xff" * TILE_BYTES) for row in places])
     assert shared.cells_of("r2") == 100 * 8 * TILE_BYTES
+
+
+def test_what_this_robot_has_swept_itself_is_not_taken_from_it():
+    fleet = FleetDrive(HALL, TWO)
+    fleet.run(50)
+    ours, other = fleet.robots.values()
+    report = other.report()
+    seen = {tuple(cell) for cell in ours.driven}
+    assert len(seen) >= MANY_TAKEN
+    ours.tell(replace(report, tiles=tiles_of(seen)))
+    assert ours.request is None
+
+
+def test_cells_are_taken_anew_from_this_robot_after_another_has_forgotten_some():
+    fleet = FleetDrive(HALL, TWO)
+    fleet.run(4)
+    ours, other = fleet.robots.values()
+    report, ahead = replace(other.report(), tiles=()), ours.walk[::-1]
+    taken = replace(report, tiles=tiles_of(ahead[: MANY_TAKEN + 9]))
+    for told, is_replanned in (
+        (taken, True),
+        (replace(report, epoch=report.epoch + 1), True),
+        (replace(taken, epoch=report.epoch + 1), True),
+        (replace(taken, epoch=report.epoch + 1), False),
+    ):
+        ours.tell(told)
+        assert (ours.request is not None) == is_replanned
+        if is_replanned:
+            ours.plan()
+
+
+def test_a_robot_without_a_part_does_not_divide_again_and_again():
+    fleet = FleetDrive(HALL, TWO)
+    ours, other = fleet.robots.values()
+    ours.hangs = True
+    swept = {(row, col) for row in range(12) for col in range(24)} - {(11, 23)}
+    report = replace(other.report(), tiles=tiles_of(swept), y=2.7)
+    for second in range(20):
+        ours.tell(replace(report, x=5.6 + 0.2 * (second % 2)), after=0.0)
+        ours.tick()
+    assert ours.mission.fleet.part_cells() < 200
+    assert 0 < ours.mission.fleet.number <= 4
 
 
 @pytest.mark.parametrize("begun", [0, 4])

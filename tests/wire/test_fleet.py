@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig, FleetConfig, RobotConfig
-from fasaco_edge.daemon.loop.fleet import LEAST_SPACING_S, FleetEar
+from fasaco_edge.daemon.loop.fleet import LEAST_SPACING_S, TILES, FleetEar, FleetVoice
 from fasaco_edge.daemon.loop.inbox import Received
 from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.wire.documents.fleet import FleetMember, SweptTile, decode_member
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.limits import MAX_FLEET_TILES, MAX_JSON_BYTES
+from tests.mission.fleets import FleetRobot
 from tests.wire.schemas import check
 
 TILE = SweptTile(-1, 2, bytes(range(256)) * 2)
@@ -88,6 +89,29 @@ def test_cells_of_another_size_do_not_fit():
 @pytest.mark.parametrize("robot", ["r1", "*", "r$*"])
 def test_nobody_speaks_for_this_robot_or_for_all(robot):
     assert heard(said(), robot) is None
+
+
+class Listener:
+    """Keeps what is published."""
+
+    def __init__(self):
+        self.heard = []
+
+    def put(self, payload):
+        self.heard.append(decode_member(payload, "hall"))
+
+
+def test_a_robot_tells_its_pace_as_it_is_now_and_after_forgetting_all_tiles_at_once():
+    robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
+    ledger, voice = robot.mission.ledger, FleetVoice(listener, CONFIG)
+    for row in range(TILES):
+        ledger.credit((64 * row, 0))
+    robot.mission.fleet.step_s = 7.5
+    for now in (0.0, 1.0, 2.0):
+        robot.mission.shared.note_forgotten()
+        voice.publish(robot.mission, now)
+    assert [said.step_s for said in listener.heard] == [7.5] * 3
+    assert [len(said.swept) for said in listener.heard] == [TILES] * 3
 
 
 def test_a_robot_that_floods_is_heard_at_its_rate():

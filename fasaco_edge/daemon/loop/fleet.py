@@ -116,9 +116,9 @@ class FleetVoice:
     def __init__(self, publisher: Publisher, config: DaemonConfig) -> None:
         assert config.fleet
         self._publisher, self._fleet, self._cell_m = publisher, config.fleet.name, config.cell_m
-        self._step_s = config.robot.cost(config.cell_m).step_s
         self._telling = Telling()
         self._said: tuple[object, ...] = ()
+        self._epoch = 0
         self._said_at = float("-inf")
 
     def publish(self, mission: Mission, now: float) -> None:
@@ -132,7 +132,11 @@ class FleetVoice:
         if now - self._said_at < wait_s:
             return
         self._said, self._said_at = key, now
-        swept = self._telling.next(mission.ledger.snapshot().tiles, FEW_TILES if is_news else TILES)
+        most = FEW_TILES if is_news else TILES
+        if mission.shared.epoch != self._epoch:
+            # What was told is forgotten.
+            self._epoch, self._telling, most = mission.shared.epoch, Telling(), TILES
+        swept = self._telling.next(mission.ledger.snapshot().tiles, most)
         member = FleetMember(
             version=FLEET_VERSION,
             fleet=self._fleet,
@@ -141,7 +145,7 @@ class FleetVoice:
             state=str(mission.state),
             x=round(stamped.pose.x, 3),
             y=round(stamped.pose.y, 3),
-            step_s=self._step_s,
+            step_s=mission.fleet.step_s,
             epoch=mission.shared.epoch,
             division=mission.fleet.number,
             open_cells=mission.open_cells(),

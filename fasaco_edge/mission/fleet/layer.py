@@ -82,6 +82,7 @@ class FleetLayer:
     Attributes:
         members: the others, by name.
         number: of the newest division.
+        step_s: what sweeping a cell takes this robot [s].
     """
 
     def __init__(
@@ -89,7 +90,7 @@ class FleetLayer:
     ) -> None:
         self.members: dict[str, Member] = {}
         self.number = 0
-        self._robot, self._step_s = robot, step_s
+        self._robot, self.step_s = robot, step_s
         self._map, self._ledger = map_state, ledger
         self._division: Division | None = None
         self._divided_at = self._looked_at = float("-inf")
@@ -100,6 +101,8 @@ class FleetLayer:
         self._tried = None, np.zeros((0, 0), np.bool_)
         # How many cells of its own part others had swept when the path was planned.
         self._taken = 0
+        # Whether the last division had a part for it, and how many cells were left then.
+        self._had_part, self._left = False, 0
 
     @property
     def has_company(self) -> bool:
@@ -133,9 +136,10 @@ class FleetLayer:
         except FleetError as error:
             self.members[event.robot] = replace(member, left_out=str(error))
             raise
+        taken = self._count_taken()
+        self._taken = min(self._taken, taken)
         if is_open_again:
             return f"{event.robot}: cells are to be swept again"
-        taken = self._count_taken()
         if taken < self._taken + MANY_TAKEN:
             return ""
         self._taken = taken
@@ -185,6 +189,7 @@ class FleetLayer:
         self._divided_at, self._owners = now, (None, self._owners[1])
         self._taken = self._count_taken()
         after = left if self._division is None else left & self._is_own(self._division, area)
+        self._had_part, self._left = bool(after.any()), int(np.count_nonzero(left))
         return why if (own != after).any() else ""
 
     def part_cells(self) -> int | None:
@@ -203,7 +208,7 @@ class FleetLayer:
 
     def _robots(self, area: ReachableArea, cell: Cell, now: float) -> list[Robot]:
         """Return who is at work where this robot can come to."""
-        robots = [Robot(self._robot, cell, self._step_s)]
+        robots = [Robot(self._robot, cell, self.step_s)]
         for name, member in self.members.items():
             place = anchor_cell(area.lattice, Pose2D(member.told.x, member.told.y))
             if not member.absence(now) and place is not None and area.contains(place):
@@ -241,7 +246,10 @@ class FleetLayer:
         """Return why parts of what is left are to be others, or ""."""
         cells = np.bincount(self._owners_on(division, area)[left], minlength=len(division.robots))
         if not cells[division.names.index(self._robot)]:
-            return "own part is done" if left.any() else ""
+            # Where there was none for it, there is none soon after.
+            is_other = self._had_part or cells.sum() > self._left
+            is_other |= now - self._divided_at >= EVEN_S
+            return "own part is done" if left.any() and is_other else ""
         steps_s = np.array([robot.step_s for robot in division.robots])
         even_s = UNEVEN * cells.sum() / (1.0 / steps_s).sum() + UNEVEN_S
         is_uneven = (cells * steps_s).max() > even_s and now - self._divided_at >= EVEN_S
@@ -262,11 +270,13 @@ class FleetLayer:
         return self._owners[1]
 
     def _count_taken(self) -> int:
-        """Return how many cells of this robot's part others have swept."""
+        """Return how many cells of this robot's part others have swept, and it has not."""
         area = self._map.area
         if area is None:
             return 0
-        swept = self._ledger.shared.swept(area.lattice.window) & area.reachable
+        window = area.lattice.window
+        swept = self._ledger.shared.swept(window) & area.reachable
+        swept &= self._ledger.current.visits(window) == 0
         if self._division is not None:
             swept = swept & self._is_own(self._division, area)
         return int(np.count_nonzero(swept))
