@@ -1,16 +1,16 @@
-"""Picture of a fleet's plan: whose cells are whose, and each robot's walk."""
+"""Pictures of a fleet: its plan, and what its robots drove and swept."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.pictures import draw_line, in_pieces
-from fasaco_edge.drawing.plot import Plot, View, bounds_of
+from fasaco_edge.drawing.pictures import DRIVEN_WIDTH, draw_line, draw_unswept, in_pieces
+from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -61,6 +61,50 @@ def draw_fleet(
     return Sheet(title, lines, key, ("0", f"{longest:,} steps"), plot.view.scale).around(
         plot.finished()
     )
+
+
+def draw_fleet_mission(
+    grid: OccupancyGrid,
+    lattice: CoverageLattice,
+    trails: Mapping[str, NDArray[np.float64]],
+    swept: Sequence[MapLayer],
+    unswept: MapLayer,
+    *,
+    title: str,
+    lines: Sequence[str],
+) -> Image.Image:
+    """Return a picture, RGB, of what several robots drove and swept.
+
+    Args:
+        grid: the map at the end.
+        lattice: the planning grid at the end.
+        trails: of each robot by its name, float64 (n, 2), n >= 1: places (x, y) [m], in order.
+        swept: reachable floor that each swept, in the same order, all on one raster.
+        unswept: reachable floor that none has swept.
+        title: heading.
+        lines: caption below it.
+    """
+    plot = Plot(
+        View.over(bounds_of(grid, lattice, np.vstack(list(trails.values()))), lattice.cell_m)
+    )
+    plot.ground(grid)
+    key = [KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.END, "end")]
+    times = np.zeros(unswept.mask.shape, np.int8)
+    for number, (name, layer) in enumerate(zip(trails, swept, strict=True)):
+        plot.paint(layer, _tint(number))
+        times += layer.mask
+        key.append(KeyEntry("tile", _tint(number), f"swept by {name} ({layer.area_m2:,.1f} m2)"))
+    twice = MapLayer(unswept.geometry, times > 1)
+    plot.paint(twice, palette.RULE)
+    key.append(KeyEntry("tile", palette.RULE, f"by two or more ({twice.area_m2:,.1f} m2)"))
+    key += draw_unswept(plot, unswept)
+    for trail in trails.values():
+        plot.track(trail[:-1], trail[1:], DRIVEN_WIDTH * lattice.cell_m)
+        plot.end_mark(trail[-1])
+        plot.start_mark(trail[0])
+    longest_m = max(float(np.hypot(*np.diff(trail, axis=0).T).sum()) for trail in trails.values())
+    bar = ("0", f"{longest_m:,.0f} m driven")
+    return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
 
 
 def _tints(lattice: CoverageLattice, walks: Sequence[NDArray[np.int32]]) -> NDArray[np.uint8]:

@@ -69,6 +69,39 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
     assert not [pid for pid in processes_of(out) if is_running(pid)]
 
 
+def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
+    pytest.importorskip("rerun")
+    out = tmp_path / "demo"
+    options = ("--map", building, "--robots", 2, "--speed", 20, "--timeout", 1200)
+    ended = fasaco_edge("demo", *options, "--out", out, "--json")
+    assert ended.code == 0, ended.err
+    summary = json.loads(ended.out)
+    assert summary["complete"] is True
+    assert [robot["name"] for robot in summary["robots"]] == ["r1", "r2"]
+    assert summary["swept_m2"] / summary["reachable_m2"] > 0.9
+    each = [robot["swept_m2"] for robot in summary["robots"]]
+    assert min(each) > 1.0
+    assert sum(each) == pytest.approx(summary["swept_m2"] + summary["swept_twice_m2"], abs=0.05)
+    starts = []
+    for name in ("r1", "r2"):
+        trail = np.loadtxt(out / name / "trail.csv", delimiter=",", skiprows=1)
+        check_clearance(read_map(building), trail)
+        starts.append(trail[0])
+        assert any(file.startswith(f"{out}/{name}/") for file in summary["recording"])
+    assert math.dist(*starts) > 2.0
+    with Image.open(summary["picture"]) as picture:
+        assert min(picture.size) > 200
+    assert not [pid for pid in processes_of(out) if is_running(pid)]
+
+
+def test_more_robots_than_places_to_start_from(tmp_path):
+    geometry = GridGeometry(12, 12, RESOLUTION_M, Pose2D(-0.15, -0.15))
+    write_map(OccupancyGrid(geometry, np.zeros((12, 12), np.int8)), tmp_path / "closet.yaml")
+    ended = fasaco_edge("demo", "--map", tmp_path / "closet.yaml", "--robots", 3, "--out", tmp_path)
+    assert ended.code == 1
+    assert "no place for a robot beside the other" in ended.err
+
+
 def processes_of(out):
     """Return the process ids of what still has the demo's folder on its command line."""
     pids = []

@@ -1,4 +1,4 @@
-"""``fasaco-edge demo``: a robot covers a building nobody mapped before."""
+"""``fasaco-edge demo``: a robot, or several, cover a building nobody mapped before."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ from fasaco_edge.grid.map_files import find_map
 from fasaco_edge.host.files import make_own_folder
 
 RUNS = Path("runs")
+MOST_ROBOTS = 6
+SPEED, FLEET_SPEED = 20.0, 5.0
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -27,11 +29,20 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--map", default="flat", metavar="MAP", help="YAML or a name from `maps` (default: flat)"
     )
     parser.add_argument(
+        "--robots",
+        type=int,
+        choices=range(1, MOST_ROBOTS + 1),
+        default=1,
+        metavar="N",
+        help=f"how many share the building as a fleet, 1 to {MOST_ROBOTS}; they begin far from one "
+        "another, and pass through one another (default: %(default)s)",
+    )
+    parser.add_argument(
         "--speed",
         type=float,
-        default=20.0,
         metavar="X",
-        help="simulated seconds per second (default: %(default)g)",
+        help=f"simulated seconds per second (default: {SPEED:g}; {FLEET_SPEED:g} for several "
+        "robots, which hear of each other once a real second)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="the planner's seed")
     parser.add_argument(
@@ -71,9 +82,12 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the mission; 0 if every reachable cell was covered."""
     from fasaco_edge.cli.demo.mission import DemoMission
+    from fasaco_edge.cli.demo.robots import demo_robots
     from fasaco_edge.cli.demo.summary import print_summary, summarise
 
     find_map(args.map)
+    if args.speed is None:
+        args.speed = SPEED if args.robots == 1 else FLEET_SPEED
     if not args.speed > 0:
         raise BadConfiguration(f"--speed must be above 0, got {args.speed}")
     out: Path = args.out or RUNS / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
@@ -85,17 +99,18 @@ def run(args: argparse.Namespace) -> int:
         out.mkdir(parents=True, exist_ok=True)
     seconds = compile_kernels()
     err().print(f"kernels ready ({seconds:.1f} s); results go to {out}")
-    with DemoMission(args, out) as mission:
+    robots = demo_robots(args, out)
+    with DemoMission(args, robots) as mission:
         ending = mission.watch()
-    summary = summarise(args, out, ending)
+    summary = summarise(args, out, robots, ending)
     print_summary(summary, as_json=args.json)
     return 0 if summary.complete else 1
 
 
 COMMAND = Command(
-    description="Start daemon, recorder and a simulated robot as processes of their own that "
-    "talk Zenoh over loopback; show the mission; exit when every reachable cell is covered. "
-    "Writes a recording (.rrd), a picture and the figures to the output folder.",
+    description="Start daemon, recorder and a simulated robot (or several of each) as processes "
+    "of their own that talk Zenoh over loopback; show the mission; exit when every reachable cell "
+    "is covered. Writes a recording (.rrd), a picture and the figures to the output folder.",
     run=run,
     add_options=_add_options,
 )

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.floor import JudgedFloor, SweepingRobot, judge_floor, swept_words
+from fasaco_edge.bench.floor import (
+    JudgedFloor,
+    SweepingRobot,
+    judge_floor,
+    share_words,
+    swept_words,
+)
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.demo.mission import Ending
+from fasaco_edge.cli.demo.robots import DemoRobot
+from fasaco_edge.drawing.fleet import draw_fleet_mission
 from fasaco_edge.drawing.pictures import draw_mission
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.errors import ProcessEnded
@@ -27,14 +36,34 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Truth:
-    """The building, what of it can be reached, and what the robot's trail did to it."""
+    """The building, what of it can be reached, and what the robots' trails did to it.
+
+    ``floor`` is judged for all trails together, ``floors`` for each.
+    """
 
     grid: OccupancyGrid
     lattice: CoverageLattice
     reachable: NDArray[np.bool_]
-    trail: NDArray[np.float64]
+    trails: list[NDArray[np.float64]]
     visits: NDArray[np.uint16]
     floor: JudgedFloor
+    floors: list[JudgedFloor]
+
+    @property
+    def swept_twice_m2(self) -> float:
+        """Floor that more than one robot swept [m2]."""
+        times = sum(floor.swept.astype(np.int8) for floor in self.floors)
+        return float(np.count_nonzero(times > 1) * self.floor.geometry.resolution**2)
+
+
+@dataclass(frozen=True, slots=True)
+class RobotFigures:
+    """What one robot of a demo did; ``drive_s`` is driving and turning, in simulated seconds."""
+
+    name: str
+    driven_m: float
+    drive_s: float
+    swept_m2: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +78,9 @@ class Summary:
     unreachable_cells: int
     reachable_m2: float
     swept_m2: float
+    swept_twice_m2: float
     driven_m: float
+    robots: tuple[RobotFigures, ...]
     plans: int
     paths: int
     plan_ms_p50: float | None
@@ -60,16 +91,28 @@ class Summary:
     picture: str
 
 
-def summarise(args: argparse.Namespace, out: Path, ending: Ending) -> Summary:
+def summarise(
+    args: argparse.Namespace, out: Path, robots: Sequence[DemoRobot], ending: Ending
+) -> Summary:
     """Return the figures of a demo, and draw and write them into ``out``."""
-    truth = _truth(args, out)
+    truth = _truth(args, robots)
     covered = truth.reachable & (truth.visits > 0)
-    driven = np.hypot(*np.diff(truth.trail, axis=0).T).sum()
     reachable, done = int(truth.reachable.sum()), int(covered.sum())
-    status = ending.status
-    if args.line != "cells" and status.coverage is not None:
-        # Along a line the robot passes beside the centres of cells: use the daemon's own count.
-        reachable, done = status.coverage.coverable, status.coverage.covered
+    reports = [status.coverage for status in ending.statuses if status.coverage is not None]
+    if args.line != "cells" and reports:
+        # Along a line the robot passes beside the centres of cells: use the daemon's own count, of
+        # several that which has most left.
+        report = max(reports, key=lambda report: report.coverable - report.covered)
+        reachable, done = report.coverable, report.covered
+    figures = tuple(
+        RobotFigures(
+            robot.name,
+            round(floor.figures.length_m, 1),
+            round(floor.figures.seconds, 1),
+            round(floor.figures.swept_m2, 2),
+        )
+        for robot, floor in zip(robots, truth.floors, strict=True)
+    )
     summary = Summary(
         map=str(args.map),
         complete=done == reachable and not ending.timed_out,
@@ -79,17 +122,19 @@ def summarise(args: argparse.Namespace, out: Path, ending: Ending) -> Summary:
         unreachable_cells=int((truth.lattice.coverable & ~truth.reachable).sum()),
         reachable_m2=round(truth.floor.figures.reachable_m2, 2),
         swept_m2=round(truth.floor.figures.swept_m2, 2),
-        driven_m=round(float(driven), 1),
-        plans=status.plan.plans,
-        paths=status.path.revision if status.path else 0,
+        swept_twice_m2=round(truth.swept_twice_m2, 2),
+        driven_m=round(sum(floor.figures.length_m for floor in truth.floors), 1),
+        robots=figures,
+        plans=sum(status.plan.plans for status in ending.statuses),
+        paths=sum(status.path.revision for status in ending.statuses if status.path),
         plan_ms_p50=_percentile(ending.replan_ms, 50),
         plan_ms_p99=_percentile(ending.replan_ms, 99),
-        errors=status.errors.total,
+        errors=sum(status.errors.total for status in ending.statuses),
         wall_s=round(ending.wall_s, 1),
-        recording=[str(file) for file in sorted(out.glob("*.rrd"))],
+        recording=[str(file) for robot in robots for file in sorted(robot.folder.glob("*.rrd"))],
         picture=str(out / "mission.png"),
     )
-    _draw(args, out, truth, summary)
+    _draw(args, truth, summary)
     (out / "summary.json").write_text(
         json.dumps(asdict(summary), indent=1) + "\n", encoding="utf-8"
     )
@@ -115,12 +160,19 @@ def print_summary(summary: Summary, *, as_json: bool) -> None:
 
 def _rows(summary: Summary) -> list[tuple[str, str]]:
     cells, covered = summary.reachable_cells, summary.covered_cells
+    fleet = [
+        (robot.name, f"{robot.driven_m} m in {robot.drive_s:.0f} s, {robot.swept_m2:.1f} m2 swept")
+        for robot in summary.robots
+    ]
+    share = summary.swept_twice_m2 / max(summary.swept_m2, 1e-9)
+    fleet.append(("swept by two robots", f"{summary.swept_twice_m2:.1f} m2 ({share_words(share)})"))
     return [
         ("covered", f"{covered} of {cells} cells"),
         ("reachable floor swept", swept_words(summary.swept_m2, summary.reachable_m2)),
         ("covered again", f"{summary.recovered_cells} cells"),
         ("out of reach", f"{summary.unreachable_cells} cells"),
         ("driven", f"{summary.driven_m} m"),
+        *(fleet if len(summary.robots) > 1 else ()),
         ("plans, paths", f"{summary.plans}, {summary.paths}"),
         ("time of a plan", f"{summary.plan_ms_p50} ms, p99 {summary.plan_ms_p99} ms"),
         ("messages refused", str(summary.errors)),
@@ -128,41 +180,68 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
     ]
 
 
-def _truth(args: argparse.Namespace, out: Path) -> _Truth:
+def _truth(args: argparse.Namespace, robots: Sequence[DemoRobot]) -> _Truth:
     grid = read_map(find_map(args.map))
     lattice = CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius))
-    file = out / "trail.csv"
-    if not file.exists():
-        raise ProcessEnded("the robot never drove", hint=f"see {out / 'robot.log'}")
-    trail = np.loadtxt(file, delimiter=",", skiprows=1, ndmin=2)
-    ledger = CoverageLedger(args.cell)
-    for x, y in trail:
-        ledger.record(Pose2D(float(x), float(y)))
-    start = anchor_cell(lattice, Pose2D(float(trail[0, 0]), float(trail[0, 1])))
+    trails, ledger = [_trail(robot) for robot in robots], CoverageLedger(args.cell)
+    for trail in trails:
+        ledger.break_track()
+        for x, y in trail:
+            ledger.record(Pose2D(float(x), float(y)))
+    first = tuple(trails[0][0].tolist())
+    start = anchor_cell(lattice, Pose2D(*first))
     nowhere = np.zeros(lattice.states.shape, bool)
     reachable = nowhere if start is None else ReachableArea.around(lattice, start).reachable
-    floor = judge_floor(grid, trail, SweepingRobot(args.cell, args.robot_radius))
-    return _Truth(grid, lattice, reachable, trail, ledger.visits(lattice.window), floor)
+    sweeper = SweepingRobot(args.cell, args.robot_radius)
+    floors = [judge_floor(grid, trail, sweeper, stands_at=first) for trail in trails]
+    floor = floors[0]
+    if len(trails) > 1:
+        # From the end of one trail to the beginning of the next nobody drives.
+        driven = np.ones(sum(map(len, trails)) - 1, np.bool_)
+        driven[np.cumsum([len(trail) for trail in trails])[:-1] - 1] = False
+        floor = judge_floor(grid, np.vstack(trails), sweeper, driven=driven, stands_at=first)
+    return _Truth(grid, lattice, reachable, trails, ledger.visits(lattice.window), floor, floors)
 
 
-def _draw(args: argparse.Namespace, out: Path, truth: _Truth, summary: Summary) -> None:
+def _trail(robot: DemoRobot) -> NDArray[np.float64]:
+    if not robot.trail.exists():
+        raise ProcessEnded("the robot never drove", hint=f"see {robot.folder / 'robot.log'}")
+    return np.loadtxt(robot.trail, delimiter=",", skiprows=1, ndmin=2)
+
+
+def _draw(args: argparse.Namespace, truth: _Truth, summary: Summary) -> None:
     lines = [
         f"{summary.covered_cells} of {summary.reachable_cells} reachable cells covered, "
         f"{summary.driven_m} m driven, {summary.paths} paths",
         f"reachable floor swept: {swept_words(summary.swept_m2, summary.reachable_m2)}",
     ]
     title = f"{Path(args.map).stem}: mapped and covered"
-    picture = draw_mission(
-        truth.grid,
-        truth.lattice,
-        truth.trail,
-        truth.visits,
-        title=title,
-        lines=lines,
-        swept=None if args.line == "cells" else MapLayer(truth.floor.geometry, truth.floor.swept),
-        unswept=MapLayer(truth.floor.geometry, truth.floor.unswept),
-    )
-    picture.save(out / "mission.png")
+    geometry = truth.floor.geometry
+    unswept = MapLayer(geometry, truth.floor.unswept)
+    if len(truth.trails) > 1:
+        swept = [MapLayer(geometry, floor.swept) for floor in truth.floors]
+        names = [robot.name for robot in summary.robots]
+        picture = draw_fleet_mission(
+            truth.grid,
+            truth.lattice,
+            dict(zip(names, truth.trails, strict=True)),
+            swept,
+            unswept,
+            title=f"{title} by {len(names)} robots",
+            lines=lines,
+        )
+    else:
+        picture = draw_mission(
+            truth.grid,
+            truth.lattice,
+            truth.trails[0],
+            truth.visits,
+            title=title,
+            lines=lines,
+            swept=None if args.line == "cells" else MapLayer(geometry, truth.floor.swept),
+            unswept=unswept,
+        )
+    picture.save(summary.picture)
 
 
 def _percentile(values: tuple[float, ...], percent: float) -> float | None:

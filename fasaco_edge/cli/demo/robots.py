@@ -1,0 +1,136 @@
+"""The robots of a demo: where each starts, its configuration, and the programs it consists of."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from fasaco_edge.errors import StartBlocked
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+from fasaco_edge.grid.map_files import find_map, read_map
+from fasaco_edge.mission.map.reachable_area import anchor_cell
+from fasaco_edge.planners.grids import start_point
+from fasaco_edge.simulation.robot import SimulationConfig
+from fasaco_edge.wire.keys import Keys
+
+FLEET = "demo"
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class DemoRobot:
+    """A simulated robot and its daemon.
+
+    Attributes:
+        name: on the bus.
+        start: where it starts, x, y [m].
+        folder: of its configuration, recording, trail and logs.
+    """
+
+    name: str
+    start: Point
+    folder: Path
+
+    @property
+    def config(self) -> Path:
+        """File of its daemon's configuration."""
+        return self.folder / "config.yaml"
+
+    @property
+    def trail(self) -> Path:
+        """File of the places it drove through."""
+        return self.folder / "trail.csv"
+
+    def write_config(self, args: argparse.Namespace, endpoint: str) -> None:
+        """Write the configuration of a daemon that joins the router at ``endpoint``."""
+        simulated = SimulationConfig()
+        config: dict[str, object] = {
+            "robot": {
+                "name": self.name,
+                "radius_m": args.robot_radius,
+                "tool_width_m": args.cell,
+                "speed_m_s": simulated.speed_m_s,
+                "turn_deg_s": math.degrees(simulated.turn_rad_s),
+                "turn_deg_s2": math.degrees(simulated.turn_acceleration_rad_s2),
+                "acceleration_m_s2": simulated.acceleration_m_s2,
+            },
+            "bus": {"mode": "client", "listen": [], "connect": [endpoint]},
+            "planner": {"seed": args.seed, "line": args.line},
+        }
+        if args.robots > 1:
+            config["fleet"] = {"name": FLEET}
+        if args.battery_min:
+            x_m, y_m = self.start
+            config["mission"] = {"dock": {"x_m": x_m, "y_m": y_m, "approach_m": 0.0}}
+            config["battery"] = {}
+        self.config.write_text(yaml.safe_dump(config), encoding="utf-8")
+
+    def programs(self, args: argparse.Namespace, endpoint: str) -> list[tuple[str, list[str]]]:
+        """Return the programs to start: for each its name, and the words after `fasaco-edge`."""
+        daemon = ["run", "--config", str(self.config), "--record", str(self.folder)]
+        # Its own progress, from the beginning: no other daemon's, nor an earlier demo's.
+        daemon += ["--state", str(self.folder / "state"), "--fresh"]
+        robot = ["simulate", str(find_map(args.map)), "--driver", args.driver]
+        robot += ["--connect", endpoint, "--robot", self.name, "--speed", str(args.speed)]
+        robot += [f"--start-xy={self.start[0]!r},{self.start[1]!r}"]
+        robot += ["--robot-radius", str(args.robot_radius), "--trail-out", str(self.trail)]
+        robot += ["--battery-min", str(args.battery_min)]
+        programs = [("daemon", daemon), ("robot", robot)]
+        if args.driver == "follow":
+            follower = ["follow", "--config", str(self.config), "--speed", str(args.speed)]
+            programs.append(("follower", follower))
+        return programs
+
+
+def demo_robots(args: argparse.Namespace, out: Path) -> list[DemoRobot]:
+    """Return the robots: one, as anybody's first; or several, far from one another, by number.
+
+    Raises:
+        StartBlocked: there are fewer places to start from than robots.
+    """
+    file = find_map(args.map)
+    truth = read_map(file)
+    first = start_point(file, truth, args.robot_radius)
+    if args.robots == 1:
+        return [DemoRobot(Keys().robot, first, out)]
+    lattice = CoverageLattice.from_map(truth, Footprint(args.cell, args.robot_radius))
+    starts = [first, *_apart(lattice, first, args.robots - 1)]
+    names = [f"r{number}" for number in range(1, args.robots + 1)]
+    return [DemoRobot(name, at, out / name) for name, at in zip(names, starts, strict=True)]
+
+
+def _apart(lattice: CoverageLattice, first: Point, count: int) -> list[Point]:
+    """Return places each of which is as far as can be by the way from all before it."""
+    from fasaco_edge.kernels.fleet.split import FAR, ways_from
+
+    start = anchor_cell(lattice, Pose2D(*first))
+    if start is None:
+        raise StartBlocked(f"the robot does not fit where it starts, {first} m")
+    row, col = lattice.local(start)
+    cols = lattice.steps.shape[1]
+    nearest = ways_from(lattice.steps, row * cols + col)
+    nearest[nearest >= FAR] = 0
+    places: list[Point] = []
+    for _ in range(count):
+        flat = int(nearest.argmax())
+        if nearest[flat] <= 0:
+            raise StartBlocked(
+                f"there is no place for a robot beside the other {len(places) + 1}",
+                hint="let fewer robots start",
+            )
+        ((x, y),) = lattice.centres(np.array([_cell(lattice, flat)], np.int32)).tolist()
+        places.append((x, y))
+        nearest = np.minimum(nearest, ways_from(lattice.steps, flat))
+    return places
+
+
+def _cell(lattice: CoverageLattice, flat: int) -> tuple[int, int]:
+    row, col = divmod(flat, lattice.steps.shape[1])
+    return row + lattice.window.row0, col + lattice.window.col0
