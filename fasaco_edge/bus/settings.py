@@ -24,8 +24,11 @@ from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 # Timeout of the handshake of an incoming connection [ms], and how many may be pending.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
 # A map or a path is many packets of 64 kB. Where two of them fill the queue, as by default, a
-# computer that is busy for 50 ms drops the map; these take a megabyte, and only when there is one.
-QUEUED_BATCHES = dict.fromkeys(("interactive_high", "data_high", "data", "data_low"), 16)
+# computer that is busy for 50 ms drops the map, and the last of the cohorts that come at once;
+# these take a megabyte, and only when there is one.
+QUEUED_BATCHES = dict.fromkeys(
+    ("interactive_high", "data_high", "data", "data_low", "background"), 16
+)
 
 
 @dataclass(frozen=True, slots=True)

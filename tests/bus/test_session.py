@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from pathlib import Path
 from queue import Queue
 
 import pytest
@@ -306,6 +307,38 @@ with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
             assert len(came) < 60  # some were dropped: else this shows nothing
         finally:
             listener.kill()
+
+
+@pytest.mark.parametrize("name", ["coverage", "pheromone", "directions"])
+def test_what_comes_at_once_waits_for_a_busy_subscriber(endpoint, name):
+    """Cohorts come one on the other: where only two could wait, the last were dropped."""
+    code = f"""
+import time
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
+with open_bus(BusSettings("client", ({endpoint!r} + "#so_rcvbuf=65536",))) as bus:
+    bus.subscribe({KEY!r}, lambda sample: print(int(sample.payload[:4]), flush=True))
+    print("listening", flush=True)
+    time.sleep(60)
+"""
+    small = BusSettings("peer", (), (f"{endpoint}#so_sndbuf=65536",))
+    with open_bus(small) as bus, subprocess.Popen([sys.executable, "-c", code], stdout=-1) as busy:
+        try:
+            assert busy.stdout.readline() == b"listening\n"
+            publisher = bus.publisher(KEY, qos=QOS[name])
+            until(publisher.has_listeners)
+            busy.send_signal(signal.SIGSTOP)
+            until(lambda: "T (stopped)" in Path(f"/proc/{busy.pid}/status").read_text())
+            for number in range(16):
+                publisher.put(_numbered(number)[:30_000])
+            busy.send_signal(signal.SIGCONT)
+            came = [int(busy.stdout.readline())]
+            while len(came) < 16 and came[-1] < 16:
+                publisher.put(_numbered(16)[:4])  # the end, of what was not dropped
+                came.append(int(busy.stdout.readline()))
+            assert came == list(range(16))
+        finally:
+            busy.kill()
 
 
 def test_a_frozen_subscriber_does_not_hold_the_end_of_a_session(endpoint):
