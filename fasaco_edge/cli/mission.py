@@ -9,6 +9,7 @@ from pathlib import Path
 from fasaco_edge.cli.ask import add_question, ask, show_mission
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.mission_fleet import command_fleet
 from fasaco_edge.errors import OrderError
 from fasaco_edge.host.plain_yaml import load, read_bounded
 from fasaco_edge.mission.orders.order import order_document, read_order
@@ -23,6 +24,7 @@ examples:
   fasaco-edge mission start --zone kitchen          a zone of the daemon's configuration
   fasaco-edge mission start --keep-out "1,1;2,1;2,2;1,2"
   fasaco-edge mission start --order evening.yaml
+  fasaco-edge mission start --fleet building_7      one order, which its robots share
   fasaco-edge mission pause && fasaco-edge mission resume
 
 evening.yaml, or the same as JSON; all lengths in metres in the frame of the map:
@@ -65,6 +67,11 @@ def _add_commands(parser: argparse.ArgumentParser) -> None:
         add_common(command)
         if name == "start":
             _add_order(command)
+        command.add_argument(
+            "--fleet",
+            metavar="NAME",
+            help="not to one robot but to each of this fleet (`fleet.name` of their configuration)",
+        )
         add_question(command)
         command.set_defaults(mission_command=name)
 
@@ -104,6 +111,8 @@ def run(args: argparse.Namespace) -> int:
     asked: dict[str, object] = {"command": command}
     if args.mission_command == "start":
         asked["order"] = _order(args)
+    if args.fleet is not None:
+        return command_fleet(args, encode_json(asked))
     reply = ask(args, "mission", payload=encode_json(asked))
     if args.json:
         print_json(decode_json(reply.payload))

@@ -50,7 +50,7 @@ class Keys:
     def robot_of(self, key: str) -> str:
         """Return the name of the robot whose key this is; "" where it is a key expression."""
         robot = key.removeprefix(f"{self.base}/{VERSION}/").partition("/")[0]
-        return robot if _CHUNK.fullmatch(robot) else ""
+        return robot if is_chunk(robot) else ""
 
     def claim(self, own: str, stand: str) -> str:
         """Return the token of the daemon with the Zenoh id ``own``, which "plans" or "waits"."""
@@ -66,8 +66,13 @@ class Keys:
         return f"{self.prefix}/@rpc/{name}"
 
 
+def is_chunk(text: str) -> bool:
+    """Tell whether a text can be the name of a robot."""
+    return bool(_CHUNK.fullmatch(text))
+
+
 def _check_chunk(what: str, chunk: str) -> None:
-    if not _CHUNK.fullmatch(chunk):
+    if not is_chunk(chunk):
         raise BadConfiguration(
             f"{what} must be chunks of letters, digits, '_' and '-', got {chunk!r}"
         )
