@@ -369,6 +369,27 @@ def test_a_robot_that_stands_gets_its_line_again():
     robot.finish()
 
 
+def test_a_robot_that_stands_beside_its_path_is_led_to_it_at_once():
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(room(6.0, 3.0)))
+    for _ in range(20):
+        robot.tell()
+    robot.drive(20)
+    robot.line = []  # it lost its path, and swerved
+    (x, y), inward = robot.at, math.copysign(0.05, 1.5 - robot.at[1])
+    for step in range(1, 15):
+        robot.at, robot.now = (x, y + step * inward), robot.now + 0.3
+        robot.tell()
+    told, stood_since = len(robot.reasons), robot.now
+    while not robot.line and robot.now < stood_since + 40.0:
+        robot.now += 0.3
+        robot.tell()
+    assert robot.reasons[told:] == ["robot left the path"]
+    assert robot.now - stood_since < 3.0
+    assert math.dist(robot.line[0], robot.at) < 0.15
+    robot.finish()
+
+
 def test_a_pause_leaves_the_line_as_it_was():
     mission = Mission(CONFIG)
     robot = Robot(mission)

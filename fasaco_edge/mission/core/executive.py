@@ -29,6 +29,8 @@ PATIENCE_S = 1.0
 # A robot that stands for so long on its path gets it again [s]: it may have lost it, or stopped for
 # something that is gone.
 STANDING_S, STANDING_M = 30.0, 0.1
+# One that stands beside its path gets another so soon [s]: no straight way may lead it back.
+BESIDE_S = 2.0
 # An errand ends once the robot was so long in the last cell of its way [s]: its path leads to the
 # middle of it, and turns it there.
 ARRIVAL_S = 2.0
@@ -181,8 +183,13 @@ class Executive:
                 self.orders.advance(self._now)
             else:
                 route.want("cells left over")
-        elif waited and path.is_far(cell):
+        elif waited and (path.is_far(cell) or self._stands_beside(cell)):
             route.want("robot left the path")
+
+    def _stands_beside(self, cell: Cell) -> bool:
+        """Tell whether the robot stands in a cell that is not where it is on its path."""
+        ahead = self.route.path.ahead
+        return len(ahead) > 1 and cell != tuple(ahead[0].tolist()) and self._stood_s() >= BESIDE_S
 
     def _stands_at(self, last: Cell | None) -> bool:
         """Tell whether the robot stands in the last cell of a path it did not drive all along.
@@ -195,12 +202,16 @@ class Executive:
 
     def _stands_on_path(self) -> bool:
         """Tell whether the robot has long been in one place, with a path to drive."""
+        stood_s = self._stood_s()
+        return len(self.route.path.ahead) > 1 and stood_s >= STANDING_S
+
+    def _stood_s(self) -> float:
+        """Return for how long the robot has been in one place, and has had its path [s]."""
         assert self.map.pose is not None
         here = self.map.pose.pose.x, self.map.pose.pose.y
         if math.dist(here, self._place) > STANDING_M:
             self._place, self._came_at = here, self._now
-        since = max(self._came_at, self.route.published_at)
-        return len(self.route.path.ahead) > 1 and self._now - since >= STANDING_S
+        return self._now - max(self._came_at, self.route.published_at)
 
     def _request(self, cell: Cell, update: PathUpdate | None) -> Decision:
         """Request the plan that is wanted; where nothing is to be covered, go on."""
