@@ -90,7 +90,8 @@ def run(args: argparse.Namespace) -> int:
             np.savetxt(args.trail_out, world.track, "%.4f", ",", header="x,y", comments="")
     print(
         f"drove {result.distance_m:.1f} m in {result.sim_s:.0f} simulated s, "
-        f"{result.collisions} collisions"
+        f"{result.collisions} collisions, {result.stops} stops before a wall, "
+        f"stood {result.longest_stand_s:.1f} s at most"
     )
     if world.battery is not None:
         battery = world.battery

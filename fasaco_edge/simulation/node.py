@@ -72,6 +72,8 @@ class Progress:
         activity: what it is doing.
         distance_m: distance driven [m].
         collisions: how often a path led into an obstacle.
+        stops: how often the robot stopped before one that its map showed.
+        longest_stand_s: the longest time that it stood between two moves [s].
         refused: how many paths or velocities were malformed, or in another frame.
         speed: simulated seconds per second, achieved since the report before.
     """
@@ -81,6 +83,8 @@ class Progress:
     activity: Activity
     distance_m: float
     collisions: int
+    stops: int
+    longest_stand_s: float
     refused: int
     speed: float
 
@@ -206,6 +210,8 @@ class RobotOnBus:
             world.activity,
             world.distance_m,
             world.collisions,
+            world.stops,
+            world.longest_stand_s,
             self._refused,
             speed,
         )

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import StartBlocked, StartOutsideMap
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
-from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
-from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.lattice.raycast import disc_is_free
 from fasaco_edge.simulation.battery import Battery
+from fasaco_edge.simulation.mapper import Mapper
 from fasaco_edge.simulation.robot import (
     ARRIVED_M,
     DriveState,
@@ -35,91 +36,8 @@ TRACK_SPACING_M = 0.02
 RECENT_TRACK_POINTS = 100
 # A base that hears no velocity for so long stops by itself [s].
 DEAF_S = 0.5
-
-
-def rays_for(reach_px: float) -> int:
-    """Return how many rays a scan needs so that it misses no pixel in sight.
-
-    Neighbouring rays are at most a pixel apart where they end: 440 rays for 3.5 m at
-    5 cm, where the LDS-01's 360 would not do. A pixel whose centre is d <= reach away
-    holds a disc of diameter 1, which is 2 asin(1 / 2d) >= 1 / reach wide in angle, so
-    at least one ray crosses it.
-    """
-    return max(math.ceil(2.0 * math.pi * reach_px), 4)
-
-
-class Mapper:
-    """A scanner in a ground-truth map, and the robot's own map beside it.
-
-    Localisation is perfect: both maps share the frame and the pixel raster. The
-    robot's own map is published as SLAM would: only as large as what is known, so
-    its origin and its size change while the robot explores.
-    """
-
-    def __init__(self, truth: OccupancyGrid, config: SimulationConfig) -> None:
-        resolution = truth.geometry.resolution
-        self._truth = truth
-        self._known: NDArray[np.int8] = np.full(truth.cells.shape, UNKNOWN, np.int8)
-        self._extent: Window | None = None
-        self._hull_px = config.hull_radius_m / resolution
-        self._reach_px = config.range_m / resolution
-        self._free_at_most = config.free_at_most
-        self._chunk_px = max(1, round(config.map_chunk_m / resolution))
-        rays = rays_for(self._reach_px)
-        self._angles = np.arange(rays) * (2.0 * math.pi / rays)
-
-    def scan(self, pose: Pose2D) -> Window | None:
-        """Take in a scan from ``pose``, and that the ground under the robot is as it is.
-
-        Returns:
-            the window of the truth's pixels in which the own map changed, or None.
-        """
-        geometry = self._truth.geometry
-        x, y = geometry.to_pixels(pose.x, pose.y)
-        # The scanner turns with the robot, so that turning on the spot sees a little more.
-        angles = self._angles + (pose.yaw - geometry.origin.yaw)
-        directions = np.column_stack((np.cos(angles), np.sin(angles)))
-        truth, known = self._truth.cells, self._known
-        scanner = Scanner(x, y, self._reach_px, self._free_at_most)
-        seen = cast_rays(truth, known, scanner, directions)
-        stood_on = reveal_disc(truth, known, x, y, self._hull_px)
-        changed = Window.around(Window(*map(int, seen)), Window(*map(int, stood_on)))
-        self._extent = Window.around(self._extent, changed)
-        return changed
-
-    def is_clear(self, start: Point, end: Point) -> bool:
-        """Tell whether the hull can move straight between two points [m], by the own map.
-
-        Unknown is not clear. Checked every half pixel: what could slip through between
-        two discs is thinner than the padding.
-        """
-        x0, y0 = self._truth.geometry.to_pixels(*start)
-        x1, y1 = self._truth.geometry.to_pixels(*end)
-        steps = max(1, math.ceil(2.0 * math.hypot(x1 - x0, y1 - y0)))
-        return all(
-            disc_is_free(
-                self._known,
-                x0 + (x1 - x0) * step / steps,
-                y0 + (y1 - y0) * step / steps,
-                self._hull_px,
-                self._free_at_most,
-            )
-            for step in range(steps + 1)
-        )
-
-    def snapshot(self, stamp_ns: int) -> OccupancyGrid | None:
-        """Return the own map, cropped to what is known; None before anything is known.
-
-        The crop is rounded outward to whole chunks, and ends where the truth ends.
-        """
-        if self._extent is None:
-            return None
-        window = self._extent.in_chunks(self._chunk_px, *self._known.shape)
-        geometry = self._truth.geometry
-        origin = Pose2D(*geometry.to_map(window.col0, window.row0), geometry.origin.yaw)
-        cells = self._known[window.row0 : window.row1, window.col0 : window.col1].copy()
-        placed = GridGeometry(window.rows, window.cols, geometry.resolution, origin)
-        return OccupancyGrid(placed, cells, self._truth.frame, stamp_ns)
+# One that stopped before something drives on once it has so much room ahead [m].
+ROOM_M = 0.05
 
 
 class Activity(enum.Enum):
@@ -131,6 +49,9 @@ class Activity(enum.Enum):
     """It is on a path, or on its way to one."""
     NO_WAY = "no_way"
     """It sees no clear way to the path's beginning, and looks again after every scan."""
+    STOPPED = "stopped"
+    """The path leads into what its own map shows; it stands before it and waits for another path,
+    or for a scan that shows room."""
     COLLIDED = "collided"
     """The path led into an obstacle; it stops there and waits for another path."""
 
@@ -186,11 +107,19 @@ class World:
         self.activity = Activity.IDLE
         self.distance_m = 0.0
         self.collisions = 0
+        self.stops = 0
+        # For how many ticks the robot stands, once it has moved; and the most of them.
+        self._stands = self._longest_stand = 0
 
     @property
     def pose(self) -> Pose2D:
         """The robot's true pose, which is also what it believes."""
         return self._drive.pose
+
+    @property
+    def longest_stand_s(self) -> float:
+        """The longest time that the robot stood between two moves [s]."""
+        return self._longest_stand * self.config.tick_s
 
     @property
     def frame(self) -> str:
@@ -236,12 +165,15 @@ class World:
         """Let one time step pass; return what is published after it."""
         self._move()
         self._ticks += 1
+        self._count_stand()
         self._drain()
         config, since_first = self.config, self._ticks - 1
         if since_first % config.period_ticks(config.scan_hz) == 0:
             self._mapper.scan(self.pose)
             if self.activity is Activity.NO_WAY:
                 self._join()
+            elif self.activity is Activity.STOPPED and self._has_room():
+                self.activity = Activity.DRIVING
         map_is_due = since_first % config.period_ticks(config.map_hz) == 0
         pose_is_due = since_first % config.period_ticks(config.pose_hz) == 0
         battery_is_due = since_first % config.period_ticks(BATTERY_HZ) == 0
@@ -285,11 +217,32 @@ class World:
         while self._corners and math.dist(here, self._corners[-1]) < ARRIVED_M:
             self._corners.pop()
         if not self._corners:
-            if self.activity is Activity.DRIVING:
+            if self.activity in (Activity.DRIVING, Activity.STOPPED):
                 self.activity = Activity.IDLE
             if not self._drive.moving:
                 return
-        self._go_on(driven(self._drive, self._corners[-1] if self._corners else None, self.config))
+        goal = self._corners[-1] if self._corners and self._looks_ahead() else None
+        if goal is not None or self._drive.moving:
+            self._go_on(driven(self._drive, goal, self.config))
+
+    def _looks_ahead(self) -> bool:
+        """Tell whether the robot may drive on: it stops before what its own map shows."""
+        if self.activity is Activity.STOPPED:
+            return False
+        ahead = driven(self._drive, self._corners[-1], self.config)
+        if ahead.speed == 0.0 or self._mapper.is_clear_at(stopping_point(ahead, self.config)):
+            return True
+        self.activity = Activity.STOPPED
+        self.stops += 1
+        return False
+
+    def _has_room(self) -> bool:
+        """Tell whether a robot that stopped can drive on, some way to its next corner."""
+        x, y = self.pose.x, self.pose.y
+        to_x, to_y = self._corners[-1]
+        share = min(1.0, ROOM_M / max(math.dist((x, y), (to_x, to_y)), ARRIVED_M))
+        ahead = x + share * (to_x - x), y + share * (to_y - y)
+        return self._mapper.is_clear((x, y), ahead)
 
     def _move_as_told(self, speed_m_s: float, turn_rad_s: float, tick: int) -> None:
         if (self._ticks - tick) * self.config.tick_s > DEAF_S:
@@ -314,6 +267,14 @@ class World:
         self._drive = DriveState(self.pose)
         self._path, self._corners = None, []
         self.activity = Activity.COLLIDED
+
+    def _count_stand(self) -> None:
+        """Count how long the robot stands, once it has moved."""
+        if self._drive.moving:
+            self._longest_stand = max(self._longest_stand, self._stands)
+            self._stands = 0
+        elif self.distance_m > 0.0:
+            self._stands += 1
 
     def _extend_track(self, ahead: DriveState) -> None:
         """Add the place the robot is about to leave, if the track so far misses it."""

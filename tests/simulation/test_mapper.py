@@ -7,8 +7,8 @@ import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.simulation.mapper import Mapper, rays_for
 from fasaco_edge.simulation.robot import SimulationConfig
-from fasaco_edge.simulation.world import Mapper, rays_for
 from tests.simulation.rooms import RESOLUTION, building
 
 

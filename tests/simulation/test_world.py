@@ -45,22 +45,33 @@ def test_a_serpentine_is_driven_to_its_end_on_the_line():
     assert np.hypot(*np.diff(track, axis=0).T).sum() == pytest.approx(world.distance_m, abs=0.01)
 
 
-def test_a_path_through_a_wall_ends_before_it_and_is_counted_once():
+def test_a_robot_stops_before_a_wall_that_its_path_leads_through():
     config = SimulationConfig()
     world = started(building(6, 2, (3.0, 0.0, 3.1, 2.0)), Pose2D(1.0, 1.0), config)
     through = centres(*[(2, col) for col in range(2, 12)])
     world.follow(through)
     run(world)
-    assert world.activity is Activity.COLLIDED
+    assert world.activity is Activity.STOPPED
     ticks(world, 200)
-    assert world.collisions == 1
+    assert (world.stops, world.collisions) == (1, 0)
     assert 3.0 - config.hull_radius_m - 0.01 < world.pose.x <= 3.0 - config.hull_radius_m + 1e-9
     # Another path takes it away again.
     world.follow(through[3::-1])
     run(world)
     assert world.activity is Activity.IDLE
-    assert world.collisions == 1
+    assert (world.stops, world.collisions) == (1, 0)
+    assert world.longest_stand_s == pytest.approx(4.0, abs=0.5)
     assert world.pose.x == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_robot_that_is_pushed_into_a_wall_collides():
+    world = started(building(6, 2, (3.0, 0.0, 3.1, 2.0)), Pose2D(2.5, 1.0))
+    for _ in range(200):
+        world.move(0.2, 0.0)
+        world.tick()
+    assert world.stops == 0
+    assert world.collisions >= 1
+    assert world.activity is Activity.COLLIDED
 
 
 def test_a_new_path_under_way_is_joined_without_a_stop_where_it_goes_on_alike():
