@@ -26,6 +26,9 @@ from fasaco_edge.bus.queries import ask_for_tokens
 
 # Period of queries to a publisher for a lost last sample [s].
 ASK_PERIOD_S = 1.0
+# So long an answer waits that leaves a gap [s]: it overtakes what is under way, as its priority is
+# higher, and samples wait for a thread of their own.
+UNDER_WAY_S = 0.5
 # Timeout of an answer [s]: a large map on a slow link takes long. No query is repeated meanwhile.
 ANSWER_S = 10.0
 # Most tokens that are looked at.
@@ -101,6 +104,8 @@ class LatchedSubscription(Subscription):
         # The same of publishers without a token. Used only to drop cached replies that were
         # received already: a reset of such a clock would go unnoticed.
         self._unconfirmed = OrderedDict[str, int]()
+        # Of an answer that overtook what is under way: until when it waits [s], publisher, mark.
+        self._ahead: tuple[float, str, int, zenoh.Sample] | None = None
         # Where several samples count, they wait for those before them, which were asked for.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._held_bytes = 0
@@ -124,6 +129,8 @@ class LatchedSubscription(Subscription):
         questions: list[tuple[str, _Publisher | None]] = []
         self._query_tokens(now)
         with self._lock:
+            if self._ahead is not None and now >= self._ahead[0]:
+                self._deliver_ahead()
             asks_all, again = self._wants_all, self._wants_again
             if asks_all:
                 self._wants_all = self._wants_again = False
@@ -139,7 +146,8 @@ class LatchedSubscription(Subscription):
                     questions.append((f"{key}?{self._missing(name)}", publisher))
             self._open += len(questions)
             waiting = [p.ask_at for p in self._publishers.values() if not p.is_asked]
-            next_at = min((self._query_tokens_at, *waiting))
+            ahead = [self._ahead[0]] if self._ahead is not None else []
+            next_at = min((self._query_tokens_at, *waiting, *ahead))
         for selector, asked in questions:
             self._put(selector, asked, again=again)
         return next_at
@@ -231,8 +239,23 @@ class LatchedSubscription(Subscription):
             last = self._last_mark.get(name, self._unconfirmed.get(name))
             if self._depth > 1:
                 self._hold(name, mark, sample)
+            elif not again and _leaves_gap(name, mark, last):
+                self._let_wait(name, mark, sample)
             elif _is_newer(mark, last) or (again and mark == last):
                 self._deliver(name, mark, sample)
+
+    def _let_wait(self, name: str, mark: int, sample: zenoh.Sample) -> None:
+        """Keep an answer back until what is before it has come, or has had the time to."""
+        self._deliver_ahead()
+        self._ahead = time.monotonic() + UNDER_WAY_S, name, mark, sample
+        if len(sample.payload) > HELD_BYTES:
+            self._deliver_ahead()
+        self._asker.wake()
+
+    def _deliver_ahead(self) -> None:
+        ahead, self._ahead = self._ahead, None
+        if ahead is not None and _is_newer(ahead[2], self._last_mark.get(ahead[1])):
+            self._deliver(*ahead[1:])
 
     def _hold(self, name: str, mark: int, sample: zenoh.Sample) -> None:
         self._held.append((name, mark, sample))
