@@ -63,11 +63,12 @@ class Mapper:
         self._extent = Window.around(self._extent, changed)
         return changed
 
-    def is_clear(self, start: Point, end: Point) -> bool:
+    def is_clear(self, start: Point, end: Point, margin_m: float = 0.0) -> bool:
         """Tell whether the hull can move straight between two points [m], by the own map.
 
         Unknown is not clear. Checked every half pixel: what could slip through between
-        two discs is thinner than the padding.
+        two discs is thinner than the padding, but enough to stop the robot. A margin [m] that
+        the hull is to keep from everything makes sure of that.
         """
         x0, y0 = self._truth.geometry.to_pixels(*start)
         x1, y1 = self._truth.geometry.to_pixels(*end)
@@ -77,7 +78,7 @@ class Mapper:
                 self._known,
                 x0 + (x1 - x0) * step / steps,
                 y0 + (y1 - y0) * step / steps,
-                self._hull_px,
+                self._hull_px + margin_m / self._truth.geometry.resolution,
                 self._free_at_most,
             )
             for step in range(steps + 1)

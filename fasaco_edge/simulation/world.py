@@ -9,6 +9,7 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +37,8 @@ TRACK_SPACING_M = 0.02
 RECENT_TRACK_POINTS = 100
 # A base that hears no velocity for so long stops by itself [s].
 DEAF_S = 0.5
-# One that stopped before something drives on once it has so much room ahead [m].
-ROOM_M = 0.05
+# A way of its own to its path keeps so far from everything where one does [m].
+MARGIN_M = 0.005
 
 
 class Activity(enum.Enum):
@@ -50,8 +51,8 @@ class Activity(enum.Enum):
     NO_WAY = "no_way"
     """It sees no clear way to the path's beginning, and looks again after every scan."""
     STOPPED = "stopped"
-    """The path leads into what its own map shows; it stands before it and waits for another path,
-    or for a scan that shows room."""
+    """Its way leads into what its own map shows; it came to rest before that, looked once for
+    another way to its path, and waits for another path."""
     COLLIDED = "collided"
     """The path led into an obstacle; it stops there and waits for another path."""
 
@@ -108,6 +109,8 @@ class World:
         self.distance_m = 0.0
         self.collisions = 0
         self.stops = 0
+        # How often it had stopped when its path came.
+        self._stopped_at = 0
         # For how many ticks the robot stands, once it has moved; and the most of them.
         self._stands = self._longest_stand = 0
 
@@ -153,7 +156,7 @@ class World:
         It replaces the path before it. From the first tick on: the robot must have
         scanned to see a way.
         """
-        self._path = path
+        self._path, self._stopped_at = path, self.stops
         self._join()
 
     def move(self, speed_m_s: float, turn_rad_s: float) -> None:
@@ -170,10 +173,8 @@ class World:
         config, since_first = self.config, self._ticks - 1
         if since_first % config.period_ticks(config.scan_hz) == 0:
             self._mapper.scan(self.pose)
-            if self.activity is Activity.NO_WAY:
+            if self.activity is Activity.NO_WAY or self._may_try_again():
                 self._join()
-            elif self.activity is Activity.STOPPED and self._has_room():
-                self.activity = Activity.DRIVING
         map_is_due = since_first % config.period_ticks(config.map_hz) == 0
         pose_is_due = since_first % config.period_ticks(config.pose_hz) == 0
         battery_is_due = since_first % config.period_ticks(BATTERY_HZ) == 0
@@ -194,12 +195,20 @@ class World:
     def _join(self) -> None:
         if self._path is None:
             return
-        route = joined(self._path, self._recent_track(), self._mapper.is_clear)
+        track, is_clear = self._recent_track(), self._mapper.is_clear
+        route = joined(self._path, track, partial(is_clear, margin_m=MARGIN_M))
+        if route is None:
+            route = joined(self._path, track, is_clear)
         if route is None:
             self._corners, self.activity = [], Activity.NO_WAY
             return
         self._corners = [(float(x), float(y)) for x, y in route[::-1]]
         self.activity = Activity.DRIVING if self._corners else Activity.IDLE
+
+    def _may_try_again(self) -> bool:
+        """Tell whether the robot stopped, for the first time on its path, and has come to rest."""
+        is_first = self.stops == self._stopped_at + 1
+        return self.activity is Activity.STOPPED and is_first and not self._drive.moving
 
     def _recent_track(self) -> NDArray[np.float64]:
         """Return the track's last metres, to the point where the robot can come to rest."""
@@ -235,14 +244,6 @@ class World:
         self.activity = Activity.STOPPED
         self.stops += 1
         return False
-
-    def _has_room(self) -> bool:
-        """Tell whether a robot that stopped can drive on, some way to its next corner."""
-        x, y = self.pose.x, self.pose.y
-        to_x, to_y = self._corners[-1]
-        share = min(1.0, ROOM_M / max(math.dist((x, y), (to_x, to_y)), ARRIVED_M))
-        ahead = x + share * (to_x - x), y + share * (to_y - y)
-        return self._mapper.is_clear((x, y), ahead)
 
     def _move_as_told(self, speed_m_s: float, turn_rad_s: float, tick: int) -> None:
         if (self._ticks - tick) * self.config.tick_s > DEAF_S:
