@@ -14,6 +14,7 @@ from fasaco_edge.host import durable, files
 from fasaco_edge.kernels import cache, jit, release, sealed
 from fasaco_edge.kernels.cache import note_complete
 from fasaco_edge.kernels.release import KERNEL_SUFFIX
+from tests.kernels.forked import Task, run_forked
 from tests.kernels.harm import kernel_files
 
 KERNELS = """
@@ -65,6 +66,7 @@ class Told:
     folder: str | None
 
 
+PATIENCE_S = 300.0
 # The one that is called by the other is linked into it, and not loaded.
 ALL_LOADED = (1, 0, [])
 
@@ -85,9 +87,16 @@ class Installation:
             shutil.copytree(place, folder / place.name)
         return Installation(folder / self.root.name, folder / self.cache.name)
 
-    def tell(self, code: str = "seven.tell()", **process) -> Told:
-        """Run both kernels, and tell what came of it."""
-        return told_by(self.start(code, **process))
+    def tell(self, code: str = "seven.tell()", *, env=None, umask: int = -1, **process) -> Told:
+        """Run both kernels, and tell what came of it.
+
+        With other words, or a library to load, in a process that is started; else in a forked one.
+        """
+        if process or (env and "LD_PRELOAD" in env):
+            return told_by(self.start(code, env=env, umask=umask, **process))
+        program = f"from fasaco_edge.kernels import seven\n{code}"
+        task = Task(program, str(self.root), self._environment(env), umask)
+        return told(*run_forked(task, PATIENCE_S))
 
     def start(
         self,
@@ -100,23 +109,26 @@ class Installation:
         **process,
     ):
         """Begin a process that imports the module ``name`` of kernels, and runs ``code``."""
-        ours = {"NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(self.cache)}
         program = [
             *words,
             sys.executable,
             "-c",
             f"{before}\nfrom fasaco_edge.kernels import {name}\n{code}",
         ]
-        environment = os.environ | ours | (env or {})
         return subprocess.Popen(
             program,
             cwd=self.root,
-            env={name: value for name, value in environment.items() if value is not None},
+            env=self._environment(env),
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             **process,
         )
+
+    def _environment(self, env: dict[str, str | None] | None) -> dict[str, str]:
+        ours = {"NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(self.cache)}
+        environment = os.environ | ours | (env or {})
+        return {name: value for name, value in environment.items() if value is not None}
 
     def look(self, env: dict[str, str]) -> str:
         """Return what a process that runs no kernel says is missing."""
@@ -134,8 +146,13 @@ class Installation:
 
 def told_by(process: subprocess.Popen[str]) -> Told:
     """Wait for the end of a process, and return what it has told."""
-    out, err = process.communicate(timeout=100)
-    assert process.returncode == 0, err
+    out, err = process.communicate(timeout=PATIENCE_S)
+    return told(process.returncode, out, err)
+
+
+def told(code: int, out: str, err: str) -> Told:
+    """Return what a process has told that ended so."""
+    assert code == 0, err
     assert err == ""
     return Told(*json.loads(out.splitlines()[-1]))
 
