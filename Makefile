@@ -11,7 +11,7 @@ WORKERS ?= $(shell n=$$(nproc); echo $$((n < 4 ? 2 * n : 8)))
 # As images for containers set it, each of some hundred processes would compile all sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format contract bench wheelhouse clean
+.PHONY: demo test properties check format contract bench wheelhouse clean
 
 demo: $(STAMP)  ## watch a robot cover a building nobody mapped before
 	$(BIN)/fasaco-edge demo $(ARGS)
@@ -22,6 +22,9 @@ test: $(STAMP)  ## all tests
 	# In the order of collection: by default files with few tests, which take longest, would come
 	# last. What a busy machine held up for too long runs once more; the closing line counts that.
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --reruns 1 -rR $(ARGS)
+
+properties: $(STAMP)  ## tests over generated inputs, with sixteen times as many as `make test` tries
+	EXAMPLES=4 $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m hypothesis $(ARGS)
 
 check: $(STAMP)  ## format, lint, types, import contracts
 	$(BIN)/ruff format --check .

@@ -5,9 +5,10 @@ import signal
 import pytest
 from hypothesis import settings
 
-# The first example may compile a kernel, or read it from the cache.
-settings.register_profile("kernels", deadline=None)
-settings.load_profile("kernels")
+from tests.support.examples import MOST, examples
+
+settings.register_profile("suite", examples(MOST))
+settings.load_profile("suite")
 
 
 def _go_on(*_: object) -> None:

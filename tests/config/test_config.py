@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.cli import main
@@ -20,6 +20,7 @@ from fasaco_edge.config.ros import RosConfig, RosFrames
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.recording.write.quota import Quota, budget_of
+from tests.support.examples import examples
 
 
 @pytest.fixture
@@ -256,7 +257,7 @@ def documents(draw: st.DrawFn) -> object:
     return document
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(document=documents())
 def test_whatever_is_written_is_a_configuration_or_refused(tmp_path_factory, document):
     file = tmp_path_factory.getbasetemp() / "any.yaml"

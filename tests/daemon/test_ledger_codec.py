@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.daemon.ledger.codec import MOST_BYTES, decode_ledger, encode_ledger
@@ -19,6 +19,7 @@ from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR
 from fasaco_edge.mission.coverage.ledger import MOST_TILES, LedgerSnapshot
 from fasaco_edge.mission.coverage.swept_floor import MOST_FLOOR_TILES
 from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot
+from tests.support.examples import examples
 from tests.support.ledgers import CELL_M, contents, driven, lane
 
 CELLS = st.tuples(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
@@ -40,7 +41,7 @@ def all_of(ledger: LedgerSnapshot) -> object:
     return contents(ledger), ledger.trail.window, ledger.trail.tau.tobytes()
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     st.lists(st.one_of(CELLS, st.tuples(st.integers(-3, 3), st.integers(-70, 70))), max_size=30),
     st.sampled_from([0.3, 0.1 + 0.2, 1e-3, 1.0]),
@@ -76,7 +77,7 @@ def test_the_bytes_are_as_described():
     assert zlib.decompress(payload[24:]) == plain
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.lists(st.floats(1e-12, 1e6), min_size=8, max_size=8))
 def test_a_trail_is_kept_to_a_share_of_itself_and_then_as_it_is(values):
     ledger = replace(lane(3), trail=trail_of(*values))
@@ -162,7 +163,7 @@ def test_any_bit_that_flips_is_found():
             decode_ledger(bytes(flipped), CELL_M)
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(st.data())
 def test_torn_and_scribbled_files_are_found(data):
     """A sector of zeros, of another file, or of noise; a tail that was never written."""
@@ -182,7 +183,7 @@ def test_torn_and_scribbled_files_are_found(data):
             decode_ledger(broken, CELL_M)
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(st.one_of(st.binary(max_size=80), st.binary(max_size=80).map(zlib.compress)))
 def test_a_body_that_is_none_is_refused_although_its_checksum_holds(body):
     with pytest.raises(LedgerFileError):

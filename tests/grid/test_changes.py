@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import MapTooLarge
@@ -13,6 +13,7 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from tests.support.examples import examples
 from tests.support.grids import (
     cropped,
     displaced,
@@ -56,7 +57,7 @@ def assert_follows(change, lattice, after, footprint):
         assert change.window is None
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(data=st.data(), whole=occupancy_grids(max_side=40))
 def test_a_lattice_follows_its_map(data, whole):
     footprint = data.draw(footprints(whole.geometry.resolution))
@@ -72,7 +73,7 @@ def test_a_lattice_follows_its_map(data, whole):
         before, lattice = after, change.after
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(data=st.data(), before=occupancy_grids(max_side=40))
 def test_a_lattice_follows_patches(data, before):
     footprint = data.draw(footprints(before.geometry.resolution))
@@ -89,7 +90,7 @@ def test_a_lattice_follows_patches(data, before):
     assert_follows(change, lattice, after, footprint)
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(data=st.data(), occupancy=occupancy_grids(max_side=20))
 def test_the_first_lattice_has_all_that_is_known(data, occupancy):
     footprint = data.draw(footprints(occupancy.geometry.resolution))

@@ -5,7 +5,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import MapTooLarge
@@ -13,6 +13,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from tests import naive
+from tests.support.examples import examples
 from tests.support.grids import cropped, footprints, grid, occupancy_grids, on_raster
 
 
@@ -22,7 +23,7 @@ def cells_and_centres(window, cell_m):
             yield (row, col), ((col + 0.5) * cell_m, (row + 0.5) * cell_m)
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(data=st.data(), whole=occupancy_grids(max_side=30))
 def test_a_cell_is_the_same_in_a_map_that_has_grown(data, whole):
     rows, cols = whole.cells.shape
@@ -49,7 +50,7 @@ def test_a_cell_is_the_same_in_a_map_that_has_grown(data, whole):
             assert new == old
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(data=st.data(), occupancy=occupancy_grids(max_side=10))
 def test_no_coverable_cell_lies_beyond_the_window(data, occupancy):
     footprint = data.draw(footprints(occupancy.geometry.resolution))

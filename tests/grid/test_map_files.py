@@ -9,7 +9,7 @@ import zlib
 import numpy as np
 import pytest
 import yaml
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from PIL import Image
@@ -19,6 +19,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.map_files import find_map, read_bare_image, read_coverage_grid, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from maps.map_writer import write_map
+from tests.support.examples import examples
 
 DESCRIPTION = {
     "image": "map.png",
@@ -28,9 +29,7 @@ DESCRIPTION = {
     "occupied_thresh": 0.65,
     "free_thresh": 0.196,
 }
-SHARED_TMP = settings(
-    deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+SHARED_TMP = examples(60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def described(folder, image=None, drop=(), **changes):

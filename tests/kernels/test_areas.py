@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
 from tests import naive
+from tests.support.examples import examples
 
 SHAPES = [(0, 0), (1, 1), (1, 9), (9, 1), (0, 5), (5, 0)]
 
@@ -28,7 +29,7 @@ def assert_agrees(kinds):
     assert beside == [naive.cell_beside(cells, free) for _, cells in expected]
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(st.integers(0, 9), st.integers(0, 9), st.integers(0, 2**32), st.integers(2, 4))
 def test_areas_are_those_a_flood_finds(rows, cols, seed, kinds):
     grid = np.random.default_rng(seed).integers(0, kinds, (rows, cols)).astype(np.uint8)

@@ -4,7 +4,7 @@ import itertools
 from collections import Counter
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.bound.blocks import (
@@ -23,6 +23,7 @@ from fasaco_edge.kernels.bound.matching import (
     pairing_for,
 )
 from tests import naive
+from tests.support.examples import examples
 from tests.support.grids import problems
 
 PLENTY = 10**6
@@ -79,7 +80,7 @@ def naive_blocks(links):
     return blocks
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(task=problems(max_side=7))
 def test_twin_finds_the_same_blocks(task):
     ground, start = task
@@ -141,7 +142,7 @@ def independent(links, chosen):
     return not any(links[cell] & chosen for cell in chosen)
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(drawn=graphs(), side=st.integers(0, 1))
 def test_twin_finds_no_larger_matching_or_independent_set(drawn, side):
     links, cells, graph = drawn
@@ -162,7 +163,7 @@ def test_twin_finds_no_larger_matching_or_independent_set(drawn, side):
             assert (cell in largest) == needed
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(drawn=graphs(), side=st.integers(0, 1), data=st.data())
 def test_a_set_is_independent_whatever_was_matched_and_must_be_chosen(drawn, side, data):
     links, cells, graph = drawn
@@ -207,7 +208,7 @@ def naive_spanning(links, islands):
     return weights
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(task=problems(max_side=8), seed=st.integers(0, 2**32), share=st.sampled_from((0.1, 0.5, 1)))
 def test_twin_sees_the_same_islands_and_spans_them_by_the_same_weight(task, seed, share):
     ground, start = task

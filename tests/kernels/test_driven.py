@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.floor.driven import (
@@ -20,13 +20,14 @@ from fasaco_edge.kernels.floor.driven import (
 )
 from fasaco_edge.kernels.floor.sweeps import NEVER, Sweeps
 from tests.kernels.test_floor import SIDE, distances, scratch
+from tests.support.examples import examples
 
 # The way may begin and end outside of the raster.
 POINTS = st.lists(st.tuples(*[st.floats(-6.0, SIDE + 6.0)] * 2), min_size=2, max_size=4)
 
 
 @given(POINTS, st.floats(0.6, 7.0), st.integers(0, 2**32 - 1))
-@settings(max_examples=60)
+@examples(60)
 def test_what_was_driven_over_is_no_longer_open(points, radius, seed):
     rng = np.random.default_rng(seed)
     still_open = rng.random((SIDE, SIDE)) < 0.7
@@ -57,7 +58,7 @@ def left_of(counts):
 
 
 @given(st.integers(0, 2**32 - 1), st.tuples(*[st.integers(0, SIDE - 9)] * 2), st.booleans())
-@settings(max_examples=60)
+@examples(60)
 def test_what_is_open_is_asked_for_and_neither_swept_nor_driven_over(seed, corner, is_asked):
     rng = np.random.default_rng(seed)
     state = rng.integers(0, 8, (SIDE, SIDE), np.uint8) | rng.integers(0, 4, (SIDE, SIDE)) << 3

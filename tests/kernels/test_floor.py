@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.floor.bits import any_between, is_marked, packed, spread, unpacked
@@ -24,6 +24,7 @@ from fasaco_edge.kernels.floor.sweeps import (
     sweep,
     swept_more,
 )
+from tests.support.examples import examples
 
 SIDE = 40
 COORDINATES = st.floats(8.0, 31.0)
@@ -107,7 +108,7 @@ def test_sweeps_are_counted_and_taken_back(segments, radius):
     assert (sweeps.left == 64).all()
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(SEGMENTS, SEGMENTS, SEGMENTS, st.floats(0.5, 7.0))
 def test_what_a_change_sweeps_more_is_what_sweeping_it_shows(before, after, others, radius):
     counts = np.zeros((SIDE, SIDE), np.int16)
@@ -154,7 +155,7 @@ def test_pixels_within_reach_of_marked_ones(seed, radius):
 
 
 @given(st.floats(0.6, 12.0) | st.integers(1, 24).map(lambda halves: halves / 2), st.randoms())
-@settings(max_examples=60)
+@examples(60)
 def test_a_place_is_where_a_way_of_no_length_is_clear(radius, random):
     blocked = np.zeros((SIDE, SIDE), np.bool_)
     for _ in range(6):
@@ -195,7 +196,7 @@ def test_bits_are_what_was_packed(cols, seed, share):
 
 
 @given(st.integers(1, 150), st.integers(0, 2**32 - 1), st.floats(0.5, 9.0))
-@settings(max_examples=40)
+@examples(40)
 def test_bits_spread_as_far_as_a_disc(cols, seed, radius):
     mask = np.random.default_rng(seed).random((24, cols)) < 0.02
     reach = disc_rows(radius)

@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
 from tests import naive
+from tests.support.examples import examples
 from tests.support.grids import footprints, grid, occupancy_grids, on_raster
 
 
@@ -21,7 +22,7 @@ def assert_agrees(occupancy, footprint):
     return lattice, twin
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(data=st.data(), occupancy=occupancy_grids(max_side=12))
 def test_twin_classifies_alike(data, occupancy):
     assert_agrees(occupancy, data.draw(footprints(occupancy.geometry.resolution)))

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.local_search.holes import rays
 from tests.kernels.grounds import Task, guarded, tasks
+from tests.support.examples import examples
 from tests.support.grids import ROOMS, lattice
 
 EAST, NORTH = 0, 1
@@ -87,7 +88,7 @@ def crossing(crossed, loop):
     return total
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(task=tasks(7), seed=st.integers(0, 2**32))
 def test_rays_cancel_out_just_for_loops_that_are_sums_of_squares(task, seed):
     ground, holes, crossed = throw(task)

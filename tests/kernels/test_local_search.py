@@ -5,7 +5,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.lattice.reach import walk_cost
@@ -23,6 +23,7 @@ from tests.kernels.grounds import (
     tasks,
     walk_on,
 )
+from tests.support.examples import examples
 from tests.support.grids import ROOMS, lattice
 
 EVERYWHERE = np.empty(0, np.int32)
@@ -124,7 +125,7 @@ def test_every_single_move_keeps_true_what_is_known_of_the_walk(prices, hot):
     assert min(kinds.values()) >= 5, kinds
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(
     task=tasks(12),
     prices=st.sampled_from(PRICES),
@@ -144,7 +145,7 @@ def test_thousands_of_moves_leave_a_sound_walk_in_any_room(task, prices, heats, 
         assert walk.counts[LENGTH] <= len(task.walk) + room
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(task=tasks(9), prices=st.sampled_from(PRICES), seed=st.integers(0, 2**32))
 def test_where_proposals_are_made_in_an_area_the_rest_keeps_its_steps(task, prices, seed):
     ground, random = task.ground(), np.random.default_rng(seed)

@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.local_search.parity import (
@@ -39,6 +39,7 @@ from tests.kernels.grounds import (
     walk_on,
 )
 from tests.kernels.test_holes import Space, crossing, links_of, loops_of, squares_of
+from tests.support.examples import examples
 from tests.support.grids import ROOMS, lattice
 
 EVERYWHERE = np.empty(0, np.int32)
@@ -64,7 +65,7 @@ def times_of(ground, tally):
     )
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(task=tasks())
 def test_steps_are_counted_in_either_direction(task):
     ground, walk, tally = set_up(task)
@@ -72,7 +73,7 @@ def test_steps_are_counted_in_either_direction(task):
     assert tally.times.sum() == len(task.walk) - 1
 
 
-@settings(max_examples=120, deadline=None)
+@examples(120)
 @given(task=tasks(), steady=st.booleans(), noted=st.booleans(), seed=st.integers(0, 2**32))
 def test_an_euler_walk_takes_each_step_as_often_as_it_is_told(task, steady, noted, seed):
     ground, walk, tally = set_up(task)
@@ -155,7 +156,7 @@ def growth_along(ground, tally, way):
                for step in itertools.pairwise(way))  # fmt: skip
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(task=tasks(), limit=st.sampled_from((1, 5, 1 << 30)), seed=st.integers(0, 2**32))
 def test_twin_finds_the_same_ways(task, limit, seed):
     ground, walk, tally = set_up(task)
@@ -186,7 +187,7 @@ def change_way(ground, tally, way):
         change_step(ground, tally, one, other)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(task=tasks(), seed=st.integers(0, 2**32))
 def test_an_end_moves_where_it_is_told_and_the_walk_grows_as_foreseen(task, seed):
     ground, walk, tally = set_up(task)
@@ -215,7 +216,7 @@ def chain_of(ground, cells):
     return frozenset(link_between(ground, *ends) for ends in times if times[ends] % 2)
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(task=tasks(), seed=st.integers(0, 2**32))
 def test_an_added_loop_goes_round_a_hole_and_the_walk_grows_as_foreseen(task, seed):
     ground, walk, tally = set_up(task, FIXED_END)
@@ -255,7 +256,7 @@ def test_an_added_loop_goes_round_a_hole_and_the_walk_grows_as_foreseen(task, se
     assert_guards_hold(walk, tally)
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(task=tasks(), prices=st.sampled_from((PRICES[1], PRICES[3])), seed=st.integers(0, 2**32))
 def test_local_search_never_changes_on_which_side_a_hole_is_passed(task, prices, seed):
     ground = task.ground()

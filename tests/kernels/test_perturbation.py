@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.local_search.perturbation import (
@@ -34,6 +34,7 @@ from tests.kernels.grounds import (
 )
 from tests.kernels.test_holes import Space, links_of, squares_of
 from tests.kernels.test_parity import chain_of
+from tests.support.examples import examples
 from tests.support.grids import ROOMS, lattice
 
 EVERY_CELL = 1 << 30
@@ -68,7 +69,7 @@ def assert_best_is_sound(task, ground, memory, prices):
     assert walk.counts.tolist() == memory.best_counts.tolist()
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     task=tasks(),
     prices=st.sampled_from(PRICES),
@@ -179,7 +180,7 @@ def test_the_surroundings_of_a_spot_are_improved_at_each_temperature(radius):
     assert memory.work.tolist() == [101 * len(near) // COOLING.size * COOLING.size, 1]
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(task=tasks(), prices=st.sampled_from(PRICES), seed=st.integers(0, 2**32))
 def test_touching_up_a_spot_makes_the_walk_better_or_leaves_it(task, prices, seed):
     search = set_up(task, prices)

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
+from tests.support.examples import examples
 
 FREE_AT_MOST = 25
 
@@ -100,7 +101,7 @@ def test_rays_see_what_the_twin_sees(name, x, y, reach):
     assert np.array_equal(known, expected)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     seed=st.integers(0, 1000),
     x=st.floats(0, 20),
@@ -144,7 +145,7 @@ def off_the_grid(thousandths):
     return thousandths / 1000 + 1e-5
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     seed=st.integers(0, 1000),
     x=st.integers(-2000, 14000).map(off_the_grid),

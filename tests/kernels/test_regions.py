@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.lattice.reach import walk_cost
@@ -48,6 +48,7 @@ from tests.kernels.grounds import (
     walk_on,
 )
 from tests.kernels.test_perturbation import rules_for
+from tests.support.examples import examples
 from tests.support.grids import lattice
 
 EVERYWHERE = np.empty(0, np.int32)
@@ -147,7 +148,7 @@ def naive_sections(task, cells, box):
     return [(run[0], run[-1]) for run in runs[1:-1] if not inside[run[0]]]
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(seed=SEEDS)
 def test_a_region_cut_out_and_put_back_is_the_same_walk(seed):
     task, region = drawn_cut(seed)
@@ -187,7 +188,7 @@ def assert_whole_walk(task, region, cells):
     assert outside[0] == outside[1]
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(seed=SEEDS, prices=st.sampled_from(PRICES), hot=st.booleans(), perturbed=st.booleans())
 def test_whatever_is_done_in_a_region_the_whole_is_a_walk(seed, prices, hot, perturbed):
     task, region = drawn_cut(seed, prices)

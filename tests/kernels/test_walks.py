@@ -4,11 +4,12 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk
 from tests import naive
+from tests.support.examples import examples
 from tests.support.grids import ROOMS, free, lattice, problems
 
 
@@ -18,7 +19,7 @@ def assert_legal(steps, walk):
         assert tuple(there) in around[tuple(here)].values()
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(ground=problems(), goal=st.integers(0, 80))
 def test_twin_reaches_the_same_cells_in_as_many_steps(ground, goal):
     lattice, start = ground

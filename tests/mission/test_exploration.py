@@ -3,7 +3,7 @@
 import itertools
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Window
@@ -12,6 +12,7 @@ from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived, State
 from tests import naive
 from tests.mission.world import FOOTPRINT, PIXELS, Drive, placed, pose_at, reachable_cells
+from tests.support.examples import examples
 
 
 class Reveal:
@@ -56,7 +57,7 @@ class Reveal:
         return MapReceived(placed(part, at))
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(
     rows=st.integers(1, 8),
     cols=st.integers(1, 8),
@@ -107,7 +108,7 @@ def test_a_robot_that_follows_its_paths_covers_all_it_can_reach(
         assert there in around[here].values()
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=st.integers(0, 2**32), pace=st.integers(2, 9))
 def test_walls_that_come_and_go_never_lead_to_an_illegal_step(seed, pace):
     """People and doors: single cells close and open again, never under the robot."""

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import FleetError
@@ -21,6 +21,7 @@ from fasaco_edge.mission.fleet.shared import (
 )
 from tests.mission.fleets import FleetDrive, FleetRobot, flaky
 from tests.mission.world import CONFIG, rectangle, with_policy
+from tests.support.examples import examples
 
 HALL = ["." * 24] * 12
 ROOMS = [
@@ -311,7 +312,7 @@ def test_a_number_that_no_count_leads_to_is_nobodys_division(begun):
     assert ours.mission.fleet.number > before
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.lists(st.tuples(st.integers(0, 3), st.sets(st.integers(0, 40))), max_size=8), st.data())
 def test_within_an_epoch_order_and_number_of_messages_do_not_count(sweeps, data):
     messages, swept = [], set()

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
@@ -12,6 +12,7 @@ from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.coverage.progress import FreeArea
 from tests.mission.world import CELL, building, started
+from tests.support.examples import examples
 from tests.support.grids import occupancy_grids
 
 FOOTPRINT = Footprint(cell_m=0.3, robot_radius_m=0.12)
@@ -28,7 +29,7 @@ def counted_m2(grid, lattice, reachable):
     return found * geometry.resolution**2
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.data())
 def test_it_is_what_its_twin_counts(data):
     rows, cols = data.draw(st.tuples(st.integers(1, 90), st.integers(1, 12)))
@@ -44,7 +45,7 @@ def test_it_is_what_its_twin_counts(data):
     assert area == pytest.approx(counted_m2(grid, lattice, reachable))
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(st.data(), occupancy_grids(max_side=40))
 def test_where_nothing_is_reached_every_free_pixel_counts_once(data, grid):
     """Also those on the border of two cells, or of the lattice, where rounding decides."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Pose2D, Window
@@ -17,6 +17,7 @@ from fasaco_edge.mission.coverage.ledger import (
     CoverageLedger,
 )
 from tests.mission.world import Drive, building, pose_at
+from tests.support.examples import examples
 
 CELL = 0.25
 
@@ -136,7 +137,7 @@ def test_visits_stop_counting_before_they_wrap():
     assert ledger.total == 2 * 65_540
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(
     st.lists(st.tuples(st.floats(-1.2, 1.2), st.floats(-1.2, 1.2)), max_size=12),
     st.sampled_from([0.25, 0.3, 1.0]),

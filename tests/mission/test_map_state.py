@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
@@ -13,6 +13,7 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.zones import kept_out, without
+from tests.support.examples import examples
 from tests.support.grids import displaced, grid, occupancy_grids, part_of, repainted
 
 FOOTPRINT = Footprint(cell_m=0.2, robot_radius_m=0.08)
@@ -43,7 +44,7 @@ def take_something_in(draw, state, whole, zones):
     return whole, zones
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(st.data(), occupancy_grids(max_side=30))
 def test_from_map_to_map_the_state_is_what_its_last_map_says(data, whole):
     state = MapState(MissionConfig(FOOTPRINT))

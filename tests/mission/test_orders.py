@@ -6,7 +6,7 @@ import json
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import CommandError, OrderError
@@ -20,6 +20,7 @@ from fasaco_edge.mission.orders.order import (
     read_order,
 )
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
+from tests.support.examples import examples
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
 KITCHEN = {"name": "kitchen", "polygon": SQUARE}
@@ -133,7 +134,7 @@ anything = st.recursive(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(anything)
 def test_whatever_is_written_is_an_order_or_refused(document):
     try:

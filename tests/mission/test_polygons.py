@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Window
@@ -11,6 +11,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.polygons import polygon_flaw
 from fasaco_edge.mission.orders.zones import cells_inside, cells_near, counts_in, without
 from tests import naive
+from tests.support.examples import examples
 
 CELL_M = 0.3
 # Of ten cells by ten, some of them beyond the origin.
@@ -59,7 +60,7 @@ def all_cells():
     ]
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(polygons)
 def test_a_zone_holds_the_cells_whose_centre_it_holds(polygon):
     assume(not polygon_flaw(polygon))
@@ -69,7 +70,7 @@ def test_a_zone_holds_the_cells_whose_centre_it_holds(polygon):
     assert cells(backwards) == expected
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(polygons, st.sampled_from([0.15, 0.18, 0.4]))
 def test_near_is_what_the_polygon_touches(polygon, reach):
     assume(not polygon_flaw(polygon))
@@ -79,7 +80,7 @@ def test_near_is_what_the_polygon_touches(polygon, reach):
     assert sure <= near <= possible
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(polygons, st.sampled_from([0.18, 0.4]))
 def test_a_robot_that_keeps_out_touches_no_keep_out_zone_on_its_way(polygon, radius):
     assume(not polygon_flaw(polygon))
@@ -156,7 +157,7 @@ def brute_crossing(polygon):
 small = st.tuples(st.integers(0, 4), st.integers(0, 4)).map(lambda p: (float(p[0]), float(p[1])))
 
 
-@settings(max_examples=400, deadline=None)
+@examples(400)
 @given(st.lists(small, min_size=3, max_size=7).map(tuple))
 def test_polygons_that_cross_or_touch_themselves_are_refused(polygon):
     said = polygon_flaw(polygon)
@@ -183,7 +184,7 @@ def test_steps_to_cells_taken_away_are_gone():
     assert free.states.all()
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(st.lists(polygons, max_size=4).map(tuple), st.integers(0, 2**32))
 def test_cells_in_many_polygons_are_counted_as_in_each(zones, seed):
     marked = np.random.default_rng(seed).random((WINDOW.rows, WINDOW.cols)) < 0.5

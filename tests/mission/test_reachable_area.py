@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.changes import LatticeChange
@@ -14,6 +14,7 @@ from fasaco_edge.mission.coverage.progress import FAR_CELLS, LOOK_AHEAD, PathPro
 from fasaco_edge.mission.map import reachable_area as area_module
 from fasaco_edge.mission.map.reachable_area import AreaChange, ReachableArea, anchor_cell
 from tests import naive
+from tests.support.examples import examples
 from tests.support.grids import lattice, placed, problems, with_passages_closed
 
 
@@ -81,7 +82,7 @@ def reworked(draw, lattice):
     )
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(problems(max_side=24), st.data())
 def test_after_a_change_the_same_is_reachable_as_if_all_were_searched(given_ground, data):
     lattice, start = given_ground
@@ -197,7 +198,7 @@ def test_a_change_says_what_it_is(change, text):
     assert change
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(problems(max_side=5), st.lists(st.integers(0, 3), max_size=12), st.integers(0, 12))
 def test_cells_hold_up_to_the_first_illegal_step(given_ground, headings, jump_at):
     lattice, start = given_ground

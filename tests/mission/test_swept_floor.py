@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
@@ -26,6 +26,7 @@ from fasaco_edge.mission.coverage.swept_floor import (
 )
 from fasaco_edge.mission.map.loop_closure import Motion, certain_floor
 from tests.mission.world import CELL, Drive, MapReceived, building, pose_at, rectangle
+from tests.support.examples import examples
 
 TOOL = 0.3
 AROUND = Window(-80, -80, 80, 120)
@@ -56,7 +57,7 @@ def distances(points, window):
     return nearest
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(
     st.lists(st.tuples(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2)), max_size=3),
     st.sampled_from([0.17, 0.3, 0.5]),

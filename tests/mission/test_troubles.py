@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, State
@@ -23,6 +23,7 @@ from tests.mission.world import (
     rectangle,
     with_policy,
 )
+from tests.support.examples import examples
 
 ROOM = ("............",) * 4
 # A little longer than the mission is patient.
@@ -201,7 +202,7 @@ ORDERS = (
 )
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.integers(0, 2**32))
 def test_whatever_happens_it_is_a_state_with_a_reason_and_the_same_every_time(seed):
     """Commands, maps, jumps and silence in any order; and all of it once more."""

@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.kernels.ants.colony import walk_cost
 from fasaco_edge.planners.cost import CoverageCost
 from tests import naive
+from tests.support.examples import examples
 
 WALKS = st.lists(st.sampled_from(naive.DIRECTIONS), max_size=60)
 COSTS = st.builds(CoverageCost, st.floats(0.001, 3600.0), st.floats(0.0, 3600.0))
@@ -23,7 +24,7 @@ def walk_along(headings, start=(70, 70)):
     return walk
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(headings=WALKS, cost=COSTS)
 def test_twin_counts_the_same_cost(headings, cost):
     walk = walk_along(headings)
@@ -33,7 +34,7 @@ def test_twin_counts_the_same_cost(headings, cost):
     assert walk_cost(flat, cost.step_us, cost.quarter_turn_us) == counted
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(forwards=st.lists(st.booleans(), min_size=2, max_size=30), cost=COSTS)
 def test_twin_counts_the_same_cost_in_a_single_column(forwards, cost):
     """Where a step north and a step east would be the same difference of index."""

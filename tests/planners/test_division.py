@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import NothingToCover, StartBlocked
@@ -16,6 +16,7 @@ from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.fleet.division import divide
 from fasaco_edge.planners.fleet.sharing import Fleet
+from tests.support.examples import examples
 
 TURNS = CoverageCost(1.0, 1.5)
 
@@ -40,7 +41,7 @@ def check(free, starts, division, *, returns):
 
 
 @given(data=st.data())
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@examples(25, suppress_health_check=[HealthCheck.too_slow])
 def test_every_cell_is_covered_by_legal_walks(data):
     rows, cols = data.draw(st.tuples(st.integers(1, 9), st.integers(1, 9)))
     blocked = data.draw(st.sets(st.tuples(st.integers(0, rows - 1), st.integers(0, cols - 1))))
@@ -169,7 +170,7 @@ def naive_split(steps, loop, ways, step_us):
 
 
 @given(st.data())
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_a_split_is_the_best_there_is(data):
     rows, cols = data.draw(st.tuples(st.integers(2, 4), st.integers(2, 4)))
     free = np.ones((rows, cols), np.bool_)

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
@@ -17,6 +17,7 @@ from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
 from tests import naive
+from tests.support.examples import examples
 from tests.support.grids import ENDS, ROOMS, end_of, lattice, problems, reference
 
 
@@ -34,7 +35,7 @@ def assert_answers(problem, path):
 
 
 @pytest.mark.parametrize("name", PLANNER_NAMES)
-@settings(max_examples=400, deadline=None)
+@examples(400)
 @given(
     ground=problems(),
     end=ENDS,
@@ -68,7 +69,7 @@ def test_aco_is_fasaco_with_one_cohort_of_velocity_1_bit_for_bit(room):
 @pytest.mark.parametrize(("planner", "rule"), [
     (spiral_stc(), naive.SPIRAL), (zigzag(), naive.ZIGZAG),
 ], ids=["spiral-stc", "zigzag"])  # fmt: skip
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(ground=problems(), end=ENDS)
 def test_twin_sweeps_the_same_anywhere(planner, rule, ground, end):
     lattice, start = ground
@@ -81,7 +82,7 @@ def test_twin_sweeps_the_same_anywhere(planner, rule, ground, end):
     assert planner.plan(problem).cells.tolist() == expected
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(ground=problems())
 def test_twin_goes_around_the_same_tree(ground):
     lattice, start = ground
@@ -92,7 +93,7 @@ def test_twin_goes_around_the_same_tree(ground):
     assert stc().plan(problem).cells.tolist() == expected
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(
     ground=problems(),
     end=st.integers(0, 80),
@@ -120,7 +121,7 @@ def test_twin_leads_the_tree_s_walk_to_the_same_end(ground, end, turn_s, covered
     assert stc().plan(problem).cells.tolist() == expected
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(blocks=st.lists(st.lists(st.booleans(), min_size=4, max_size=4), min_size=1, max_size=5))
 def test_stc_visits_every_cell_once_where_all_blocks_are_whole(blocks):
     """Gabriely and Rimon's theorem: a Hamiltonian cycle."""
@@ -134,7 +135,7 @@ def test_stc_visits_every_cell_once_where_all_blocks_are_whole(blocks):
     assert path.steps == problem.cells
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(ground=problems())
 def test_stc_is_no_longer_than_its_bound(ground):
     """Twice around any tree at most: 2 (k - 1) steps in a node of k cells, 2 for each join."""

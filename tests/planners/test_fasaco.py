@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.planners.colony import ColonyConfig
@@ -16,6 +16,7 @@ from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import SearchProgress, SearchWork, TimeBudget, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
 from tests import naive
+from tests.support.examples import examples
 from tests.support.grids import ENDS, ROOMS, end_of, lattice, problems, reference
 
 HALL = lattice(*["." * 40] * 30)
@@ -37,7 +38,7 @@ def assert_answers(problem, path):
     assert path.cells.dtype == np.int32
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(
     ground=problems(max_side=20),
     velocities=st.lists(st.integers(1, 64), min_size=1, max_size=5).map(tuple),
@@ -197,7 +198,7 @@ def test_a_snapshot_shows_the_mean_trail_of_the_moves_into_a_cell(turn_s, delta_
     assert snapshots[0].trail == pytest.approx(expected)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(ground=problems(), seed=st.integers(0, 100), end=ENDS)
 def test_figures_are_what_counting_gives(ground, seed, end):
     ground, start = ground

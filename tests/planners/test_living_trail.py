@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Window
@@ -21,6 +21,7 @@ from fasaco_edge.planners.living_trail import (
     mean_into,
     strongest_into,
 )
+from tests.support.examples import examples
 
 ALPHA, TAU0 = np.float32(0.25), np.float32(0.125)
 RULES = TrailRules(alpha=0.25, tau0=0.125)
@@ -102,7 +103,7 @@ def table(trail):
     }
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.integers(0, 10**6), st.lists(st.sampled_from(["map", "path", "drive"]), max_size=12))
 def test_it_is_what_the_rules_say(seed, events):
     trail, twin, window = LivingTrail(RULES), Naive(), Window(-3, 4, 4, 10)

@@ -4,7 +4,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
@@ -18,6 +18,7 @@ from fasaco_edge.planners.planner import SearchWork, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.repair import can_repair, completed, repaired
 from tests.benchmarks.judge import check_walk
+from tests.support.examples import examples
 
 SHORT = WorkLimit(SearchWork(perturbations=8))
 TURNS = CoverageCost(1.0, 1.5)
@@ -60,7 +61,7 @@ def judge(problem, cells):
     return verdict
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(
     seed=st.integers(0, 10**6),
     change=st.sampled_from((0.0, 0.03, 0.2)),
@@ -74,7 +75,7 @@ def test_a_completed_walk_is_legal_and_complete(seed, change, home, held):
     judge(problem, np.column_stack(np.divmod(flat, framed.cols)))
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(seed=st.integers(0, 10**6))
 def test_where_nothing_changed_the_walk_is_what_it_was(seed):
     problem = driven_halfway(seed, change=0.0)
@@ -103,7 +104,7 @@ def test_what_can_wait_leaves_the_next_steps_alone():
         assert later or not same[:12].all()
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     seed=st.integers(0, 10**6),
     change=st.sampled_from((0.03, 0.2)),
@@ -135,7 +136,7 @@ def test_a_repair_is_worth_its_while():
     assert np.mean(gains) > 5
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(seed=st.integers(0, 10**6), pieces=st.integers(0, 5))
 def test_the_same_work_repairs_the_same_way(seed, pieces):
     problem = driven_halfway(seed, change=0.1, cost=TURNS)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
@@ -27,10 +27,11 @@ from tests.planners.searches import (
     plan,
     take_apart,
 )
+from tests.support.examples import examples
 from tests.support.grids import ENDS, ROOMS, end_of, problems
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     ground=problems(max_side=12),
     end=ENDS,
@@ -107,7 +108,7 @@ def test_a_search_ends_by_itself_and_that_repeats_too(room, cost):
     assert_repeats(problem, path, FEW_ANTS)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(rows=st.integers(1, 200), cols=st.integers(1, 200), number=st.integers(0, 5))
 def test_each_cell_is_of_one_region_and_that_fits_into_memory(rows, cols, number):
     problem = CoverageProblem.of(CoverageLattice.from_free(np.ones((rows, cols), bool)), (0, 0))

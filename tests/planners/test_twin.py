@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
@@ -12,6 +12,7 @@ from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.planner import SearchWork
 from fasaco_edge.planners.problem import CoverageProblem
 from tests import naive
+from tests.support.examples import examples
 from tests.support.grids import ENDS, ROOMS, end_of, problems
 
 VELOCITIES = {
@@ -56,7 +57,7 @@ def test_twin_walks_the_same_in_several_groups(room, visibility):
     assert_same_walk(CoverageProblem.of(lattice, start), config)
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(
     ground=problems(),
     end=ENDS,

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration
@@ -17,6 +17,7 @@ from fasaco_edge.simulation.robot import (
     driven,
     stopping_point,
 )
+from tests.support.examples import examples
 
 CONFIG = SimulationConfig()
 
@@ -29,7 +30,7 @@ def drive_to(goal, state, ticks=3000):
     return states
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     x=st.floats(-3, 3),
     y=st.floats(-3, 3),

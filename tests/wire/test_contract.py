@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, NothingToCover
@@ -21,6 +21,7 @@ from fasaco_edge.wire.documents.replies import encode_error
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import CoverageValue
 from fasaco_edge.wire.schemas import POSE_SCHEMAS
+from tests.support.examples import examples
 
 PROTOCOL = folder("protocol")
 TABLE = yaml.safe_load((PROTOCOL / "keys.yaml").read_text())
@@ -141,13 +142,13 @@ json_values = st.recursive(
 )
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(st.dictionaries(st.text(), json_values, max_size=5))
 def test_json_round_trip(message: dict[str, object]) -> None:
     assert decode_json(encode_json(message)) == message
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(st.binary(max_size=60), st.integers(0, 59))
 def test_json_noise(noise: bytes, at: int) -> None:
     good = encode_json({"state": "planning", "steps": [1, 2, 3], "eta_s": 1.5})

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -23,6 +23,7 @@ from fasaco_edge.wire.messages.maps import (
     encode_occupancy_grid,
 )
 from fasaco_edge.wire.messages.pheromone import decode_pheromone, encode_pheromone
+from tests.support.examples import examples
 
 # The float32s from the least normal one up: trails do not come smaller.
 trails = hnp.arrays(
@@ -68,7 +69,7 @@ def test_coverage_lies_where_the_lattice_says() -> None:
         assert (math.floor(row), math.floor(col)) == cell
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(trails)
 def test_a_level_is_the_trail_to_half_a_step(trail: np.ndarray) -> None:
     message = decode_pheromone(encode_pheromone(snapshot(trail), "map", 1))

@@ -9,7 +9,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import MalformedMessage
@@ -20,6 +20,7 @@ from fasaco_edge.wire.messages.maps import encode_map_update
 from fasaco_edge.wire.messages.paths import decode_path, encode_path
 from fasaco_edge.wire.messages.poses import decode_transforms
 from fasaco_edge.wire.schemas import POSE_SCHEMAS
+from tests.support.examples import examples
 from tests.wire.decoders import DECODERS
 from tests.wire.mutations import mutant, seeds_of
 from tests.wire.soundness import is_read, peak_bytes
@@ -35,7 +36,7 @@ def test_mutations_raise_only_malformed_message(schema: str) -> None:
     assert MUTATIONS // 4 < refused < MUTATIONS
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(payload=st.binary(max_size=200), schema=st.sampled_from(sorted(DECODERS)))
 def test_noise_is_refused(payload: bytes, schema: str) -> None:
     for noise in (payload, b"\0\1\0\0" + payload):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -23,6 +23,7 @@ from fasaco_edge.wire.messages.maps import (
 )
 from fasaco_edge.wire.messages.paths import decode_path, encode_path
 from fasaco_edge.wire.messages.poses import decode_pose, encode_pose_stamped
+from tests.support.examples import examples
 from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 from tests.wire import oracle
 
@@ -36,7 +37,7 @@ resolutions = st.integers(1, 99_999).map(lambda millimetres: millimetres / 1000)
 shapes = hnp.array_shapes(min_dims=2, max_dims=2, max_side=12)
 cell_values = st.integers(-1, 100)
 
-some = settings(max_examples=80, deadline=None)
+some = examples(80)
 
 
 @st.composite
