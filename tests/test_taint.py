@@ -35,7 +35,7 @@ from fasaco_edge.recording.write.part import Part
 from fasaco_edge.samples import SampleEncoder
 from fasaco_edge.text import json_line
 from fasaco_edge.wire import schemas
-from fasaco_edge.wire.documents.path_digest import PATH_DIGEST
+from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from fasaco_edge.wire.topics import RPC_NAMES

@@ -1,13 +1,15 @@
-"""Publisher on one key, with its encoding and quality of service."""
+"""Publishers: one on a native key with encoding and quality of service, one of a ROS 2 topic."""
 
 from __future__ import annotations
 
+import time
 from functools import partial
 from typing import Any
 
 import zenoh
 import zenoh.ext
 
+from fasaco_edge.wire.ros_keys import attachment
 from fasaco_edge.wire.topic_types import Qos
 
 CDR = zenoh.Encoding.APPLICATION_CDR
@@ -79,3 +81,22 @@ def _latched(session: zenoh.Session, key: str, options: dict[str, Any], samples:
         ),
         publisher_detection=True,
     )
+
+
+class RosPublisher:
+    """Publishes one ROS 2 topic; with ``gid``, what rmw_zenoh demands goes with each sample."""
+
+    def __init__(self, publisher: Publisher, gid: bytes = b"") -> None:
+        self._publisher = publisher
+        self._gid = gid
+        self._count = 0
+
+    def forget(self) -> None:
+        """Drop the sample kept for late joiners."""
+        self._publisher.forget()
+
+    def put(self, payload: bytes | zenoh.ZBytes) -> None:
+        """Send a message."""
+        self._count += 1
+        beside = attachment(self._count, time.time_ns(), self._gid) if self._gid else b""
+        self._publisher.put(payload, beside)

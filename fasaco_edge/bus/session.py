@@ -8,6 +8,7 @@ the sample on.
 from __future__ import annotations
 
 import contextlib
+import logging
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -30,10 +31,15 @@ from fasaco_edge.bus.queries import (
     size_of,
 )
 from fasaco_edge.bus.settings import BusSettings, first_line, session_config
-from fasaco_edge.bus.stand_in import StandIn
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import VOLATILE, Qos, Topic
+
+LOG = logging.getLogger(__name__)
+
+# A port at which nobody has listened for so long [s] is taken: one that is only restarted gets its
+# own again. And so long until the next try, where another process was first [s].
+ABSENT_S, RETRY_S = 2.0, 1.0
 
 # Longest wait for the end of a session [s]: before a listener that no longer reads, Zenoh tries for
 # ten seconds to get rid of what is queued, and fails then.
@@ -276,3 +282,36 @@ def open_bus(settings: BusSettings) -> Bus:
     except zenoh.ZError as error:
         raise BusUnavailable(first_line(error)) from error
     return Bus(session, stand_in=StandIn(session_config(settings)))
+
+
+class StandIn:
+    """Listens in place of a process that was joined, and is gone.
+
+    A session that finds its port taken is a client of whom has it. Once that one is gone, nobody
+    else could reach this process: so it listens there itself, by a session that the first finds.
+
+    Args:
+        config: of a session that listens there.
+    """
+
+    def __init__(self, config: zenoh.Config) -> None:
+        self._config = config
+        self._session: Any = None  # close() has no annotation
+        self._try_at: float | None = None
+
+    def poll(self, now: float, *, is_alone: bool) -> None:
+        """Listen once the first session has been alone for ``ABSENT_S``; ``now`` is steady [s]."""
+        if not is_alone or self._session is not None:
+            self._try_at = None
+        elif self._try_at is None:
+            self._try_at = now + ABSENT_S
+        elif now >= self._try_at:
+            self._try_at = now + RETRY_S
+            with contextlib.suppress(zenoh.ZError):  # another process listens there by now
+                self._session = zenoh.open(self._config)
+                LOG.info("who listened here is gone: this process listens instead")
+
+    def close(self) -> None:
+        """End the session."""
+        if self._session is not None:
+            self._session.close()

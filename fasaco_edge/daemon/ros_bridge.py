@@ -13,8 +13,8 @@ from functools import partial
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
+from fasaco_edge.bus.publisher import RosPublisher
 from fasaco_edge.bus.queries import Reply
-from fasaco_edge.bus.ros_publisher import RosPublisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.daemon.loop.inbox import poster

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fasaco_edge.bus.ros_publisher import RosPublisher
+from fasaco_edge.bus.publisher import RosPublisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.wire import topics

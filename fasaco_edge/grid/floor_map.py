@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange, stale_cells
 from fasaco_edge.grid.fine_raster import (
+    PolygonsOnRaster,
     RobotDiscs,
     blocked_pixels,
     fine_geometry,
@@ -22,7 +23,6 @@ from fasaco_edge.grid.fine_raster import (
 )
 from fasaco_edge.grid.floor import StandLattice, states_of
 from fasaco_edge.grid.geometry import GridGeometry, Point, Polygon, Window, polygon_bounds
-from fasaco_edge.grid.kept_out import PolygonsOnRaster
 from fasaco_edge.grid.lattice import (
     UNKNOWN,
     Cell,

@@ -20,8 +20,7 @@ from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder, Zone, read_command
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
-from fasaco_edge.wire.documents.path_digest import PATH_DIGEST
-from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
 from fasaco_edge.wire.documents.replies import FloorReport
 from fasaco_edge.wire.documents.settings import Settings, known_settings
 from fasaco_edge.wire.documents.status import Status

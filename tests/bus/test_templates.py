@@ -11,7 +11,7 @@ import zenoh
 
 from fasaco_edge.bus import access
 from fasaco_edge.bus.settings import BusSettings, session_config
-from fasaco_edge.config.config import load_config
+from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.security import read_client_security
 from fasaco_edge.host.resources import folder
 

@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
+from fasaco_edge.grid.fine_raster import PolygonsOnRaster
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
-from fasaco_edge.grid.kept_out import PolygonsOnRaster
 
 ROWS, COLS = 120, 170
 

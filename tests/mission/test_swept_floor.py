@@ -14,8 +14,7 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     PIXEL_M,
     pixels_under,
 )
-from fasaco_edge.mission.coverage.pose_scatter import PoseScatter
-from fasaco_edge.mission.coverage.steady_track import SteadyTrack
+from fasaco_edge.mission.coverage.steady_track import PoseScatter, SteadyTrack
 from fasaco_edge.mission.coverage.swept_floor import (
     ANYWHERE,
     DROPPED_FLOOR_TILES,

@@ -28,7 +28,7 @@ from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter, WriterState
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.documents.path_digest import DIGEST_BYTES, PATH_DIGEST, digest
+from fasaco_edge.wire.documents.path_documents import DIGEST_BYTES, PATH_DIGEST, digest
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path

@@ -25,7 +25,7 @@ from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.recording.write.part import Part
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.documents.path_digest import PATH_DIGEST
+from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID

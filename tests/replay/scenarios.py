@@ -19,8 +19,7 @@ from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.replay.mission_drive import ReplayStep
 from fasaco_edge.replay.replay import Replay, read_run
 from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.documents.path_digest import PATH_DIGEST, digest
-from fasaco_edge.wire.documents.path_documents import PlanFigures
+from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PlanFigures, digest
 from fasaco_edge.wire.messages.maps import (
     decode_map_update,
     decode_occupancy_grid,

@@ -16,7 +16,7 @@ from fasaco_edge.cli import main
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.replay import Replay, read_run
-from fasaco_edge.wire.documents.path_digest import PATH_DIGEST
+from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
 from tests.replay import scenarios
 from tests.replay.scenarios import driven_m, left, places, played, stands_on_unknown
 from tests.support.processes import fasaco_edge

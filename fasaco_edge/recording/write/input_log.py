@@ -17,7 +17,7 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.samples import Numbered, SampleEncoder
 from fasaco_edge.wire.documents.json_text import decode_tolerant
-from fasaco_edge.wire.documents.path_digest import PATH_DIGEST, digest
+from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, digest
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.topics import RECORDED_INPUTS

@@ -1,4 +1,4 @@
-"""Path documents: attachments to a path's poses and to the trail's field."""
+"""Path documents: attachments to a path's poses and to the trail's field, a path's digest."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Name, 
 
 if TYPE_CHECKING:
     from fasaco_edge.planners.path import CoveragePath
+
+
+import hashlib
 
 
 class PlanFigures(Document, frozen=True):
@@ -131,3 +134,14 @@ class TrailAttachment(Document, frozen=True):
     revision: Count = 0
     cells: Count = 0
     branching: Amount = 0.0
+
+
+PATH_DIGEST = "path_digest"
+"""Topic that stands for a path in a recording: with its attachment and, as payload, the ``digest``
+of its points, float64 x, y [m]."""
+DIGEST_BYTES = 16
+
+
+def digest(payload: bytes) -> bytes:
+    """Return DIGEST_BYTES bytes that no other payload has."""
+    return hashlib.blake2b(payload, digest_size=DIGEST_BYTES).digest()
