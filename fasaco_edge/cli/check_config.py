@@ -10,7 +10,8 @@ import yaml
 from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
-from fasaco_edge.config.config import DaemonConfig, inspect_config
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.loading import inspect_config
 from fasaco_edge.config.reading import Fault
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.errors import BadConfiguration

@@ -170,7 +170,7 @@ def _answer(question: str, default: str) -> str:
 
 def _checked(text: str) -> DaemonConfig:
     """Return the configuration in a text; raise the first of its faults."""
-    from fasaco_edge.config.config import inspect_config
+    from fasaco_edge.config.loading import inspect_config
 
     with TemporaryDirectory() as folder:
         file = Path(folder, "config.yaml")

@@ -16,9 +16,8 @@ from fasaco_edge.config.config import (
     PoseConfig,
     RecordingConfig,
     RobotConfig,
-    decode_config,
-    load_config,
 )
+from fasaco_edge.config.loading import decode_config, load_config
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.wire.schemas import POSE_SCHEMAS, POSE_STAMPED
 

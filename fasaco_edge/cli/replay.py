@@ -17,11 +17,10 @@ from fasaco_edge import __version__
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.config.config import load_config
+from fasaco_edge.config.loading import load_config
 from fasaco_edge.replay.cycle_replay import CycleReplay, Difference, read_turns
 from fasaco_edge.replay.replay import Replay, read_run
-from fasaco_edge.wire.documents.path_digest import digest
-from fasaco_edge.wire.documents.path_documents import PlanFigures
+from fasaco_edge.wire.documents.path_documents import PlanFigures, digest
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.events import PathUpdate

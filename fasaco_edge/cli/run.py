@@ -54,7 +54,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve."""
-    from fasaco_edge.config.config import load_config, with_mask
+    from fasaco_edge.config.loading import load_config, with_mask
     from fasaco_edge.daemon.service import run_daemon
 
     def read() -> DaemonConfig:

@@ -7,7 +7,8 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from fasaco_edge.config.config import DaemonConfig, load_config
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.loading import load_config
 from fasaco_edge.doctor import machine, security, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, fail, find_unit, ok, warn
 from fasaco_edge.errors import BadConfiguration, FasacoError

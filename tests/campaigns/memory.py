@@ -25,7 +25,8 @@ from typing import Any
 import numpy as np
 
 from fasaco_edge.bench.processes import warm_kernels
-from fasaco_edge.config.config import DaemonConfig, load_config
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.loading import load_config
 from fasaco_edge.daemon.memory import afforded, needed_bytes
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid

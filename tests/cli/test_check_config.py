@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from fasaco_edge.cli import main
-from fasaco_edge.config.config import load_config
+from fasaco_edge.config.loading import load_config
 from fasaco_edge.errors import BadConfiguration
 from tests.support.processes import fasaco_edge
 

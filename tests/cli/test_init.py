@@ -9,7 +9,8 @@ import pytest
 
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console import terminal
-from fasaco_edge.config.config import DaemonConfig, load_config
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.loading import load_config
 from tests.support.processes import free_endpoint
 from tests.support.ros_robot import GRID, Naming, ros_robot, ros_router
 

@@ -15,7 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.cli import main
-from fasaco_edge.config.config import DaemonConfig, MissionSettings, decode_config, load_config
+from fasaco_edge.config.config import DaemonConfig, MissionSettings
+from fasaco_edge.config.loading import decode_config, load_config
 from fasaco_edge.config.ros import RosConfig, RosFrames
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.registry import PLANNER_NAMES
@@ -278,7 +279,7 @@ def test_checking_needs_no_compiler(tmp_path):
     file = tmp_path / "config.yaml"
     file.write_text("planner: {velocities: '4,2', ants: 100}")
     code = (
-        "import sys; from pathlib import Path; from fasaco_edge.config.config import load_config; "
+        "import sys; from pathlib import Path; from fasaco_edge.config.loading import load_config; "
         f"load_config(Path({str(file)!r})); assert 'numba' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -3,7 +3,7 @@
 import pytest
 import yaml
 
-from fasaco_edge.config.config import load_config
+from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.reading import with_credentials
 
 LENT = {"CREDENTIALS_DIRECTORY": "/run/credentials/a.service"}

@@ -7,7 +7,7 @@ import subprocess
 import pytest
 import yaml
 
-from fasaco_edge.config.config import load_config
+from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import from_here, is_local
 from fasaco_edge.errors import BadConfiguration, OpenToEveryone

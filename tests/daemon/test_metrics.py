@@ -13,7 +13,8 @@ from contextlib import contextmanager
 import pytest
 from msgspec import structs
 
-from fasaco_edge.config.config import DaemonConfig, inspect_config
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.loading import inspect_config
 from fasaco_edge.config.metrics import Address, MetricsConfig
 from fasaco_edge.daemon.exposition import CONTENT_TYPE, exposition
 from fasaco_edge.daemon.metrics import MetricsServer, serve_metrics

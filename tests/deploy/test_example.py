@@ -6,7 +6,8 @@ from pathlib import Path
 import msgspec
 import yaml
 
-from fasaco_edge.config.config import DaemonConfig, load_config
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.ros import RosConfig
 
 EXAMPLE = Path(__file__).parents[2] / "deploy" / "fasaco-edge.yaml"

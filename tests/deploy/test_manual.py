@@ -9,7 +9,7 @@ import subprocess
 
 import pytest
 
-from fasaco_edge.config.config import load_config
+from fasaco_edge.config.loading import load_config
 from tests.deploy.manual import MANUAL, blocks
 from tests.support.processes import PROGRAM
 

@@ -14,9 +14,9 @@ import pytest
 import yaml
 
 from fasaco_edge.cli import main
-from fasaco_edge.config.config import load_config
+from fasaco_edge.config.loading import load_config
 from fasaco_edge.daemon.ledger.file import LedgerFile
-from fasaco_edge.wire.documents.path_digest import digest
+from fasaco_edge.wire.documents.path_documents import digest
 
 pytest.importorskip("rerun")
 

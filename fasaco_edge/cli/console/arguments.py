@@ -190,7 +190,7 @@ def robot_on_bus(args: argparse.Namespace) -> RobotOnBus:
 
     file = getattr(args, "config", None)
     if file is not None:
-        from fasaco_edge.config.config import load_config
+        from fasaco_edge.config.loading import load_config
 
         config = load_config(file)
         keys = Keys(args.robot or config.robot.name, args.base or config.bus.base)

@@ -1,0 +1,142 @@
+"""Loading of configurations: a YAML file read and checked as a whole, with all that is wrong."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+from msgspec import structs
+
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.reading import Fault, read_text, section_faults, with_credentials
+from fasaco_edge.config.security import security_faults
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.mission.orders.mask import INLINE, inline_mask
+from fasaco_edge.wire.keys import Keys
+
+
+def load_config(path: Path | None) -> DaemonConfig:
+    """Read a YAML file; without one return the defaults.
+
+    Raises:
+        BadConfiguration: the file is missing, is no YAML, has unknown keys or
+            impossible values; the text names key, value and what is allowed.
+    """
+    config, faults = inspect_config(path)
+    if config is not None:
+        return config
+    first, *more = faults
+    where = f"{path}, line {first.line}" if first.line else str(path)
+    hint = first.error.hint
+    if more:
+        others = f"the {len(more)} others" if len(more) > 1 else "another one"
+        hint += f"; fasaco-edge check-config {path} shows {others}"
+    raise type(first.error)(f"{where}: {first.error}", hint=hint) from first.error
+
+
+def with_mask(config: DaemonConfig, file: Path | None) -> DaemonConfig:
+    """Return a configuration that holds its keep-out mask itself.
+
+    Args:
+        config: with the name of a file, sought from the configuration's own folder.
+        file: of the configuration.
+
+    Raises:
+        BadConfiguration: the mask cannot be read.
+    """
+    mission = config.mission
+    if not mission.keep_out_mask or mission.keep_out_mask.startswith(INLINE):
+        return config
+    path = (file or Path()).parent / mission.keep_out_mask
+    mask = inline_mask(path, config.map.occupied_at_least)
+    return structs.replace(config, mission=structs.replace(mission, keep_out_mask=mask))
+
+
+def decode_config(document: bytes) -> DaemonConfig:
+    """Return a configuration from the JSON that another process of the package has encoded.
+
+    Raises:
+        BadConfiguration: it is none.
+    """
+    try:
+        return msgspec.json.decode(document, type=DaemonConfig)
+    except msgspec.DecodeError as error:
+        raise BadConfiguration(f"configuration on standard input: {error}") from error
+
+
+def inspect_config(path: Path | None) -> tuple[DaemonConfig | None, tuple[Fault, ...]]:
+    """Read a YAML file; return the configuration, or None and all faults.
+
+    Whether values fit together is checked once each is valid by itself.
+    """
+    if path is None:
+        return DaemonConfig(), ()
+    try:
+        text = read_text(path)
+    except BadConfiguration as error:
+        return None, (Fault("", error),)
+    faults = [*text.twice, *section_faults(DaemonConfig, text.document)]
+    if not faults:
+        config = msgspec.convert(with_credentials(text.document), DaemonConfig)
+        faults = [Fault(_named_in(error), error) for error in _misfits(config)]
+        if not faults:
+            return config, ()
+    return None, tuple(
+        replace(fault, line=fault.line or text.line_of(fault.key)) for fault in faults
+    )
+
+
+def _named_in(error: BadConfiguration) -> str:
+    """Return the key at the start of an error."""
+    match = re.match(r"[\w.\[\]]*", str(error))
+    return match[0] if match else ""
+
+
+def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
+    """Yield values that do not fit together."""
+    low, high = config.map.free_at_most, config.map.occupied_at_least
+    if low >= high:
+        yield BadConfiguration(
+            f"map.free_at_most must be below map.occupied_at_least, got {low} and {high}"
+        )
+    bus = config.bus
+    if not (bus.listen or bus.connect):
+        yield BadConfiguration("bus.listen and bus.connect must not both be empty")
+    yield from security_faults(
+        bus.security, bus.listen, bus.connect, open_to_everyone=bus.open_to_everyone
+    )
+    if bus.security.roles.ros and not config.ros2:
+        yield BadConfiguration("bus.security.roles.ros: without a block ros2 there is no such role")
+    part_mb, quota_mb = config.recording.part_mb, config.recording.quota_mb
+    if 0 < quota_mb < 2 * part_mb:
+        yield BadConfiguration(
+            f"recording.quota_mb must be 0 or at least twice recording.part_mb, {2 * part_mb}, "
+            f"got {quota_mb}"
+        )
+    yield from _refused("", config.metrics.address)
+    if "\0" in config.mission.state_dir:
+        yield BadConfiguration("mission.state_dir must be a path, got one with a NUL")
+    if (battery := config.battery) and battery.enough < max(battery.low, battery.reserve) + 0.1:
+        yield BadConfiguration(
+            "battery.enough must be at least 0.1 above battery.low and battery.reserve, got "
+            f"{battery.enough:g}, {battery.low:g} and {battery.reserve:g}"
+        )
+    if config.ros2:
+        for error in config.ros2.faults():
+            yield BadConfiguration(f"ros2.{error}")
+    yield from _refused("bus.", lambda: Keys(base=config.bus.base))
+    yield from _refused("robot.name: ", lambda: Keys(robot=config.robot.name))
+    yield from _refused("robot: ", config.robot.cost)
+    yield from _refused("planner.", config.planner.colony)
+    yield from _refused("", config.mission.check_zones)
+
+
+def _refused(before: str, make: Callable[[], object]) -> Iterator[BadConfiguration]:
+    """Yield why ``make`` refuses a value, if it does."""
+    try:
+        make()
+    except BadConfiguration as error:
+        yield BadConfiguration(before + str(error), hint=error.hint)
