@@ -20,7 +20,7 @@ __version__ = "0.1.0"
 # ``__init__.pyi``.
 _PLACES = {
     "Map": "offline.maps:Map",
-    "Plan": "offline.plan:Plan",
+    "Plan": "offline.result:Plan",
     "Robot": "config.config:RobotConfig",
     "Search": "offline.settings:Search",
     "load_map": "offline.maps:load_map",

@@ -1,8 +1,8 @@
 from fasaco_edge.config.config import RobotConfig as Robot
 from fasaco_edge.offline.maps import Map as Map
 from fasaco_edge.offline.maps import load_map as load_map
-from fasaco_edge.offline.plan import Plan as Plan
 from fasaco_edge.offline.plan import plan as plan
+from fasaco_edge.offline.result import Plan as Plan
 from fasaco_edge.offline.settings import Search as Search
 
 __version__: str

@@ -24,7 +24,7 @@ from fasaco_edge.host.processes import ctrl_c_asks
 from fasaco_edge.planners.planner import ColonySnapshot, Interrupt, ignore
 
 if TYPE_CHECKING:
-    from fasaco_edge.offline.plan import Plan
+    from fasaco_edge.offline.result import Plan
 
 WITH_PHEROMONE = ("fasaco", "aco")
 
@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _draw_pheromone(file: Path, planned: Plan, trails: Sequence[ColonySnapshot]) -> None:
-    from fasaco_edge.offline.picture import pheromone_picture_of
+    from fasaco_edge.offline.result import pheromone_picture_of
 
     if not trails or trails[0].tau is None:
         raise BadConfiguration(

@@ -1,30 +1,23 @@
-"""A plan: a walk over the cells of a map, the line to be driven, and how good both are."""
+"""Planning offline: a walk over the cells of a map, and the line to be driven."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
-from pathlib import Path
+from dataclasses import replace
 from types import FunctionType
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
-from PIL import Image
 
-from fasaco_edge.bench.floor import JudgedFloor
 from fasaco_edge.config.config import RobotConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.offline.figures import figures_of
-from fasaco_edge.offline.floor import PlannedFloor, judged_floor
-from fasaco_edge.offline.ground import Ground, Line
+from fasaco_edge.offline.ground import Ground
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.own_planner import OwnPlanner
-from fasaco_edge.offline.picture import picture_of
+from fasaco_edge.offline.result import Plan
 from fasaco_edge.offline.settings import (
     ANYWHERE,
     AXES,
@@ -53,84 +46,6 @@ from fasaco_edge.planners.registry import planner_of
 
 # Rows and columns of the farthest cells there are: arrays of cells are int32.
 MOST_INDEX = 2**31 - 1
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A walk over a map, and the line along it.
-
-    Attributes:
-        map: what it is on.
-        robot: for which.
-        line: through the centres of ``cells``, or over the floor, ``quick`` or ``thorough``.
-        search: how the walk was searched.
-        ground: the cells, and where the robot stands in them.
-        problem: what was to be covered, from where.
-        path: the walk, with its cost and bound.
-        xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, to be driven straight from
-            one to the next.
-        ended_by: what ended the search.
-        wall_s, cpu_s: what the search took [s].
-    """
-
-    map: Map
-    robot: RobotConfig
-    line: str
-    search: Search
-    ground: Ground
-    problem: CoverageProblem
-    path: CoveragePath
-    xy: Line
-    ended_by: str
-    wall_s: float
-    cpu_s: float
-
-    @property
-    def cells(self) -> NDArray[np.int32]:
-        """The walk, int32 (n, 2): cells (row, col), the start first."""
-        return self.path.cells
-
-    @property
-    def steps(self) -> int:
-        """Steps from cell to cell."""
-        return self.path.steps
-
-    @property
-    def cost_s(self) -> float:
-        """Seconds that the robot drives and turns along the cells."""
-        return self.path.cost_s
-
-    @property
-    def gap(self) -> float | None:
-        """How far ``cost_s`` may be above the least there can be, a share; None if not known."""
-        return self.path.gap
-
-    @cached_property
-    def judged(self) -> JudgedFloor | None:
-        """The floor that the line sweeps and leaves; None for a coverage grid."""
-        return judged_floor(self.map.grid, self.xy, self.robot)
-
-    @property
-    def floor(self) -> PlannedFloor | None:
-        """Figures of the floor; None for a coverage grid."""
-        return None if self.judged is None else PlannedFloor.of(self.judged.figures)
-
-    @property
-    def swept_share(self) -> float | None:
-        """The share of the reachable floor that the line sweeps; None for a coverage grid."""
-        return None if self.floor is None else self.floor.swept_share
-
-    @property
-    def figures(self) -> dict[str, object]:
-        """All figures, as values that JSON has too: those of ``fasaco-edge plan --json``."""
-        return figures_of(self)
-
-    def plot(self, file: str | Path | None = None) -> Image.Image:
-        """Return a picture, RGB, of the walk or the line over the map; as PNG, too."""
-        picture = picture_of(self)
-        if file is not None:
-            picture.save(file, "PNG")
-        return picture
 
 
 def plan(

@@ -19,7 +19,6 @@ from fasaco_edge.cli.planning.progress import watching
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import ctrl_c_asks
-from fasaco_edge.offline.figures import driving
 from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
@@ -122,6 +121,8 @@ def _figures(
     args: argparse.Namespace, request: PlanRequest, lattice: CoverageLattice, division: Division
 ) -> dict[str, object]:
     """Return the figures of all robots together, as JSON values."""
+    from fasaco_edge.offline.result import driving
+
     steps = [len(walk) - 1 for walk in division.walks]
     least = division.lower_bound_steps
     window = lattice.window

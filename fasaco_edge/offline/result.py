@@ -1,0 +1,287 @@
+"""The result of planning: a walk, the line along it, how good both are, and pictures of them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from fasaco_edge.bench.drive_time import DriveLimits
+from fasaco_edge.bench.floor import (
+    FloorFigures,
+    JudgedFloor,
+    SweepingRobot,
+    judge_floor,
+    swept_words,
+)
+from fasaco_edge.config.config import RobotConfig
+from fasaco_edge.drawing.pictures import draw_walk
+from fasaco_edge.drawing.plot import MapLayer
+from fasaco_edge.drawing.trail import draw_trail
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.offline.ground import Ground, Line
+from fasaco_edge.offline.maps import Map
+from fasaco_edge.offline.settings import CELLS, Search
+from fasaco_edge.planners.living_trail import Tau, branching
+from fasaco_edge.planners.path import CoveragePath, walk_figures
+from fasaco_edge.planners.problem import CoverageProblem
+
+# Members of ``RobotConfig``: the limits that bends of the line are counted by.
+LIMITS = ("turn_deg_s", "turn_deg_s2", "acceleration_m_s2", "steered_deg")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A walk over a map, and the line along it.
+
+    Attributes:
+        map: what it is on.
+        robot: for which.
+        line: through the centres of ``cells``, or over the floor, ``quick`` or ``thorough``.
+        search: how the walk was searched.
+        ground: the cells, and where the robot stands in them.
+        problem: what was to be covered, from where.
+        path: the walk, with its cost and bound.
+        xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, to be driven straight from
+            one to the next.
+        ended_by: what ended the search.
+        wall_s, cpu_s: what the search took [s].
+    """
+
+    map: Map
+    robot: RobotConfig
+    line: str
+    search: Search
+    ground: Ground
+    problem: CoverageProblem
+    path: CoveragePath
+    xy: Line
+    ended_by: str
+    wall_s: float
+    cpu_s: float
+
+    @property
+    def cells(self) -> NDArray[np.int32]:
+        """The walk, int32 (n, 2): cells (row, col), the start first."""
+        return self.path.cells
+
+    @property
+    def steps(self) -> int:
+        """Steps from cell to cell."""
+        return self.path.steps
+
+    @property
+    def cost_s(self) -> float:
+        """Seconds that the robot drives and turns along the cells."""
+        return self.path.cost_s
+
+    @property
+    def gap(self) -> float | None:
+        """How far ``cost_s`` may be above the least there can be, a share; None if not known."""
+        return self.path.gap
+
+    @cached_property
+    def judged(self) -> JudgedFloor | None:
+        """The floor that the line sweeps and leaves; None for a coverage grid."""
+        return judged_floor(self.map.grid, self.xy, self.robot)
+
+    @property
+    def floor(self) -> PlannedFloor | None:
+        """Figures of the floor; None for a coverage grid."""
+        return None if self.judged is None else PlannedFloor.of(self.judged.figures)
+
+    @property
+    def swept_share(self) -> float | None:
+        """The share of the reachable floor that the line sweeps; None for a coverage grid."""
+        return None if self.floor is None else self.floor.swept_share
+
+    @property
+    def figures(self) -> dict[str, object]:
+        """All figures, as values that JSON has too: those of ``fasaco-edge plan --json``."""
+        return figures_of(self)
+
+    def plot(self, file: str | Path | None = None) -> Image.Image:
+        """Return a picture, RGB, of the walk or the line over the map; as PNG, too."""
+        picture = picture_of(self)
+        if file is not None:
+            picture.save(file, "PNG")
+        return picture
+
+
+def judged_floor(
+    grid: OccupancyGrid | None, line_xy: Line, robot: RobotConfig
+) -> JudgedFloor | None:
+    """Return what a line does to the floor of a map; None for a coverage grid, which has none."""
+    if grid is None:
+        return None
+    limits = None
+    if robot.turn_deg_s is not None:
+        limits = DriveLimits(
+            robot.acceleration_m_s2, robot.turn_deg_s, robot.turn_deg_s2, robot.steered_deg
+        )
+    judged = SweepingRobot(
+        robot.tool_width_m,
+        robot.radius_m,
+        robot.speed_m_s,
+        robot.cost().quarter_turn_s,
+        limits=limits,
+    )
+    return judge_floor(grid, line_xy, judged)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedFloor:
+    """The floor that a plan sweeps, as ``--json`` has it; ``FloorFigures`` says what each is."""
+
+    reachable_m2: float
+    swept_share: float | None
+    seconds_per_m2: float | None
+    patches_over_4_dm2: int
+    largest_patch_m2: float
+    illegal_share: float
+
+    def __str__(self) -> str:
+        """What a table and a picture say of it."""
+        if self.swept_share is None:
+            return "none is reachable"
+        swept_m2 = self.swept_share * self.reachable_m2
+        words = f"{swept_words(swept_m2, self.reachable_m2)} swept"
+        if count := self.patches_over_4_dm2:
+            patches = "1 patch" if count == 1 else f"{count} patches"
+            words += f", {patches} over 4 dm2 left, the largest {self.largest_patch_m2:,.2f} m2"
+        if self.seconds_per_m2 is not None:
+            words += f", {self.seconds_per_m2:.1f} s/m2"
+        if self.illegal_share:
+            words += f"; {self.illegal_share:.1%} of the line is too near to what is not free"
+        return words
+
+    @classmethod
+    def of(cls, figures: FloorFigures) -> PlannedFloor:
+        """Return the figures, rounded."""
+        share, pace = figures.swept_share, figures.seconds_per_m2
+        return cls(
+            reachable_m2=round(figures.reachable_m2, 2),
+            swept_share=None if share is None else round(share, 4),
+            seconds_per_m2=None if pace is None else round(pace, 3),
+            patches_over_4_dm2=figures.patches_over_4_dm2,
+            largest_patch_m2=round(figures.largest_patch_m2, 3),
+            illegal_share=round(figures.illegal_share, 4),
+        )
+
+
+def figures_of(plan: Plan) -> dict[str, object]:
+    """Return the figures of a walk, of the search for it, and of the floor under its line."""
+    path, problem, ground, search = plan.path, plan.problem, plan.ground, plan.search
+    cell_m = problem.lattice.cell_m
+    return {
+        "planner": path.planner,
+        "local_search": search.has_local_search,
+        "seed": path.seed,
+        "ants": path.work.ants,
+        "kicks": path.work.perturbations,
+        "proposals": path.work.proposals,
+        "velocities": velocities_of(plan),
+        "map": plan.map.name,
+        "line": plan.line,
+        "tool_m": plan.robot.tool_width_m,
+        "cell_m": cell_m,
+        "lattice_deg": round(ground.lattice_deg, 3),
+        "start": list(problem.start),
+        "end": path.cells[-1].tolist(),
+        **asdict(walk_figures(problem.lattice, path.cells)),
+        # What there is to cover; the walk may pass over no other cells.
+        "cells": problem.cells,
+        "length_m": round(path.steps * cell_m, 3),
+        "cost_s": path.cost_s,
+        "lower_bound_steps": path.lower_bound_steps,
+        "lower_bound_cost_s": path.lower_bound_cost_s,
+        "gap": None if path.gap is None else round(path.gap, 6),
+        "unreachable_cells": int(np.count_nonzero(problem.unreachable)),
+        **driving(plan.robot),
+        "budget_s": search.most_s,
+        "target_gap": search.target_gap,
+        "threads": search.threads,
+        "ended_by": plan.ended_by,
+        "first_walk_ms": round(1e3 * path.first_walk_s, 3),
+        "wall_s": round(plan.wall_s, 6),
+        "cpu_s": round(plan.cpu_s, 6),
+        "floor": asdict(plan.floor) if plan.floor else None,
+    }
+
+
+def driving(robot: RobotConfig) -> dict[str, float | None]:
+    """Return what driving takes a robot; limits are None where turns count by their angle."""
+    has_limits = robot.turn_deg_s is not None
+    return {
+        "speed_m_s": robot.speed_m_s,
+        "turn_s": robot.cost().quarter_turn_s,
+        **{name: getattr(robot, name) if has_limits else None for name in LIMITS},
+    }
+
+
+def velocities_of(plan: Plan) -> str | None:
+    """Return the velocities of the ants that walked; None of a planner that has none."""
+    return {"fasaco": plan.search.velocities, "aco": "1"}.get(plan.path.planner)
+
+
+def picture_of(plan: Plan) -> Image.Image:
+    """Return a picture, RGB, of a plan."""
+    path, ground, judged = plan.path, plan.ground, plan.judged
+    has_search = plan.search.has_local_search
+    search = f", {path.work.perturbations} perturbations" if has_search else ""
+    walk = walk_figures(ground.lattice, path.cells)
+    deg = round(ground.lattice_deg, 3)
+    askew = f" at {deg:g} degrees" if deg else ""
+    lines = [
+        f"{plan.map.name}: {plan.problem.cells} cells of {ground.lattice.cell_m:g} m{askew}, "
+        f"{walk.steps} steps, {walk.revisits} revisits, {walk.turns_90} quarter-turns; "
+        f"at most {path.gap or 0.0:.1%} above the least time there can be",
+    ]
+    if judged is not None:
+        lines.append(f"reachable floor: {plan.floor}")
+    shows_floor = judged is not None and plan.line != CELLS
+    return draw_walk(
+        ground.lattice,
+        path.cells,
+        grid=ground.grid,
+        title=path.planner + _colony(plan) + search,
+        lines=lines,
+        line_xy=plan.xy,
+        swept=MapLayer(judged.geometry, judged.swept) if judged and shows_floor else None,
+        unswept=MapLayer(judged.geometry, judged.unswept) if judged else None,
+    )
+
+
+def pheromone_picture_of(plan: Plan, tau: Tau) -> Image.Image:
+    """Return a picture, RGB, of the trail that a plan's colony left."""
+    ground = plan.ground
+    # Ants come nowhere else.
+    tau = np.where(plan.problem.to_cover[..., np.newaxis], tau, np.float32(0))
+    # Cells askew are drawn upright, without the map that they lie askew on.
+    deg = round(ground.lattice_deg, 3)
+    askew = f", along rows at {deg:g} degrees to the map, which is not drawn" if deg else ""
+    lines = [
+        f"{plan.map.name}: where the pheromone on a cell's steps points to{askew}. The stronger "
+        "the colour and the larger the arrow, the more of it lies on that one step, beside "
+        "the cell where it is most.",
+        f"On average {branching(tau):.2f} of a cell's directions have much pheromone (1: the trail "
+        "leads one way everywhere).",
+    ]
+    return draw_trail(
+        ground.lattice,
+        tau,
+        grid=None if deg else ground.grid,
+        title=f"pheromone of {plan.path.planner}{_colony(plan)}",
+        lines=lines,
+    )
+
+
+def _colony(plan: Plan) -> str:
+    """Return which ants walked; "" for none."""
+    ants = plan.path.work.ants
+    counted = "1 ant" if ants == 1 else f"{ants} ants"
+    return f" {velocities_of(plan)}, {counted}, seed {plan.path.seed}" if ants else ""
