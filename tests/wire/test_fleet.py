@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig, FleetConfig, RobotConfig
 from fasaco_edge.daemon.loop.fleet import LEAST_SPACING_S, TILES, FleetEar, FleetVoice
-from fasaco_edge.daemon.loop.inbox import Received
 from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.wire.documents.fleet import FleetMember, SweptTile, decode_member
 from fasaco_edge.wire.documents.json_text import encode_json
@@ -30,7 +29,7 @@ def said(**members):
 
 def heard(payload, robot="r2"):
     ear = FleetEar(CONFIG)
-    return ear.event(Received("fleet", Sample(f"fasaco/@v1/{robot}/fleet", payload), 0.0))
+    return ear.event(Sample(f"fasaco/@v1/{robot}/fleet", payload))
 
 
 def test_it_comes_back_as_it_was_and_is_that_of_the_schema():

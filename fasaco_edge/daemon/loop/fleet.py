@@ -6,10 +6,10 @@ Without a block ``fleet`` in the configuration nothing here is made.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
@@ -22,7 +22,6 @@ from fasaco_edge.wire.limits import MAX_FLEET_TILES
 from fasaco_edge.wire.topics import FLEET
 
 if TYPE_CHECKING:
-    from fasaco_edge.daemon.loop.inbox import Received
     from fasaco_edge.mission.core.mission import Mission
 
 PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
@@ -46,27 +45,26 @@ class FleetEar:
         self._keys, self._fleet, self._cell_m = config.keys(), config.fleet.name, config.cell_m
         self._heard_at: dict[str, float] = {}
 
-    def listen(self, bus: Bus, mailbox: Mailbox[object]) -> None:
-        """Post what others say into a mailbox, as far as they keep to their rate."""
-        from fasaco_edge.daemon.loop.inbox import Received  # noqa: PLC0415
+    def listen(self, bus: Bus, post: Callable[[Sample, float], None]) -> None:
+        """Hand on what others say, and when [s, monotonic], as far as they keep to their rate."""
 
-        def post(sample: Sample) -> None:
+        def post_due(sample: Sample) -> None:
             if self._is_due(sample.key, now := time.monotonic()):
-                mailbox.post(FLEET.name, Received(FLEET.name, sample, now))
+                post(sample, now)
 
-        bus.subscribe(self._keys.of_all(FLEET), post)
+        bus.subscribe(self._keys.of_all(FLEET), post_due)
 
-    def event(self, received: Received) -> MemberHeard | None:
+    def event(self, sample: Sample) -> MemberHeard | None:
         """Return what a robot says; None of one of another fleet, and of this one.
 
         Raises:
             MalformedMessage: it is not what it should be.
         """
-        robot = self._keys.robot_of(received.sample.key)
+        robot = self._keys.robot_of(sample.key)
         if robot in ("", self._keys.robot):
             return None
         try:
-            member = decode_member(received.sample.payload, self._fleet)
+            member = decode_member(sample.payload, self._fleet)
         except FleetError as error:
             return MemberHeard(robot, misfit=str(error))
         except FasacoError as error:

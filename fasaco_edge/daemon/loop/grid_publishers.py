@@ -1,74 +1,79 @@
-"""Publisher of the living trail: its field, with figures, and where it points to."""
+"""Publishers of grids that change as the robot drives: coverage, swept floor, living trail."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from fasaco_edge.daemon.loop.last_samples import ShownTrail
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.planners.living_trail import (
-    TrailSnapshot,
-    branching,
-    directions,
-    strongest_into,
-)
-from fasaco_edge.planners.planner import ColonySnapshot
-from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.documents.path_documents import TrailAttachment
-from fasaco_edge.wire.messages.maps import direction_values, encode_occupancy_grid
-from fasaco_edge.wire.messages.pheromone import encode_pheromone
+from fasaco_edge.wire.messages.maps import coverage_values
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.outbox import Outbox
     from fasaco_edge.mission.core.mission import Mission
 
-# The field is shown no more often than this [s], and a large one, which takes the loop some
+# The coverage is published no more often than this [s].
+COVERAGE_PERIOD_S = 0.5
+# Neither is the swept floor; in so many squares at most, which are larger where it is large.
+FLOOR_PERIOD_S = 2.0
+MOST_SQUARES = 1_000_000
+# The trail is shown no more often than this [s], and a large one, which takes the loop some
 # milliseconds per 100,000 cells, less often.
 PERIOD_S = 0.5
 CELLS_PER_S = 200_000
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ShownTrail:
-    """The living trail at a moment; becomes messages on any thread.
+class CoveragePublisher:
+    """Publishes the coverage grid when it has changed, but no more than twice a second."""
 
-    Attributes:
-        held: the trail.
-        cell_m: edge of a cell [m].
-        frame: of the map.
-        revision: of the path in force.
-        steps: of it, still to be driven.
-        stamp_ns: of the moment [ns].
-    """
+    def __init__(self, outbox: Outbox) -> None:
+        self._outbox = outbox
+        self._published_at = float("-inf")
+        self._key: tuple[object, ...] = ()
 
-    held: TrailSnapshot
-    cell_m: float
-    frame: str
-    revision: int
-    steps: int
-    stamp_ns: int
+    def forget(self) -> None:
+        """Publish the next grid even if it has not changed."""
+        self._key = ()
 
-    def field(self) -> tuple[bytes, bytes]:
-        """Return the field as payload and attachment."""
-        tau = self.held.tau
-        field = strongest_into(tau)
-        about = TrailAttachment(
-            revision=self.revision,
-            cells=int(np.count_nonzero(field)),
-            branching=round(branching(tau), 4),
-        )
-        seen = ColonySnapshot(self.held.window, self.cell_m, field, 0, 0, 0, self.steps)
-        return encode_pheromone(seen, self.frame, self.stamp_ns), encode_json(about)
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish the coverage if that is due."""
+        # An order may forget what was covered, and keep the robot out of cells.
+        key = (mission.covered.version, mission.map_revision, mission.order_state)
+        if key == self._key or now - self._published_at < COVERAGE_PERIOD_S:
+            return
+        lattice, grid = mission.lattice, mission.grid
+        if lattice is None or grid is None:
+            return
+        self._published_at, self._key = now, key
+        geometry = GridGeometry.of_cells(lattice.window, lattice.cell_m)
+        values = coverage_values(lattice.states, mission.covered.visits(lattice.window))
+        self._outbox.coverage(OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns))
 
-    def directions(self) -> bytes:
-        """Return where it points to as a payload."""
-        geometry = GridGeometry.of_cells(self.held.window, self.cell_m)
-        values = direction_values(*directions(self.held.tau))
-        return encode_occupancy_grid(OccupancyGrid(geometry, values, self.frame, self.stamp_ns))
+
+class FloorPublisher:
+    """Publishes the swept floor when it has changed and someone listens, every two seconds."""
+
+    def __init__(self, outbox: Outbox) -> None:
+        self._outbox = outbox
+        self._published_at = float("-inf")
+        self._key: tuple[object, ...] = ()
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish the swept floor if that is due."""
+        if not self._outbox.shows_floor:
+            self._key = ()  # the next listener has not received it
+            return
+        floor, grid = mission.floor, mission.grid
+        key = (floor, floor.changes)
+        is_early = now - self._published_at < FLOOR_PERIOD_S
+        if key == self._key or is_early or grid is None:
+            return
+        self._published_at, self._key = now, key
+        shown = floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
+        if shown is not None:
+            self._outbox.floor(shown)
 
 
 class TrailPublisher:

@@ -194,7 +194,8 @@ class Inbox:
         for topic in (topics.MAP_UPDATE, topics.POSE, topics.BATTERY):
             bus.listen(keys, topic, poster(mailbox, topic.name, max_pixels))
         if fleet is not None:
-            fleet.listen(bus, mailbox)
+            name = topics.FLEET.name
+            fleet.listen(bus, lambda said, at: mailbox.post(name, Received(name, said, at)))
 
     def ask_for_map(self, now: float) -> None:
         """Ask the publishers of the map for their newest one, unless that was done lately."""
@@ -260,7 +261,7 @@ class Inbox:
         """Return the event in a sample; None for transforms that give no new pose, and others."""
         kind, sample = received.kind, received.sample
         if kind == topics.FLEET.name:
-            return self._fleet.event(received) if self._fleet else None
+            return self._fleet.event(sample) if self._fleet else None
         if kind == "map_update":
             return PatchReceived(decode_map_update(sample.payload, self._max_pixels))
         if kind == "battery":

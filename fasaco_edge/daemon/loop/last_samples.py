@@ -4,15 +4,30 @@ from __future__ import annotations
 
 import re
 import threading
+from dataclasses import dataclass
 from functools import partial
+
+import numpy as np
 
 from fasaco_edge.bus.queries import Reply, Request
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.loop.answers import Said, answering, check
-from fasaco_edge.daemon.loop.trail_publisher import ShownTrail
 from fasaco_edge.errors import BadQuery, NotYet
+from fasaco_edge.grid.geometry import GridGeometry
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.planners.living_trail import (
+    TrailSnapshot,
+    branching,
+    directions,
+    strongest_into,
+)
+from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import schemas, topics
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.path_documents import TrailAttachment
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.messages.maps import direction_values, encode_occupancy_grid
+from fasaco_edge.wire.messages.pheromone import encode_pheromone
 
 # The cohort that stands for the last one.
 NEWEST = "newest"
@@ -91,3 +106,42 @@ class LastSamples:
             raise NotYet("there is no pheromone yet: there is no map with cells")
         payload, attachment = living.field()
         return Reply(payload, schemas.PHEROMONE_GRID, attachment)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShownTrail:
+    """The living trail at a moment; becomes messages on any thread.
+
+    Attributes:
+        held: the trail.
+        cell_m: edge of a cell [m].
+        frame: of the map.
+        revision: of the path in force.
+        steps: of it, still to be driven.
+        stamp_ns: of the moment [ns].
+    """
+
+    held: TrailSnapshot
+    cell_m: float
+    frame: str
+    revision: int
+    steps: int
+    stamp_ns: int
+
+    def field(self) -> tuple[bytes, bytes]:
+        """Return the field as payload and attachment."""
+        tau = self.held.tau
+        field = strongest_into(tau)
+        about = TrailAttachment(
+            revision=self.revision,
+            cells=int(np.count_nonzero(field)),
+            branching=round(branching(tau), 4),
+        )
+        seen = ColonySnapshot(self.held.window, self.cell_m, field, 0, 0, 0, self.steps)
+        return encode_pheromone(seen, self.frame, self.stamp_ns), encode_json(about)
+
+    def directions(self) -> bytes:
+        """Return where it points to as a payload."""
+        geometry = GridGeometry.of_cells(self.held.window, self.cell_m)
+        values = direction_values(*directions(self.held.tau))
+        return encode_occupancy_grid(OccupancyGrid(geometry, values, self.frame, self.stamp_ns))

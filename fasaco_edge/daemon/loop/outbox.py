@@ -19,11 +19,9 @@ from fasaco_edge.bus.queries import Reply, Shared
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.figures import log_fault
 from fasaco_edge.daemon.loop.inbox import PlanSnapshot
-from fasaco_edge.daemon.loop.last_samples import LastSamples
-from fasaco_edge.daemon.loop.trail_publisher import ShownTrail
+from fasaco_edge.daemon.loop.last_samples import LastSamples, ShownTrail
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.errors import FasacoError, NotPublished
-from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import command_document
@@ -32,7 +30,7 @@ from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.messages.maps import coverage_values, encode_occupancy_grid
+from fasaco_edge.wire.messages.maps import encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 
@@ -43,11 +41,6 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# The coverage is published no more often than this [s].
-COVERAGE_PERIOD_S = 0.5
-# Neither is the swept floor; in so many squares at most, which are larger where it is large.
-FLOOR_PERIOD_S = 2.0
-MOST_SQUARES = 1_000_000
 # Of what fails again and again one is logged in so long [s].
 LOG_PERIOD_S = 10.0
 # So many failures wait to be counted at most.
@@ -208,57 +201,6 @@ def rectangle(window: Window | None, cell_m: float) -> Rectangle | None:
         return None
     edges = (window.col0, window.row0, window.col1, window.row1)
     return Rectangle(*(round(edge * cell_m, 3) for edge in edges))
-
-
-class CoveragePublisher:
-    """Publishes the coverage grid when it has changed, but no more than twice a second."""
-
-    def __init__(self, outbox: Outbox) -> None:
-        self._outbox = outbox
-        self._published_at = float("-inf")
-        self._key: tuple[object, ...] = ()
-
-    def forget(self) -> None:
-        """Publish the next grid even if it has not changed."""
-        self._key = ()
-
-    def publish(self, mission: Mission, now: float) -> None:
-        """Publish the coverage if that is due."""
-        # An order may forget what was covered, and keep the robot out of cells.
-        key = (mission.covered.version, mission.map_revision, mission.order_state)
-        if key == self._key or now - self._published_at < COVERAGE_PERIOD_S:
-            return
-        lattice, grid = mission.lattice, mission.grid
-        if lattice is None or grid is None:
-            return
-        self._published_at, self._key = now, key
-        geometry = GridGeometry.of_cells(lattice.window, lattice.cell_m)
-        values = coverage_values(lattice.states, mission.covered.visits(lattice.window))
-        self._outbox.coverage(OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns))
-
-
-class FloorPublisher:
-    """Publishes the swept floor when it has changed and someone listens, every two seconds."""
-
-    def __init__(self, outbox: Outbox) -> None:
-        self._outbox = outbox
-        self._published_at = float("-inf")
-        self._key: tuple[object, ...] = ()
-
-    def publish(self, mission: Mission, now: float) -> None:
-        """Publish the swept floor if that is due."""
-        if not self._outbox.shows_floor:
-            self._key = ()  # the next listener has not received it
-            return
-        floor, grid = mission.floor, mission.grid
-        key = (floor, floor.changes)
-        is_early = now - self._published_at < FLOOR_PERIOD_S
-        if key == self._key or is_early or grid is None:
-            return
-        self._published_at, self._key = now, key
-        shown = floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
-        if shown is not None:
-            self._outbox.floor(shown)
 
 
 class PublishGuard:
