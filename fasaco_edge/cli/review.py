@@ -28,6 +28,7 @@ from fasaco_edge.review.comparison import (
 from fasaco_edge.review.document import ReviewDocument, explanations
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.spot import spots_left
+from fasaco_edge.review.wording import clock
 from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
@@ -157,13 +158,13 @@ def run(args: argparse.Namespace) -> int:
 def _answer(args: argparse.Namespace, review: Review) -> int:
     """Answer questions about a moment, and about spots."""
     from fasaco_edge.cli.console.arguments import writing
-    from fasaco_edge.review.instant import instant_rows, scene_at
+    from fasaco_edge.review.instant import scene_at
     from fasaco_edge.review.pictures import draw_scene, draw_spots
-    from fasaco_edge.review.spot import explain, spot_rows
+    from fasaco_edge.review.spot import explain
 
     if args.at is not None and args.at > review.duration_s:
         raise BadConfiguration(
-            f"--at: the recording is {rows.clock(review.duration_s)} long",
+            f"--at: the recording is {clock(review.duration_s)} long",
             hint="times count from the beginning of the recording, as in its review",
         )
     console = terminal.out()
@@ -174,10 +175,10 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
         print_json(msgspec.to_builtins(found))
     else:
         if scene is not None:
-            console.print(f"at {rows.clock(args.at)}", style="bold")
-            console.print(terminal.figures(instant_rows(scene.instant)))
+            console.print(f"at {clock(args.at)}", style="bold")
+            console.print(terminal.figures(rows.instant_rows(scene.instant)))
         for spot in spots:
-            console.print(terminal.figures(spot_rows(spot)))
+            console.print(terminal.figures(rows.spot_rows(spot)))
     if args.png:
         picture = draw_scene(review, scene) if scene else draw_spots(review, spots)
         if picture is None:
@@ -303,7 +304,7 @@ def _print_curve(console: Console, review: Review, height: int) -> None:
     console.print(Text("Coverage over time", "bold"), "of the cells coverable at the end")
     for label, line in zip(labels, lines, strict=True):
         console.print(f"{label:>6}", Text(line, "cyan"))
-    end = rows.clock(review.duration_s)
+    end = clock(review.duration_s)
     console.print(f"{'':>6} 0:00{end:>{PLOT_WIDTH - 4}}")
 
 

@@ -1,14 +1,17 @@
-"""Two runs side by side: how their set-ups differ, and which of their figures compare."""
+"""The figures of a run by name, and two runs side by side: how set-ups and figures differ."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TypeGuard
 
 import msgspec
 
+from fasaco_edge.bench.floor import swept_words
 from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.rows import NUMBERS, Figure, figures
+from fasaco_edge.review.drive import MILESTONES
+from fasaco_edge.review.wording import NOT_KNOWN, clock, count
 
 # By the name of a setting.
 SETTINGS = {
@@ -185,3 +188,77 @@ def _building(document: ReviewDocument) -> str:
     cells_m2 = _cells_m2(document)
     cells = "" if cells_m2 is None else f", {cells_m2:.1f} m2 of cells to cover"
     return f"{width:.1f} x {depth:.1f} m{cells}"
+
+
+NUMBERS = (
+    ("floor swept by the ledger", "ledger_swept_m2", "m2"),
+    ("covered again", "recovered_cells", "cells"),
+    ("out of reach", "unreachable_cells", "cells"),
+    ("steps", "steps", ""),
+    ("revisits", "revisits", ""),
+    ("quarter-turns", "turns_90", ""),
+    ("about-turns", "turns_180", ""),
+    ("driven", "driven_m", "m"),
+    ("paths published", "paths", ""),
+    ("replans", "replans", ""),
+    ("first plan", "first_plan_ms", "ms"),
+    ("replan, median", "replan_ms_p50", "ms"),
+    ("replan, p99", "replan_ms_p99", "ms"),
+    ("replan, slowest", "replan_ms_max", "ms"),
+    ("plans made", "plans", ""),
+    ("plans that became no path", "plans_unused", ""),
+    ("slowest plan", "plan_ms_max", "ms"),
+    ("attempts at a better path", "attempts", ""),
+    ("attempts that found one", "attempts_used", ""),
+    ("memory of the daemon, most", "memory_mb_max", "MB"),
+    ("memory of the recorder, most", "recorder_memory_mb_max", "MB"),
+    ("processor time, most", "processor_percent_max", "% of a core"),
+    ("messages refused", "faults", ""),
+    ("lost by the recorder", "recorder_lost", "samples"),
+    ("samples missing", "samples_missing", ""),
+)
+"""Names of figures, the members of the document they are, and their units."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure: its name, its text, and its value where it is a number."""
+
+    name: str
+    text: str
+    value: float | None = None
+
+
+def figures(document: ReviewDocument) -> Iterator[Figure]:
+    """Yield the figures that two runs are compared by."""
+    share = f" ({document.share_covered})" if document.share_covered else ""
+    covered = document.covered_cells
+    yield Figure("complete", {True: "yes", False: "no", None: NOT_KNOWN}[document.complete])
+    yield Figure("duration", clock(document.duration_s), document.duration_s)
+    text = NOT_KNOWN if covered is None else f"{covered} of {document.coverable_cells} cells{share}"
+    yield Figure("covered", text, covered)
+    swept_m2, reachable_m2 = document.swept_m2, document.reachable_m2
+    text = NOT_KNOWN
+    if swept_m2 is not None and reachable_m2 is not None:
+        text = swept_words(swept_m2, reachable_m2)
+    yield Figure("reachable floor swept", text, swept_m2)
+    patches, largest_m2 = document.patches_over_4_dm2, document.largest_patch_m2
+    yield Figure("patches left, over 4 dm2", count(patches, ""), patches)
+    yield Figure("largest patch left", count(largest_m2, "m2"), largest_m2)
+    yield Figure("floor left", _by_reason(document.left_by_reason))
+    yield Figure("floor out of reach", _by_reason(document.out_of_reach_by_reason))
+    for percent in MILESTONES:
+        at_s = (document.reached_s or {}).get(str(percent))
+        text = "never" if document.reached_s else NOT_KNOWN
+        yield Figure(
+            f"{percent} % of cells covered after", text if at_s is None else clock(at_s), at_s
+        )
+    for name, member, unit in NUMBERS:
+        value: float | None = getattr(document, member)
+        yield Figure(name, count(value, unit), value)
+
+
+def _by_reason(floor: dict[str, float] | None) -> str:
+    if floor is None:
+        return NOT_KNOWN
+    return "; ".join(f"{m2:.2f} m2 {reason}" for reason, m2 in floor.items()) or "none"

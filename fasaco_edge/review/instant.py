@@ -7,7 +7,7 @@ lines of paths are read as they were drawn: of many paths in quick succession no
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,6 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.drawn import DrawnLabel, DrawnLine, drawings
 from fasaco_edge.recording.read.run import RecordedSamples, RunRecord
 from fasaco_edge.review.orders import CommandThen, commands_of, order_words
-from fasaco_edge.review.rows import clock
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.wire.documents.path_documents import Rectangle
 
@@ -341,58 +340,3 @@ def _resampled(old: OccupancyGrid, new: OccupancyGrid) -> NDArray[np.int8]:
         theirs = old.cells[common.row0 : common.row1, common.col0 : common.col1]
         found[common.slices_in(here)] = theirs
     return found
-
-
-def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
-    """Yield name and text of all that is known of a moment."""
-    state, why = instant.state or "not known", instant.state_reason
-    # The first path since that state was entered: which one it is now is told below.
-    yield "state", f"{state}: {why}" if why and not why.startswith("path ") else state
-    if instant.order:
-        yield "order", instant.order
-    if instant.x is not None and instant.yaw_deg is not None:
-        moving = "" if instant.speed_m_s is None else f", {instant.speed_m_s:.2f} m/s"
-        facing = direction(instant.yaw_deg)
-        yield "robot", f"at ({instant.x:.2f}, {instant.y:.2f}) m, facing {facing}{moving}"
-    if (turn := instant.turn) is not None:
-        side = "left" if turn.degrees > 0 else "right"
-        span = f"{clock(turn.begin_s)} to {clock(turn.end_s)}"
-        yield "turned", f"{abs(turn.degrees):.0f} deg to the {side}, {span}: {turn.why}"
-    for name, path in (
-        ("path before", instant.path_before),
-        ("path", instant.path),
-        ("path after", instant.path_after),
-    ):
-        if path is not None:
-            yield name, _path_words(path, clock(path.at_s))
-    if (change := instant.map) is not None:
-        yield "map", _map_words(change, clock(change.since_s))
-    for name, command in (("command", instant.command), ("next command", instant.next_command)):
-        if command is not None:
-            yield name, f"{clock(command.at_s)} {command.command}"
-    yield "trail", instant.trail or "not recorded"
-
-
-def _path_words(path: PathThen, when: str) -> str:
-    leads = "" if path.leads_deg is None else f"; leads {direction(path.leads_deg)} from there"
-    where = "" if path.changed is None else f", map changed {_box_words(path.changed)}"
-    return f"{path.revision} at {when}: {path.reason}{where}; {path.steps} steps{leads}"
-
-
-def _map_words(change: MapThen, since: str) -> str:
-    parts = [
-        f"{m2:.2f} m2 {what}"
-        for m2, what in (
-            (change.seen_m2, "seen for the first time"),
-            (change.blocked_m2, "now blocked"),
-            (change.freed_m2, "now free"),
-        )
-        if m2
-    ]
-    if not parts or change.around is None:
-        return f"no change since {since}"
-    return f"since {since} {', '.join(parts)}, {_box_words(change.around)}"
-
-
-def _box_words(box: Rectangle) -> str:
-    return f"within ({box.x_min:.1f}, {box.y_min:.1f}) to ({box.x_max:.1f}, {box.y_max:.1f}) m"

@@ -35,6 +35,7 @@ from fasaco_edge.review.panels import (
 from fasaco_edge.review.pictures import draw_fields, draw_map
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.spot import spots_left
+from fasaco_edge.review.wording import amount, clock
 from fasaco_edge.text import Html, element, html
 
 WIDTH = 640
@@ -205,12 +206,12 @@ def _tiles(figures: ReviewDocument) -> Html:
     tiles = (
         (swept, "of the reachable floor swept"),
         (figures.share_covered or "-", "of the reachable cells covered"),
-        (rows.clock(figures.duration_s), "recorded"),
-        (rows.amount(figures.driven_m, "m"), "driven"),
-        (rows.amount(figures.revisits, ""), "revisits"),
-        (rows.amount(figures.replan_ms_p50, "ms"), "a replan, median"),
-        (rows.amount(figures.replan_ms_max, "ms"), "the slowest replan"),
-        (rows.amount(figures.faults, ""), "messages refused"),
+        (clock(figures.duration_s), "recorded"),
+        (amount(figures.driven_m, "m"), "driven"),
+        (amount(figures.revisits, ""), "revisits"),
+        (amount(figures.replan_ms_p50, "ms"), "a replan, median"),
+        (amount(figures.replan_ms_max, "ms"), "the slowest replan"),
+        (amount(figures.faults, ""), "messages refused"),
     )
     cells = (element("div", element("b", v), element("span", n)) for v, n in tiles)
     return element("div", *cells, class_="tiles")
@@ -247,9 +248,7 @@ def _fields(review: Review, of: int, name: str) -> Html:
         "shown, is dark."
     )
     figures = (
-        element(
-            "figure", _image(picture, "pheromone field"), element("figcaption", rows.clock(at_s))
-        )
+        element("figure", _image(picture, "pheromone field"), element("figcaption", clock(at_s)))
         for at_s, picture in pictures
     )
     title = "The pheromone trail" + (f" in {name}" if of > 1 else "")

@@ -16,11 +16,12 @@ from fasaco_edge.drawing.pictures import draw_mission, draw_order, draw_unswept
 from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.review.instant import Scene, instant_rows
+from fasaco_edge.review.instant import Scene
 from fasaco_edge.review.panels import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.review import Review
-from fasaco_edge.review.rows import clock
-from fasaco_edge.review.spot import Spot, spot_rows
+from fasaco_edge.review.rows import instant_rows, spot_rows
+from fasaco_edge.review.spot import Spot
+from fasaco_edge.review.wording import clock
 
 # Fields on a page; the edge of the square that each has to fit into [px].
 FIELDS, FIELD_PX = 4, 440

@@ -29,10 +29,10 @@ from fasaco_edge.review.drive import (
     drive_over,
     first_covered,
     milestones,
+    swept_floor,
     walk_figures,
 )
 from fasaco_edge.review.faults import Faults, faults_of
-from fasaco_edge.review.floor import swept_floor
 from fasaco_edge.review.moments import (
     RECORDER_IN_ORDER,
     TROUBLES,

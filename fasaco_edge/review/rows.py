@@ -1,62 +1,33 @@
-"""The figures of a review as rows of text: the same for terminal and page."""
+"""What a review tells, as rows of text: the same for terminal and page."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msgspec.structs import astuple
 
-from fasaco_edge.bench.floor import swept_words
-from fasaco_edge.review.document import MILESTONES, ReviewDocument
+from fasaco_edge.review.comparison import figures
+from fasaco_edge.review.document import ReviewDocument
+from fasaco_edge.review.drive import MILESTONES
+from fasaco_edge.review.instant import Instant, MapThen, PathThen, direction
 from fasaco_edge.review.orders import order_words
+from fasaco_edge.review.wording import NOT_KNOWN, amount, clock, count
+from fasaco_edge.wire.documents.path_documents import Rectangle
 
 if TYPE_CHECKING:
     from fasaco_edge.review.moments import Span
     from fasaco_edge.review.review import Review
     from fasaco_edge.review.run_data import PublishedPath
     from fasaco_edge.review.spot import Spot
-    from fasaco_edge.wire.documents.path_documents import Rectangle
 
-NOT_KNOWN = "not known"
-NUMBERS = (
-    ("floor swept by the ledger", "ledger_swept_m2", "m2"),
-    ("covered again", "recovered_cells", "cells"),
-    ("out of reach", "unreachable_cells", "cells"),
-    ("steps", "steps", ""),
-    ("revisits", "revisits", ""),
-    ("quarter-turns", "turns_90", ""),
-    ("about-turns", "turns_180", ""),
-    ("driven", "driven_m", "m"),
-    ("paths published", "paths", ""),
-    ("replans", "replans", ""),
-    ("first plan", "first_plan_ms", "ms"),
-    ("replan, median", "replan_ms_p50", "ms"),
-    ("replan, p99", "replan_ms_p99", "ms"),
-    ("replan, slowest", "replan_ms_max", "ms"),
-    ("plans made", "plans", ""),
-    ("plans that became no path", "plans_unused", ""),
-    ("slowest plan", "plan_ms_max", "ms"),
-    ("attempts at a better path", "attempts", ""),
-    ("attempts that found one", "attempts_used", ""),
-    ("memory of the daemon, most", "memory_mb_max", "MB"),
-    ("memory of the recorder, most", "recorder_memory_mb_max", "MB"),
-    ("processor time, most", "processor_percent_max", "% of a core"),
-    ("messages refused", "faults", ""),
-    ("lost by the recorder", "recorder_lost", "samples"),
-    ("samples missing", "samples_missing", ""),
-)
-"""Names of figures, the members of the document they are, and their units."""
 
 REASONS = ("reason", "replans", "median", "slowest")
 REPLANS = ("at", "took", "steps planned", "gap", "to drive", "changed on the map", "why")
 """Columns of ``reason_rows`` and ``replan_rows``."""
 MOST_REPLANS = 8
-
 # The most important settings; the others are in the run card and in the JSON document.
 CARD_SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
-
 
 ORDERS = ("order", "from", "to", "result", "driven", "replans", "paused", "asked for")
 UNREACHED = ("order", "m2", "at", "why")
@@ -143,12 +114,12 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         ("cells after", ", ".join(reached)),
         ("left", _some(left)),
         ("not reached", _some(unreached)),
-        ("driven", f"{amount(document.driven_m, 'm')}, {_count(document.steps, 'steps')}"),
+        ("driven", f"{amount(document.driven_m, 'm')}, {count(document.steps, 'steps')}"),
         ("replans", replans),
         ("commands", _some(commands)),
         *([("charges", _some(charges))] if charges else []),
         ("troubles", _some(troubles)),
-        ("refused", f"{document.faults} messages; lost {_count(document.recorder_lost, '')}"),
+        ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
     ]
 
 
@@ -280,76 +251,10 @@ def fault_rows(document: ReviewDocument) -> list[tuple[str, str]]:
 
 def unknown_lines(document: ReviewDocument) -> Iterator[str]:
     """Yield which samples and figures a recording does not give, and why."""
-    for topic, count in document.unreadable.items():
-        yield f"{count} samples of {topic} cannot be read"
+    for topic, number in document.unreadable.items():
+        yield f"{number} samples of {topic} cannot be read"
     for names, why in document.not_recorded.items():
         yield f"not known: {names}: {why}"
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """A figure: its name, its text, and its value where it is a number."""
-
-    name: str
-    text: str
-    value: float | None = None
-
-
-def figures(document: ReviewDocument) -> Iterator[Figure]:
-    """Yield the figures that two runs are compared by."""
-    share = f" ({document.share_covered})" if document.share_covered else ""
-    covered = document.covered_cells
-    yield Figure("complete", {True: "yes", False: "no", None: NOT_KNOWN}[document.complete])
-    yield Figure("duration", clock(document.duration_s), document.duration_s)
-    text = NOT_KNOWN if covered is None else f"{covered} of {document.coverable_cells} cells{share}"
-    yield Figure("covered", text, covered)
-    swept_m2, reachable_m2 = document.swept_m2, document.reachable_m2
-    text = NOT_KNOWN
-    if swept_m2 is not None and reachable_m2 is not None:
-        text = swept_words(swept_m2, reachable_m2)
-    yield Figure("reachable floor swept", text, swept_m2)
-    patches, largest_m2 = document.patches_over_4_dm2, document.largest_patch_m2
-    yield Figure("patches left, over 4 dm2", _count(patches, ""), patches)
-    yield Figure("largest patch left", _count(largest_m2, "m2"), largest_m2)
-    yield Figure("floor left", _by_reason(document.left_by_reason))
-    yield Figure("floor out of reach", _by_reason(document.out_of_reach_by_reason))
-    for percent in MILESTONES:
-        at_s = (document.reached_s or {}).get(str(percent))
-        text = "never" if document.reached_s else NOT_KNOWN
-        yield Figure(
-            f"{percent} % of cells covered after", text if at_s is None else clock(at_s), at_s
-        )
-    for name, member, unit in NUMBERS:
-        value: float | None = getattr(document, member)
-        yield Figure(name, _count(value, unit), value)
-
-
-def _by_reason(floor: dict[str, float] | None) -> str:
-    if floor is None:
-        return NOT_KNOWN
-    return "; ".join(f"{m2:.2f} m2 {reason}" for reason, m2 in floor.items()) or "none"
-
-
-def clock(seconds: float) -> str:
-    """Return a time as minutes and seconds, or with hours."""
-    minutes, rest = divmod(round(seconds, 1), 60)
-    hours, minutes = divmod(int(minutes), 60)
-    return f"{hours}:{minutes:02d}:{rest:04.1f}" if hours else f"{minutes}:{rest:04.1f}"
-
-
-def amount(value: float | None, unit: str) -> str:
-    """Return a value with its unit."""
-    if value is None:
-        return NOT_KNOWN
-    digits = 0 if abs(value) >= 100 or value == round(value) else 1 if abs(value) >= 10 else 2
-    return f"{value:,.{digits}f} {unit}".rstrip()
-
-
-def _count(value: float | None, unit: str) -> str:
-    if value is None:
-        return NOT_KNOWN
-    text = f"{value:,}" if isinstance(value, int) else f"{value:,.1f}"
-    return f"{text} {unit}".rstrip()
 
 
 def _place(changed: Rectangle | None) -> str:
@@ -363,3 +268,67 @@ def _began(began: str) -> str:
     """Return when it began; a clock that shows a time before this program was is not set."""
     when = began.replace("T", " ").replace("Z", " UTC")
     return when if began >= "2024" else f"{when}, by a clock that was not set"
+
+
+def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
+    """Yield name and text of all that is known of a moment."""
+    state, why = instant.state or "not known", instant.state_reason
+    # The first path since that state was entered: which one it is now is told below.
+    yield "state", f"{state}: {why}" if why and not why.startswith("path ") else state
+    if instant.order:
+        yield "order", instant.order
+    if instant.x is not None and instant.yaw_deg is not None:
+        moving = "" if instant.speed_m_s is None else f", {instant.speed_m_s:.2f} m/s"
+        facing = direction(instant.yaw_deg)
+        yield "robot", f"at ({instant.x:.2f}, {instant.y:.2f}) m, facing {facing}{moving}"
+    if (turn := instant.turn) is not None:
+        side = "left" if turn.degrees > 0 else "right"
+        span = f"{clock(turn.begin_s)} to {clock(turn.end_s)}"
+        yield "turned", f"{abs(turn.degrees):.0f} deg to the {side}, {span}: {turn.why}"
+    for name, path in (
+        ("path before", instant.path_before),
+        ("path", instant.path),
+        ("path after", instant.path_after),
+    ):
+        if path is not None:
+            yield name, _path_words(path, clock(path.at_s))
+    if (change := instant.map) is not None:
+        yield "map", _map_words(change, clock(change.since_s))
+    for name, command in (("command", instant.command), ("next command", instant.next_command)):
+        if command is not None:
+            yield name, f"{clock(command.at_s)} {command.command}"
+    yield "trail", instant.trail or "not recorded"
+
+
+def _path_words(path: PathThen, when: str) -> str:
+    leads = "" if path.leads_deg is None else f"; leads {direction(path.leads_deg)} from there"
+    where = "" if path.changed is None else f", map changed {_box_words(path.changed)}"
+    return f"{path.revision} at {when}: {path.reason}{where}; {path.steps} steps{leads}"
+
+
+def _map_words(change: MapThen, since: str) -> str:
+    parts = [
+        f"{m2:.2f} m2 {what}"
+        for m2, what in (
+            (change.seen_m2, "seen for the first time"),
+            (change.blocked_m2, "now blocked"),
+            (change.freed_m2, "now free"),
+        )
+        if m2
+    ]
+    if not parts or change.around is None:
+        return f"no change since {since}"
+    return f"since {since} {', '.join(parts)}, {_box_words(change.around)}"
+
+
+def _box_words(box: Rectangle) -> str:
+    return f"within ({box.x_min:.1f}, {box.y_min:.1f}) to ({box.x_max:.1f}, {box.y_max:.1f}) m"
+
+
+def spot_rows(spot: Spot) -> Iterator[tuple[str, str]]:
+    """Yield name and text of what is known of a spot."""
+    known = {True: "swept", False: "not swept", None: "not known"}[spot.swept]
+    yield "at", f"({spot.x:.2f}, {spot.y:.2f}) m: {known}"
+    yield "why", spot.words if spot.words.startswith(spot.why) else f"{spot.why}: {spot.words}"
+    if spot.patch_m2 is not None:
+        yield "in one piece", f"{spot.patch_m2:.2f} m2 of floor not swept"

@@ -7,7 +7,7 @@ no way for the robot, not ordered; what the robot could have swept it missed, or
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -24,9 +24,9 @@ from fasaco_edge.mission.orders.zones import cells_inside
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.drawn import DrawnLine, drawings
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.review.floor import swept_floor
-from fasaco_edge.review.rows import clock
+from fasaco_edge.review.drive import swept_floor
 from fasaco_edge.review.run_data import BETTER, maps_of
+from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.settings import known_settings
 
 if TYPE_CHECKING:
@@ -332,12 +332,3 @@ def _passed(
     away = np.hypot(*(starts + shares[:, None] * ways - place).T)
     away[squares > jump_m**2] = math.inf
     return away, at_s[1:]
-
-
-def spot_rows(spot: Spot) -> Iterator[tuple[str, str]]:
-    """Yield name and text of what is known of a spot."""
-    known = {True: "swept", False: "not swept", None: "not known"}[spot.swept]
-    yield "at", f"({spot.x:.2f}, {spot.y:.2f}) m: {known}"
-    yield "why", spot.words if spot.words.startswith(spot.why) else f"{spot.why}: {spot.words}"
-    if spot.patch_m2 is not None:
-        yield "in one piece", f"{spot.patch_m2:.2f} m2 of floor not swept"

@@ -17,8 +17,8 @@ from fasaco_edge.review.moments import (
     spans_of,
 )
 from fasaco_edge.review.panels import curve
-from fasaco_edge.review.rows import clock
 from fasaco_edge.review.run_data import PlanLog, RunData, StatusSample, first_counted
+from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.replies import CoverageReport
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.documents.turns import Cycle, Decided, LogStart, PlanTaken, TurnBatch

@@ -1,0 +1,28 @@
+"""The wording of times and amounts in a review."""
+
+from __future__ import annotations
+
+NOT_KNOWN = "not known"
+
+
+def clock(seconds: float) -> str:
+    """Return a time as minutes and seconds, or with hours."""
+    minutes, rest = divmod(round(seconds, 1), 60)
+    hours, minutes = divmod(int(minutes), 60)
+    return f"{hours}:{minutes:02d}:{rest:04.1f}" if hours else f"{minutes}:{rest:04.1f}"
+
+
+def amount(value: float | None, unit: str) -> str:
+    """Return a value with its unit."""
+    if value is None:
+        return NOT_KNOWN
+    digits = 0 if abs(value) >= 100 or value == round(value) else 1 if abs(value) >= 10 else 2
+    return f"{value:,.{digits}f} {unit}".rstrip()
+
+
+def count(value: float | None, unit: str) -> str:
+    """Return a value with its unit, a whole number with all its digits."""
+    if value is None:
+        return NOT_KNOWN
+    text = f"{value:,}" if isinstance(value, int) else f"{value:,.1f}"
+    return f"{text} {unit}".rstrip()
