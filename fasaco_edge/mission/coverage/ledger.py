@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Point, Pose2D, Window
 from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR, FloorSnapshot
+from fasaco_edge.mission.coverage.shared_tiles import SharedTiles
 from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot
 
 if TYPE_CHECKING:
@@ -98,10 +98,7 @@ class CoverageLedger:
         self.total = 0
         self.dropped = 0
         self._cell_m = cell_m
-        # By tile, so that a map that jumps far away costs nothing in between.
-        self._tiles: dict[Cell, NDArray[np.uint16]] = {}
-        # The tiles that no snapshot shares.
-        self._own: set[Cell] = set()
+        self._tiles = SharedTiles(MOST_TILES, DROPPED_TILES, np.zeros((TILE, TILE), np.uint16))
         self._under_tool: frozenset[Cell] = frozenset()
         self._last: Pose2D | None = None
 
@@ -110,16 +107,13 @@ class CoverageLedger:
         """Return the ledger as it was, without the last pose: the way from it is unknown."""
         ledger = cls(snapshot.cell_m, snapshot.frame)
         ledger.total = snapshot.total
-        ledger._tiles = dict(snapshot.tiles)
+        ledger._tiles.update(snapshot.tiles)
         ledger._under_tool = snapshot.under_tool
         return ledger
 
     def snapshot(self) -> LedgerSnapshot:
         """Return what it holds now; a tile is copied once it changes."""
-        for place in self._own:
-            self._tiles[place].flags.writeable = False
-        self._own.clear()
-        tiles = MappingProxyType(dict(self._tiles))
+        tiles = self._tiles.snapshot()
         return LedgerSnapshot(self._cell_m, self.frame, self.total, tiles, self._under_tool)
 
     def move_to(self, frame: str) -> None:
@@ -172,7 +166,7 @@ class CoverageLedger:
             ends = np.cumsum([len(at) for at in visited])
             for place, at, part in zip(places, visited, np.split(chosen, ends[:-1]), strict=True):
                 if part.any():
-                    self._writable(place)[tuple(at[part].T)] = 0
+                    self._tiles.writable(place)[tuple(at[part].T)] = 0
         for cell in self._under_tool:
             if not self.has_visited(cell):
                 self._visit(cell)
@@ -202,34 +196,9 @@ class CoverageLedger:
         row, col = cell
         self.total += 1
         place = (row // TILE, col // TILE)
-        tile = self._writable(place)
+        self.dropped += len(self._tiles.make_room(place))
+        tile = self._tiles.writable(place)
         tile[row % TILE, col % TILE] = min(int(tile[row % TILE, col % TILE]) + 1, 65535)
-
-    def _writable(self, place: Cell) -> NDArray[np.uint16]:
-        tile = self._tiles.get(place)
-        if tile is not None and place in self._own:
-            return tile
-        if tile is None:
-            self._limit_tiles(place)
-            tile = np.zeros((TILE, TILE), np.uint16)
-        else:
-            tile = tile.copy()
-        self._tiles[place] = tile
-        self._own.add(place)
-        return tile
-
-    def _limit_tiles(self, place: Cell) -> None:
-        """Drop the tiles farthest from ``place`` where there is no room for another."""
-        if len(self._tiles) < MOST_TILES:
-            return
-
-        def distance(other: Cell) -> tuple[int, Cell]:
-            return max(abs(other[0] - place[0]), abs(other[1] - place[1])), other
-
-        for far in sorted(self._tiles, key=distance)[-DROPPED_TILES:]:
-            del self._tiles[far]
-            self._own.discard(far)
-        self.dropped += DROPPED_TILES
 
     def _centre(self, cell: Cell) -> Point | None:
         return (cell[1] + 0.5) * self._cell_m, (cell[0] + 0.5) * self._cell_m

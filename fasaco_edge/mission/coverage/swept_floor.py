@@ -16,7 +16,6 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
-from types import MappingProxyType
 from typing import Self
 
 import numpy as np
@@ -38,6 +37,7 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     window_of,
 )
 from fasaco_edge.mission.coverage.floor_tiles import Place as TilePlace
+from fasaco_edge.mission.coverage.shared_tiles import SharedTiles
 from fasaco_edge.mission.coverage.steady_track import Place, SteadyTrack
 
 # Two poses further apart than so many times the tool are a jump, not a drive.
@@ -89,9 +89,8 @@ class SweptFloor:
         # What was swept beyond that, not made yet after another pose; and where that is at most.
         self._ahead: tuple[Window, Mask] | None = None
         self._around_ahead: Window | None = None
-        self._tiles: dict[TilePlace, Bits] = {}
-        # The tiles that no snapshot shares.
-        self._own: set[TilePlace] = set()
+        blank = np.zeros((FLOOR_TILE, ROW_BYTES), np.uint8)
+        self._tiles = SharedTiles(MOST_FLOOR_TILES, DROPPED_FLOOR_TILES, blank)
         # The number of the last changes, and where they were.
         self._news: deque[tuple[int, Window]] = deque(maxlen=REMEMBERED)
 
@@ -100,15 +99,12 @@ class SweptFloor:
         """Return the floor as it was, without the last pose: the way from it is unknown."""
         floor = cls(tool_m)
         floor.changes, floor.pixels = snapshot.changes, snapshot.pixels
-        floor._tiles = dict(snapshot.tiles)
+        floor._tiles.update(snapshot.tiles)
         return floor
 
     def snapshot(self) -> FloorSnapshot:
         """Return what it holds now; a tile is copied once it changes."""
-        for place in self._own:
-            self._tiles[place].flags.writeable = False
-        self._own.clear()
-        return FloorSnapshot(MappingProxyType(dict(self._tiles)), self.changes)
+        return FloorSnapshot(self._tiles.snapshot(), self.changes)
 
     @property
     def swept_m2(self) -> float:
@@ -196,12 +192,10 @@ class SweptFloor:
         for place, left in left_of(self._tiles):
             count = count_bits(left)
             self.pixels -= count_bits(self._tiles[place]) - count
-            self._own.discard(place)
             if count:
-                self._tiles[place] = left
-                self._own.add(place)
+                self._tiles.put(place, left)
             else:
-                del self._tiles[place]
+                self._tiles.drop(place)
         if self.pixels != before:
             self.forgotten += 1
             self._note(ANYWHERE)
@@ -309,39 +303,20 @@ class SweptFloor:
             if tile is not None:
                 new = new & ~tile[within]
             if count := count_bits(new):
-                self._writable(place)[within] |= new
+                self._make_room(place)
+                self._tiles.writable(place)[within] |= new
                 self.pixels += count
                 has_changed = True
         if has_changed:
             self._note(window)
 
-    def _writable(self, place: TilePlace) -> Bits:
-        tile = self._tiles.get(place)
-        if tile is not None and place in self._own:
-            return tile
-        if tile is None:
-            self._limit_tiles(place)
-            tile = np.zeros((FLOOR_TILE, ROW_BYTES), np.uint8)
-        else:
-            tile = tile.copy()
-        self._tiles[place] = tile
-        self._own.add(place)
-        return tile
-
-    def _limit_tiles(self, place: TilePlace) -> None:
+    def _make_room(self, place: TilePlace) -> None:
         """Drop the tiles farthest from ``place`` where there is no room for another."""
-        if len(self._tiles) < MOST_FLOOR_TILES:
-            return
-
-        def distance(other: TilePlace) -> tuple[int, TilePlace]:
-            return max(abs(other[0] - place[0]), abs(other[1] - place[1])), other
-
-        for far in sorted(self._tiles, key=distance)[-DROPPED_FLOOR_TILES:]:
-            self.pixels -= count_bits(self._tiles.pop(far))
-            self._own.discard(far)
-        self.dropped += DROPPED_FLOOR_TILES
-        self.forgotten += 1
-        self._note(ANYWHERE)
+        if dropped := self._tiles.make_room(place):
+            self.pixels -= sum(map(count_bits, dropped))
+            self.dropped += len(dropped)
+            self.forgotten += 1
+            self._note(ANYWHERE)
 
 
 def _apart(one: Pose2D, other: Pose2D) -> float:
