@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from fasaco_edge.bench.drive_time import DriveLimits
+from fasaco_edge.bench.driven_line import DriveLimits
 from fasaco_edge.bench.floor import (
     FloorFigures,
     JudgedFloor,

@@ -12,7 +12,7 @@ import pytest
 from msgspec import ValidationError, convert
 from PIL import Image
 
-from fasaco_edge.bench.drive_time import DriveLimits, drive_seconds
+from fasaco_edge.bench.driven_line import DriveLimits, drive_seconds
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.cli.planning.turning import LIMITS

@@ -1,0 +1,171 @@
+"""A driven line: its pieces on a raster, the pixels that it sweeps, and its drive time.
+
+The robot comes to rest wherever it turns on the spot. Between two such places it speeds up, drives
+and brakes (a trapezoid of speed over time, or a triangle on short ways); a turn is a trapezoid of
+its rate. Knows nothing of what planners assume.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bench.pixels import Mask
+from fasaco_edge.grid.geometry import GridGeometry
+
+# Distances of whole pixels are reached; rounding must not decide otherwise [pixels].
+TOUCH_TOLERANCE_PX = 1e-3
+# So many rows of pixels beside pieces of it are looked at together while it sweeps.
+SWEPT_ROWS = 30_000
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class DriveLimits:
+    """What bounds a robot's motion, beside its speed.
+
+    Attributes:
+        acceleration_m_s2: of driving, up and down.
+        turn_deg_s, turn_deg_s2: rate of turning on the spot, and its acceleration.
+        steered_deg: a bend up to this is steered without a stop.
+    """
+
+    acceleration_m_s2: float
+    turn_deg_s: float
+    turn_deg_s2: float
+    steered_deg: float = 1.0
+
+
+def drive_seconds(
+    ways_m: NDArray[np.float64], bends_deg: NDArray[np.float64], speed_m_s: float, by: DriveLimits
+) -> float:
+    """Return what driving along a line takes [s].
+
+    Args:
+        ways_m: float64 (n,), lengths between its points [m].
+        bends_deg: float64 (n - 1,), turns at the points between, in [0, 180].
+        speed_m_s: the robot's speed.
+        by: its limits.
+    """
+    if not len(ways_m):
+        return 0.0
+    is_stop = bends_deg > by.steered_deg
+    runs_m = np.add.reduceat(ways_m, np.concatenate([[0], np.flatnonzero(is_stop) + 1]))
+    runs_s = _from_rest_to_rest(runs_m, speed_m_s, by.acceleration_m_s2)
+    turns_s = _from_rest_to_rest(bends_deg[is_stop], by.turn_deg_s, by.turn_deg_s2)
+    return float(runs_s.sum() + turns_s.sum())
+
+
+def _from_rest_to_rest(
+    ways: NDArray[np.float64], most_speed: float, acceleration: float
+) -> NDArray[np.float64]:
+    """Return the least seconds for ways, angles or lengths, from standstill to standstill."""
+    ramp = most_speed / acceleration
+    return np.where(
+        ways < most_speed * ramp, 2.0 * np.sqrt(ways / acceleration), ways / most_speed + ramp
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrivenLine:
+    """A driven line on the raster of a floor.
+
+    Attributes:
+        starts, ends: where each way begins and ends, (column, row) [pixels], both (n, 2), n >= 1.
+    """
+
+    starts: Points
+    ends: Points
+
+    @classmethod
+    def of(cls, line_xy: Points, geometry: GridGeometry, driven: Mask | None) -> DrivenLine:
+        origin, yaw = geometry.origin, geometry.origin.yaw
+        turned = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+        places = (line_xy - np.array([origin.x, origin.y])) @ turned / geometry.resolution
+        starts, ends = places[:-1], places[1:]
+        if driven is not None:
+            starts, ends = starts[driven], ends[driven]
+        if not len(starts):
+            starts = ends = places[:1]
+        return cls(starts, ends)
+
+    @property
+    def ways_and_bends(self) -> tuple[Points, Points]:
+        """Lengths [pixels], (m,), and the turns between them [deg], (m - 1,)."""
+        way = self.ends - self.starts
+        lengths = np.hypot(*way.T)
+        way = way[lengths > 0]
+        turned = np.diff(np.degrees(np.arctan2(way[:, 1], way[:, 0])))
+        return lengths[lengths > 0], np.abs((turned + 180.0) % 360.0 - 180.0)
+
+    def pieces(self, most_px: float, together: int) -> Iterator[tuple[Points, Points]]:
+        """Yield start and end, (k, 2), of pieces of at most ``most_px``, some at a time."""
+        way = self.ends - self.starts
+        counts = np.maximum(np.ceil(np.hypot(*way.T) / most_px), 1).astype(np.int64)
+        stops = np.cumsum(counts)
+        begins = stops - counts
+        for first in range(0, int(stops[-1]), together):
+            number = np.arange(first, min(first + together, int(stops[-1])))
+            segment = np.searchsorted(stops, number, side="right")
+            part = number - begins[segment]
+            start, along = self.starts[segment], way[segment]
+            share = (np.stack([part, part + 1]) / counts[segment])[..., None]
+            yield start + share[0] * along, start + share[1] * along
+
+    def swept(self, half_px: float, shape: tuple[int, int]) -> Mask:
+        """Return the pixels whose centre lies within ``half_px`` of the line, bool ``shape``.
+
+        Those of one row near one piece of it are a run: it is counted where each run begins, and
+        counted off behind its end.
+        """
+        rows, cols = shape
+        reach = half_px + TOUCH_TOLERANCE_PX
+        longest = max(half_px, 1.0)
+        together = max(SWEPT_ROWS // math.ceil(2 * reach + longest + 1), 1)
+        runs = np.zeros(rows * (cols + 1), np.int32)
+        for starts, ends in self.pieces(longest, together):
+            bottom = np.floor(np.minimum(starts[:, 1], ends[:, 1]) - reach).astype(np.int64)
+            top = np.maximum(starts[:, 1], ends[:, 1]) + reach
+            row = bottom[:, None] + np.arange(math.ceil((top - bottom).max()))
+            left, right = _run_beside(starts, ends, row.astype(np.float64) + 0.5, reach)
+            first = np.maximum(np.ceil(left - 0.5), 0.0)
+            stop = np.minimum(np.floor(right - 0.5) + 1.0, float(cols))
+            near = (first < stop) & (row >= 0) & (row < rows)
+            before = row[near] * (cols + 1)
+            np.add.at(runs, before + first[near].astype(np.int64), 1)
+            np.add.at(runs, before + stop[near].astype(np.int64), -1)
+        # Runs that end in a row's last pixel are counted off in one of its own.
+        beside = np.cumsum(runs, out=runs).reshape(rows, cols + 1) > 0
+        return beside[:, :-1]
+
+
+def _run_beside(starts: Points, ends: Points, y: Points, reach: float) -> tuple[Points, Points]:
+    """Return where lines across segments enter and leave all that lies within ``reach`` of them.
+
+    A disc at the share ``t`` of a segment spans ``x(t) +- sqrt(reach^2 - (y - y(t))^2)`` on a
+    line: its right end is furthest where the line meets the tangent of all discs, or else at the
+    nearer end of the segment; so is its left end.
+
+    Args:
+        starts, ends: of the segments, float64 (n, 2).
+        y: of the lines, parallel to the x axis, float64 (n, m).
+        reach: radius of the discs.
+
+    Returns:
+        Two of x, float64 (n, m); the first is NaN where a line comes near no point of a segment.
+    """
+    way = ends - starts
+    dx, dy = way[:, :1], np.where(way[:, 1:] == 0.0, 1e-12, way[:, 1:])
+    up = y - starts[:, 1:]
+    tangent = reach * dx * np.sign(dy) / np.hypot(dx, dy)
+    found = []
+    for side in (-1.0, 1.0):
+        share = np.clip((up + side * tangent) / dy, 0.0, 1.0)
+        square = reach * reach - (up - share * dy) ** 2
+        with np.errstate(invalid="ignore"):
+            found.append(starts[:, :1] + share * dx + side * np.sqrt(square))
+    return found[0], found[1]
