@@ -1,0 +1,184 @@
+"""The figures of a status as a table, beside the picture."""
+
+from __future__ import annotations
+
+from rich.table import Table
+from rich.text import Text
+
+from fasaco_edge.text import one_line
+from fasaco_edge.watch import phrases
+from fasaco_edge.watch.glyphs import GlyphSet
+from fasaco_edge.wire.documents.path_documents import PathReport
+from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport, MissionReport
+from fasaco_edge.wire.documents.status import BatteryReport, FleetReport, Status, SupervisedRecorder
+
+Row = tuple[str, Text]
+# Colour of a state.
+STATE_COLOURS = {
+    "planning": "magenta",
+    "covering": "green",
+    "returning": "green",
+    "charging": "cyan",
+    "paused": "yellow",
+    "blocked": "red",
+    "degraded": "yellow",
+    "done": "blue",
+}
+LONGEST_BAR = 40
+LABEL_WIDTH = 9
+# Width from which optional parts are shown [characters].
+WIDE = 30
+
+
+def figures(status: Status, width: int, glyphs: GlyphSet) -> Table:
+    """Return all figures of a status as a table ``width`` characters wide."""
+    table = Table.grid(padding=(0, 1), pad_edge=False)
+    table.add_column(width=LABEL_WIDTH, style="cyan", no_wrap=True)
+    table.add_column(overflow="fold")
+    table.width = width
+    for name, value in _rows(status, width - LABEL_WIDTH - 1, glyphs):
+        table.add_row(name, value)
+    return table
+
+
+def _rows(status: Status, width: int, glyphs: GlyphSet) -> list[Row]:
+    state = Text(one_line(status.state), f"bold {state_colour(status.state)}")
+    # The path's number is shown with the path.
+    if status.path is None or status.reason != f"path {status.path.revision}":
+        state.append(f": {one_line(status.reason)}", "not bold")
+    rows: list[Row] = [("state", state)]
+    if status.coverage is not None:
+        rows += _coverage(
+            status.coverage, glyphs.bar(status.coverage.fraction, min(width, LONGEST_BAR))
+        )
+    if status.floor is not None:
+        rows += _floor(status.floor)
+    if status.path is not None:
+        rows += _path(status.path, width)
+    rows += _mission(status.mission)
+    rows += _fleet(status.fleet)
+    rows += _running(status)
+    return rows
+
+
+def state_colour(state: str) -> str:
+    """Return the colour of a state."""
+    return STATE_COLOURS.get(state, "bright_black")
+
+
+def _coverage(coverage: CoverageReport, bar: Text) -> list[Row]:
+    share = Text(phrases.percent(coverage.fraction), "bold")
+    share.append(f", {coverage.covered} of {coverage.coverable} cells", "not bold")
+    rows: list[Row] = [("covered", share), ("", bar)]
+    if coverage.recovered:
+        rows.append(("twice", _text(_cells(coverage.recovered))))
+    return rows
+
+
+def _floor(floor: FloorReport) -> list[Row]:
+    left = [f"{left.m2:.1f} m2 left: {left.reason}" for left in floor.left or ()]
+    beyond = [f"{part.m2:.1f} m2 out of reach: {part.reason}" for part in floor.out_of_reach or ()]
+    rows = [("", _text(each)) for each in (*left, *beyond)]
+    return [("swept", _text(phrases.swept(floor))), *rows]
+
+
+def _path(path: PathReport, width: int) -> list[Row]:
+    left = f"{path.remaining_steps} of {path.steps} steps to go" if path.steps else "stop"
+    rows: list[Row] = [(f"path {path.revision}", _text(left)), ("", _text(path.reason))]
+    if path.planned_steps is not None:
+        plan = f"{path.planned_steps} steps"
+        if path.lower_bound_steps is not None:
+            plan += f", bound {path.lower_bound_steps}"
+        if path.gap is not None and width >= WIDE:
+            plan += f", gap {100 * path.gap:.1f} % of time"
+        rows.append(("plan", _text(plan)))
+    return rows
+
+
+def _mission(mission: MissionReport) -> list[Row]:
+    rows: list[Row] = [("mission", _text(phrases.stage(mission)))]
+    for zone in mission.zones:
+        at, covered = phrases.zone_progress(zone)
+        progress = f"pass {at}, {covered}" if zone.pass_number else at
+        rows.append((one_line(zone.name), _text(progress)))
+    more = []
+    if mission.keep_out:
+        more.append(f"keep-out zones: {mission.keep_out}")
+    if mission.return_home:
+        more.append("returns home")
+    if more:
+        rows.append(("", _text(", ".join(more))))
+    if mission.unreached.cells:
+        left = f"{_cells(mission.unreached.cells)}, {mission.unreached.m2:.1f} m2"
+        rows.append(("unreached", _text(left)))
+    return rows
+
+
+def _fleet(fleet: FleetReport | None) -> list[Row]:
+    if fleet is None:
+        return []
+    part = "alone" if fleet.part_cells is None else f"{_cells(fleet.part_cells)} are its part"
+    rows: list[Row] = [("fleet", _text(f"{fleet.name}: {part}"))]
+    for member in fleet.members:
+        swept = f"{_cells(member.swept_cells)} swept"
+        what = f"away ({member.away}), {swept}" if member.away else f"{member.state}, {swept}"
+        rows.append((one_line(member.name), _text(what, "yellow" if member.away else "")))
+    return rows
+
+
+def _running(status: Status) -> list[Row]:
+    latency, errors = status.latency_ms, status.errors
+    latencies = [
+        f"{name} {milliseconds:.0f}"
+        for name, milliseconds in (
+            ("plan", latency.plan),
+            ("map to path", latency.map_to_path),
+            ("map", latency.ingest),
+        )
+        if milliseconds is not None
+    ]
+    counted = ", ".join(f"{count} {code}" for code, count in errors.by_code.items())
+    rows: list[Row] = [
+        ("drive", _text(phrases.drive(status.drive))),
+        *([("battery", _battery(status.battery))] if status.battery else []),
+        ("latency", _text(f"{', '.join(latencies)} ms" if latencies else "-")),
+        ("errors", _text(counted, "red") if errors.total else _text("none")),
+        ("ledger", _ledger(status)),
+        ("recorder", _recorder(status.recorder)),
+        ("daemon", _text(f"up {phrases.age(status.uptime_s)}, {status.rss_mb:.0f} MB")),
+    ]
+    return rows
+
+
+def _battery(battery: BatteryReport) -> Text:
+    level = "not known" if battery.level is None else phrases.percent(battery.level)
+    is_low = None not in (battery.level, battery.turns_back_at) and (
+        (battery.level or 0.0) <= (battery.turns_back_at or 0.0)
+    )
+    until = f", goes on at {phrases.percent(battery.goes_on_at)}" if battery.goes_on_at else ""
+    return _text(f"{level}, {battery.power}{until}", "yellow" if is_low else "")
+
+
+def _ledger(status: Status) -> Text:
+    ledger = status.ledger
+    if ledger.fault:
+        return _text(ledger.fault, "red")
+    if ledger.age_s is None:
+        return _text("not written yet")
+    return _text(f"written {phrases.age(ledger.age_s)} ago")
+
+
+def _recorder(recorder: SupervisedRecorder | None) -> Text:
+    if recorder is None:
+        return _text("none")
+    if recorder.state in ("recording", "starting"):
+        return _text(recorder.state)
+    return _text(f"{recorder.state}: {recorder.reason or ''}", "red")
+
+
+def _cells(count: int) -> str:
+    return "1 cell" if count == 1 else f"{count} cells"
+
+
+def _text(text: str, style: str = "") -> Text:
+    return Text(one_line(text), style)
