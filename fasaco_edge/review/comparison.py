@@ -38,6 +38,34 @@ Difference = tuple[str, str, str]
 """What differs, and its value in the first run and in the other."""
 Row = tuple[str, str, str, str]
 """Name, the texts of one recording and of the other, and the difference; "" for none."""
+NUMBERS = (
+    ("floor swept by the ledger", "ledger_swept_m2", "m2"),
+    ("covered again", "recovered_cells", "cells"),
+    ("out of reach", "unreachable_cells", "cells"),
+    ("steps", "steps", ""),
+    ("revisits", "revisits", ""),
+    ("quarter-turns", "turns_90", ""),
+    ("about-turns", "turns_180", ""),
+    ("driven", "driven_m", "m"),
+    ("paths published", "paths", ""),
+    ("replans", "replans", ""),
+    ("first plan", "first_plan_ms", "ms"),
+    ("replan, median", "replan_ms_p50", "ms"),
+    ("replan, p99", "replan_ms_p99", "ms"),
+    ("replan, slowest", "replan_ms_max", "ms"),
+    ("plans made", "plans", ""),
+    ("plans that became no path", "plans_unused", ""),
+    ("slowest plan", "plan_ms_max", "ms"),
+    ("attempts at a better path", "attempts", ""),
+    ("attempts that found one", "attempts_used", ""),
+    ("memory of the daemon, most", "memory_mb_max", "MB"),
+    ("memory of the recorder, most", "recorder_memory_mb_max", "MB"),
+    ("processor time, most", "processor_percent_max", "% of a core"),
+    ("messages refused", "faults", ""),
+    ("lost by the recorder", "recorder_lost", "samples"),
+    ("samples missing", "samples_missing", ""),
+)
+"""Names of figures, the members of the document they are, and their units."""
 
 
 def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Difference]:
@@ -188,36 +216,6 @@ def _building(document: ReviewDocument) -> str:
     cells_m2 = _cells_m2(document)
     cells = "" if cells_m2 is None else f", {cells_m2:.1f} m2 of cells to cover"
     return f"{width:.1f} x {depth:.1f} m{cells}"
-
-
-NUMBERS = (
-    ("floor swept by the ledger", "ledger_swept_m2", "m2"),
-    ("covered again", "recovered_cells", "cells"),
-    ("out of reach", "unreachable_cells", "cells"),
-    ("steps", "steps", ""),
-    ("revisits", "revisits", ""),
-    ("quarter-turns", "turns_90", ""),
-    ("about-turns", "turns_180", ""),
-    ("driven", "driven_m", "m"),
-    ("paths published", "paths", ""),
-    ("replans", "replans", ""),
-    ("first plan", "first_plan_ms", "ms"),
-    ("replan, median", "replan_ms_p50", "ms"),
-    ("replan, p99", "replan_ms_p99", "ms"),
-    ("replan, slowest", "replan_ms_max", "ms"),
-    ("plans made", "plans", ""),
-    ("plans that became no path", "plans_unused", ""),
-    ("slowest plan", "plan_ms_max", "ms"),
-    ("attempts at a better path", "attempts", ""),
-    ("attempts that found one", "attempts_used", ""),
-    ("memory of the daemon, most", "memory_mb_max", "MB"),
-    ("memory of the recorder, most", "recorder_memory_mb_max", "MB"),
-    ("processor time, most", "processor_percent_max", "% of a core"),
-    ("messages refused", "faults", ""),
-    ("lost by the recorder", "recorder_lost", "samples"),
-    ("samples missing", "samples_missing", ""),
-)
-"""Names of figures, the members of the document they are, and their units."""
 
 
 @dataclass(frozen=True, slots=True)

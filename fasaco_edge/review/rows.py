@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from fasaco_edge.review.run_data import PublishedPath
     from fasaco_edge.review.spot import Spot
 
-
 REASONS = ("reason", "replans", "median", "slowest")
 REPLANS = ("at", "took", "steps planned", "gap", "to drive", "changed on the map", "why")
 """Columns of ``reason_rows`` and ``replan_rows``."""
@@ -34,6 +33,8 @@ UNREACHED = ("order", "m2", "at", "why")
 LEFT = ("m2", "at", "why")
 COMMANDS = ("at", "command")
 """Columns of ``order_rows``, ``unreached_rows``, ``left_rows`` and ``command_rows``."""
+MOST_PLACES = 3
+CHARGES = ("at", "for", "battery")
 
 
 def order_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
@@ -78,9 +79,6 @@ def command_rows(document: ReviewDocument) -> list[tuple[str, str]]:
 def replans_in_time(review: Review) -> list[tuple[str, ...]]:
     """Return all replans as ``replan_rows`` has the slowest ones, in order of time."""
     return [_replan_row(path) for path in review.replans.later]
-
-
-MOST_PLACES = 3
 
 
 def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str]]:
@@ -224,9 +222,6 @@ def moment_rows(review: Review) -> list[tuple[str, ...]]:
 def trouble_rows(troubles: list[Span]) -> list[tuple[str, ...]]:
     """Return each trouble: the state, when, for how long, and why."""
     return [(s.name, clock(s.begin_s), f"{s.seconds:.1f} s", s.reason) for s in troubles]
-
-
-CHARGES = ("at", "for", "battery")
 
 
 def charge_rows(document: ReviewDocument) -> list[tuple[str, str, str]]:
