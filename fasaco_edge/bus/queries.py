@@ -1,4 +1,4 @@
-"""Queries, their replies, and the roll of liveliness tokens.
+"""Queries, their replies, and the list of liveliness tokens.
 
 Tokens are queried and not subscribed to. A subscriber of Zenoh's (1.10) keeps each key that it has
 ever received; after a flood it keeps tokens that no longer exist; and beside a subscriber, the

@@ -32,13 +32,14 @@ from fasaco_edge.review.drive import (
     swept_floor,
     walk_figures,
 )
-from fasaco_edge.review.faults import Faults, faults_of
 from fasaco_edge.review.moments import (
     RECORDER_IN_ORDER,
     TROUBLES,
+    Faults,
     Moment,
     Replans,
     Span,
+    faults_of,
     spans_of,
     worst_moments,
 )

@@ -12,8 +12,7 @@ from msgspec.structs import astuple
 
 from fasaco_edge.mission.orders.order import order_document
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import DrawnLine, drawings
-from fasaco_edge.recording.read.fields import DrawnField
+from fasaco_edge.recording.read.drawn import DrawnField, DrawnLine, drawings
 from fasaco_edge.review.orders import command_words
 from fasaco_edge.review.panels import covered_share
 from fasaco_edge.review.review import Review

@@ -7,7 +7,7 @@ import pytest
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.recording.arrow import pa
-from fasaco_edge.recording.read.fields import MOST_FIELDS, FieldSampler
+from fasaco_edge.recording.read.drawn import MOST_FIELDS, FieldSampler
 
 
 def strict(kind):

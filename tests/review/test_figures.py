@@ -7,9 +7,9 @@ import pytest
 
 from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.drive import milestones, walk_figures
-from fasaco_edge.review.faults import faults_of
 from fasaco_edge.review.moments import (
     Span,
+    faults_of,
     kind_of,
     largest_drop,
     longest_gap,

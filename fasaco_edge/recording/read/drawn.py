@@ -1,32 +1,117 @@
 """Lines, labels and pheromone fields in a recording, each as it was drawn, one after the other.
 
-What a review does not need for its figures: it is read when somebody asks for it.
+A review keeps some fields, spread over all of the time; all else is read when somebody asks for it.
 """
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
-from fasaco_edge.recording.read.fields import DrawnField, fields_in
 from fasaco_edge.recording.read.frames import Chunk, chunks, column, open_part, wall_ns
 
-_STRIPS = pa.list_(
-    pa.list_(
-        pa.field(
-            "item",
-            pa.list_(pa.field("item", pa.float32(), nullable=False), 3),
-            nullable=False,
-        )
-    )
-)
-_PLACE = pa.list_(pa.list_(pa.field("item", pa.float32(), nullable=False), 3))
+# Most that are kept; of more every other one is dropped.
+MOST_FIELDS = 64
+
+_POINT = pa.list_(pa.field("item", pa.float32(), nullable=False), 3)
+_STRIPS = pa.list_(pa.list_(pa.field("item", _POINT, nullable=False)))
+_PLACE = pa.list_(_POINT)
+_DATA = pa.list_(pa.list_(pa.field("item", pa.uint8(), nullable=False)))
+_CELL = pa.list_(pa.float32())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawnField:
+    """A field as it was drawn.
+
+    Attributes:
+        at_ns: when, by the recorder's clock [ns].
+        window: the cells it spans, as it was drawn: relative to where 0 was.
+        cell_m: edge of a cell [m].
+        anchor: where 0 was, (x, y) [m] in the map frame, for those who know.
+    """
+
+    at_ns: int
+    window: Window
+    _packed: bytes
+    cell_m: float
+    anchor: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def levels(self) -> NDArray[np.uint8]:
+        """Pheromone on a log scale, uint8 (rows, cols), row 0 with the smallest y; 0 for none."""
+        shape = self.window.rows, self.window.cols
+        return np.frombuffer(zlib.decompress(self._packed), np.uint8).reshape(shape)
+
+
+def fields_in(batch: pa.RecordBatch, times: list[int]) -> Iterator[DrawnField]:
+    """Yield the fields of a batch of rows, drawn at ``times`` [ns].
+
+    Raises:
+        ValueError: the batch holds something else.
+    """
+    data = column(batch, "GridMap:data", _DATA)
+    cells = column(batch, "GridMap:cell_size", _CELL)
+    places = column(batch, "GridMap:translation", _PLACE)
+    if data is None or cells is None or places is None:
+        return
+    formats = batch.column("GridMap:format").to_pylist()
+    for row, at_ns in enumerate(times):
+        levels = np.asarray(data[row].values[0].values, np.uint8)
+        shape = int(formats[row][0]["height"]), int(formats[row][0]["width"])
+        cell_m, (x, y, _) = cells[row].as_py()[0], places[row].as_py()[0]
+        if levels.size != shape[0] * shape[1] or not cell_m > 0:
+            raise ValueError(f"a field of {levels.size} cells, {shape[0]} x {shape[1]} told")
+        corner = Window(0, 0, *shape).moved(round(y / cell_m), round(x / cell_m))
+        # An image's row 0 is its top.
+        upright = np.ascontiguousarray(levels.reshape(shape)[::-1])
+        yield DrawnField(at_ns, corner, zlib.compress(upright.data, 1), cell_m)
+
+
+@dataclass(slots=True)
+class FieldSampler:
+    """Takes fields in order of time and keeps some.
+
+    Attributes:
+        count: how many there were.
+        fields: those kept, about evenly spread, and the last one.
+    """
+
+    count: int = 0
+    fields: list[DrawnField] = field(default_factory=list)
+    _every: int = 1
+    _last: DrawnField | None = None
+
+    def take(self, batch: pa.RecordBatch, times: list[int]) -> None:
+        """Take the fields of a batch of rows.
+
+        Raises:
+            ValueError: the batch holds something else.
+        """
+        for taken in fields_in(batch, times):
+            self._keep(taken)
+
+    def _keep(self, taken: DrawnField) -> None:
+        if self.count % self._every == 0:
+            self.fields.append(taken)
+        self.count += 1
+        self._last = taken
+        if len(self.fields) > MOST_FIELDS:
+            self.fields = self.fields[::2]
+            self._every *= 2
+
+    def spread(self) -> tuple[DrawnField, ...]:
+        """Return the fields kept, in order of time, the last one among them."""
+        last = [] if self._last is None or self._last in self.fields else [self._last]
+        return tuple(sorted([*self.fields, *last], key=lambda one: one.at_ns))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,7 +19,7 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
-from fasaco_edge.recording.read.fields import DrawnField, FieldSampler
+from fasaco_edge.recording.read.drawn import DrawnField, FieldSampler
 from fasaco_edge.recording.read.frames import HINT, Chunk, chunks, column, open_part, wall_ns
 from fasaco_edge.samples import Place, SampleDecoder, place_of
 
