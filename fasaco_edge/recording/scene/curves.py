@@ -124,13 +124,7 @@ class StatusFigures:
         for name, milliseconds in asdict(status.latency_ms).items():
             if milliseconds is not None:
                 self._curves.draw(f"{entities.LATENCY}/{name}", milliseconds, NOISE)
-        # 0 means that the daemon does not send it.
-        if status.rss_mb:
-            self._curves.draw(f"{entities.MEMORY}/planner", status.rss_mb, NOISE)
-        if status.uptime_s:
-            self._add_processor(status.uptime_s, status.cpu_s)
-        if status.threads:
-            self._draw(entities.THREADS, status.threads)
+        self._add_process(status)
         if status.coverage is not None:
             for name in CELLS:
                 self._draw(f"{entities.CELLS}/{name}", getattr(status.coverage, name))
@@ -155,6 +149,15 @@ class StatusFigures:
             self._saved[1] += about.saved_by_local_search_s
             for entity, seconds in zip(SAVED, self._saved, strict=True):
                 self._curves.draw(entity, seconds)
+
+    def _add_process(self, status: Status) -> None:
+        """Draw what the daemon's process takes; 0 means that the daemon does not send it."""
+        if status.rss_mb:
+            self._curves.draw(f"{entities.MEMORY}/planner", status.rss_mb, NOISE)
+        if status.uptime_s:
+            self._add_processor(status.uptime_s, status.cpu_s)
+        if status.threads:
+            self._draw(entities.THREADS, status.threads)
 
     def _add_processor(self, uptime_s: float, cpu_s: float) -> None:
         since = self._since
