@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.ants.colony import ColonyState, Rules, deposit, settle, walk_ants
 from fasaco_edge.kernels.ants.graph import Graph
 from fasaco_edge.planners.colony import VISIBILITIES, ColonyConfig
-from fasaco_edge.planners.cost import MICROSECONDS
+from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
 from fasaco_edge.planners.effort import HELD_CELLS
 from fasaco_edge.planners.living_trail import mean_into
 from fasaco_edge.planners.path import CoveragePath, Saved
@@ -40,7 +40,6 @@ from fasaco_edge.planners.planner import (
     ColonySnapshot,
     Observer,
     SearchProgress,
-    SearchWork,
     StoppingCriterion,
     ignore,
     never,

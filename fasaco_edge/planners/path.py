@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import shortest_walk
-from fasaco_edge.planners.cost import count_turns
-from fasaco_edge.planners.planner import NO_WORK, SearchWork, gap_to
+from fasaco_edge.planners.cost import NO_WORK, SearchWork, count_turns, gap_to
 
 
 class Saved(NamedTuple):

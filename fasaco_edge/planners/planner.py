@@ -16,47 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.planners.cost import MICROSECONDS
+from fasaco_edge.planners.cost import SearchWork, gap_to
 
 if TYPE_CHECKING:
     from fasaco_edge.planners.path import CoveragePath
     from fasaco_edge.planners.problem import CoverageProblem
-
-
-@dataclass(frozen=True, slots=True)
-class SearchWork:
-    """Work of a search in counts; with problem, planner and seed they repeat its path.
-
-    The wire contract calls perturbations ``kicks``.
-
-    Attributes:
-        ants: ants that walked, and the sweeps that a search begins with.
-        perturbations: changes by which a local search left a local optimum, and windows that
-            were solved anew.
-        proposals: moves that a local search tried.
-    """
-
-    ants: int = 0
-    perturbations: int = 0
-    proposals: int = 0
-
-    def __add__(self, other: SearchWork) -> SearchWork:
-        return SearchWork(
-            self.ants + other.ants,
-            self.perturbations + other.perturbations,
-            self.proposals + other.proposals,
-        )
-
-    def reaches(self, limit: SearchWork) -> bool:
-        """Return whether every count is at least that of ``limit``."""
-        return (
-            self.ants >= limit.ants
-            and self.perturbations >= limit.perturbations
-            and self.proposals >= limit.proposals
-        )
-
-
-NO_WORK = SearchWork()
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,15 +43,6 @@ class SearchProgress:
     def gap(self) -> float | None:
         """How far above the bound the cost of the best walk is; None without a bound."""
         return gap_to(self.lower_bound_cost_s, self.cost_s)
-
-
-def gap_to(lower_bound_s: float, cost_s: float) -> float | None:
-    """Return ``cost_s / lower_bound_s - 1``; None where the bound is 0, not known.
-
-    One division of whole microseconds: 115 s over a bound of 100 s are 0.15 to the last bit.
-    """
-    least, cost = round(lower_bound_s * MICROSECONDS), round(cost_s * MICROSECONDS)
-    return (cost - least) / least if least > 0 else None
 
 
 # Called again and again while a search runs; True ends it with the best walk it has. There

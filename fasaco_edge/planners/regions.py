@@ -47,7 +47,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
     Walk,
     recount,
 )
-from fasaco_edge.planners.planner import SearchWork
+from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.problem import FramedGround
 
 EVERYWHERE = np.empty(0, np.int32)

@@ -21,15 +21,10 @@ from fasaco_edge.errors import NothingToCover
 from fasaco_edge.kernels.local_search.regions import changed_cells
 from fasaco_edge.kernels.local_search.repair import keep_legal, put_in_new
 from fasaco_edge.planners.bound import GLANCE, lower_bound_of
-from fasaco_edge.planners.cost import MICROSECONDS
+from fasaco_edge.planners.cost import MICROSECONDS, NO_WORK, SearchWork
 from fasaco_edge.planners.effort import HELD_CELLS, RepairEffort, repair_for
 from fasaco_edge.planners.path import CoveragePath, Saved, common_beginning
-from fasaco_edge.planners.planner import (
-    NO_WORK,
-    SearchProgress,
-    SearchWork,
-    StoppingCriterion,
-)
+from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.regions import Neighbourhood, WalkRegion, neighbourhoods, spot, stream_of
 

@@ -27,15 +27,11 @@ import numpy as np
 from fasaco_edge.planners.baselines import first_walks
 from fasaco_edge.planners.bound import GLANCE, THOROUGH, LowerBound
 from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.cost import MICROSECONDS
+from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
 from fasaco_edge.planners.effort import HELD_CELLS, effort_for
 from fasaco_edge.planners.fasaco import Colony, Group, groups_of, snapshot_of
 from fasaco_edge.planners.path import CoveragePath, Saved
-from fasaco_edge.planners.planner import (
-    Observer,
-    SearchProgress,
-    SearchWork,
-)
+from fasaco_edge.planners.planner import Observer, SearchProgress
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of
 from fasaco_edge.planners.regions import EDGE, WalkRegion, is_one_region, regions_of, stream_of
 from fasaco_edge.planners.repair import completed, has_walk

@@ -24,7 +24,8 @@ from fasaco_edge.daemon.loop.loop import TICK_S
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.mission.core.events import CommandReceived, PathUpdate, PlanReady, PlanRequest
 from fasaco_edge.mission.orders.order import read_command
-from fasaco_edge.planners.planner import AnyOf, CoveragePlanner, SearchWork, WorkLimit, ignore
+from fasaco_edge.planners.cost import SearchWork
+from fasaco_edge.planners.planner import AnyOf, CoveragePlanner, WorkLimit, ignore
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment, digest

@@ -84,10 +84,10 @@ def plan(building: str, truth: OccupancyGrid, start: tuple[float, float], case: 
     from fasaco_edge.grid.floor import Floor, StandLattice
     from fasaco_edge.grid.lattice import CoverageLattice, Footprint
     from fasaco_edge.kernels.floor.turning import proportional_turning
-    from fasaco_edge.planners.cost import CoverageCost
+    from fasaco_edge.planners.cost import CoverageCost, SearchWork
     from fasaco_edge.planners.line import LINES, line_over
     from fasaco_edge.planners.near_optimal import NearOptimal
-    from fasaco_edge.planners.planner import SearchWork, WorkLimit
+    from fasaco_edge.planners.planner import WorkLimit
     from fasaco_edge.planners.problem import CoverageProblem
 
     limit = WorkLimit(SearchWork(proposals=PROPOSALS))
@@ -120,10 +120,10 @@ def drive(building: str, truth: OccupancyGrid, start: tuple[float, float], case:
     from fasaco_edge.mission.config import Sweeping
     from fasaco_edge.mission.core.events import MapReceived, PlanReady, PoseReceived, State
     from fasaco_edge.mission.core.mission import Mission, MissionConfig
-    from fasaco_edge.planners.cost import CoverageCost
+    from fasaco_edge.planners.cost import CoverageCost, SearchWork
     from fasaco_edge.planners.line import LINES
     from fasaco_edge.planners.near_optimal import NearOptimal
-    from fasaco_edge.planners.planner import SearchWork, WorkLimit
+    from fasaco_edge.planners.planner import WorkLimit
     from fasaco_edge.simulation.robot import SimulationConfig
     from fasaco_edge.simulation.world import World
 

@@ -255,7 +255,8 @@ class Robot:
 
     def _hear(self, events: Sequence[Event]) -> None:
         from fasaco_edge.mission.core.events import PlanReady
-        from fasaco_edge.planners.planner import SearchWork, WorkLimit
+        from fasaco_edge.planners.cost import SearchWork
+        from fasaco_edge.planners.planner import WorkLimit
 
         decision = self.mission.step(events, self._now)
         limit = WorkLimit(SearchWork(proposals=PROPOSALS))

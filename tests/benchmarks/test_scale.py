@@ -8,7 +8,8 @@ from PIL import Image
 
 from fasaco_edge.bench.benchmark import Goal
 from fasaco_edge.errors import BadConfiguration, ProcessEnded
-from fasaco_edge.planners.planner import NO_WORK, SearchProgress
+from fasaco_edge.planners.cost import NO_WORK
+from fasaco_edge.planners.planner import SearchProgress
 from tests.benchmarks.__main__ import main
 from tests.benchmarks.scale.benchmark import budgets, planned
 from tests.benchmarks.scale.process import GapWatch, ScaleRun, ScaleTask, SizedRun

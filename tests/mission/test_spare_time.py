@@ -9,9 +9,9 @@ from fasaco_edge.daemon.loop.outbox import path_attachment
 from fasaco_edge.mission.core.events import MapReceived, PlanReady
 from fasaco_edge.mission.core.spare_time import SKIPPED_S, Attempt
 from fasaco_edge.planners.bound import lower_bound_steps
-from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.planner import SearchWork, WorkLimit, never
+from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.repair import HELD_CELLS
 from tests.benchmarks.judge import check_walk
 from tests.mission.world import CONFIG, Drive, building, patch, pose_at

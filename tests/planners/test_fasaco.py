@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.fasaco import LARGEST_GROUP, Fasaco
 from fasaco_edge.planners.path import walk_figures
-from fasaco_edge.planners.planner import SearchProgress, SearchWork, TimeBudget, WorkLimit, never
+from fasaco_edge.planners.planner import SearchProgress, TimeBudget, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
 from tests import naive
 from tests.support.examples import examples

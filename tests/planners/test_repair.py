@@ -11,10 +11,10 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.effort import HELD_CELLS, repair_for
 from fasaco_edge.planners.near_optimal import NearOptimal
-from fasaco_edge.planners.planner import SearchWork, WorkLimit, never
+from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.repair import can_repair, completed, repaired
 from tests.benchmarks.judge import check_walk

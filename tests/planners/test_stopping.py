@@ -5,12 +5,12 @@ import time
 
 import pytest
 
+from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.planner import (
     AnyOf,
     GapReached,
     Interrupt,
     SearchProgress,
-    SearchWork,
     TimeBudget,
     WorkLimit,
 )

@@ -33,9 +33,9 @@ from fasaco_edge.mission.core.events import (
     State,
 )
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
-from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.planners.planner import SearchWork, WorkLimit, ignore
+from fasaco_edge.planners.planner import WorkLimit, ignore
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.benchmarks.harness import planner_for
 from tests.benchmarks.judge import MOVES
