@@ -25,6 +25,7 @@ from fasaco_edge.bus.queries import (
     Request,
     Roll,
     Shared,
+    ask_for_answers,
     reply_of,
     request_of,
     send,
@@ -193,6 +194,21 @@ class Bus:
             selector, timeout=timeout_s, payload=payload or None, encoding=encoding
         )
         return [reply_of(reply) for reply in replies]
+
+    def ask(
+        self,
+        key: str,
+        payload: bytes,
+        beside: bytes,
+        timeout_s: float,
+        end: Callable[[list[Reply]], None],
+    ) -> None:
+        """Ask all that answer on ``key`` for something, as clients of ROS 2 services do.
+
+        ``end`` is called with the answers, on a Zenoh thread: when all have come, or none is there
+        to answer, or ``timeout_s`` is over (an error is among them then).
+        """
+        ask_for_answers(self._session, key, (payload, beside), timeout_s, end)
 
     def token(self, key: str) -> object:
         """Declare a liveliness token and return it; it vanishes with this session."""

@@ -16,11 +16,18 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import python_program, stop_event
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from fasaco_edge.bus.session import Bus
+    from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.config.ros import RosConfig
+    from fasaco_edge.follow.node import Node
     from fasaco_edge.follow.settings import FollowSettings, PoseSource
 
 # Descriptor of standard input; it may be closed, and sys.stdin None.
 STDIN = 0
+# Of the tool's width: lanes beside each other are further apart, and a robot is nearer to its own.
+NEAR_SHARE = 0.75
 EPILOG = """\
 Speeds and accelerations are those of the configuration: robot.speed_m_s, acceleration_m_s2,
 turn_deg_s, turn_deg_s2 and steered_deg. Where the configuration has a block ros2, poses come from
@@ -36,6 +43,11 @@ and when this program ends. It drives on by itself when that is over: after the 
 pose has moved by 0.1 m, or another path comes. A pose with the stamp of the one before is no new
 one. Zeros are sent for a second after a stop, then nothing. A base has to stop by itself where
 nothing comes for 0.5 s: nobody else can, if this program or its computer dies.
+
+With `ros2.follow: nav2` in the configuration nothing is driven here: the path goes to Nav2's
+controller, piece by piece, as goals of /follow_path (nav2_msgs/FollowPath), which end for the same
+reasons. What Nav2 says of them is said here. Were this program or its computer to die, Nav2 would
+drive to the end of the goal that it has, at most 20 m.
 
 examples:
   fasaco-edge follow --config /etc/fasaco-edge/config.yaml --dry-run
@@ -109,15 +121,17 @@ def _become_small(args: argparse.Namespace) -> NoReturn:
 
 def _drive() -> int:
     """Drive, in the small process."""
-    from fasaco_edge.follow.node import native_out, run_follower
+    from fasaco_edge.follow.node import native_node, run_follower
     from fasaco_edge.follow.settings import FollowSettings
 
     settings = FollowSettings.decode(sys.stdin.buffer.read())
-    out_of = native_out
-    if settings.ros:
-        from fasaco_edge.follow.ros import ros_out as out_of
+    node_of: Callable[[Bus, FollowSettings, Callable[[str], None]], Node] = native_node
+    if settings.nav2:
+        from fasaco_edge.follow.nav2_node import nav2_node as node_of
+    elif settings.ros:
+        from fasaco_edge.follow.ros import ros_node as node_of
     with stop_event() as stop:
-        run_follower(settings, stop, out_of, lambda line: print(line, flush=True))
+        run_follower(settings, stop, node_of, lambda line: print(line, flush=True))
     return Exit.OK
 
 
@@ -154,6 +168,7 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         frame=ros.frames.robot if ros else "base_link",
         cmd_key=ros.output_key(ros.velocities(schema)) if ros else here.keys.of(topics.CMD_VEL),
         ros=_ros_node(ros, schema) if ros else {},
+        nav2=_nav2(config) if ros and ros.follow == "nav2" else {},
         pace=args.speed,
         dry_run=args.dry_run,
     )
@@ -180,6 +195,14 @@ def _ros_node(ros: RosConfig, schema: str) -> dict[str, object]:
         "node": f"{ros.node}_follow",
         "topic": ros.velocities(schema).name,
     }
+
+
+def _nav2(config: DaemonConfig) -> dict[str, object]:
+    assert config.ros2
+    ros, nav2 = config.ros2, config.ros2.nav2
+    names = (nav2.controller, nav2.goal_checker, nav2.progress_checker, nav2.path_handler)
+    near_m = nav2.near_m if nav2.near_m is not None else NEAR_SHARE * config.robot.tool_width_m
+    return {"action": ros.action, "release": nav2.release, "plugins": names, "near_m": near_m}
 
 
 COMMAND = Command(

@@ -13,6 +13,7 @@ from fasaco_edge.config.reading import Section
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
 from fasaco_edge.wire.messages.ros_services import TRIGGERED, Triggered
+from fasaco_edge.wire.ros_actions import Release
 from fasaco_edge.wire.ros_keys import TRIGGER, RosTopic, graph_key
 from fasaco_edge.wire.schemas import TWIST_SCHEMAS
 from fasaco_edge.wire.topics import ROS_TOPICS, TF_STATIC
@@ -53,13 +54,31 @@ class RosFrames(Section, frozen=True):
     robot: str = "base_link"
 
 
+class Nav2Config(Section, frozen=True):
+    """Nav2's controller server, where ``follow`` is ``nav2``.
+
+    ``controller``, ``goal_checker``, ``progress_checker`` and ``path_handler`` name its plugins, ""
+    for the only one there is; ``release`` is whose goals a server behind a bridge takes. A goal
+    does not come nearer to itself than ``near_m`` [m]; without it, than 0.75 of the tool's width.
+    """
+
+    action: str = "/follow_path"
+    release: Release = "jazzy"
+    controller: str = ""
+    goal_checker: str = ""
+    progress_checker: str = ""
+    path_handler: str = ""
+    near_m: Annotated[float, Meta(ge=0.05, le=10)] | None = None
+
+
 class RosConfig(Section, frozen=True):
     """ROS 2 topics, beside the native keys.
 
     ``kind`` says how ROS comes to Zenoh: its middleware is rmw_zenoh, or zenoh-bridge-ros2dds
     stands between. ``domain`` and ``node`` are for rmw_zenoh alone: a bridge has its own.
     ``pose`` is the type of the pose's topic, or "tf"; the mission's commands are services
-    below ``services``.
+    below ``services``. ``follow`` says what ``fasaco-edge follow`` does: drive the base itself, or
+    hand the path to Nav2's controller.
     """
 
     kind: Literal["bridge", "rmw_zenoh"]
@@ -75,6 +94,8 @@ class RosConfig(Section, frozen=True):
         "nav_msgs/msg/Odometry",
     ] = "tf"
     frames: RosFrames = RosFrames()
+    follow: Literal["own", "nav2"] = "own"
+    nav2: Nav2Config = Nav2Config()
 
     @property
     def inputs(self) -> dict[str, RosTopic]:
@@ -96,6 +117,11 @@ class RosConfig(Section, frozen=True):
             name: RosTopic(self._name(f"{self.services}/{name}"), TRIGGER, depth=SERVICE_DEPTH)
             for name in TRIGGERED
         }
+
+    @property
+    def action(self) -> str:
+        """Name of the action of Nav2's controller."""
+        return self._name(self.nav2.action)
 
     def velocities(self, schema: str) -> RosTopic:
         """Return what the follower publishes, of type ``schema``."""
@@ -152,6 +178,14 @@ class RosConfig(Section, frozen=True):
             yield BadConfiguration(f"node must be letters, digits and _, got {self.node!r}")
         if self.kind == "bridge" and (self.domain != 0 or self.node != DEFAULT_NODE):
             yield BadConfiguration("domain and node are for kind rmw_zenoh: a bridge has its own")
+        if not _TOPIC.fullmatch(self.nav2.action):
+            yield BadConfiguration(
+                f"nav2.action must be like /follow_path, got {self.nav2.action!r}"
+            )
+        for key in ("controller", "goal_checker", "progress_checker", "path_handler"):
+            name = getattr(self.nav2, key)
+            if not name.isprintable() or len(name.encode()) > MAX_STRING_BYTES:
+                yield BadConfiguration(f"nav2.{key} must be the name of a plugin, got {name!r}")
         yield from self._topic_faults()
         for key in ("map", "robot"):
             frame = getattr(self.frames, key)

@@ -6,29 +6,24 @@ import logging
 import math
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
-from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.errors import BusUnavailable, FasacoError
+from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.follow.estimate import STAND, Command, Limits
-from fasaco_edge.follow.follower import LINK_S, RATE_HZ, Follower, Patience, State
-from fasaco_edge.follow.settings import FollowSettings, PoseSource
+from fasaco_edge.follow.follower import RATE_HZ, Follower
+from fasaco_edge.follow.inputs import Inputs, patience_of
+from fasaco_edge.follow.settings import FollowSettings
+from fasaco_edge.follow.supervision import State
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.messages.twists import Velocity, encode_velocity
 from fasaco_edge.wire.schemas import TWIST_STAMPED
 from fasaco_edge.wire.topic_types import VOLATILE
 
 log = logging.getLogger(__name__)
 
-# Poses that may wait for the next turn; of more the oldest go.
-MOST_POSES = 256
 # While nobody listens at the endpoint it is tried again after so long [s].
 RETRY_S = 1.0
 REPORT_EVERY_S = 1.0
@@ -41,10 +36,20 @@ class Out(Protocol):
         """Send a message."""
 
 
+class Node(Protocol):
+    """A follower on the bus."""
+
+    def turn(self) -> None:
+        """Take what came, and do what follows from it."""
+
+    def end(self) -> None:
+        """Have the robot stand."""
+
+
 def run_follower(
     settings: FollowSettings,
     stop: threading.Event,
-    out_of: Callable[[Bus, FollowSettings], Out],
+    node_of: Callable[[Bus, FollowSettings, Callable[[str], None]], Node],
     report: Callable[[str], None],
 ) -> None:
     """Drive the base along the path until ``stop`` is set; it is told to stand before the end.
@@ -52,23 +57,24 @@ def run_follower(
     Args:
         settings: the follower's.
         stop: ends it.
-        out_of: makes what commands are sent by.
+        node_of: makes what takes the turns.
         report: is told each second what would be sent, in a dry run.
     """
     bus = _joined(settings, stop)
     if bus is None:
         return
     with bus:
-        node = FollowerNode(settings, bus, out_of(bus, settings), report)
+        node = node_of(bus, settings, report)
         try:
-            node.run(stop)
+            _take_turns(node, 1.0 / (RATE_HZ * settings.pace), stop)
         finally:
-            node.send(STAND)
+            node.end()
 
 
-def native_out(bus: Bus, settings: FollowSettings) -> Out:
-    """Return the publisher of the native key."""
-    return bus.publisher(settings.cmd_key, settings.schema, topics.CMD_VEL.qos or VOLATILE)
+def native_node(bus: Bus, settings: FollowSettings, report: Callable[[str], None]) -> FollowerNode:
+    """Return what sends velocities on the native key."""
+    out = bus.publisher(settings.cmd_key, settings.schema, topics.CMD_VEL.qos or VOLATILE)
+    return FollowerNode(settings, bus, out, report)
 
 
 def _joined(settings: FollowSettings, stop: threading.Event) -> Bus | None:
@@ -85,6 +91,18 @@ def _joined(settings: FollowSettings, stop: threading.Event) -> Bus | None:
     return None
 
 
+def _take_turns(node: Node, period_s: float, stop: threading.Event) -> None:
+    due = time.monotonic()
+    while not stop.is_set():
+        node.turn()
+        due += period_s
+        now = time.monotonic()
+        if due <= now:
+            # Turns that were missed are not made up for.
+            due = now + period_s
+        stop.wait(due - now)
+
+
 class FollowerNode:
     """Takes what came in, steps the follower, and sends what it says."""
 
@@ -94,7 +112,6 @@ class FollowerNode:
         self._settings = settings
         self._out = out
         self._report = report
-        self._pace = settings.pace
         self._follower = Follower(
             Limits(
                 settings.speed_m_s,
@@ -103,52 +120,29 @@ class FollowerNode:
                 math.radians(settings.turn_deg_s2),
                 math.radians(settings.steered_deg),
             ),
-            Patience(
-                settings.pose_age_s,
-                max(settings.pose_age_s, LINK_S),
-                Patience().status_s * settings.pace,
-            ),
+            patience_of(settings),
             moves=not settings.dry_run,
         )
-        self._decoder = PoseDecoder(settings.pose_schema, settings.frames)
-        self._poses = deque[tuple[Sample, PoseSource, float]](maxlen=MOST_POSES)
-        self._path: LatestSlot[Sample] = LatestSlot()
-        # Ids of the daemons that plan, and when one of them was heard; on Zenoh's threads.
-        self._planners: set[str] = set()
-        self._heard_at: float | None = None
-        self._lock = threading.Lock()
-        self._said: tuple[State, str] | None = None
+        self._inputs = Inputs(settings, bus)
+        self._told = Told()
         self._reported_at = -math.inf
-        keys = Keys(settings.robot, settings.base)
-        for source in settings.poses:
-            bus.subscribe(source.key, self._pose_taker(source), source.latched, source.depth)
-        bus.watch_tokens(keys.of(topics.CLAIM), self._on_claim)
-        bus.listen(keys, topics.STATUS, self._on_status)
-        bus.listen(keys, topics.PATH, self._path.put)
-
-    def run(self, stop: threading.Event) -> None:
-        """Let turns follow each other until ``stop`` is set."""
-        period_s = 1.0 / (RATE_HZ * self._pace)
-        due = time.monotonic()
-        while not stop.is_set():
-            self.turn()
-            due += period_s
-            now = time.monotonic()
-            if due <= now:
-                # Turns that were missed are not made up for.
-                due = now + period_s
-            stop.wait(due - now)
 
     def turn(self) -> None:
         """Take what came, and send what follows from it."""
         follower = self._follower
-        self._take(follower)
-        command = follower.step(self._now())
+        self._inputs.feed(follower)
+        command = follower.step(self._inputs.now())
         if command is not None:
-            self.send(command)
-        self._tell(command)
+            self._send(command)
+        if self._told.tell(follower.state, follower.detail):
+            self._reported_at = -math.inf
+        self._say(command)
 
-    def send(self, command: Command) -> None:
+    def end(self) -> None:
+        """Have the robot stand."""
+        self._send(STAND)
+
+    def _send(self, command: Command) -> None:
         """Send a command; in a dry run none."""
         if self._settings.dry_run:
             return
@@ -159,67 +153,31 @@ class FollowerNode:
             )
         self._out.put(encode_velocity(velocity, self._settings.schema))
 
-    def _take(self, follower: Follower) -> None:
-        with self._lock:
-            planner = min(self._planners, default="")
-            heard_at, self._heard_at = self._heard_at, None
-        follower.take_planner(planner, self._now())
-        if heard_at is not None:
-            follower.heard_status(heard_at)
-        while self._poses:
-            sample, source, at = self._poses.popleft()
-            try:
-                pose = self._decoder.decode(
-                    sample.payload,
-                    source.schema or sample.schema,
-                    is_static=source.is_static,
-                    came_at=at,
-                )
-            except FasacoError as error:
-                follower.refuse_pose(error)
-                continue
-            if pose is not None:
-                follower.take_pose(pose, at)
-            if (link := self._decoder.oldest_link) is not None:
-                follower.heard_link(link)
-        if (path := self._path.take(0.0)) is not None:
-            follower.take_path(path.payload)
-
-    def _tell(self, command: Command | None) -> None:
-        """Log what the robot does, where that is new; in a dry run report each second."""
-        follower = self._follower
-        said = follower.state, "" if follower.state is State.DRIVING else follower.detail
-        if self._said is None or self._said[0] is not said[0]:
-            detail = f": {follower.detail}" if follower.detail else ""
-            what = "driving" if follower.state is State.DRIVING else "standing"
-            why = "" if follower.state is State.DRIVING else f", {follower.state.value}{detail}"
-            log.info("%s%s", what, why)
-            self._said = said
-            self._reported_at = -math.inf
+    def _say(self, command: Command | None) -> None:
+        """In a dry run report each second."""
         now = time.monotonic()
         if self._settings.dry_run and now - self._reported_at >= REPORT_EVERY_S:
             self._reported_at = now
             sent = command or STAND
             turn = math.degrees(sent.turn_rate)
-            self._report(f"{sent.speed:6.3f} m/s {turn:7.1f} deg/s  {follower.state.value}")
+            state = self._follower.state.value
+            self._report(f"{sent.speed:6.3f} m/s {turn:7.1f} deg/s  {state}")
 
-    def _now(self) -> float:
-        """Return the time by the clock that the robot's seconds are counted by [s]."""
-        return time.monotonic() * self._pace
 
-    def _pose_taker(self, source: PoseSource) -> Callable[[Sample], None]:
-        def take(sample: Sample) -> None:
-            self._poses.append((sample, source, self._now()))
+class Told:
+    """Logs what the robot does, where that is new."""
 
-        return take
+    def __init__(self) -> None:
+        self._state: State | None = None
 
-    def _on_claim(self, key: str, is_there: bool) -> None:
-        _, _, claim = key.rpartition("/claim/")
-        planner, _, stand = claim.partition("/")
-        if stand == "plans":
-            with self._lock:
-                (self._planners.add if is_there else self._planners.discard)(planner)
-
-    def _on_status(self, _sample: Sample) -> None:
-        with self._lock:
-            self._heard_at = self._now()
+    def tell(self, state: State, detail: str) -> bool:
+        """Log a state that is another one than before; return whether it is."""
+        if state is self._state:
+            return False
+        self._state = state
+        words = f": {detail}" if detail else ""
+        if state is State.DRIVING:
+            log.info("driving%s", words)
+        else:
+            log.info("standing, %s%s", state.value, words)
+        return True

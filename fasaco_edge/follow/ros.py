@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from fasaco_edge.bus.publisher import RosPublisher
 from fasaco_edge.bus.session import Bus
+from fasaco_edge.follow.node import FollowerNode
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, gid_of
 from fasaco_edge.wire.topic_types import VOLATILE
 
 
-def ros_out(bus: Bus, settings: FollowSettings) -> RosPublisher:
+def ros_node(bus: Bus, settings: FollowSettings, report: Callable[[str], None]) -> FollowerNode:
     """Return what sends velocities to ROS; to rmw_zenoh it shows itself as a node."""
     ros, gid = settings.ros, b""
     if ros["kind"] == "rmw_zenoh":
@@ -20,4 +23,4 @@ def ros_out(bus: Bus, settings: FollowSettings) -> RosPublisher:
         bus.token(token)
         gid = gid_of(token)
     out = bus.publisher(settings.cmd_key, settings.schema, topics.CMD_VEL.qos or VOLATILE)
-    return RosPublisher(out, gid)
+    return FollowerNode(settings, bus, RosPublisher(out, gid), report)

@@ -46,6 +46,8 @@ class FollowSettings:
         frame: of a TwistStamped, the robot's own.
         cmd_key: what it is sent on.
         ros: kind, domain, namespace, name of the node and topic, where ``cmd_key`` is ROS 2's.
+        nav2: where it is Nav2's controller that drives: name of its action, release, names of
+            plugins, and how near goals may not come to themselves [m].
         pace: simulated seconds in a second.
         dry_run: say what would be sent, and send nothing.
     """
@@ -66,6 +68,7 @@ class FollowSettings:
     schema: str = TWIST
     frame: str = "base_link"
     ros: Mapping[str, Any] = field(default_factory=dict)
+    nav2: Mapping[str, Any] = field(default_factory=dict)
     secured: Mapping[str, Any] = field(default_factory=dict, repr=False)
     pace: float = 1.0
     dry_run: bool = False

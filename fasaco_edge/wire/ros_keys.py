@@ -76,7 +76,7 @@ class RosTopic:
     def rmw_key(self, domain: int, *, any_hash: bool = False) -> str:
         """Return the key that rmw_zenoh gives it; ``any_hash``: whatever its type's hash."""
         type_hash = "*" if any_hash else _type_hash(self.schema)
-        return f"{domain}/{self.bridge_key}/{_dds_type(self.schema)}/{type_hash}"
+        return f"{domain}/{self.bridge_key}/{dds_type(self.schema)}/{type_hash}"
 
     @property
     def qos(self) -> str:
@@ -114,7 +114,7 @@ class RosNode:
 
         ``number`` is its own among those of the node, from 1 on.
         """
-        what = f"{_mangled(topic.name)}/{_dds_type(topic.schema)}/{_type_hash(topic.schema)}"
+        what = f"{mangled(topic.name)}/{dds_type(topic.schema)}/{_type_hash(topic.schema)}"
         return f"{self._prefix(number)}/{kind}/{self._name}/{what}/{topic.qos}"
 
     def _prefix(self, number: int) -> str:
@@ -123,7 +123,7 @@ class RosNode:
     @property
     def _name(self) -> str:
         """No security enclave, the namespace, the name."""
-        return f"{_mangled('/')}/{_mangled(self.namespace)}/{self.name}"
+        return f"{mangled('/')}/{mangled(self.namespace)}/{self.name}"
 
 
 def graph_key(domain: int) -> str:
@@ -159,7 +159,8 @@ def attachment_of(beside: bytes) -> tuple[int, bytes] | None:
     return (sequence, gid) if size == GID_BYTES else None
 
 
-def _dds_type(schema: str) -> str:
+def dds_type(schema: str) -> str:
+    """Return the name that DDS has for a type."""
     package, kind, name = schema.split("/")
     return f"{package}::{kind}::dds_::{name}_"
 
@@ -168,5 +169,6 @@ def _type_hash(schema: str) -> str:
     return f"RIHS01_{(TYPE_HASHES | SERVICE_HASHES)[schema]}"
 
 
-def _mangled(name: str) -> str:
+def mangled(name: str) -> str:
+    """Return a name as it stands in tokens."""
     return name.replace("/", "%")

@@ -8,7 +8,8 @@ from collections import Counter, deque
 import numpy as np
 
 from fasaco_edge.follow.estimate import Limits
-from fasaco_edge.follow.follower import Follower, State
+from fasaco_edge.follow.follower import Follower
+from fasaco_edge.follow.supervision import State
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.simulation.robot import SimulationConfig

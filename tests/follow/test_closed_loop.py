@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fasaco_edge.follow.follower import State
+from fasaco_edge.follow.supervision import State
 from fasaco_edge.grid.geometry import Pose2D
 from tests.follow.closed_loop import ClosedLoop, ideal_seconds
 from tests.simulation.rooms import building, distances_to, serpentine

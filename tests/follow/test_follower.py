@@ -7,7 +7,8 @@ import pytest
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.follow.estimate import STAND, moved
-from fasaco_edge.follow.follower import ZEROS_S, Follower, Patience, State
+from fasaco_edge.follow.follower import ZEROS_S, Follower
+from fasaco_edge.follow.supervision import Patience, State
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from tests.follow.closed_loop import LIMITS, PERIOD_S, path_message
 

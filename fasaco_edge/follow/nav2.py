@@ -1,0 +1,396 @@
+"""Nav2's controller as follower: paths, poses, signs of the daemon and answers in, requests out.
+
+A goal is a piece of the path that begins where the robot is. The next one is sent while the robot
+is still on its way to the end: Nav2 goes over to it without standing. At a sharp corner that is
+not possible, and the next goal goes out when the one before is done. No clock, no session.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
+from fasaco_edge.follow.supervision import Patience, State, Supervision
+from fasaco_edge.grid.geometry import Point, Pose2D
+from fasaco_edge.wire.messages.follow_path import (
+    ABORTED,
+    CANCELED,
+    ENDED_BEFORE,
+    ERRORS,
+    NO_SUCH_GOAL,
+    SUCCEEDED,
+    TAKEN,
+    Ending,
+)
+from fasaco_edge.wire.messages.path_points import PathPoints
+
+# The next goal is sent so far before the end of the one before [m], and as far as the robot
+# drives in so many seconds; and only if it leads on by so much [m].
+AHEAD_M, AHEAD_S = 0.5, 3.0
+GAIN_M = 0.3
+# How far a goal would lead is looked at again after so far [m].
+LOOK_M = 0.2
+# Where a path begins further off, it is not driven [m]; how far on it the robot may be by then.
+BEGINNING_M = 1.0
+# Where two paths are as near as this to each other they are the same [m].
+SAME_M = 0.03
+# Along a goal the robot is looked for so far ahead [m].
+LOOK_AHEAD_M = 2.0
+# After its goal was ended it rolls on by no more [m].
+COAST_M = 0.5
+# Nav2 says that a goal is done; so far from its end it is not [m].
+DONE_M = 0.5
+# After an error the next goal is sent so much later [s], twice as long each time, at most so long.
+RETRY_S, MOST_RETRY_S = 1.0, 30.0
+# A robot that has not moved by so much in so long stands [m, s]; then the result is asked for
+# again, as it may have been lost, and after longer the goal is given up [s].
+MOVED_M, STANDS_S, GIVE_UP_S = 0.05, 3.0, 20.0
+# Requests to cancel are repeated [s].
+CANCEL_EVERY_S = 1.0
+
+
+@dataclass(slots=True)
+class Goal:
+    """A piece that Nav2 was given.
+
+    Attributes:
+        id: of the goal, 16 bytes.
+        start, end: on the line [m].
+    """
+
+    id: bytes
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, slots=True)
+class SendGoal:
+    """Have Nav2 follow points [m] in a frame."""
+
+    id: bytes
+    points: list[Point]
+    frame: str
+
+
+@dataclass(frozen=True, slots=True)
+class AskResult:
+    """Ask how a goal ended; the answer comes when it has."""
+
+    id: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class CancelGoal:
+    """Have Nav2 end a goal."""
+
+    id: bytes
+
+
+Request = SendGoal | AskResult | CancelGoal
+
+
+@dataclass(slots=True)
+class Doomed:
+    """A goal that is to end, and when that was last asked for [s]."""
+
+    asked_at: float = -math.inf
+    # Whether Nav2 has said if it took the goal: before, it may not know it yet.
+    is_known: bool = True
+
+
+@dataclass(slots=True)
+class Tally:
+    """What was done, to be told.
+
+    Attributes:
+        goals: how many were sent.
+        errors: how many ended otherwise than done.
+    """
+
+    goals: int = 0
+    errors: int = 0
+
+
+class Nav2Follower(Supervision):
+    """Gives Nav2's controller the newest path, piece by piece, while all that it takes is there.
+
+    Args:
+        near: how near a piece may not come to itself [m].
+        speed: of the robot [m/s].
+        new_id: makes the id of a goal.
+        patience: how old pose and status may become.
+    """
+
+    def __init__(
+        self, near: float, speed: float, new_id: Callable[[], bytes], patience: Patience
+    ) -> None:
+        super().__init__(patience)
+        self.tally = Tally()
+        self._near = near
+        self._ahead = AHEAD_M + AHEAD_S * speed
+        self._new_id = new_id
+        self._here: Point | None = None
+        self._came_at: float | None = None
+        self._line: Line | None = None
+        # What takes its place, once Nav2 has answered what it was sent.
+        self._next: Line | None = None
+        # Where the robot is along the line, and where that was last looked at for the next goal.
+        self._way = self._looked = 0.0
+        # Where the last goal was done: from there the next one goes on, wherever the robot stopped.
+        self._done = -1.0
+        # What Nav2 drives, and what it was sent and has not answered yet.
+        self._active: Goal | None = None
+        self._pending: Goal | None = None
+        self._doomed: dict[bytes, Doomed] = {}
+        self._moved_last: tuple[Point, float] | None = None
+        self._asked_again = -math.inf
+        self._retry_at, self._retry_s = -math.inf, RETRY_S
+        self._trouble_of_nav2: tuple[State, str] | None = None
+        self._requests: list[Request] = []
+        # What follows from answers, and is asked for at the next step.
+        self._requests_later: list[Request] = []
+
+    def step(self, now: float) -> list[Request]:
+        """Return what is to be asked of Nav2 now."""
+        self._requests = []
+        try:
+            self.state, self.detail = self._trouble(now)
+            if self.state is State.DRIVING:
+                self._drive(now)
+            else:
+                self._stop()
+        except MalformedMessage as error:
+            # Further on the path is none.
+            self._have_none(State.BAD_PATH, str(error))
+            self.state, self.detail = State.BAD_PATH, str(error)
+            self._stop()
+        for goal_id, doomed in self._doomed.items():
+            if now - doomed.asked_at >= CANCEL_EVERY_S:
+                doomed.asked_at = now
+                self._requests.append(CancelGoal(goal_id))
+        return self._requests
+
+    def end(self) -> list[Request]:
+        """Return what ends all goals."""
+        self._stop()
+        return [CancelGoal(goal_id) for goal_id in self._doomed]
+
+    def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
+        """Take in whether Nav2 took a goal; None where it did not say."""
+        if goal_id in self._doomed:
+            self._doomed[goal_id] = Doomed()
+            if accepted is False:
+                del self._doomed[goal_id]
+        if self._pending is None or self._pending.id != goal_id:
+            return
+        goal, self._pending = self._pending, None
+        if accepted:
+            self._active = goal
+            self._moved_last = None
+            self._trouble_of_nav2 = None
+            self._asked_again = now
+            self._requests_later.append(AskResult(goal_id))
+            return
+        state = State.REFUSED if accepted is False else State.NO_NAV2
+        self._fail(state, why or "is its controller server active?", now)
+
+    def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
+        """Take in how a goal ended; None where Nav2 did not say, and will not."""
+        self._doomed.pop(goal_id, None)
+        if self._active is None or self._active.id != goal_id:
+            return
+        goal, self._active = self._active, None
+        self._requests_later.clear()
+        if self._pending is not None:
+            # It goes over to the next one.
+            return
+        if ending is None:
+            self._fail(State.NO_NAV2, why, now)
+        elif ending.status == SUCCEEDED:
+            self._take_done(goal, now)
+        elif ending.status == ABORTED:
+            what = ERRORS.get(ending.code, "no code") if ending.code else "without a code"
+            code = f"{ending.code} " if ending.code else ""
+            said = f": {ending.message}" if ending.message else ""
+            self._fail(State.GIVEN_UP, f"{code}{what}{said}", now)
+        elif ending.status == CANCELED:
+            self._fail(State.CANCELED, "goes on with the next path", math.inf)
+        else:
+            self._fail(State.NO_NAV2, "it knows nothing of its goal: was it started anew?", now)
+
+    def take_cancelled(self, goal_id: bytes, code: int | None) -> None:
+        """Take in what becomes of a request to cancel; None where Nav2 did not say."""
+        doomed = self._doomed.get(goal_id)
+        if doomed and doomed.is_known and code in (TAKEN, NO_SUCH_GOAL, ENDED_BEFORE):
+            del self._doomed[goal_id]
+
+    def _drive(self, now: float) -> None:
+        self._requests += self._requests_later
+        self._requests_later.clear()
+        self._advance()
+        if self._next is not None and self._pending is None and not self._join(self._next, now):
+            return
+        assert self._line is not None
+        whole = self._line.length(self._way + 2 * self._ahead)
+        goal = self._pending or self._active
+        if goal is None:
+            self._begin(whole, now)
+        elif goal is self._active:
+            self._watch(goal, now)
+            if goal.end - self._way <= self._ahead and goal.end < whole:
+                self._send_next(goal)
+
+    def _begin(self, whole: float, now: float) -> None:
+        """Send a goal where Nav2 has none."""
+        if self._trouble_of_nav2 is not None:
+            self.state, self.detail = self._trouble_of_nav2
+        if whole - self._way <= STEP_M:
+            self.state, self.detail = State.DRIVEN, ""
+        elif now >= self._retry_at:
+            assert self._line is not None
+            self._send(end_of_piece(self._line, self._way, self._near))
+
+    def _send_next(self, goal: Goal) -> None:
+        """Send the next goal ahead, if it leads on."""
+        if self._way - self._looked < LOOK_M:
+            return
+        self._looked = self._way
+        assert self._line is not None
+        end = end_of_piece(self._line, self._way, self._near)
+        if end >= goal.end + GAIN_M:
+            self._send(end)
+
+    def _send(self, end: float) -> None:
+        assert self._line is not None
+        goal = Goal(self._new_id(), self._way, end)
+        self._pending = goal
+        self._looked = self._way
+        self.tally.goals += 1
+        points = self._line.poses(goal.start, goal.end)
+        self._requests.append(SendGoal(goal.id, points, self._path_frame))
+
+    def _join(self, line: Line, now: float) -> bool:
+        """Go over to a new path; where it is the same ahead, what Nav2 drives stays.
+
+        Returns:
+            whether the path begins where the robot is.
+        """
+        assert self._here is not None
+        way, far = line.nearest(self._here, 0.0, line.length(BEGINNING_M))
+        if far > BEGINNING_M:
+            self.state, self.detail = State.PATH_ELSEWHERE, f"{far:.2f} m away"
+            self._stop()
+            return False
+        goal = self._active
+        shift = self._shift(line, way, goal) if goal is not None else 0.0
+        self._line, self._next = line, None
+        self._way, self._looked, self._done = way, -math.inf, -1.0
+        self._retry_at, self._retry_s = now, RETRY_S
+        self._trouble_of_nav2 = None
+        if goal is None:
+            return True
+        if shift is None:
+            # Nav2 goes over to it from what it drives.
+            self._send(end_of_piece(line, way, self._near))
+        else:
+            goal.start, goal.end = goal.start + shift, goal.end + shift
+        return True
+
+    def _shift(self, line: Line, way: float, goal: Goal) -> float | None:
+        """Return how much further what is left of a goal is along a new line; None where the
+        line is another one there."""
+        assert self._line is not None
+        was, far = self._line.nearest(line.at(way), self._way, goal.end)
+        left = goal.end - was
+        if far > SAME_M or line.length(way + left) < way + left - SAME_M:
+            return None
+        same = all(
+            math.dist(self._line.at(was + part), line.at(way + part)) <= SAME_M
+            for part in _parts(left)
+        )
+        return way - was if same else None
+
+    def _advance(self) -> None:
+        """Find the robot along the line: never back, and not beyond what it was given."""
+        goal = self._active
+        if self._line is None or (self._pending is not None and goal is None):
+            return
+        assert self._here is not None
+        if goal is not None:
+            end = min(goal.end, self._way + LOOK_AHEAD_M)
+        elif self._way != self._done:
+            end = self._line.length(self._way + COAST_M)
+            end = min([end, *self._line.corners(self._way + STEP_M, end)])
+        else:
+            return
+        if end > self._way:
+            self._way, _ = self._line.nearest(self._here, self._way, end)
+
+    def _watch(self, goal: Goal, now: float) -> None:
+        """Ask again, or give up, where the robot stands."""
+        assert self._here is not None
+        if self._moved_last is None or math.dist(self._here, self._moved_last[0]) > MOVED_M:
+            self._moved_last = (self._here, now)
+        if self._way - goal.start > BEGINNING_M:
+            self._retry_s = RETRY_S
+        stands_s = now - self._moved_last[1]
+        if stands_s <= STANDS_S:
+            return
+        self.state, self.detail = State.STANDS, f"for {stands_s:.0f} s"
+        if stands_s > GIVE_UP_S:
+            self._doomed[goal.id] = Doomed()
+            self._active = None
+            self._fail(State.GIVEN_UP, f"stood for {stands_s:.0f} s without an error", now)
+        elif now - self._asked_again > STANDS_S:
+            self._asked_again = now
+            self._requests.append(AskResult(goal.id))
+
+    def _take_done(self, goal: Goal, now: float) -> None:
+        if self._line is None or self._here is None:
+            return
+        far = math.dist(self._here, self._line.at(goal.end))
+        if far > DONE_M and goal.end - self._way > DONE_M:
+            self._fail(State.GIVEN_UP, f"done, it says, {far:.1f} m before the end", now)
+            return
+        self._way = self._done = goal.end
+        self._retry_at, self._retry_s = now, RETRY_S
+
+    def _fail(self, state: State, detail: str, now: float) -> None:
+        self.tally.errors += 1
+        self._trouble_of_nav2 = (state, detail)
+        self._retry_at = now + self._retry_s
+        self._retry_s = min(2.0 * self._retry_s, MOST_RETRY_S)
+
+    def _stop(self) -> None:
+        """Have all goals end."""
+        for goal, is_known in ((self._active, True), (self._pending, False)):
+            if goal is not None:
+                self._doomed[goal.id] = Doomed(is_known=is_known)
+        self._active = self._pending = None
+        self._requests_later.clear()
+
+    def _moved_to(self, pose: Pose2D, now: float) -> None:
+        self._here, self._came_at = (pose.x, pose.y), now
+
+    def _have(self, points: PathPoints) -> None:
+        self._next = Line(points.take)
+
+    def _withdraw(self) -> None:
+        self._line = self._next = None
+        self._stop()
+
+    @property
+    def _has_path(self) -> bool:
+        return self._line is not None or self._next is not None
+
+    @property
+    def _pose_at(self) -> float | None:
+        return self._came_at
+
+
+def _parts(length: float) -> list[float]:
+    count = max(math.ceil(length / (2 * STEP_M)), 1)
+    return [length * part / count for part in range(count + 1)]

@@ -1,0 +1,181 @@
+"""Nav2's controller on the bus: requests of the follower as queries, their answers between turns.
+
+rmw_zenoh shows in its graph what the server's types are, and where it is; a bridge does not, and is
+asked by name.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+
+from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.follow.inputs import Inputs, patience_of
+from fasaco_edge.follow.nav2 import AskResult, CancelGoal, Nav2Follower, Request, SendGoal
+from fasaco_edge.follow.node import Told
+from fasaco_edge.follow.settings import FollowSettings
+from fasaco_edge.wire.messages.follow_path import (
+    GOAL_ID_BYTES,
+    decode_accepted,
+    decode_cancel,
+    decode_ending,
+    encode_cancel,
+    encode_goal,
+    encode_goal_id,
+)
+from fasaco_edge.wire.ros_actions import (
+    RELEASES,
+    Call,
+    Release,
+    bridge_keys,
+    release_of,
+    served_keys,
+    server_tokens,
+)
+from fasaco_edge.wire.ros_keys import RosNode, attachment, gid_of
+
+# How long an answer may take [s]; that of a result, as long as the way to the end of a goal. What
+# does not come by then is asked for again.
+ANSWER_S, RESULT_S = 5.0, 300.0
+# Whoever ends a question for a result sooner, and says nothing, is not there any more [s].
+GONE_S = 290.0
+# How often the graph is looked at for the action's server [s].
+LOOK_EVERY_S = 2.0
+# At the end, goals are given so long to end [s].
+END_S = 1.0
+
+
+def nav2_node(bus: Bus, settings: FollowSettings, report: Callable[[str], None]) -> Nav2Node:
+    """Return what gives Nav2's controller its goals."""
+    return Nav2Node(bus, settings, report)
+
+
+class Nav2Node:
+    """Takes what came in, steps the follower, and asks Nav2 what it says."""
+
+    def __init__(self, bus: Bus, settings: FollowSettings, report: Callable[[str], None]) -> None:
+        nav2, ros = settings.nav2, settings.ros
+        self._bus = bus
+        self._report = report
+        self._is_dry = settings.dry_run
+        self._action: str = nav2["action"]
+        self._domain: int = ros["domain"]
+        self._plugins: list[str] = list(nav2["plugins"])
+        self._release: Release = nav2["release"]
+        new_id = partial(os.urandom, GOAL_ID_BYTES)
+        speed = settings.speed_m_s
+        self._follower = Nav2Follower(nav2["near_m"], speed, new_id, patience_of(settings))
+        self._inputs = Inputs(settings, bus)
+        self._told = Told()
+        # What Nav2 said, by threads of Zenoh's.
+        self._answers = deque[Callable[[], None]]()
+        self._sequence = 0
+        self._gid = b""
+        self._roll = None
+        if ros["kind"] == "rmw_zenoh":
+            node = RosNode(self._domain, bus.id, ros["namespace"], ros["node"])
+            bus.token(node.token)
+            self._gid = gid_of(node.token)
+            self._roll = bus.roll(server_tokens(self._domain, self._action))
+
+    def turn(self) -> None:
+        """Take what came, and ask for what follows from it."""
+        if self._roll is not None:
+            self._roll.ask(LOOK_EVERY_S)
+        self._take_answers()
+        self._inputs.feed(self._follower)
+        for request in self._follower.step(self._inputs.now()):
+            self._ask(request)
+        self._told.tell(self._follower.state, self._follower.detail)
+
+    def end(self) -> None:
+        """Have the robot stand."""
+        requests = self._follower.end()
+        for request in requests:
+            self._ask(request)
+        ends = time.monotonic() + END_S
+        while requests and len(self._answers) < len(requests) and time.monotonic() < ends:
+            time.sleep(0.01)
+
+    def _take_answers(self) -> None:
+        while self._answers:
+            self._answers.popleft()()
+
+    def _ask(self, request: Request) -> None:
+        follower, now = self._follower, self._inputs.now()
+        if self._is_dry:
+            if isinstance(request, SendGoal):
+                (x, y), count = request.points[-1], len(request.points)
+                self._report(f"a goal of {count} poses, to {x:.2f}, {y:.2f} in {request.frame!r}")
+            return
+        goal_id = request.id
+        keys = self._keys()
+        if isinstance(request, SendGoal):
+            call: Call = "send_goal"
+            release, why = self._release_at(keys)
+            if release is None:
+                follower.take_accepted(goal_id, None, why, now)
+                return
+            plugins = self._plugins[: RELEASES[release]]
+            payload = encode_goal(goal_id, request.points, request.frame, 0, plugins)
+        elif isinstance(request, AskResult):
+            call, payload = "get_result", encode_goal_id(goal_id)
+        else:
+            call, payload = "cancel_goal", encode_cancel(goal_id)
+        if call not in keys:
+            self._answers.append(partial(self._take, request, [], time.monotonic()))
+            return
+        self._sequence += 1
+        beside = attachment(self._sequence, time.time_ns(), self._gid) if self._gid else b""
+        asked_at = time.monotonic()
+        self._bus.ask(
+            keys[call],
+            payload,
+            beside,
+            RESULT_S if call == "get_result" else ANSWER_S,
+            lambda replies: self._answers.append(partial(self._take, request, replies, asked_at)),
+        )
+
+    def _take(self, request: Request, replies: list[Reply], asked_at: float) -> None:
+        """Tell the follower what came of a request."""
+        follower, now = self._follower, self._inputs.now()
+        payload = next((reply.payload for reply in replies if not reply.is_error), None)
+        why = f"{self._action} did not answer"
+        try:
+            if isinstance(request, SendGoal):
+                accepted = None if payload is None else decode_accepted(payload)
+                follower.take_accepted(request.id, accepted, why if accepted is None else "", now)
+            elif isinstance(request, CancelGoal):
+                code = None if payload is None else decode_cancel(payload)
+                follower.take_cancelled(request.id, code)
+            elif payload is not None:
+                follower.take_ending(request.id, decode_ending(payload), "", now)
+            elif time.monotonic() - asked_at < GONE_S:
+                follower.take_ending(request.id, None, f"{self._action} went away", now)
+            else:
+                self._ask(request)
+        except MalformedMessage as error:
+            if isinstance(request, SendGoal):
+                follower.take_accepted(request.id, None, str(error), now)
+            elif isinstance(request, AskResult):
+                follower.take_ending(request.id, None, str(error), now)
+
+    def _keys(self) -> dict[Call, str]:
+        if self._roll is None:
+            return bridge_keys(self._action)
+        return served_keys(self._domain, self._action, self._roll.there())
+
+    def _release_at(self, keys: dict[Call, str]) -> tuple[Release | None, str]:
+        """Return whose goals the server takes; or why none can be sent."""
+        if self._roll is None:
+            return self._release, ""
+        if len(keys) < 3:
+            return None, f"no server of {self._action} in domain {self._domain}"
+        found = release_of(keys["send_goal"])
+        type_hash = keys["send_goal"].rpartition("/")[2]
+        return found, f"its FollowPath is none that is known: {type_hash}"

@@ -1,0 +1,162 @@
+"""Pieces of a path that neither cross nor come near themselves, as poses for a controller.
+
+A coverage path crosses and touches itself. A controller that gets it whole goes on at whatever part
+is nearest, and is done where the end is near; so it gets no more at a time than what is simple:
+between two poses that are further from each other along the piece than ``APART`` times ``near``,
+there is at least ``near``.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable
+
+from fasaco_edge.grid.geometry import Point
+
+# Poses of a piece are so far from each other [m]: controllers look for the nearest one.
+STEP_M = 0.05
+# Along a piece so many times ``near`` is near for a reason: a bend of up to 120 degrees is.
+APART = 2.0
+# At a bend that is sharper the robot turns on the spot: there a piece ends if it has to [rad].
+CORNER_RAD = math.radians(60.0)
+# A piece is no longer [m].
+MOST_M = 20.0
+# Points are read as they are needed, so many at a time.
+CHUNK = 500
+# Nearer points are one [m].
+LEAST_M = 1e-3
+
+
+class Line:
+    """A path by the way along it, from 0 at its beginning.
+
+    Args:
+        take: returns the next points of the path [m], at most as many as asked for.
+    """
+
+    def __init__(self, take: Callable[[int], list[Point]]) -> None:
+        self._take = take
+        self._points: list[Point] = []
+        self._ways: list[float] = []
+        self._is_read = False
+
+    def length(self, most: float) -> float:
+        """Return how long it is, or ``most`` where it is longer [m]."""
+        while not self._is_read and (not self._ways or self._ways[-1] < most):
+            points = self._take(CHUNK)
+            self._is_read = len(points) < CHUNK
+            for point in points:
+                way = math.dist(self._points[-1], point) if self._points else 0.0
+                if not self._points or way >= LEAST_M:
+                    self._points.append(point)
+                    self._ways.append(self._ways[-1] + way if self._ways else 0.0)
+        return min(self._ways[-1], most) if self._ways else 0.0
+
+    def at(self, way: float) -> Point:
+        """Return the point there [m]; its end, or beginning, beyond."""
+        self.length(way)
+        index = bisect_right(self._ways, way)
+        if not 0 < index < len(self._ways):
+            return self._points[0 if index == 0 else -1]
+        (x, y), (to_x, to_y) = self._points[index - 1 : index + 1]
+        share = (way - self._ways[index - 1]) / (self._ways[index] - self._ways[index - 1])
+        return x + share * (to_x - x), y + share * (to_y - y)
+
+    def nearest(self, here: Point, start: float, stop: float) -> tuple[float, float]:
+        """Return where between two places it is nearest to a point, and how near [m].
+
+        Of places as near the first counts.
+        """
+        self.length(stop)
+        best, best_m = start, math.dist(self.at(start), here)
+        index = bisect_right(self._ways, start)
+        while True:
+            end = min(self._ways[index], stop) if index < len(self._ways) else start
+            if end <= start:
+                return best, best_m
+            (ax, ay), (bx, by) = self.at(start), self.at(end)
+            length = end - start
+            along = ((here[0] - ax) * (bx - ax) + (here[1] - ay) * (by - ay)) / length
+            way = start + min(max(along, 0.0), length)
+            far = math.dist(self.at(way), here)
+            if far < best_m - LEAST_M:
+                best, best_m = way, far
+            start, index = end, index + 1
+
+    def corners(self, start: float, stop: float) -> list[float]:
+        """Return the places between two others at which it bends sharply, in order [m]."""
+        self.length(stop + LEAST_M)
+        first = max(bisect_right(self._ways, start), 1)
+        found = []
+        for index in range(first, len(self._ways) - 1):
+            if self._ways[index] > stop:
+                break
+            (ax, ay), (bx, by), (cx, cy) = self._points[index - 1 : index + 2]
+            turn = math.atan2(cy - by, cx - bx) - math.atan2(by - ay, bx - ax)
+            if abs(math.remainder(turn, math.tau)) > CORNER_RAD:
+                found.append(self._ways[index])
+        return found
+
+    def poses(self, start: float, stop: float) -> list[Point]:
+        """Return points from one place to another, ``STEP_M`` apart and at each corner [m]."""
+        return [self.at(way) for way in self.ways(start, stop)]
+
+    def ways(self, start: float, stop: float) -> list[float]:
+        """Return where these points are."""
+        first, last = bisect_right(self._ways, start), bisect_right(self._ways, stop)
+        bends = [way for way in self._ways[first:last] if start < way < stop]
+        ways = [start]
+        for bend in (*bends, stop):
+            parts = max(math.ceil((bend - ways[-1]) / STEP_M - 1e-9), 1)
+            begin = ways[-1]
+            ways += [begin + (bend - begin) * part / parts for part in range(1, parts)]
+            ways.append(bend)
+        return ways
+
+
+def end_of_piece(line: Line, start: float, near: float) -> float:
+    """Return how far a piece may go that begins at ``start``, by the way along the line [m].
+
+    Where it has to end before the line does, it ends at a corner of the last ``APART`` times
+    ``near``, if there is one: the robot stands there anyway.
+
+    Args:
+        line: the path.
+        start: beginning of the piece [m].
+        near: how near the piece may not come to itself [m].
+    """
+    stop = line.length(start + MOST_M)
+    ways = line.ways(start, stop)
+    seen: dict[tuple[int, int], list[int]] = {}
+    points = [line.at(way) for way in ways]
+    # Poses that are far enough behind to count are filed as the piece goes on.
+    filed = 0
+    for index, (way, point) in enumerate(zip(ways, points, strict=True)):
+        while way - ways[filed] > APART * near:
+            seen.setdefault(_cell(points[filed], near), []).append(filed)
+            filed += 1
+        if (other := _touched(seen, points, point, near)) is not None:
+            corners = line.corners(max(ways[other], start), ways[index - 1])
+            late = [corner for corner in corners if corner >= way - 2.0 * APART * near]
+            return late[-1] if late and late[-1] > start + LEAST_M else ways[index - 1]
+    return stop
+
+
+def _touched(
+    seen: dict[tuple[int, int], list[int]], points: list[Point], point: Point, near: float
+) -> int | None:
+    """Return the last of the filed points that one is too near to."""
+    column, row = _cell(point, near)
+    touched = [
+        other
+        for east in (-1, 0, 1)
+        for north in (-1, 0, 1)
+        for other in seen.get((column + east, row + north), ())
+        if math.dist(points[other], point) < near
+    ]
+    return max(touched, default=None)
+
+
+def _cell(point: Point, near: float) -> tuple[int, int]:
+    return math.floor(point[0] / near), math.floor(point[1] / near)

@@ -1,0 +1,199 @@
+"""What a follower needs to be there: a daemon that plans, a path of its, and the robot's pose.
+
+No clock, no session: who calls tells the time, by a clock that never steps.
+"""
+
+from __future__ import annotations
+
+import enum
+from abc import abstractmethod
+from dataclasses import dataclass
+
+from fasaco_edge.errors import FasacoError, MalformedMessage
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.wire.messages.path_points import PathPoints
+from fasaco_edge.wire.messages.poses import Link
+
+# Links of poses that are transforms may be older than poses [s].
+LINK_S = 2.0
+
+
+class State(enum.Enum):
+    """What the robot does, and why it stands."""
+
+    DRIVING = "driving"
+    DRIVEN = "the path is driven"
+    NO_PATH = "no path"
+    EMPTY_PATH = "stopped by an empty path"
+    BAD_PATH = "path refused"
+    PATH_ELSEWHERE = "path elsewhere"
+    OFF_PATH = "off the path"
+    NOT_MOVING = "does not move as told"
+    NO_POSE = "no pose"
+    OLD_POSE = "pose too old"
+    BAD_POSE = "pose refused"
+    POSE_JUMPED = "pose jumped"
+    WRONG_FRAME = "wrong frame"
+    NO_DAEMON = "no daemon"
+    SILENT_DAEMON = "daemon silent"
+    STANDS = "Nav2's controller stands"
+    NO_NAV2 = "no answer from Nav2"
+    REFUSED = "refused by Nav2"
+    GIVEN_UP = "given up by Nav2"
+    CANCELED = "canceled by somebody else"
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How old what a follower depends on may become.
+
+    Attributes:
+        pose_s: the newest pose, by its arrival [s].
+        link_s: each other transform between map and robot, by its arrival [s]: localisers say where
+            odometry began less often than odometry comes.
+        status_s: the newest sign of a daemon that is there [s].
+    """
+
+    pose_s: float = 0.5
+    link_s: float = LINK_S
+    status_s: float = 2.5
+
+
+USUAL = Patience()
+
+
+class Supervision:
+    """Tells whether path, pose and daemon let the robot drive; what drives it is built on this.
+
+    Args:
+        patience: how old pose and status may become.
+
+    Attributes:
+        state: what the robot does.
+        detail: the same in figures, for people.
+    """
+
+    def __init__(self, patience: Patience) -> None:
+        self.state, self.detail = State.NO_DAEMON, ""
+        self._patience = patience
+        self._frame, self._stamp_ns = "", 0
+        self._repeats = False
+        self._link: Link | None = None
+        self._pose_fault: FasacoError | None = None
+        self._path_frame = ""
+        self._path_state = State.NO_PATH
+        self._path_detail = ""
+        self._planner = ""
+        self._path_of = ""
+        self._status_at = -float("inf")
+
+    def take_pose(self, stamped: StampedPose, now: float) -> None:
+        """Take a pose in, as it comes; one with the stamp of the one before is no new one."""
+        self._repeats = stamped.stamp_ns != 0 and stamped.stamp_ns == self._stamp_ns
+        if self._repeats and stamped.frame == self._frame:
+            return
+        self._pose_fault = None
+        self._frame, self._stamp_ns = stamped.frame, stamped.stamp_ns
+        self._moved_to(stamped.pose, now)
+
+    def heard_link(self, link: Link) -> None:
+        """Note which transform between map and robot came longest ago."""
+        self._link = link
+
+    def refuse_pose(self, error: FasacoError) -> None:
+        """Stop for a pose that is none, until the next one."""
+        self._pose_fault = error
+
+    def take_path(self, payload: bytes) -> None:
+        """Follow another path from now on; an empty one, or one that is none, stops the robot."""
+        self._path_of = self._planner
+        try:
+            points = PathPoints(payload)
+        except MalformedMessage as error:
+            self._have_none(State.BAD_PATH, str(error))
+            return
+        if not points.left:
+            self._have_none(State.EMPTY_PATH)
+            return
+        self._path_frame = points.frame
+        self._have(points)
+
+    def take_planner(self, planner: str, now: float) -> None:
+        """Note which daemon plans, "" for none; another one's path is not this one's."""
+        if planner == self._planner:
+            return
+        self._planner, self._status_at = planner, now
+        if planner and self._path_of and planner != self._path_of:
+            self._have_none(State.NO_PATH)
+            self._path_of = ""
+        elif planner and not self._path_of:
+            self._path_of = planner
+
+    def heard_status(self, now: float) -> None:
+        """Note a sign of the daemon."""
+        self._status_at = now
+
+    @abstractmethod
+    def _moved_to(self, pose: Pose2D, now: float) -> None:
+        """Take in where the robot is."""
+
+    @abstractmethod
+    def _have(self, points: PathPoints) -> None:
+        """Follow these points."""
+
+    @abstractmethod
+    def _withdraw(self) -> None:
+        """Follow nothing."""
+
+    @property
+    @abstractmethod
+    def _has_path(self) -> bool:
+        """Whether there is a path to follow."""
+
+    @property
+    @abstractmethod
+    def _pose_at(self) -> float | None:
+        """When the newest pose that is believed came [s]; None before there is one."""
+
+    def _jump(self) -> str:
+        """Return how far the newest pose jumped; "" where it is believed."""
+        return ""
+
+    def _have_none(self, state: State, detail: str = "") -> None:
+        """Have no path; the one before is withdrawn, too."""
+        self._withdraw()
+        self._path_state, self._path_detail = state, detail
+
+    def _trouble(self, now: float) -> tuple[State, str]:
+        """Return why the robot has to stand, and figures; or that it may drive."""
+        if not self._planner:
+            return State.NO_DAEMON, "none plans for this robot"
+        if (silent_s := now - self._status_at) > self._patience.status_s:
+            return State.SILENT_DAEMON, f"for {silent_s:.1f} s"
+        if not self._has_path:
+            return self._path_state, self._path_detail
+        return self._trouble_of_poses(now) or (State.DRIVING, "")
+
+    def _trouble_of_poses(self, now: float) -> tuple[State, str] | None:
+        if self._pose_fault is not None:
+            return State.BAD_POSE, str(self._pose_fault)
+        pose_at = self._pose_at
+        if pose_at is None:
+            return State.NO_POSE, "none has come"
+        if jump := self._jump():
+            return State.POSE_JUMPED, jump
+        if age := self._age(pose_at, now):
+            return State.OLD_POSE, age
+        if self._frame != self._path_frame:
+            return State.WRONG_FRAME, f"pose in {self._frame!r}, path in {self._path_frame!r}"
+        return None
+
+    def _age(self, pose_at: float, now: float) -> str:
+        """Return how old pose or link is, where that is too old; else ""."""
+        if (age_s := now - pose_at) > self._patience.pose_s:
+            why = ", and comes again and again by its stamp" if self._repeats else ""
+            return f"{age_s:.2f} s{why}"
+        if self._link and (age_s := now - self._link.came_at) > self._patience.link_s:
+            transform = self._link.transform
+            return f"{age_s:.2f} s: transform of {transform.child!r} in {transform.frame!r}"
+        return ""

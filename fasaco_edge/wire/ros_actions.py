@@ -1,0 +1,71 @@
+"""Names of a ROS 2 action on Zenoh: the services behind it, and what tokens say of its server.
+
+An action is three services and two topics below ``<action>/_action``; rmw_zenoh and
+zenoh-bridge-ros2dds know no more of it. Sources: rcl_action of Jazzy (names), rmw_zenoh_cpp at
+commit 028bbe3 (``rmw_service_data.cpp``: what a request has to have, and that a number may not
+come twice), nav2_msgs of Humble, Iron, Jazzy and Lyrical. Hashes follow REP 2016; that of
+CancelGoal is also published.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final, Literal
+
+from fasaco_edge.wire.ros_keys import dds_type, mangled
+
+Call = Literal["send_goal", "cancel_goal", "get_result"]
+CALLS: Final[tuple[Call, ...]] = ("send_goal", "cancel_goal", "get_result")
+_TYPES: Final = {
+    "send_goal": "nav2_msgs/action/FollowPath_SendGoal",
+    "cancel_goal": "action_msgs/srv/CancelGoal",
+    "get_result": "nav2_msgs/action/FollowPath_GetResult",
+}
+
+Release = Literal["humble", "jazzy", "lyrical"]
+RELEASES: Final[dict[Release, int]] = {"humble": 2, "jazzy": 3, "lyrical": 4}
+"""How many names of plugins a goal of nav2_msgs/FollowPath ends with: controller, goal checker,
+from Iron on progress checker, from Lyrical on path handler. What is sent to Iron and Kilted is as
+for Jazzy."""
+
+_GOALS: Final[dict[str, Release]] = {
+    "TypeHashNotSupported": "humble",
+    "RIHS01_5b662aee1159e1d7e7b5f8fef21f556b8bc67c818c730a68e18bb29b85f66946": "jazzy",
+    "RIHS01_0c091793c90a67349df3445771d5d30005daea785137bd6e6bf5d96ea53fb721": "lyrical",
+}
+"""By the hash in the key of ``send_goal``."""
+
+
+def bridge_keys(action: str) -> dict[Call, str]:
+    """Return the keys that zenoh-bridge-ros2dds gives the services of an action."""
+    return {call: f"{action.strip('/')}/_action/{call}" for call in CALLS}
+
+
+def rmw_keys(domain: int, action: str) -> dict[Call, str]:
+    """Return the keys that rmw_zenoh gives them, whatever the types' hashes."""
+    return {
+        call: f"{domain}/{action.strip('/')}/_action/{call}/{dds_type(_TYPES[call])}/*"
+        for call in CALLS
+    }
+
+
+def server_tokens(domain: int, action: str) -> str:
+    """Return the key expression of the tokens of an action's services."""
+    return f"@ros2_lv/{domain}/*/*/*/SS/*/*/*/{mangled(action)}%_action%$*/**"
+
+
+def served_keys(domain: int, action: str, tokens: Iterable[str]) -> dict[Call, str]:
+    """Return the keys of the services that tokens tell of, as far as they do."""
+    found = dict[Call, str]()
+    for token in sorted(tokens):
+        parts = token.split("/")
+        name, kind, type_hash = parts[9:12] if len(parts) >= 12 else ("", "", "")
+        for call in CALLS:
+            if name == f"{mangled(action)}%_action%{call}" and kind == dds_type(_TYPES[call]):
+                found[call] = f"{domain}/{action.strip('/')}/_action/{call}/{kind}/{type_hash}"
+    return found
+
+
+def release_of(send_goal_key: str) -> Release | None:
+    """Return whose goals a server takes, by its key of rmw_zenoh; None for none that is known."""
+    return _GOALS.get(send_goal_key.rpartition("/")[2])

@@ -1,0 +1,142 @@
+"""Coverage lines driven by a look-alike of Nav2: aborts, delays, restarts, lost replies.
+
+``python -m tests.campaigns.nav2_goals [--missions 50] [--length 40] [--seed 0]``; prints a row for
+each mission and what became of all. A mission is part of a line over a bundled map, so many metres
+long; daemon, path and status are stood in for, the follower and the look-alike are processes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fasaco_edge as fe
+from tests.follow.nav2_missions import Point, kind_of, nav2_follower, nav2_robot, passed
+from tests.support.driven_base import DrivenBase
+
+SPEED_M_S = 1.0
+FAULTS: dict[str, dict[str, float]] = {
+    "none": {},
+    "delays of a second": {"delay_s": 1.0},
+    "aborts": {"abort_every_s": 8.0},
+    "restarts": {"restart_every_s": 15.0},
+    "lost replies": {"lost": 0.2},
+    "all": {"delay_s": 1.0, "abort_every_s": 15.0, "restart_every_s": 30.0, "lost": 0.05},
+}
+
+
+@dataclass(frozen=True)
+class Mission:
+    """What became of one.
+
+    Attributes:
+        faults: which were made.
+        complete: whether the end was reached, and all before it passed in order.
+        again_m: how much more was driven than the line is long [m].
+        standing: share of the time that the robot stood between goals that succeeded.
+        figures: what the look-alike counted.
+    """
+
+    faults: str
+    complete: bool
+    again_m: float
+    standing: float
+    figures: dict[str, Any]
+
+
+def line_of(length_m: float, seed: int) -> list[Point]:
+    """Return a part of the line over a bundled map."""
+    plan = fe.plan(fe.load_map("office"), search=fe.Search(seed=1, budget_s=0.2))
+    xy = np.asarray(plan.xy)
+    first = int(np.random.default_rng(seed).integers(0, len(xy) // 2))
+    points: list[Point] = [(float(xy[first][0]), float(xy[first][1]))]
+    way = 0.0
+    for x, y in xy[first + 1 :]:
+        way += math.dist(points[-1], (x, y))
+        points.append((float(x), float(y)))
+        if way >= length_m:
+            break
+    return points
+
+
+def run_mission(faults: str, length_m: float, seed: int, limit_s: float = 600.0) -> Mission:
+    """Drive one line to its end."""
+    line = line_of(length_m, seed)
+    base, domain = DrivenBase(), 7 if seed % 2 else None
+    base.says_poses = False
+    robot = {
+        "endpoint": base.endpoint, "domain": domain, "start": line[0], "speed": SPEED_M_S,
+        "seed": seed, **FAULTS[faults],
+    }  # fmt: skip
+    try:
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            nav2_robot(**robot) as nav2,
+            nav2_follower(Path(folder), base.endpoint, kind_of(domain), speed_m_s=SPEED_M_S) as log,
+        ):
+            base.plans()
+            base.send_path(*line)
+            ends = time.monotonic() + limit_s
+            while "standing, the path is driven" not in (said := log.read_text()):
+                if time.monotonic() > ends:
+                    break
+                time.sleep(0.1)
+        done = nav2.end()
+    finally:
+        base.close()
+    trail = done.pop("trail")
+    is_there = "standing, the path is driven" in said
+    length = sum(math.dist(a, b) for a, b in itertools.pairwise(line))
+    whole_s = done["driving_s"] + done["standing_s"]
+    return Mission(
+        faults,
+        # Where Nav2 cuts corners, or is done by its tolerance, the tool has still been.
+        is_there and done["refused"] == [] and passed(trail, line, near=0.25),
+        done["driven_m"] - length,
+        done["standing_s"] / max(whole_s, 1e-9),
+        {"log": said, **done},
+    )
+
+
+def main() -> None:
+    """Run missions, the faults in turn."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--missions", type=int, default=50)
+    parser.add_argument("--length", type=float, default=40.0)
+    parser.add_argument("--seed", type=int, default=0)
+    args = parser.parse_args()
+    missions = []
+    for number in range(args.missions):
+        faults = list(FAULTS)[number % len(FAULTS)]
+        mission = run_mission(faults, args.length, args.seed + number)
+        missions.append(mission)
+        figures = {name: value for name, value in mission.figures.items() if name != "log"}
+        print(
+            f"{number:3} {faults:20} {'complete' if mission.complete else 'NOT COMPLETE':12}"
+            f" again {mission.again_m:6.2f} m  standing {mission.standing:6.2%}  {figures}",
+            flush=True,
+        )
+        if not mission.complete:
+            print(mission.figures["log"], flush=True)
+    complete = sum(mission.complete for mission in missions)
+    print(f"{complete} of {len(missions)} complete")
+    for faults in FAULTS:
+        those = [mission for mission in missions if mission.faults == faults]
+        if those:
+            standing, again = (
+                max(mission.standing for mission in those),
+                max(mission.again_m for mission in those),
+            )
+            print(f"{faults:20} standing at most {standing:.2%}, again at most {again:.2f} m")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,301 @@
+"""Goals that follow from paths, poses and answers; time is what the test says."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from fasaco_edge.follow.nav2 import (
+    GIVE_UP_S,
+    RETRY_S,
+    STANDS_S,
+    AskResult,
+    CancelGoal,
+    Nav2Follower,
+    SendGoal,
+)
+from fasaco_edge.follow.supervision import Patience, State
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.wire.messages.follow_path import (
+    ABORTED,
+    CANCELED,
+    ERRORS,
+    SUCCEEDED,
+    TAKEN,
+    UNKNOWN,
+    Ending,
+)
+from fasaco_edge.wire.messages.paths import encode_path
+
+NEAR = 0.225
+SPEED = 0.5
+LONG = ((0.0, 0.0), (8.0, 0.0))
+BACK = ((0.0, 0.0), (3.0, 0.0), (0.0, 0.0))
+NO_ANSWER = None
+
+
+class Drive:
+    """A follower whose daemon is there, and a robot that is put where the test says."""
+
+    def __init__(self, *points):
+        ids = itertools.count(1)
+        self.follower = Nav2Follower(
+            NEAR, SPEED, lambda: next(ids).to_bytes(16, "big"), Patience(status_s=1e9)
+        )
+        self.now = 0.0
+        self.follower.take_planner("a1", 0.0)
+        if points:
+            self.path(*points)
+
+    def path(self, *points):
+        xy = np.array(points, np.float64).reshape(-1, 2)
+        self.follower.take_path(encode_path(xy, np.zeros(len(xy)), "map", 1))
+
+    def step(self, x, y=0.0, after=0.1):
+        """Put the robot somewhere, after so long [s]; return what is asked of Nav2."""
+        self.now += after
+        self.follower.take_pose(StampedPose(Pose2D(x, y), "map", int(self.now * 1e9)), self.now)
+        return self.follower.step(self.now)
+
+    def accept(self, request, accepted=True):
+        self.follower.take_accepted(request.id, accepted, "", self.now)
+
+    def end(self, request, status, code=0):
+        self.follower.take_ending(request.id, Ending(status, code), "", self.now)
+
+    def begun(self, x=0.0, y=0.0):
+        """Return the first goal, which Nav2 has accepted."""
+        (goal,) = self.step(x, y)
+        assert isinstance(goal, SendGoal)
+        self.accept(goal)
+        assert self.step(x, y) == [AskResult(goal.id)]
+        return goal
+
+    @property
+    def state(self):
+        return self.follower.state
+
+
+def test_a_goal_begins_where_the_robot_is():
+    drive = Drive((0.0, 0.0), (3.0, 0.0))
+    (goal,) = drive.step(0.42, 0.05)
+    assert goal.points[0] == (pytest.approx(0.42), 0.0)
+    assert goal.points[-1] == (3.0, 0.0)
+    assert goal.frame == "map"
+    assert max(math.dist(a, b) for a, b in itertools.pairwise(goal.points)) <= 0.0501
+    # Until there is an answer, nothing else is sent.
+    assert drive.step(0.42, 0.05) == []
+
+
+def test_the_next_goal_is_sent_ahead_and_leads_on():
+    far = ((0.0, 0.0), (30.0, 0.0))
+    drive = Drive(*far)
+    goal = drive.begun()
+    sent = []
+    for decimetre in range(1, 195):
+        sent += [(decimetre / 10, request) for request in drive.step(decimetre / 10)]
+    ((at, ahead),) = sent
+    assert goal.points[-1][0] == pytest.approx(20.0)
+    # Half a metre and three seconds' way before the end.
+    assert 17.8 < at < 18.5
+    assert ahead.points[0][0] == pytest.approx(at)
+    assert ahead.points[-1] == (30.0, 0.0)
+    drive.accept(ahead)
+    # What it takes the place of ends as aborted; that is no error.
+    drive.end(goal, ABORTED)
+    assert drive.state is State.DRIVING
+    assert drive.follower.tally.errors == 0
+
+
+def test_the_one_before_may_end_before_the_next_is_accepted():
+    drive = Drive((0.0, 0.0), (30.0, 0.0))
+    goal = drive.begun()
+    ahead = next(request for step in range(1, 195) for request in drive.step(step / 10))
+    drive.end(goal, ABORTED)
+    assert drive.step(19.5) == []
+    drive.accept(ahead)
+    assert drive.step(19.6) == [AskResult(ahead.id)]
+    assert drive.follower.tally.errors == 0
+
+
+def test_where_the_path_turns_back_the_next_goal_waits_for_the_end():
+    drive = Drive(*BACK)
+    goal = drive.begun()
+    assert goal.points[-1] == (3.0, 0.0)
+    for step in range(1, 29):
+        assert drive.step(step / 10) == []
+    drive.end(goal, SUCCEEDED)
+    (back,) = drive.step(2.9)
+    assert back.points[0] == (3.0, 0.0)
+    assert back.points[-1] == (0.0, 0.0)
+
+
+def test_a_path_that_is_driven_says_so():
+    drive = Drive((0.0, 0.0), (1.0, 0.0))
+    goal = drive.begun()
+    for step in range(1, 11):
+        drive.step(step / 10)
+    drive.end(goal, SUCCEEDED)
+    assert drive.step(1.0) == []
+    assert drive.state is State.DRIVEN
+
+
+def test_a_goal_that_is_done_too_early_is_not_believed():
+    drive = Drive(*LONG)
+    goal = drive.begun()
+    drive.step(0.2)
+    drive.end(goal, SUCCEEDED)
+    assert drive.step(0.2) == []
+    assert drive.state is State.GIVEN_UP
+    assert "done, it says, 7.8 m before the end" in drive.follower.detail
+    (again,) = drive.step(0.2, after=RETRY_S)
+    assert again.points[0][0] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("code", "name"), ERRORS.items())
+def test_errors_have_their_names_and_goals_are_sent_anew_later_and_later(code, name):
+    drive = Drive(*LONG)
+    goal = drive.begun()
+    drive.end(goal, ABORTED, code)
+    assert drive.step(0.0) == []
+    assert drive.state is State.GIVEN_UP
+    assert drive.follower.detail == f"{code} {name}"
+    (goal,) = drive.step(0.0, after=RETRY_S)
+    drive.accept(goal)
+    drive.end(goal, ABORTED, code)
+    assert drive.step(0.0, after=RETRY_S) == []
+    (goal,) = drive.step(0.0, after=RETRY_S)
+    assert isinstance(goal, SendGoal)
+
+
+def test_what_somebody_else_cancels_stays_canceled_until_the_next_path():
+    drive = Drive(*LONG)
+    drive.end(drive.begun(), CANCELED)
+    assert drive.step(0.0, after=100.0) == []
+    assert drive.state is State.CANCELED
+    drive.path(*LONG)
+    (goal,) = drive.step(0.0)
+    assert isinstance(goal, SendGoal)
+
+
+@pytest.mark.parametrize("ending", [Ending(UNKNOWN), NO_ANSWER])
+def test_a_server_that_was_started_anew_gets_the_goal_again(ending):
+    drive = Drive(*LONG)
+    goal = drive.begun()
+    drive.step(1.0)
+    drive.follower.take_ending(goal.id, ending, "went away", drive.now)
+    drive.step(1.0)
+    assert drive.state is State.NO_NAV2
+    (again,) = drive.step(1.0, after=RETRY_S)
+    assert again.points[0][0] == pytest.approx(1.0)
+
+
+def test_no_answer_to_a_goal_is_another_goal():
+    drive = Drive(*LONG)
+    (goal,) = drive.step(0.0)
+    drive.follower.take_accepted(goal.id, None, "did not answer", drive.now)
+    assert drive.step(0.0) == []
+    assert (drive.state, drive.follower.detail) == (State.NO_NAV2, "did not answer")
+    (again,) = drive.step(0.0, after=RETRY_S)
+    assert again.id != goal.id
+
+
+def test_a_refusal_is_said():
+    drive = Drive(*LONG)
+    (goal,) = drive.step(0.0)
+    drive.accept(goal, accepted=False)
+    drive.step(0.0)
+    assert drive.state is State.REFUSED
+
+
+def test_a_path_that_is_the_same_ahead_changes_no_goal():
+    drive = Drive((0.0, 0.0), (8.0, 0.0), (8.0, 2.0))
+    goal = drive.begun()
+    drive.step(1.0)
+    # From where the robot was a while ago, and with another end.
+    drive.path((0.9, 0.01), (8.0, 0.0), (8.0, 2.0), (4.0, 2.0))
+    assert drive.step(1.1) == []
+    for step in range(11, 80):
+        assert drive.step(step / 10) == [], step
+    (ahead,) = [r for step in range(1, 19) for r in drive.step(8.0, step / 10)]
+    assert ahead.points[-1] == (4.0, 2.0)
+    assert goal.id != ahead.id
+
+
+@pytest.mark.parametrize("turn", [2.0, 7.9])
+def test_a_path_that_is_another_one_ahead_replaces_the_goal(turn):
+    drive = Drive(*LONG)
+    drive.begun()
+    drive.step(1.0)
+    drive.path((0.9, 0.0), (turn, 0.0), (turn, 3.0))
+    (goal,) = drive.step(1.1)
+    assert isinstance(goal, SendGoal)
+    assert goal.points[0] == (pytest.approx(1.1), 0.0)
+    assert goal.points[-1] == (turn, 3.0)
+
+
+def test_a_path_that_begins_elsewhere_is_not_driven():
+    drive = Drive(*LONG)
+    goal = drive.begun()
+    drive.path((0.0, 5.0), (8.0, 5.0))
+    assert drive.step(0.0) == [CancelGoal(goal.id)]
+    assert drive.state is State.PATH_ELSEWHERE
+
+
+def test_an_empty_path_cancels_until_nav2_has_heard():
+    drive = Drive(*LONG)
+    goal = drive.begun()
+    drive.path()
+    assert drive.step(0.1) == [CancelGoal(goal.id)]
+    assert drive.state is State.EMPTY_PATH
+    assert drive.step(0.1) == []
+    assert drive.step(0.1, after=1.0) == [CancelGoal(goal.id)]
+    drive.follower.take_cancelled(goal.id, TAKEN)
+    assert drive.step(0.1, after=1.0) == []
+
+
+def test_a_goal_that_was_just_sent_is_canceled_once_it_is_there():
+    """Nav2 may not know it yet when the request to cancel comes."""
+    drive = Drive(*LONG)
+    (goal,) = drive.step(0.0)
+    drive.path()
+    assert drive.step(0.0) == [CancelGoal(goal.id)]
+    drive.follower.take_cancelled(goal.id, 2)
+    drive.accept(goal)
+    assert drive.step(0.0) == [CancelGoal(goal.id)]
+    drive.follower.take_cancelled(goal.id, TAKEN)
+    assert drive.step(0.0, after=2.0) == []
+
+
+def test_an_old_pose_cancels_and_a_new_one_goes_on():
+    drive = Drive(*LONG)
+    goal = drive.begun()
+    drive.now += 1.0
+    assert drive.follower.step(drive.now) == [CancelGoal(goal.id)]
+    assert drive.state is State.OLD_POSE
+    (again,) = drive.step(0.3)
+    assert again.points[0][0] == pytest.approx(0.3)
+
+
+def test_a_controller_that_stands_is_asked_and_then_given_up():
+    drive = Drive(*LONG)
+    drive.begun()
+    drive.step(0.5)
+    requests, said = [], set()
+    while drive.now < GIVE_UP_S + 2.0:
+        requests += [type(request) for request in drive.step(0.5, after=0.25)]
+        if drive.now > STANDS_S + 1.0:
+            said.add(drive.state)
+    # The result may have been lost.
+    assert requests.count(AskResult) >= 4
+    assert requests.count(CancelGoal) >= 1
+    assert SendGoal in requests
+    assert {State.STANDS, State.GIVEN_UP} <= said
+    assert drive.follower.tally.goals == 2
+
+
+def test_end_cancels_what_there_is():
+    drive = Drive(*LONG)
+    goal = drive.begun()
+    assert drive.follower.end() == [CancelGoal(goal.id)]

@@ -1,0 +1,152 @@
+"""``fasaco-edge follow`` and a look-alike of Nav2, each in a process of its own."""
+
+import math
+import time
+
+import pytest
+
+from tests.follow.nav2_missions import kind_of, nav2_follower, nav2_robot, passed
+from tests.support.driven_base import DrivenBase
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import map_bytes, room
+
+LANES = ((0.0, 0.0), (2.0, 0.0), (2.0, 0.276), (0.0, 0.276), (0.0, 0.552), (2.0, 0.552))
+CROSSING = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, -1.0))
+PATIENCE_S = 120.0
+
+
+@pytest.fixture
+def base():
+    base = DrivenBase()
+    base.says_poses = False
+    yield base
+    base.close()
+
+
+def until(log, words):
+    ends = time.monotonic() + PATIENCE_S
+    while words not in log.read_text():
+        assert time.monotonic() < ends, log.read_text()
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("release", ["humble", "jazzy", "lyrical"])
+@pytest.mark.parametrize("domain", [7, None], ids=["rmw_zenoh", "bridge"])
+def test_a_path_is_driven_to_its_end(base, tmp_path, release, domain):
+    robot = {"endpoint": base.endpoint, "domain": domain, "release": release, "start": (0.0, 0.0)}
+    ros2 = {**kind_of(domain), "nav2": {"release": release}}
+    if domain is not None:
+        # It is seen, whatever the configuration says.
+        ros2["nav2"] = {"release": "jazzy", "controller": "FollowPath"}
+    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
+        base.plans()
+        base.send_path(*LANES)
+        until(log, "standing, the path is driven")
+    done = nav2.end()
+    assert done["refused"] == []
+    assert done["errors"] == []
+    # Lanes beside each other are one goal.
+    assert done["counts"] == {"goals": 1, "preempted": 0, "canceled": 0}
+    assert passed(done["trail"], LANES)
+    assert math.dist((done["x"], done["y"]), LANES[-1]) < 0.15
+
+
+def test_a_path_that_crosses_itself_is_driven_without_standing(base, tmp_path):
+    robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0), "speed": 0.5}
+    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, kind_of(7)) as log:
+        base.plans()
+        base.send_path(*CROSSING)
+        until(log, "standing, the path is driven")
+    done = nav2.end()
+    assert passed(done["trail"], CROSSING)
+    # The next goal was sent while the robot drove.
+    assert done["counts"]["goals"] == done["counts"]["preempted"] + 1 == 2
+
+
+def test_a_replan_that_changes_nothing_ahead_changes_no_goal(base, tmp_path):
+    robot = {"endpoint": base.endpoint, "domain": None, "start": (0.0, 0.0), "speed": 0.3}
+    ros2 = kind_of(None)
+    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
+        base.plans()
+        base.send_path((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
+        until(log, "driving")
+        time.sleep(0.5)
+        # As the daemon says it again: from somewhere before the robot on.
+        base.send_path((0.02, 0.0), (1.0, 0.0), (1.0, 1.0), (0.7, 1.0))
+        until(log, "standing, the path is driven")
+    done = nav2.end()
+    assert done["counts"]["canceled"] == 0
+    assert done["counts"]["goals"] == 2
+    assert math.dist((done["x"], done["y"]), (0.7, 1.0)) < 0.15
+
+
+def test_a_replan_that_changes_what_lies_ahead_replaces_the_goal(base, tmp_path):
+    robot = {"endpoint": base.endpoint, "domain": None, "start": (0.0, 0.0), "speed": 0.3}
+    ros2 = kind_of(None)
+    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
+        base.plans()
+        base.send_path((0.0, 0.0), (3.0, 0.0))
+        until(log, "driving")
+        base.send_path((0.0, 0.0), (0.9, 0.0), (0.9, 0.8))
+        until(log, "standing, the path is driven")
+    done = nav2.end()
+    assert done["counts"] == {"goals": 2, "preempted": 1, "canceled": 0}
+    assert math.dist((done["x"], done["y"]), (0.9, 0.8)) < 0.15
+
+
+@pytest.mark.parametrize("why", ["empty path", "no daemon"])
+def test_what_stops_the_robot_cancels_its_goal(base, tmp_path, why):
+    robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0), "speed": 0.3}
+    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, kind_of(7)) as log:
+        base.plans()
+        base.send_path((0.0, 0.0), (30.0, 0.0))
+        until(log, "driving")
+        time.sleep(1.0)
+        if why == "empty path":
+            base.send_path()
+        else:
+            base.plans(False)
+        until(log, f"standing, {'stopped by an empty path' if why == 'empty path' else why}")
+        time.sleep(0.5)
+        before = time.monotonic()
+        base.plans()
+        base.send_path((0.0, 0.0), (30.0, 0.0))
+        assert time.monotonic() - before < 1.0
+    done = nav2.end()
+    assert done["counts"]["canceled"] >= 1
+    assert done["driven_m"] < 10.0
+
+
+def test_no_server_and_an_error_are_said_with_their_reasons(base, tmp_path):
+    base.says_poses = True
+    robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0)}
+    ros2 = {**kind_of(7), "nav2": {"controller": "Nothing"}}
+    base.plans()
+    base.send_path(*LANES)
+    with nav2_follower(tmp_path, base.endpoint, ros2) as log:
+        until(log, "no pose")
+        with nav2_robot(**robot):
+            until(log, "standing, given up by Nav2: 101 invalid controller: no controller Nothing")
+        until(log, "pose too old")
+
+
+def test_a_mission_is_driven_by_nav2_to_its_end(tmp_path):
+    """Daemon, follower and look-alike; aborts, late and lost answers in between."""
+    names = {"name": "robot", "speed_m_s": 1.0, "quarter_turn_s": 0.5}
+    ros2 = {**kind_of(0), "pose": "geometry_msgs/msg/PoseStamped"}
+    with (
+        daemon_process(tmp_path, ros2=ros2, robot=names) as daemon,
+        Outsider(daemon.endpoint) as native,
+        nav2_robot(
+            endpoint=daemon.endpoint, domain=0, start=(0.6, 0.6), abort_every_s=6.0, delay_s=0.5,
+            lost=0.02,
+        ) as nav2,
+        nav2_follower(tmp_path, daemon.endpoint, ros2, **names),
+    ):  # fmt: skip
+        native.put("map", map_bytes(room(2.4, 2.0)))
+        status = native.wait_status(lambda status: status["state"] == "done")
+        assert status["coverage"]["remaining"] == 0
+        assert status["errors"]["total"] == 0
+        done = nav2.end()
+    assert done["refused"] == []
