@@ -45,9 +45,10 @@ COAST_M = 0.5
 DONE_M = 0.5
 # After an error the next goal is sent so much later [s], twice as long each time, at most so long.
 RETRY_S, MOST_RETRY_S = 1.0, 30.0
-# A robot that has not moved by so much in so long stands [m, s]; then the result is asked for
-# again, as it may have been lost, and after longer the goal is given up [s].
-MOVED_M, STANDS_S, GIVE_UP_S = 0.05, 3.0, 20.0
+# A robot that has not moved by so much in so long stands [m, s], near the end of its goal sooner;
+# then the result is asked for again, as it may have been lost, and after longer the goal is given
+# up [s].
+MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 # Requests to cancel are repeated [s].
 CANCEL_EVERY_S = 1.0
 
@@ -337,14 +338,16 @@ class Nav2Follower(Supervision):
         if self._way - goal.start > BEGINNING_M:
             self._retry_s = RETRY_S
         stands_s = now - self._moved_last[1]
-        if stands_s <= STANDS_S:
+        longest_s = ARRIVED_S if goal.end - self._way <= DONE_M else STANDS_S
+        if stands_s <= longest_s:
             return
-        self.state, self.detail = State.STANDS, f"for {stands_s:.0f} s"
+        if stands_s > STANDS_S:
+            self.state, self.detail = State.STANDS, f"for {stands_s:.0f} s"
         if stands_s > GIVE_UP_S:
             self._doomed[goal.id] = Doomed()
             self._active = None
             self._fail(State.GIVEN_UP, f"stood for {stands_s:.0f} s without an error", now)
-        elif now - self._asked_again > STANDS_S:
+        elif now - self._asked_again > longest_s:
             self._asked_again = now
             self._requests.append(AskResult(goal.id))
 
