@@ -63,7 +63,9 @@ def nav2_follower(
     config.write_text(yaml.safe_dump(sections))
     with log.open("wb") as stderr:
         process = subprocess.Popen(
-            [*PROGRAM, "follow", "--config", str(config)], stderr=stderr, env=ENVIRONMENT
+            [*PROGRAM, "follow", "--config", str(config), "--pose-age", "5"],
+            stderr=stderr,
+            env=ENVIRONMENT,
         )
     try:
         yield log
