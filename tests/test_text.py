@@ -13,11 +13,16 @@ from fasaco_edge.text import MOST, Html, element, html, json_line, lines, one_li
 # Kaithi numbers begin with are of a category with them, and seen.
 SEEN = {0x600, 0x601, 0x602, 0x603, 0x604, 0x605, 0x6DD, 0x70F, 0x890, 0x891, 0x8E2}
 SEEN |= {0x110BD, 0x110CD} | set(range(0x13430, 0x13440))
-HIDDEN = [
-    mark
-    for mark in map(chr, range(0x110000))
-    if unicodedata.category(mark) in ("Cc", "Cf", "Cs", "Zl", "Zp") and ord(mark) not in SEEN
-]
+
+
+@pytest.fixture(scope="module")
+def hidden():
+    """All signs of Unicode that are not to be seen."""
+    return [
+        mark
+        for mark in map(chr, range(0x110000))
+        if unicodedata.category(mark) in ("Cc", "Cf", "Cs", "Zl", "Zp") and ord(mark) not in SEEN
+    ]
 
 
 @pytest.mark.parametrize(
@@ -38,11 +43,11 @@ def test_what_would_do_something_is_seen(text, seen):
     assert one_line(text) == seen
 
 
-def test_all_that_unicode_hides_is_seen():
-    for mark in HIDDEN:
+def test_all_that_unicode_hides_is_seen(hidden):
+    for mark in hidden:
         assert one_line(mark).isprintable()
         assert one_line(mark).isascii()
-    assert lines("".join(HIDDEN)).replace("\n", "").replace("\t", "").isprintable()
+    assert lines("".join(hidden)).replace("\n", "").replace("\t", "").isprintable()
 
 
 def test_line_ends_and_tabs_stay_where_they_are_meant():
@@ -72,9 +77,9 @@ def test_on_a_page_text_is_no_mark_up():
     )
 
 
-def test_json_has_escapes_of_its_own():
+def test_json_has_escapes_of_its_own(hidden):
     # Two halves of a pair beside each other would be one sign.
-    text = "-".join(HIDDEN)
+    text = "-".join(hidden)
     document = {text: [text, 1.5, None]}
     line = json_line(document)
     assert line.isascii()

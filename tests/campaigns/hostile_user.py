@@ -17,6 +17,7 @@ import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -189,6 +190,10 @@ def try_together(campaign: Campaign) -> None:
 
 
 def _asks(campaign: Campaign, connect: tuple[str, ...]) -> bool:
+    host, _, port = campaign.endpoint.removeprefix("tcp/").rpartition(":")
+    with socket.socket() as probe:
+        if probe.connect_ex((host, int(port))):
+            return False
     words = [campaign.program, "ask", "status", *connect]
     return subprocess.run(words, capture_output=True, check=False).returncode == 0
 

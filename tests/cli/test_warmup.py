@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from fasaco_edge.kernels.cache import code_digest
 from tests.kernels.harm import zeroed
 from tests.kernels.installations import fill_with
@@ -26,6 +28,12 @@ print(sum(sum(kernel.stats.cache_misses.values()) for kernel in kernels))
 """
 
 
+@pytest.fixture(scope="module")
+def ready():
+    """What a warm-up tells that found all kernels, or has compiled them."""
+    return json.loads(fasaco_edge("warmup", "--json").out)
+
+
 def test_warmup_says_where_the_kernels_are():
     ended = fasaco_edge("warmup")
     assert ended.code == 0
@@ -33,21 +41,20 @@ def test_warmup_says_where_the_kernels_are():
     assert "kernels-" in ended.err
 
 
-def test_what_is_ready_is_loaded_and_never_compiled():
-    told = json.loads(fasaco_edge("warmup", "--json").out)
-    assert told["ready"] is True
+def test_what_is_ready_is_loaded_and_never_compiled(ready):
+    assert ready["ready"] is True
     checked = fasaco_edge("warmup", "--check", "--json")
     assert checked.code == 0
     again = json.loads(checked.out)
-    assert (again["ready"], again["folder"], again["seconds"]) == (True, told["folder"], 0.0)
+    assert (again["ready"], again["folder"], again["seconds"]) == (True, ready["folder"], 0.0)
     counted = subprocess.run(
         [sys.executable, "-c", COUNT], env=ENVIRONMENT, capture_output=True, text=True, check=True
     )
     assert counted.stdout == "0\n"
 
 
-def test_two_processes_compile_what_is_missing(tmp_path, monkeypatch):
-    complete = Path(json.loads(fasaco_edge("warmup", "--json").out)["folder"])
+def test_two_processes_compile_what_is_missing(ready, tmp_path, monkeypatch):
+    complete = Path(ready["folder"])
     folder = tmp_path / complete.name
     shutil.copytree(complete, folder)
     # Of both ends; called from Python: who loads a kernel does not compile what that one calls.
@@ -64,9 +71,9 @@ def test_two_processes_compile_what_is_missing(tmp_path, monkeypatch):
     assert all(file.exists() for file in missing)
 
 
-def test_the_same_sources_make_the_same_code():
+def test_the_same_sources_make_the_same_code(ready):
     """The compiler names the code of an expression over whole arrays after an address."""
-    folder = Path(json.loads(fasaco_edge("warmup", "--json").out)["folder"])
+    folder = Path(ready["folder"])
     named = [
         file.name
         for file in folder.glob("*.kernel")
