@@ -57,7 +57,7 @@ DEAR_PIECES, PIECES = 50, 5
 WINDOWS_A_PERTURBATION = 10
 # States that the whole ground is solved with at first, where turns are dear: so many over its
 # cells, within a range; some times as many if none leads on.
-WHOLE_STATES, LEAST_BEAM, MOST_BEAM, WIDER = 16_000, 8, 100, 4
+WHOLE_STATES, LEAST_BEAM, MOST_BEAM, WIDER = 8_000, 8, 100, 4
 
 # Cells that the bound solves in bands for each pause, and at once: some 3 % of the time where
 # turns are dear, 10 to 20 % else.

@@ -41,9 +41,9 @@ DEAR_STEPS = 10
 # Grounds on lattices of more cells take too much memory: about 75 bytes a cell.
 MOST_LATTICE = 250_000
 # A ring beside the first one costs so many quarter-turns where a whole ground is solved: rather
-# any way on than that. Windows that join rings: so many in a piece, and pieces.
+# any way on than that. Windows that join rings: so many in a piece, and pieces; few states do.
 RING_TURNS = 1000
-JOINS_AT_ONCE, JOIN_PIECES = 8, 40
+JOINS_AT_ONCE, JOIN_PIECES, JOIN_BEAM = 8, 40, 20
 NO_SIDE = 1 << 60
 
 
@@ -144,9 +144,10 @@ class WindowSearch:
         self._tally[COST] += end_window(ground, passages, terms, window, program)
         self._tally[SOLVED] += 1
         rings, seams = np.empty((self._size, 2), np.int32), np.empty_like(self._aim.cells)
+        aim = self._aim._replace(beam=JOIN_BEAM)
         for _ in range(JOIN_PIECES):
             left = join_rings(
-                *(ground, passages, terms, self._program, self._aim, rings, seams, self._tally),
+                *(ground, passages, terms, self._program, aim, rings, seams, self._tally),
                 *(JOINS_AT_ONCE, random),
             )
             yield
