@@ -55,10 +55,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Serve."""
     from fasaco_edge.config.loading import load_config, with_mask
+    from fasaco_edge.daemon.memory import mask_bytes
     from fasaco_edge.daemon.service import run_daemon
+    from fasaco_edge.host.processes import memory_limit
 
     def read() -> DaemonConfig:
-        return with_mask(load_config(args.config), args.config)
+        config = load_config(args.config)
+        return with_mask(config, args.config, mask_bytes(config, memory_limit()))
 
     run_daemon(read(), args.record, args.state, fresh=args.fresh, read=read)
     # All is closed. What is left is the interpreter's own end, in which it was seen to wait for

@@ -37,21 +37,24 @@ def load_config(path: Path | None) -> DaemonConfig:
     raise type(first.error)(f"{where}: {first.error}", hint=hint) from first.error
 
 
-def with_mask(config: DaemonConfig, file: Path | None) -> DaemonConfig:
+def with_mask(
+    config: DaemonConfig, file: Path | None, most_bytes: int | None = None
+) -> DaemonConfig:
     """Return a configuration that holds its keep-out mask itself.
 
     Args:
         config: with the name of a file, sought from the configuration's own folder.
         file: of the configuration.
+        most_bytes: what it may take to read the mask [bytes]; None for anything.
 
     Raises:
-        BadConfiguration: the mask cannot be read.
+        BadConfiguration: the mask cannot be read, or takes more.
     """
     mission = config.mission
     if not mission.keep_out_mask or mission.keep_out_mask.startswith(INLINE):
         return config
     path = (file or Path()).parent / mission.keep_out_mask
-    mask = inline_mask(path, config.map.occupied_at_least)
+    mask = inline_mask(path, config.map.occupied_at_least, most_bytes)
     return structs.replace(config, mission=structs.replace(mission, keep_out_mask=mask))
 
 

@@ -17,6 +17,9 @@ A pixel is a byte, held in up to ten copies where updates are as large as the ma
 * 3 in the cycle: a map and an update being decoded, and Zenoh's buffer of the last one;
 * 2 in the mission: its map, and the one it is compared with or patched to.
 
+A keep-out mask is read where no map is decoded, and may take what two of the cycle's copies do
+(``mask_bytes``).
+
 Larger messages are dropped on arrival, by their size alone. Nothing else grows with the
 pixels: kernels look at a map tile by tile, and a tile has a bound, see ``grid.lattice``. Of a
 lattice's cells it is the path that takes most: some 80 bytes a pose, twice while it is sent. The
@@ -59,6 +62,12 @@ FRAME_PIXELS = 100_000
 STAND_BYTES = 128
 # MemoryMax= above MemoryHigh=, beyond which the system only slows a service down.
 SPARE = 1.1
+
+# Of the copies of a pixel, those that a keep-out mask may take while it is read; what reads it; and
+# the least for a mask, of which the base has some to spare.
+MASK_COPIES = 2
+PILLOW_BYTES = 6 * MB
+LEAST_MASK_BYTES = 10 * MB
 
 # The smallest limits ever applied: a small flat.
 LEAST_PIXELS, LEAST_CELLS = 250_000, 10_000
@@ -106,6 +115,16 @@ def floor_pixels(max_pixels: int) -> int:
     As many as the map, and a frame around it: it has to fit every map that is taken.
     """
     return max_pixels + max_pixels // 10 + FRAME_PIXELS
+
+
+def mask_bytes(config: DaemonConfig, limit: int | None) -> int:
+    """Return what it may take to read a keep-out mask under a memory limit [bytes].
+
+    As much as the map and the update that are decoded in a cycle: in one that reads the
+    configuration again none is. A small picture is always read.
+    """
+    share = MASK_COPIES * afforded(config, limit).map.max_pixels
+    return max(share - PILLOW_BYTES, LEAST_MASK_BYTES)
 
 
 def limits_mib(config: DaemonConfig) -> tuple[int, int]:

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
@@ -28,19 +27,12 @@ from fasaco_edge.grid.geometry import (
     GridGeometry,
     Pose2D,
 )
+from fasaco_edge.grid.map_images import MapImage, check_size, read_image
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.host.plain_yaml import PlainYamlError, load, read_bounded
 from fasaco_edge.host.resources import folder
 from fasaco_edge.text import shown
 
-if TYPE_CHECKING:
-    from PIL import Image
-
-MAX_PIXELS = 64_000_000
-
-# nav2's three recommended formats, and the one that published maps come in; PPM is Pillow's name
-# for the PGM family. What JPEG does to sharp edges may turn unknown pixels beside walls free.
-FORMATS = ("PPM", "PNG", "BMP", "JPEG")
 IMAGE_SUFFIXES = (".pgm", ".png", ".bmp", ".jpg", ".jpeg")
 # What ROS 1's map_saver writes; grey of 205, which it writes for unknown, is not free by that.
 FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
@@ -59,6 +51,25 @@ def read_map(path: str | Path) -> OccupancyGrid:
         MapFileError: a file is missing, is not what it should be or too large; a key is
             missing or its value impossible.
     """
+    return _grid(*read_map_rows(path))
+
+
+def read_map_rows(
+    path: str | Path, most_bytes: int | None = None
+) -> tuple[GridGeometry, Iterator[NDArray[np.int8]]]:
+    """Return where a map lies, and its rows from the smallest y up, as ``read_map`` reads them.
+
+    Args:
+        path: the YAML file.
+        most_bytes: what it may take to read the image [bytes]; None for anything.
+
+    Returns:
+        The geometry, and stripes of the map, int8 (some, cols): each but the last has a multiple
+        of 8 rows.
+
+    Raises:
+        MapFileError: as ``read_map``, or the image takes more.
+    """
     path = Path(path)
     if path.suffix.lower() in IMAGE_SUFFIXES:
         raise MapFileError(
@@ -73,7 +84,9 @@ def read_map(path: str | Path) -> OccupancyGrid:
         raise keys.error("free_thresh", f"less than occupied_thresh, {thresholds[1]}")
     resolution = keys.number("resolution", MIN_RESOLUTION_M, MAX_RESOLUTION_M, " [m/pixel]")
     file, mode, origin, negate = keys.image(), keys.mode(), keys.origin(), keys.negate()
-    return _grid(_read_image(file), mode, thresholds, negate, resolution, origin)
+    image = read_image(Path(file), most_bytes)
+    geometry = GridGeometry(image.rows, image.cols, resolution, origin)
+    return geometry, _cells(image, mode, thresholds, negate)
 
 
 def read_bare_image(path: str | Path, resolution_m: float) -> OccupancyGrid:
@@ -104,24 +117,30 @@ def read_bare_image(path: str | Path, resolution_m: float) -> OccupancyGrid:
             f"[m/pixel], got {resolution_m:g}",
             hint="give the edge of a pixel in metres, as 0.05",
         )
-    thresholds = FREE_THRESH, OCCUPIED_THRESH
-    return _grid(_read_image(path), MODES[0], thresholds, False, resolution_m, Pose2D(0, 0, 0))
+    image = read_image(path)
+    geometry = GridGeometry(image.rows, image.cols, resolution_m, Pose2D(0, 0, 0))
+    return _grid(geometry, _cells(image, MODES[0], (FREE_THRESH, OCCUPIED_THRESH), negate=False))
 
 
-def _grid(
-    image: _Image,
-    mode: str,
-    thresholds: tuple[float, float],
-    negate: bool,
-    resolution_m: float,
-    origin: Pose2D,
-) -> OccupancyGrid:
-    # Images run from the top down, maps from the smallest y up.
-    cells = _values(mode, thresholds, image.white, negate)[image.levels[::-1]]
-    if image.transparent is not None and mode != "raw":
-        cells[image.transparent[::-1]] = UNKNOWN
-    rows, cols = cells.shape
-    return OccupancyGrid(GridGeometry(rows, cols, resolution_m, origin), cells)
+def _cells(
+    image: MapImage, mode: str, thresholds: tuple[float, float], negate: bool
+) -> Iterator[NDArray[np.int8]]:
+    """Yield the rows of a map, int8 (some, cols), from the smallest y up."""
+    values = _values(mode, thresholds, image.white, negate)
+    for stripe in image.stripes():
+        cells = values[stripe.levels]
+        if stripe.transparent is not None and mode != "raw":
+            cells[stripe.transparent] = UNKNOWN
+        yield cells
+
+
+def _grid(geometry: GridGeometry, stripes: Iterator[NDArray[np.int8]]) -> OccupancyGrid:
+    cells = np.empty((geometry.rows, geometry.cols), np.int8)
+    row = 0
+    for stripe in stripes:
+        cells[row : row + len(stripe)] = stripe
+        row += len(stripe)
+    return OccupancyGrid(geometry, cells)
 
 
 def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
@@ -143,7 +162,7 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
         raise MapFileError(
             f"{path}: expected a bool array of two dimensions, got {array.dtype} {array.shape}"
         )
-    _check_size(path, array.shape[1], array.shape[0])
+    check_size(path, array.shape[1], array.shape[0])
     # A bool of another program may be any byte but 0; kernels read its lowest bit alone.
     cells: NDArray[np.bool_] = np.ascontiguousarray(array).view(np.uint8) != 0
     return cells
@@ -271,65 +290,6 @@ class _YamlKeys:
         if not os.path.isfile(found):
             raise self.error("image", f"an existing file, sought at {found}")
         return found
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Image:
-    """An image as a map is read from it.
-
-    Attributes:
-        levels: uint8 or uint16 (rows, cols), top row first: brightness, 0 black to
-            ``white``; the mean over the colour channels, alpha is none of them.
-        white: the brightest level.
-        transparent: bool (rows, cols), or None where the image has no alpha channel.
-    """
-
-    levels: NDArray[np.uint8] | NDArray[np.uint16]
-    white: int
-    transparent: NDArray[np.bool_] | None = None
-
-
-def _read_image(path: Path) -> _Image:
-    """Return the pixels of a PGM, PNG, BMP or JPEG file.
-
-    Raises:
-        MapFileError: it is missing, no such image, damaged, empty or too large.
-    """
-    # Pillow is loaded with the first image: a daemon that never reads one does without.
-    from PIL import Image, UnidentifiedImageError  # noqa: PLC0415
-
-    try:
-        with warnings.catch_warnings():
-            # _check_size has the smaller limit.
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(path, formats=FORMATS)
-        with image:
-            _check_size(path, *image.size)
-            return _decoded(path, image)
-    except Image.DecompressionBombError as error:
-        raise MapFileError(f"{path}: more than {MAX_PIXELS} pixels: {error}") from error
-    except UnidentifiedImageError as error:
-        raise MapFileError(f"{path}: not an image (PGM, PNG, BMP or JPEG)") from error
-    except (OSError, ValueError, SyntaxError) as error:
-        raise MapFileError(f"{path}: not readable as an image: {error}") from error
-
-
-def _check_size(path: str | Path, cols: int, rows: int) -> None:
-    """Raise MapFileError unless there is at least one pixel and at most MAX_PIXELS."""
-    if not 0 < rows * cols <= MAX_PIXELS:
-        raise MapFileError(f"{path}: expected 1 to {MAX_PIXELS} pixels, got {cols} x {rows}")
-
-
-def _decoded(path: Path, image: Image.Image) -> _Image:
-    if image.mode.startswith("I"):
-        return _Image(np.asarray(image).astype(np.uint16), 65535)
-    if image.mode in ("1", "L") and "transparency" not in image.info:
-        return _Image(np.asarray(image.convert("L")), 255)
-    if image.mode not in ("1", "L", "LA", "P", "RGB", "RGBA"):
-        raise MapFileError(f"{path}: expected grey, palette or RGB pixels, got {image.mode}")
-    pixels = np.asarray(image.convert("RGBA"))
-    levels = pixels[:, :, :3].sum(axis=2, dtype=np.uint16)
-    return _Image(levels, 3 * 255, pixels[:, :, 3] < 255)
 
 
 def _values(

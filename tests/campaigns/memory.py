@@ -2,6 +2,7 @@
 
 python -m tests.campaigns.memory
 python -m tests.campaigns.memory --sides 1000,5000,8000 --rates 20 --limit-mb 400
+python -m tests.campaigns.memory --kinds grey,colour --rates 20
 
 The daemon runs in a control group with its unit's MemoryMax=, where there is one to be had. It is
 to live, whatever comes: what it takes must fit into what ``fasaco_edge.daemon.memory`` says, what
@@ -12,17 +13,22 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
+from math import isqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
+from PIL import Image
 
 from fasaco_edge.bench.processes import warm_kernels
 from fasaco_edge.config.config import DaemonConfig
@@ -36,12 +42,14 @@ from tests.support import processes
 from tests.support.outsider import Outsider, open_client
 from tests.support.processes import Daemon, daemon_process
 from tests.support.rooms import map_bytes, pose_bytes, room
-from tests.support.service_manager import Group, memory_group, unit_limit, why_not
+from tests.support.service_manager import Group, Manager, memory_group, unit_limit, why_not
 
 SIDES = (1000, 2000, 4000, 5000, 8000)
 RESOLUTIONS = (0.0001, 0.02, 0.05)
 RATES = (1.0, 10.0, 20.0)
-KINDS = ("maps", "moving", "updates", "mappers")
+KINDS = ("maps", "moving", "updates", "mappers", "grey", "colour")
+# Keep-out masks of that side, read by a daemon whose maps are as large as they may be.
+MASKS = {"grey": "L", "colour": "RGBA"}
 # Mappers that speak at once.
 MAPPERS = 3
 # A daemon is asked for its status so often before it counts as stuck.
@@ -54,8 +62,9 @@ class Flood:
 
     Attributes:
         kind: "maps" that differ in a pixel; "moving" ones, none on the raster of the one before;
-            "updates": each map followed by an update of all of it; "mappers": several at once.
-        side: of the square maps [pixels].
+            "updates": each map followed by an update of all of it; "mappers": several at once;
+            one of ``MASKS``: updates, and a keep-out mask in between.
+        side: of the square maps, or the mask [pixels].
         resolution: edge of a pixel [m].
         rate: so many a second, if the link takes them.
     """
@@ -108,6 +117,39 @@ def update_payload(flood: Flood) -> bytes:
     return encode_map_update(MapPatch(Window(0, 0, flood.side, flood.side), pixels, "map", 9))
 
 
+def mask_file(flood: Flood, folder: Path) -> Path:
+    """Write a mask that keeps out of two rectangles; return the map_server YAML file."""
+    pixels = np.full((flood.side, flood.side), 255, np.uint8)
+    pixels[: flood.side // 3, 1 : flood.side // 9] = pixels[-flood.side // 7 :] = 0
+    Image.fromarray(pixels).convert(MASKS[flood.kind]).save(folder / "mask.png")
+    keys = {"image": "mask.png", "resolution": 0.05, "origin": [500.0, 500.0, 0.0], "negate": 0}
+    file = folder / "mask.yaml"
+    file.write_text(yaml.safe_dump(keys))
+    return file
+
+
+def pour_with_mask(
+    flood: Flood, config: Path, daemon: Daemon, outsider: Outsider, seconds: float
+) -> bool:
+    """Send the largest maps, and let a mask be read meanwhile; return whether it was taken."""
+    document = yaml.safe_load(config.read_text())
+    document["mission"]["keep_out_mask"] = str(mask_file(flood, config.parent))
+    config.write_text(yaml.safe_dump(document))
+    largest = isqrt(afforded(load_config(config), None).map.max_pixels)
+    reload = threading.Timer(seconds / 2, daemon.process.send_signal, [signal.SIGHUP])
+    reload.start()
+    pour(replace(flood, kind="updates", side=largest), daemon, outsider, seconds)
+    reload.join()
+    until = time.monotonic() + ANSWERS_S
+    while time.monotonic() < until and daemon.process.poll() is None:
+        if "configuration read again: mission.keep_out_mask" in daemon.log_text():
+            return True
+        if "configuration refused" in daemon.log_text():
+            return False
+        time.sleep(0.1)
+    return False
+
+
 def pour(flood: Flood, daemon: Daemon, outsider: Outsider, seconds: float) -> int:
     """Send for so long; return how many maps that were."""
     payloads = [map_payload(flood, number) for number in range(3)]
@@ -141,16 +183,21 @@ def settled(
         earlier: the status before something was sent, of which it has to tell.
     """
     until, before = time.monotonic() + ANSWERS_S, ()
-    known = earlier and (earlier["map"]["revision"], earlier["errors"]["total"])
+    known = earlier and (_maps(earlier), earlier["errors"]["total"])
     while daemon.process.poll() is None:
         status = outsider.ask_status()
-        now = (status["map"]["revision"], status["errors"]["total"], status["plan"]["planning"])
+        now = (_maps(status), status["errors"]["total"], status["plan"]["planning"])
         is_settled = now == before and not now[2] and now[:2] != known
         if is_settled or time.monotonic() > until:
             return status
         before = now
         time.sleep(1.2)
     return {}
+
+
+def _maps(status: dict[str, Any]) -> int:
+    """Return how many maps a mission has had; one that has just begun again has none."""
+    return status["map"]["revision"] if status["map"] else 0
 
 
 def run_flood(
@@ -166,29 +213,43 @@ def run_flood(
     # Other tests count cells; what the unit has room for is the default.
     config = {"planner": {"line": DaemonConfig().planner.line}} | config
     processes.PROGRAM = program
+    manager = Manager(folder)
     try:
-        with daemon_process(folder, **config) as daemon, Outsider(daemon.endpoint) as outsider:
-            written = load_config(next(folder.glob("daemon*.yaml")))
+        with (
+            daemon_process(folder, env={"NOTIFY_SOCKET": manager.address}, **config) as daemon,
+            Outsider(daemon.endpoint) as outsider,
+        ):
+            file = next(folder.glob("daemon*.yaml"))
+            written, has_mask = load_config(file), None
             needs = needed_bytes(afforded(written, limit))
             outsider.put("map", map_bytes(room(8.0, 6.0)))
             outsider.put("pose", pose_bytes(0.75, 0.75))
             outsider.wait_status(lambda status: status["state"] == "covering")
             before = settled(outsider, daemon)
-            sent = pour(flood, daemon, outsider, seconds)
+            if flood.kind in MASKS:
+                sent = 1
+                has_mask = pour_with_mask(flood, file, daemon, outsider, seconds)
+            else:
+                sent = pour(flood, daemon, outsider, seconds)
             status = settled(outsider, daemon, before)
             peak = peak_mb(daemon.pid) if status else 0.0
     finally:
         processes.PROGRAM = PROGRAM
+        manager.close()
     row = Row(
         **asdict(flood), outcome="ended", sent=sent, taken=0, peak_mb=peak,
         needs_mb=round(needs / 1e6), error="", broken="the daemon has ended",
     )  # fmt: skip
     if status:
-        row.taken = status["map"]["revision"] - before["map"]["revision"]
+        row.taken = _maps(status) - _maps(before)
         row.error = status["errors"]["last"]
+        if has_mask is not None:
+            row.taken = has_mask
+            row.error = "" if has_mask else daemon.log_text().partition("configuration refused")[2]
         row.outcome, row.broken = "taken" if row.taken else "refused", ""
         # Updates of a map that was refused are refused in their turn, for want of it.
-        if not row.taken and not status["errors"]["by_code"].get("map_too_large"):
+        refusal = "map_too_large" if has_mask is None else "bad_configuration"
+        if not row.taken and not status["errors"]["by_code"].get(refusal):
             row.broken = "neither taken nor refused"
         elif peak > row.needs_mb:
             row.broken = f"{peak:.0f} MB are more than it says"

@@ -27,6 +27,9 @@ limited = pytest.mark.skipif(bool(why_not()), reason=why_not())
         (Flood("maps", 3000, 0.02, 10.0), "refused", "9000104 bytes was dropped: it may have at"),
         (Flood("maps", 2000, 0.0003, 5.0), "refused", "must be 0.0012 m or larger"),
         (Flood("maps", 2000, 0.05, 5.0), "refused", "exceeds 60000 cells"),
+        (Flood("grey", 900, 0.02, 10.0), "taken", ""),
+        (Flood("grey", 2000, 0.02, 10.0), "refused", "take 11.9 MB to read, more than the 10.0"),
+        (Flood("colour", 4000, 0.02, 10.0), "refused", "take 71.7 MB to read, more than the 10.0"),
     ],
     ids=lambda value: value.kind if isinstance(value, Flood) else None,
 )
@@ -44,8 +47,10 @@ def test_a_daemon_takes_no_more_than_it_says(tmp_path, flood, outcome, error):
         Flood("maps", 8000, 0.02, 20.0),
         Flood("maps", 8000, 0.0001, 2.0),
         Flood("updates", 5000, 0.03, 20.0),
+        Flood("grey", 5900, 0.03, 20.0),
+        Flood("colour", 8000, 0.03, 20.0),
     ],
-    ids=["twenty", "fine", "updates"],
+    ids=["twenty", "fine", "updates", "grey", "colour"],
 )
 def test_a_daemon_lives_under_its_units_limit(tmp_path, flood):
     (row,) = run_floods([flood], tmp_path, 2.0, unit_limit())

@@ -15,11 +15,16 @@ from fasaco_edge.daemon.memory import (
     FLOOR_BYTES,
     FRAME_PIXELS,
     LEAST_CELLS,
+    LEAST_MASK_BYTES,
     LEAST_PIXELS,
+    MASK_COPIES,
+    MB,
     MIB,
+    PILLOW_BYTES,
     afforded,
     floor_pixels,
     limits_mib,
+    mask_bytes,
     most_bytes,
     needed_bytes,
     queues,
@@ -51,6 +56,8 @@ def test_the_guides_say_the_formula():
         formula = f"{BASE_BYTES:,} + {pixel} x map.max_pixels + {cell} x map.max_lattice_cells"
         assert formula in guide
     assert f"MemoryMax={limits_mib(DEFAULT)[1]}M" in guide
+    reads = f"{MASK_COPIES} x map.max_pixels - {PILLOW_BYTES:,}"
+    assert f"{reads} bytes ({mask_bytes(DEFAULT, None) // MB} MB)" in guide
     contract = " ".join((ROOT / "protocol" / "README.md").read_text().split())
     maps = DEFAULT.map
     assert f"`map.max_pixels` pixels ({maps.max_pixels:,}" in contract
@@ -59,6 +66,16 @@ def test_the_guides_say_the_formula():
     assert f"more than {MOST_REACH_PX} of them" in contract
     limits = (ROOT / "protocol" / "limits.yaml").read_text()
     assert f"by default {maps.max_pixels}" in limits
+
+
+@given(st.integers(0, 4 << 30))
+def test_a_mask_is_read_in_what_maps_leave(limit):
+    """While the configuration is read again no map and no update are decoded."""
+    most = mask_bytes(DEFAULT, limit)
+    assert most + PILLOW_BYTES <= 2 * afforded(DEFAULT, limit).map.max_pixels or (
+        most == LEAST_MASK_BYTES < BASE_BYTES / 10
+    )
+    assert most <= mask_bytes(DEFAULT, None)
 
 
 @given(st.integers(1, MAX_GRID_CELLS))

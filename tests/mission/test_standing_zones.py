@@ -1,6 +1,7 @@
 """Standing zones of the configuration: orders name them, and every mission keeps out."""
 
 import time
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -143,6 +144,40 @@ def test_a_picture_that_is_no_mask_is_refused_before_it_holds_a_reload_up(tmp_pa
     with pytest.raises(BadConfiguration, match="take more than 2000 rectangles"):
         inline_mask(mask_file(tmp_path, noise), 65)
     assert time.process_time() - began < 5.0
+
+
+def test_a_mask_takes_no_more_memory_than_it_may(tmp_path):
+    """One of 64 million pixels took a gigabyte, in a daemon of a limited one."""
+    marked = np.zeros((1500, 2000), bool)
+    marked[:700, 400:900] = marked[900:905] = True
+    file = mask_file(tmp_path, marked)
+    assert len(mask_polygons(inline_mask(file, 65, 11_000_000))) == 2
+    for image, mode, takes in (("mask.png", "RGBA", "19.9"), ("mask.jpg", "RGB", "37.9")):
+        picture = Image.open(tmp_path / "mask.png").convert(mode)
+        picture.save(tmp_path / image, progressive=True)
+        file.write_text(file.read_text().replace("mask.png", image))
+        with pytest.raises(BadConfiguration, match=rf"{takes} MB to read, more than the 11\.0"):
+            inline_mask(file, 65, 11_000_000)
+        file.write_text(file.read_text().replace(image, "mask.png"))
+
+
+def test_a_mask_of_one_row_takes_no_more_either(tmp_path):
+    """Each pixel of it was a rectangle at first."""
+    for cols, said in ((90_000, "take more than 2000 rect"), (4_000_000, "4000000 pixels wide")):
+        stripes = np.indices((1, cols)).sum(axis=0) % 2 == 0
+        tracemalloc.start()
+        with pytest.raises(BadConfiguration, match=said):
+            inline_mask(mask_file(tmp_path, stripes), 65, 99_000_000_000)
+        assert tracemalloc.get_traced_memory()[1] < 100_000_000
+        tracemalloc.stop()
+
+
+def test_a_mask_that_takes_long_to_read_is_refused(tmp_path):
+    """A daemon reads it between two turns of its loop."""
+    file = mask_file(tmp_path, np.zeros((1, 1), bool))
+    (tmp_path / "mask.png").write_bytes(b"P5 1100 1000 100\n" + bytes(1_100_000))
+    with pytest.raises(BadConfiguration, match="slow to read, of which there may be 1000000"):
+        inline_mask(file, 65, 44_000_000)
 
 
 def test_cells_inside_small_polygons_are_those_of_the_whole_window():

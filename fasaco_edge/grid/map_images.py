@@ -1,0 +1,158 @@
+"""Images of maps, decoded as a whole and looked at a stripe of rows at a time.
+
+What Pillow decodes takes a byte a pixel of grey and four of colour. All else that is made of an
+image is made of stripes, so that it takes little beside.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import MapFileError
+
+if TYPE_CHECKING:
+    from PIL import Image
+    from PIL.ImageFile import ImageFile
+
+MAX_PIXELS = 64_000_000
+
+# nav2's three recommended formats, and the one that published maps come in; PPM is Pillow's name
+# for the PGM family. What JPEG does to sharp edges may turn unknown pixels beside walls free.
+FORMATS = ("PPM", "PNG", "BMP", "JPEG")
+# Of a stripe, a multiple of 8 rows: some pixels, and what each of them takes at most [bytes].
+STRIPE_PIXELS = 500_000
+STRIPE_BYTES = 16
+# What a pixel takes decoded, by Pillow's mode [bytes]; 4 of any other.
+_DECODED = {"1": 1, "L": 1, "P": 1, "I;16": 2, "I;16B": 2}
+# JPEG decoded in several scans keeps the coefficients of all channels, too [bytes a channel].
+_COEFFICIENTS = 2
+# Some rare formats Pillow decodes in Python, a microsecond a pixel, on a slow computer ten.
+SLOW_PIXELS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stripe:
+    """Rows of an image.
+
+    Attributes:
+        levels: uint8 or uint16 (rows, cols), lowest row first: brightness, 0 black to ``white``;
+            the mean over the colour channels, alpha is none of them.
+        transparent: bool (rows, cols), or None where the image has no alpha channel.
+    """
+
+    levels: NDArray[np.uint8] | NDArray[np.uint16]
+    transparent: NDArray[np.bool_] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapImage:
+    """A decoded image.
+
+    Attributes:
+        rows, cols: its size [pixels].
+        white: the brightest level.
+    """
+
+    rows: int
+    cols: int
+    white: int
+    _decoded: Image.Image
+
+    def stripes(self) -> Iterator[Stripe]:
+        """Yield stripes from the lowest up; each but the last has a multiple of 8 rows."""
+        height = stripe_rows(self.cols)
+        for low in range(0, self.rows, height):
+            bottom = self.rows - low
+            stripe = self._decoded.crop((0, max(bottom - height, 0), self.cols, bottom))
+            # Images run from the top down, maps from the smallest y up.
+            if self.white == 65535:
+                yield Stripe(np.asarray(stripe)[::-1].astype(np.uint16))
+            elif self.white == 255:
+                yield Stripe(np.asarray(stripe.convert("L"))[::-1])
+            else:
+                pixels = np.asarray(stripe.convert("RGBA"))[::-1]
+                levels = pixels[:, :, :3].sum(axis=2, dtype=np.uint16)
+                yield Stripe(levels, pixels[:, :, 3] < 255)
+
+
+def stripe_rows(cols: int) -> int:
+    """Return how many rows a stripe has, a multiple of 8."""
+    return 8 * max(STRIPE_PIXELS // (8 * cols), 1)
+
+
+def read_image(path: Path, most_bytes: int | None = None) -> MapImage:
+    """Return the pixels of a PGM, PNG, BMP or JPEG file.
+
+    Args:
+        path: the file.
+        most_bytes: what it may take to decode it and to look at it [bytes]; None for anything.
+            With it, images that Pillow decodes slowly have at most ``SLOW_PIXELS``.
+
+    Raises:
+        MapFileError: it is missing, no such image, damaged, empty or too large.
+    """
+    # Pillow is loaded with the first image: a daemon that never reads one does without.
+    from PIL import Image, UnidentifiedImageError  # noqa: PLC0415
+
+    try:
+        with warnings.catch_warnings():
+            # check_size has the smaller limit.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(path, formats=FORMATS)
+        with image:
+            check_size(path, *image.size)
+            if most_bytes is not None:
+                _check_affordable(path, image, most_bytes)
+            return _decoded(path, image)
+    except Image.DecompressionBombError as error:
+        raise MapFileError(f"{path}: more than {MAX_PIXELS} pixels: {error}") from error
+    except UnidentifiedImageError as error:
+        raise MapFileError(f"{path}: not an image (PGM, PNG, BMP or JPEG)") from error
+    except (OSError, ValueError, SyntaxError) as error:
+        raise MapFileError(f"{path}: not readable as an image: {error}") from error
+
+
+def check_size(path: str | Path, cols: int, rows: int) -> None:
+    """Raise MapFileError unless there is at least one pixel and at most MAX_PIXELS."""
+    if not 0 < rows * cols <= MAX_PIXELS:
+        raise MapFileError(f"{path}: expected 1 to {MAX_PIXELS} pixels, got {cols} x {rows}")
+
+
+def _check_affordable(path: Path, image: ImageFile, most_bytes: int) -> None:
+    from PIL.Image import DECODERS  # noqa: PLC0415
+
+    cols, rows = image.size
+    pixel_bytes = _DECODED.get(image.mode, 4)
+    if image.format == "JPEG":
+        pixel_bytes += _COEFFICIENTS * len(image.getbands())
+    needed = rows * cols * pixel_bytes + stripe_rows(cols) * cols * STRIPE_BYTES
+    if needed > most_bytes:
+        raise MapFileError(
+            f"{path}: {cols} x {rows} pixels ({image.mode}) take {needed / 1e6:.1f} MB to read, "
+            f"more than the {most_bytes / 1e6:.1f} MB that there are",
+            hint="save it as 8-bit grey, or with larger pixels, or raise the memory limit",
+        )
+    is_slow = any(tile[0] in DECODERS for tile in image.tile)
+    if is_slow and rows * cols > SLOW_PIXELS:
+        raise MapFileError(
+            f"{path}: {cols} x {rows} pixels of a format that is slow to read, of which there may "
+            f"be {SLOW_PIXELS}",
+            hint="save it as PNG",
+        )
+
+
+def _decoded(path: Path, image: Image.Image) -> MapImage:
+    is_grey = image.mode in ("1", "L") and "transparency" not in image.info
+    white = 65535 if image.mode.startswith("I") else 255 if is_grey else 3 * 255
+    if white == 3 * 255 and image.mode not in ("1", "L", "LA", "P", "RGB", "RGBA"):
+        raise MapFileError(f"{path}: expected grey, palette or RGB pixels, got {image.mode}")
+    image.load()
+    cols, rows = image.size
+    return MapImage(rows, cols, white, image)
