@@ -240,6 +240,41 @@ def test_what_is_out_of_reach_follows_a_map_that_grows_and_an_order_for_a_zone()
     assert floor_report(robot.mission).out_of_reach == floor_report(last.mission).out_of_reach
 
 
+def test_what_blocks_path_and_line_ahead_leaves_the_line_further_on_as_it_was():
+    grid = room(12.0, 3.0)
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(grid))
+    for _ in range(60):
+        robot.tell()
+    robot.drive(20)
+    for number in range(24):
+        robot.drive(2)
+        # So far along its line from the robot, where the line still leads now and then.
+        at = point_along(robot.line, robot.at, 0.7 + 0.1 * (number % 12))
+        col, row = (int(place) for place in grid.geometry.to_pixels(*at))
+        before = far_points(robot, at)
+        robot.tell(MapReceived(with_obstacle(grid, row - 2, col - 2, 4)))
+        check_tally(robot.mission)
+        assert len(before & far_points(robot, at)) > 0.8 * len(before)
+        robot.tell(MapReceived(grid))
+    robot.finish()
+
+
+def point_along(line, start, length_m):
+    """Return the point so far along a line from its start."""
+    for end in line:
+        if (edge_m := math.dist(start, end)) >= length_m:
+            share = length_m / edge_m
+            return tuple(a + share * (b - a) for a, b in zip(start, end, strict=True))
+        start, length_m = end, length_m - edge_m
+    return start
+
+
+def far_points(robot, at):
+    """Return the points of the line that are far from a place."""
+    return {point for point in robot.line if math.dist(point, at) > 3.0}
+
+
 def test_the_same_events_give_the_same_line():
     trails = []
     for _ in range(2):

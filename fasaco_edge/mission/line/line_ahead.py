@@ -16,6 +16,7 @@ from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.kernels.floor.capsule import is_clear
+from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.mission.line.pieces import (
     MOVED,
     POLISHED,
@@ -131,8 +132,13 @@ class LineAhead:
         if unchecked is not None:
             self.check(unchecked)
 
-    def _join(self, pieces: list[Piece]) -> None:
-        """Take the line that is put together of pieces of the one before."""
+    def _join(self, pieces: list[Piece], beyond: Piece | None = None) -> None:
+        """Take the line that is put together of pieces of the one before.
+
+        Args:
+            pieces: in order.
+            beyond: what is kept behind the cut, where the walk was cut off.
+        """
         begin = self._begin()[None]
         here = Line(begin, np.array([self.cell]), np.array([POLISHED], np.uint8))
         if not len(self._walk):
@@ -141,14 +147,32 @@ class LineAhead:
         stands, tally = self._floor.stands, self.tally
         joiner = Joiner(
             here,
-            self._walk,
+            self._walk[: self._cut],
             self.cell,
             stand=stands.stand,
             raw=stands.line,
             is_clear=self._is_clear,
             is_swept=lambda cell: not tally.is_open(stands.stand(cell)),
         )
-        self._take(joiner.joined(pieces))
+        joined = joiner.joined(pieces)
+        if beyond is not None and joined:
+            joined += self._put_behind(joined[-1].line.points[-1], beyond)
+        self._take(joined)
+
+    def _put_behind(self, last: Points, beyond: Piece) -> list[Piece]:
+        """Return what is kept behind the cut, to come after a point.
+
+        Whether it can be driven to from there is looked at once the next walk comes.
+        """
+        while len(beyond.line) and np.abs(last - beyond.line.points[0]).sum() < LEAST_EDGE:
+            beyond = beyond.without_first()
+        if not len(beyond.line):
+            return []
+        ends = np.stack([last, beyond.line.points[0]])
+        (row0, col0), (row1, col1) = np.floor(ends.min(axis=0)), np.ceil(ends.max(axis=0)) + 1.0
+        joint = Window(int(row0), int(col0), int(row1), int(col1))
+        self._unchecked = Window.around(self._unchecked, joint)
+        return [beyond]
 
     def _begin(self) -> Points:
         """Return where a new line begins: where the robot is.
@@ -185,12 +209,11 @@ class LineAhead:
         ]
         if not blocked:
             return False
-        if self._cut is not None:
-            # Beyond the cut the walk may lead where no cell is any more.
-            self._walk, self._cut, self._unchecked = self._walk[: self._cut], None, None
         first, last = blocked[0], blocked[-1] + 1
         head = [Piece(line.part(0, first + 1), 0)] if first else []
-        self._join([*head, Piece(line.part(last), last)])
+        # Beyond the cut the walk may lead where no cell is any more: the line there stays.
+        beyond = Piece(self.line.part(len(line)), len(line)) if self.is_cut else None
+        self._join([*head, Piece(line.part(last), last)], beyond)
         return True
 
     def drive(self, pose: Pose2D) -> None:
