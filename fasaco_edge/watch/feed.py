@@ -9,19 +9,23 @@ from typing import Self
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Queue
+from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
-from fasaco_edge.watch.robot_view import Token
+from fasaco_edge.watch.robot_state import Token
 from fasaco_edge.wire.keys import VERSION, Keys
-from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
+from fasaco_edge.wire.limits import MAX_JSON_BYTES, MAX_MESSAGE_BYTES
 from fasaco_edge.wire.topic_types import NEWEST, Topic
-from fasaco_edge.wire.topics import PHEROMONE, TOPICS
+from fasaco_edge.wire.topics import FLEET, FLOOR, PHEROMONE, TOPICS
 
 WATCHED = [topic for topic in TOPICS if topic.queues.watch is not None]
-# The daemon makes the field only while a subscriber exists: it is requested.
-SUBSCRIBED = [topic for topic in WATCHED if topic is not PHEROMONE]
-QUEUED = {"token": Queue(256)} | {
+# The daemon makes these only while a subscriber exists: they are requested.
+ON_REQUEST = (PHEROMONE, FLOOR)
+SUBSCRIBED = [topic for topic in WATCHED if topic not in ON_REQUEST]
+# How many messages of other robots of a fleet wait.
+FLEET_WAITING = 64
+QUEUED = {"token": Queue(256), FLEET.name: Queue(FLEET_WAITING, MAX_JSON_BYTES)} | {
     topic.name: Queue(topic.queues.watch, MAX_MESSAGE_BYTES)
     for topic in WATCHED
     if topic.queues.watch is not None and topic.queues.watch > NEWEST
@@ -38,19 +42,22 @@ def _size_of(item: object) -> int:
 class Feed:
     """The samples of one robot, and the robots there are; a context that has to be left.
 
+    ``hears_fleet``: also what all robots say to those that they share an area with.
+
     Attributes:
         trouble: why the bus cannot be joined yet; "" once it is.
     """
 
-    def __init__(self, settings: BusSettings, keys: Keys) -> None:
+    def __init__(self, settings: BusSettings, keys: Keys, *, hears_fleet: bool = False) -> None:
         self.trouble = ""
         self._settings = settings
         self._keys = keys
         self._mailbox: Mailbox[object] = Mailbox(QUEUED, size_of=_size_of)
         self._ended = threading.Event()
         self._bus: Bus | None = None
-        self._wants_field = False
-        self._field: Subscription | None = None
+        self._hears_fleet = hears_fleet
+        self._wanted: set[Topic] = set()
+        self._requested: dict[Topic, Subscription] = {}
         self._lock = threading.Lock()
         # In a thread: a host that does not answer would block the caller.
         self._joining = threading.Thread(target=self._join, name="join-bus", daemon=True)
@@ -71,19 +78,35 @@ class Feed:
         """Return what came, as (topic, Sample or Token); wait up to ``timeout_s`` [s] for it."""
         return self._mailbox.take(timeout_s)
 
-    def want_field(self, wants: bool) -> None:
-        """Subscribe to the pheromone field, or unsubscribe."""
+    def want(self, topic: Topic, wants: bool) -> None:
+        """Subscribe to a topic of ``ON_REQUEST``, or unsubscribe."""
         with self._lock:
-            self._wants_field = wants
+            (self._wanted.add if wants else self._wanted.discard)(topic)
             if self._bus is not None:
-                self._follow_field(self._bus)
+                self._request(self._bus)
 
-    def _follow_field(self, bus: Bus) -> None:
-        if self._wants_field and self._field is None:
-            self._field = self._subscribe(bus, PHEROMONE)
-        elif not self._wants_field and self._field is not None:
-            bus.unsubscribe(self._field)
-            self._field = None
+    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
+        """Ask the robot's daemon; return all answers.
+
+        Args:
+            query: name of the query.
+            payload: JSON that goes with it.
+            timeout_s: how long to wait for an answer [s].
+
+        Raises:
+            BusUnavailable: the bus is not joined yet.
+        """
+        with self._lock:
+            bus = self._bus
+        if bus is None:
+            raise BusUnavailable(self.trouble or "not joined yet")
+        return bus.get(self._keys.rpc(query), timeout_s, payload)
+
+    def _request(self, bus: Bus) -> None:
+        for topic in self._wanted - self._requested.keys():
+            self._requested[topic] = self._subscribe(bus, topic)
+        for topic in self._requested.keys() - self._wanted:
+            bus.unsubscribe(self._requested.pop(topic))
 
     def _join(self) -> None:
         while not self._ended.is_set():
@@ -107,7 +130,9 @@ class Feed:
         bus.watch_tokens(f"{prefix}/*/alive", self._note_token)
         for topic in SUBSCRIBED:
             self._subscribe(bus, topic)
-        self._follow_field(bus)
+        if self._hears_fleet:
+            bus.subscribe(self._keys.of_all(FLEET), partial(self._post, FLEET.name))
+        self._request(bus)
 
     def _subscribe(self, bus: Bus, topic: Topic) -> Subscription:
         return bus.listen(self._keys, topic, partial(self._post, topic.name))

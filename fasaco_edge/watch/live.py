@@ -23,6 +23,7 @@ from fasaco_edge.watch.feed import Feed
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.documents.json_text import decode_json
+from fasaco_edge.wire.topics import PHEROMONE
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # At most ten pages a second, and only where something changed or the clock did [s].
@@ -66,7 +67,7 @@ def watch_on_screen(feed: Feed, view: RobotView, console: Console) -> None:
                 return
             if typed.count("f") % 2:
                 shown_at = (0, (0, 0), "")
-                feed.want_field(page.toggle_field())
+                feed.want(PHEROMONE, page.toggle_field())
 
 
 def watch_in_lines(feed: Feed, view: RobotView) -> None:

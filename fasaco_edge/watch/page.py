@@ -10,10 +10,11 @@ from rich.text import Text
 
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import picture
+from fasaco_edge.watch.events import BAD, GOOD, ORDER, PLAIN, Event
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.phrases import age, clock, percent
 from fasaco_edge.watch.picture import MissionPicture
-from fasaco_edge.watch.robot_view import BAD, GOOD, ORDER, PLAIN, Event, RobotView
+from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.watch.status_table import figures, state_colour
 from fasaco_edge.wire.documents.status import Status
 

@@ -114,7 +114,7 @@ FLOOR = Topic(
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
     qos=Qos("data_low", why="for display: late joiners get it within two seconds"),
-    queues=Queues(recorder=NEWEST),
+    queues=Queues(recorder=NEWEST, watch=NEWEST),
     limits=("max_grid_cells",),
 )
 PHEROMONE = Topic(

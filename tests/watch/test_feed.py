@@ -23,15 +23,15 @@ def test_the_field_is_listened_to_only_while_it_is_shown(endpoint, early):
     """Also where somebody asks for it before the bus is joined."""
     with Feed(BusSettings("client", (endpoint,), ()), Keys()) as feed:
         if early:
-            feed.want_field(True)
+            feed.want(PHEROMONE, True)
         with open_bus(BusSettings("peer", (), (endpoint,))) as bus:
             field = bus.advertise(Keys(), PHEROMONE)
             for _ in range(3):
-                feed.want_field(True)
+                feed.want(PHEROMONE, True)
                 until(field.has_listeners)
                 field.put(b"field")
                 until(lambda: ("pheromone", b"field") in payloads(feed))
-                feed.want_field(False)
+                feed.want(PHEROMONE, False)
                 until(lambda: not field.has_listeners())
 
 

@@ -15,7 +15,8 @@ from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
-from fasaco_edge.watch.robot_view import RobotView, Token
+from fasaco_edge.watch.robot_state import Token
+from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from tests.watch.grids import NOW, console, mid_mission, plain, status, tell
 

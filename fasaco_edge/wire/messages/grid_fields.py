@@ -1,69 +1,17 @@
-"""The fields that messages with a grid share: its placement and its cells."""
+"""The cells of messages with a grid, as arrays."""
 
 from __future__ import annotations
 
-import struct
-from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Window
-from fasaco_edge.wire.limits import MAX_GRID_TILT, MAX_RESOLUTION_M, MIN_RESOLUTION_M
 from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import (
-    POSE,
-    SECOND_NS,
-    check_pose,
-    planar,
-    refuse_nanosec,
-    write_pose,
-)
+from fasaco_edge.wire.messages.grid_info import read_octets
 
 _Cell = TypeVar("_Cell", np.int8, np.uint8)
-
-_INFO = struct.Struct("<iIfII")
-_INFO_NAMES = (
-    "info.map_load_time.sec",
-    "info.map_load_time.nanosec",
-    "info.resolution",
-    "info.width",
-    "info.height",
-)
-
-
-def read_grid_geometry(reader: CdrReader) -> GridGeometry:
-    """Read a nav_msgs/MapMetaData; its time of loading is dropped."""
-    _, nanosec, edge, cols, rows = reader.words(_INFO, _INFO_NAMES)
-    if nanosec >= SECOND_NS:
-        refuse_nanosec(reader, "info.map_load_time", nanosec)
-    resolution = _shortest_decimal(edge)
-    _check_resolution(resolution, reader.message)
-    origin = reader.doubles(POSE, "info.origin")
-    check_pose(origin, reader.message, "info.origin")
-    if max(abs(origin[3]), abs(origin[4])) > MAX_GRID_TILT:
-        refuse(
-            reader.message,
-            "info.origin.orientation",
-            f"a turn about z (x and y within {MAX_GRID_TILT})",
-            list(origin[3:]),
-        )
-    return GridGeometry(rows, cols, resolution, planar(origin))
-
-
-def write_grid_geometry(writer: CdrWriter, geometry: GridGeometry, stamp_ns: int) -> None:
-    """Write a nav_msgs/MapMetaData, loaded at ``stamp_ns``."""
-    _check_resolution(geometry.resolution, writer.message)
-    writer.words(
-        _INFO,
-        _INFO_NAMES,
-        *divmod(stamp_ns, SECOND_NS),
-        geometry.resolution,
-        geometry.cols,
-        geometry.rows,
-    )
-    write_pose(writer, geometry.origin, "info.origin")
 
 
 def read_cells(
@@ -77,15 +25,8 @@ def read_cells(
 
     Returns a read-only view, (rows, cols), of type ``dtype``.
     """
-    rows, cols = geometry.rows, geometry.cols
-    count = reader.length(field, 1)
-    if not 0 < count <= max_cells:
-        refuse(reader.message, f"length of {field}", f"1..{max_cells}", count)
-    if count != rows * cols:
-        expected = f"width x height = {cols} x {rows} = {rows * cols}"
-        refuse(reader.message, f"length of {field}", expected, count)
-    cells: NDArray[_Cell] = np.ndarray((rows, cols), dtype, reader.octets(count, field))
-    reader.end()
+    octets = read_octets(reader, geometry, max_cells, field)
+    cells: NDArray[_Cell] = np.ndarray((geometry.rows, geometry.cols), dtype, octets)
     return cells
 
 
@@ -95,16 +36,3 @@ def write_cells(writer: CdrWriter, cells: NDArray[np.generic], field: str = "dat
         refuse(writer.message, f"length of {field}", "at least 1", 0)
     writer.uint32(cells.size, f"length of {field}")
     writer.view(np.ascontiguousarray(cells).data)
-
-
-# A robot's maps have one resolution, and numpy takes a while to find its decimal.
-@lru_cache(maxsize=16)
-def _shortest_decimal(value: float) -> float:
-    """Return the shortest decimal that is this float32: 0.05 m stays 0.05 m."""
-    return float(str(np.float32(value)))
-
-
-def _check_resolution(resolution: float, message: str) -> None:
-    if not MIN_RESOLUTION_M <= resolution <= MAX_RESOLUTION_M:
-        expected = f"{MIN_RESOLUTION_M}..{MAX_RESOLUTION_M:g} m"
-        refuse(message, "info.resolution", expected, resolution)

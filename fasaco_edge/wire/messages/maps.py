@@ -5,7 +5,6 @@ How far the mission is comes as an occupancy grid on the lattice, too: any map v
 
 from __future__ import annotations
 
-import struct
 from enum import IntEnum
 
 import numpy as np
@@ -17,17 +16,15 @@ from fasaco_edge.grid.occupancy import OCCUPIED, UNKNOWN, MapPatch, OccupancyGri
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
 from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
 from fasaco_edge.wire.messages.fields import read_header, write_header
-from fasaco_edge.wire.messages.grid_fields import (
-    read_cells,
+from fasaco_edge.wire.messages.grid_fields import read_cells, write_cells
+from fasaco_edge.wire.messages.grid_info import (
+    PLACE,
+    PLACE_NAMES,
     read_grid_geometry,
-    write_cells,
     write_grid_geometry,
 )
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, OCCUPANCY_GRID_UPDATE
 
-# Of a map update: its corner and its size.
-_PLACE = struct.Struct("<iiII")
-_PLACE_NAMES = ("x", "y", "width", "height")
 PATCH_CELLS = 4096
 """Fewer cells are looked through by calls that are quick to begin, but copy them."""
 
@@ -82,7 +79,7 @@ def decode_map_update(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> MapPat
     """
     reader = CdrReader(payload, OCCUPANCY_GRID_UPDATE)
     frame, stamp_ns = read_header(reader)
-    col, row, cols, rows = reader.words(_PLACE, _PLACE_NAMES)
+    col, row, cols, rows = reader.words(PLACE, PLACE_NAMES)
     window = Window(row, col, row + rows, col + cols)
     cells = read_cells(reader, window, np.int8, max_cells)
     _check_occupancy(cells, reader.message)
@@ -103,7 +100,7 @@ def encode_map_update(patch: MapPatch) -> bytes:
     _check_occupancy(patch.cells, writer.message)
     write_header(writer, patch.frame, patch.stamp_ns)
     place = (window.col0, window.row0, window.cols, window.rows)
-    writer.words(_PLACE, _PLACE_NAMES, *place)
+    writer.words(PLACE, PLACE_NAMES, *place)
     write_cells(writer, patch.cells)
     return writer.payload()
 

@@ -8,7 +8,6 @@ cannot be covered.
 from __future__ import annotations
 
 import math
-import struct
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,19 +18,17 @@ from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
 from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
 from fasaco_edge.wire.messages.fields import read_header, write_header
-from fasaco_edge.wire.messages.grid_fields import (
-    read_cells,
+from fasaco_edge.wire.messages.grid_fields import read_cells, write_cells
+from fasaco_edge.wire.messages.grid_info import (
+    COLONY,
+    COLONY_NAMES,
     read_grid_geometry,
-    write_cells,
     write_grid_geometry,
 )
 from fasaco_edge.wire.schemas import PHEROMONE_GRID
 
 TOP_STEP = 254
 """Steps of the scale between level 1, trail_min, and level 255, trail_max."""
-
-_COLONY = struct.Struct("<ffIIII")
-_COLONY_NAMES = ("trail_min", "trail_max", "cohort", "velocity", "ants", "best_steps")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,8 +81,8 @@ def encode_pheromone(snapshot: ColonySnapshot, frame: str, stamp_ns: int) -> byt
         refuse(writer.message, "levels", f"{geometry.rows, geometry.cols}", levels.shape)
     write_grid_geometry(writer, geometry, stamp_ns)
     writer.words(
-        _COLONY,
-        _COLONY_NAMES,
+        COLONY,
+        COLONY_NAMES,
         trail_min,
         trail_max,
         snapshot.cohort,
@@ -106,7 +103,7 @@ def decode_pheromone(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> Pheromo
     reader = CdrReader(payload, PHEROMONE_GRID)
     frame, stamp_ns = read_header(reader)
     geometry = read_grid_geometry(reader)
-    colony = reader.words(_COLONY, _COLONY_NAMES)
+    colony = reader.words(COLONY, COLONY_NAMES)
     trail_min, trail_max, cohort, velocity, ants, best_steps = colony
     levels = read_cells(reader, geometry, np.uint8, max_cells, "levels")
     empty = trail_min == trail_max == 0.0 and not levels.any()

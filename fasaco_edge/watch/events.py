@@ -1,0 +1,62 @@
+"""What happened to a robot lately, in words: entries, and what is new in a status."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+from fasaco_edge.text import one_line
+from fasaco_edge.wire.documents.status import Status
+
+KEPT = 200
+# Tone of an entry.
+PLAIN, GOOD, BAD, ORDER = "plain", "good", "bad", "order"
+TROUBLED = ("blocked", "degraded")
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened: when, since the epoch [s], what, and its tone."""
+
+    at_s: float
+    text: str
+    tone: str = PLAIN
+
+
+class EventLog:
+    """The newest entries, and how many there ever were."""
+
+    def __init__(self) -> None:
+        self.entries: deque[Event] = deque(maxlen=KEPT)
+        self.count = 0
+
+    def add(self, at_s: float, text: str, tone: str = PLAIN) -> None:
+        """Note what happened at ``at_s``, since the epoch [s]."""
+        self.entries.append(Event(at_s, one_line(text), tone))
+        self.count += 1
+
+    def since(self, count: int) -> list[Event]:
+        """Return what was noted after the first ``count`` entries, as far as it is kept."""
+        new = min(self.count - count, len(self.entries))
+        return list(self.entries)[len(self.entries) - new :]
+
+
+def differences(before: Status | None, after: Status) -> list[tuple[str, str]]:
+    """Return what is new in a status, as (text, tone)."""
+    found: list[tuple[str, str]] = []
+    if before is None or before.state != after.state:
+        tone = BAD if after.state in TROUBLED else GOOD if after.state == "done" else PLAIN
+        found.append((f"{after.state}: {after.reason}", tone))
+    elif after.state in TROUBLED and before.reason != after.reason:
+        found.append((f"{after.state}: {after.reason}", BAD))
+    known = before.errors.by_code if before is not None else {}
+    for code, count in after.errors.by_code.items():
+        if more := count - known.get(code, 0):
+            found.append((f"refused: {more} x {code}, {after.errors.last}", BAD))
+    if after.ledger.fault and (before is None or before.ledger.fault != after.ledger.fault):
+        found.append((f"ledger: {after.ledger.fault}", BAD))
+    recorder = before.recorder.state if before is not None and before.recorder else ""
+    if after.recorder and after.recorder.state != recorder:
+        tone = PLAIN if after.recorder.state in ("recording", "starting") else BAD
+        found.append((f"recorder {after.recorder.state}: {after.recorder.reason or ''}", tone))
+    return found

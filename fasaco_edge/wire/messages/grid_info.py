@@ -1,0 +1,109 @@
+"""The placement of a grid as messages have it, and where its cells begin.
+
+Without numpy, for a program that stays small.
+"""
+
+from __future__ import annotations
+
+import struct
+from functools import lru_cache
+
+from fasaco_edge.grid.geometry import GridGeometry, Window
+from fasaco_edge.wire.limits import MAX_GRID_TILT, MAX_RESOLUTION_M, MIN_RESOLUTION_M
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
+from fasaco_edge.wire.messages.fields import (
+    POSE,
+    SECOND_NS,
+    check_pose,
+    planar,
+    refuse_nanosec,
+    write_pose,
+)
+
+# Of a map update: its corner and its size.
+PLACE = struct.Struct("<iiII")
+PLACE_NAMES = ("x", "y", "width", "height")
+# Of a pheromone grid: its scale, and how far the colony is.
+COLONY = struct.Struct("<ffIIII")
+COLONY_NAMES = ("trail_min", "trail_max", "cohort", "velocity", "ants", "best_steps")
+_INFO = struct.Struct("<iIfII")
+_INFO_NAMES = (
+    "info.map_load_time.sec",
+    "info.map_load_time.nanosec",
+    "info.resolution",
+    "info.width",
+    "info.height",
+)
+
+
+def read_grid_geometry(reader: CdrReader) -> GridGeometry:
+    """Read a nav_msgs/MapMetaData; its time of loading is dropped."""
+    _, nanosec, edge, cols, rows = reader.words(_INFO, _INFO_NAMES)
+    if nanosec >= SECOND_NS:
+        refuse_nanosec(reader, "info.map_load_time", nanosec)
+    resolution = _shortest_decimal(edge)
+    _check_resolution(resolution, reader.message)
+    origin = reader.doubles(POSE, "info.origin")
+    check_pose(origin, reader.message, "info.origin")
+    if max(abs(origin[3]), abs(origin[4])) > MAX_GRID_TILT:
+        refuse(
+            reader.message,
+            "info.origin.orientation",
+            f"a turn about z (x and y within {MAX_GRID_TILT})",
+            list(origin[3:]),
+        )
+    return GridGeometry(rows, cols, resolution, planar(origin))
+
+
+def write_grid_geometry(writer: CdrWriter, geometry: GridGeometry, stamp_ns: int) -> None:
+    """Write a nav_msgs/MapMetaData, loaded at ``stamp_ns``."""
+    _check_resolution(geometry.resolution, writer.message)
+    writer.words(
+        _INFO,
+        _INFO_NAMES,
+        *divmod(stamp_ns, SECOND_NS),
+        geometry.resolution,
+        geometry.cols,
+        geometry.rows,
+    )
+    write_pose(writer, geometry.origin, "info.origin")
+
+
+def read_octets(
+    reader: CdrReader, size: GridGeometry | Window, max_cells: int, field: str = "data"
+) -> memoryview:
+    """Read the last field, a byte for each of the cells of ``size``; return a view of them."""
+    rows, cols = size.rows, size.cols
+    count = reader.length(field, 1)
+    if not 0 < count <= max_cells:
+        refuse(reader.message, f"length of {field}", f"1..{max_cells}", count)
+    if count != rows * cols:
+        expected = f"width x height = {cols} x {rows} = {rows * cols}"
+        refuse(reader.message, f"length of {field}", expected, count)
+    octets = reader.octets(count, field)
+    reader.end()
+    return octets
+
+
+# A robot's maps have one resolution, and its decimal takes a while to find.
+_FLOAT32 = struct.Struct("<f")
+# No resolution by far; what is rounded up may be no float32 any more.
+_FAR = 1e30
+
+
+@lru_cache(maxsize=16)
+def _shortest_decimal(value: float) -> float:
+    """Return the shortest decimal that is this float32: 0.05 m stays 0.05 m."""
+    if not abs(value) < _FAR:
+        return value
+    for digits in range(1, 9):
+        decimal = float(f"{value:.{digits}g}")
+        if _FLOAT32.unpack(_FLOAT32.pack(decimal))[0] == value:
+            return decimal
+    return float(f"{value:.9g}")
+
+
+def _check_resolution(resolution: float, message: str) -> None:
+    if not MIN_RESOLUTION_M <= resolution <= MAX_RESOLUTION_M:
+        expected = f"{MIN_RESOLUTION_M}..{MAX_RESOLUTION_M:g} m"
+        refuse(message, "info.resolution", expected, resolution)
