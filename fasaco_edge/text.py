@@ -3,7 +3,7 @@
 A name, a reason or a message off the bus, out of a file or a recording may hold what a terminal
 obeys (escapes, C0 and C1 controls), what turns a line about or hides in it (overrides, joiners,
 fillers), line ends that feign another line, and mark-up. All output to people goes through
-here: ``cli.console``, ``daemon.notify``, ``drawing`` and ``review``.
+here: ``cli.console``, ``daemon.notify``, ``drawing``, ``review`` and ``serve``.
 """
 
 from __future__ import annotations

@@ -33,12 +33,16 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.part import Part
 from fasaco_edge.samples import SampleEncoder
+from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.text import json_line
+from fasaco_edge.watch.robot_state import Token
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
+from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from fasaco_edge.wire.topics import RPC_NAMES
+from tests.serve.serving import looking, served
 from tests.support.outsider import Outsider
 from tests.support.processes import COMMAND_S, ENVIRONMENT, PROGRAM, daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pose_bytes, room
@@ -216,6 +220,51 @@ def test_a_live_view_in_lines(spoof):
         process.wait(60)
     assert b"INJECTED" in said
     judge(said.decode())
+
+
+def test_a_page_gets_text_that_does_nothing(spoof, tmp_path):
+    """Of the daemon in messages; the page itself holds no text of anybody's."""
+    pytest.importorskip("websockets")
+    with served(tmp_path, spoof, "--allow-commands") as page, looking(page) as looker:
+        looker.wait("events", lambda events: SCRIPT in json.dumps(events["entries"]))
+        answer = looker.command("start", {"zones": [{"name": TAINT}]})
+        assert "INJECTED" in answer["text"]
+        for text in looker.texts:
+            for said in _texts_in(json.loads(text)):
+                judge(said)
+        assert "INJECTED" not in page.get()[2]
+        assert "innerHTML" not in page.get()[2]
+    judge(page.log.read_text())
+
+
+def test_a_page_shows_a_status_that_does_nothing():
+    status = tainted("status.json")
+    status["claim"]["stand"] = "plans"
+    corners = [[0, 0], [1, 0], [1, 1]]
+    status["config"] = {"mission": {"zones": [{"name": TAINT, "polygon": corners}]}}
+    order = {"zones": [{"name": TAINT, "polygon": corners}]}
+    view = ServedView(Keys())
+    view.take("token", Token(TOKEN, True), 1.0)
+    view.take("status", Sample("", json.dumps(status).encode()), 1.0)
+    command = {"command": "start", "order": order}
+    view.take("command", Sample("", json.dumps(command).encode()), 1.0)
+    said = {kind: json.loads(message) for kind, message in view.news(2.0).items()}
+    assert SCRIPT in said["state"]["reason"]
+    assert len(said["areas"]["zones"]) == 2
+    for text in _texts_in(said):
+        judge(text)
+
+
+def _texts_in(part: Any) -> Iterator[str]:
+    if isinstance(part, str):
+        yield part
+    elif isinstance(part, dict):
+        for key, value in part.items():
+            yield key
+            yield from _texts_in(value)
+    elif isinstance(part, list):
+        for value in part:
+            yield from _texts_in(value)
 
 
 def recorded(folder: Path) -> Path:

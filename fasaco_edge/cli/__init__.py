@@ -30,6 +30,7 @@ COMMANDS = {
     "mission": "command a running daemon: start, pause, resume, home, cancel, replan, status ...",
     "ask": "query a running daemon: status, path, coverage, pheromone, config, replan ...",
     "watch": "watch a robot's mission live in this terminal",
+    "serve": "serve a robot's mission as a live page, for a phone too",
     "record": "record a robot's mission into a Rerun recording (.rrd)",
     "review": "report what happened in a recorded mission",
     "replay": "replay a recorded mission and compare its decisions",

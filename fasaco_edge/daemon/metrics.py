@@ -12,8 +12,8 @@ import socket
 import threading
 import time
 
-from fasaco_edge.config.metrics import Address
 from fasaco_edge.daemon.exposition import CONTENT_TYPE, exposition
+from fasaco_edge.host.addresses import Address
 from fasaco_edge.wire.documents.status import Status
 
 LOG = logging.getLogger(__name__)

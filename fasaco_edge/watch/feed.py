@@ -48,7 +48,13 @@ class Feed:
         trouble: why the bus cannot be joined yet; "" once it is.
     """
 
-    def __init__(self, settings: BusSettings, keys: Keys, *, hears_fleet: bool = False) -> None:
+    def __init__(
+        self,
+        settings: BusSettings,
+        keys: Keys,
+        *,
+        hears_fleet: bool = False,
+    ) -> None:
         self.trouble = ""
         self._settings = settings
         self._keys = keys

@@ -15,7 +15,7 @@ from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.watch.events import BAD, GOOD, ORDER, EventLog, differences
 from fasaco_edge.wire.documents.json_text import decode_document, decode_json
-from fasaco_edge.wire.documents.settings import known_settings
+from fasaco_edge.wire.documents.settings import KnownSettings, known_settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.limits import MAX_COORDINATE_M
 from fasaco_edge.wire.messages.poses import decode_pose
@@ -48,6 +48,7 @@ class RobotState:
         pose: where the robot is; None before the first pose.
         status: the newest one; None before the first.
         document: the same as it came, b"" before the first.
+        settings: of the daemon, as the status says.
         walk: the path, and how far the robot is on it.
         robots: of all robots on the bus that have a daemon, the names.
         trouble: why the bus cannot be reached; "" where it can.
@@ -61,6 +62,7 @@ class RobotState:
         self.pose: Pose2D | None = None
         self.status: Status | None = None
         self.document = b""
+        self.settings = KnownSettings()
         self.walk = PathProgress()
         self.robots: set[str] = set()
         self.trouble = ""
@@ -94,11 +96,15 @@ class RobotState:
             try:
                 self._readers[topic](item, now)
             except FasacoError as error:
-                self._malformed += 1
-                # A faulty publisher is so with every message: note the 1st, 2nd, 4th, 8th ...
-                if self._malformed & (self._malformed - 1) == 0:
-                    text = f"{topic} cannot be read ({self._malformed} so far): {error}"
-                    self.events.add(now, text, BAD)
+                self.note_unreadable(topic, error, now)
+
+    def note_unreadable(self, topic: str, error: FasacoError, now: float) -> None:
+        """Note that a sample of ``topic`` could not be read."""
+        self._malformed += 1
+        # A faulty publisher is so with every message: note the 1st, 2nd, 4th, 8th ...
+        if self._malformed & (self._malformed - 1) == 0:
+            text = f"{topic} cannot be read ({self._malformed} so far): {error}"
+            self.events.add(now, text, BAD)
 
     def _note_token(self, token: Token, now: float) -> None:
         was_here = self.is_here
@@ -113,8 +119,8 @@ class RobotState:
             self.events.add(now, f"the daemon is {'back' if back else 'there'}", GOOD)
 
     def _read_pose(self, sample: Sample, now: float) -> None:
-        configured = known_settings(self.status.config).pose.schema if self.status else ""
-        stamped = decode_pose(sample.payload, sample.schema or configured or POSE_STAMPED)
+        schema = sample.schema or self.settings.pose.schema or POSE_STAMPED
+        stamped = decode_pose(sample.payload, schema)
         self._posed_at = now
         self._move(stamped.pose)
 
@@ -129,6 +135,8 @@ class RobotState:
             return
         for text, tone in differences(self.status, status):
             self.events.add(now, text, tone)
+        if self.status is None or status.config != self.status.config:
+            self.settings = known_settings(status.config)
         self.status, self.document, self._reported_at = status, sample.payload, now
         if status.path is None:
             # A restarted daemon has none of the old paths.

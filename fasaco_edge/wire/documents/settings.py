@@ -9,11 +9,12 @@ Settings = dict[str, object]
 
 
 class RobotSettings(Document, frozen=True):
-    """The robot's size, and the tool's [m]; 0 where not sent. By what share lanes overlap."""
+    """Size of robot and tool [m], speed; 0 where not sent. By what share lanes overlap."""
 
     radius_m: float = 0.0
     tool_width_m: float = 0.0
     overlap: float = 0.0
+    speed_m_s: float = 0.0
 
 
 class PlannerSettings(Document, frozen=True):
@@ -35,11 +36,22 @@ class PoseSettings(Document, frozen=True):
     schema: str = ""
 
 
+Corners = tuple[tuple[float, float], ...]
+
+
+class ZoneSettings(Document, frozen=True):
+    """A zone that orders may name."""
+
+    name: str = ""
+    polygon: Corners = ()
+
+
 class MissionSettings(Document, frozen=True):
-    """How long the mission continues without a pose [s]; what it always keeps out of."""
+    """How long the mission continues without a pose [s]; its zones; what it always keeps out of."""
 
     lost_pose_s: float = 0.0
-    keep_out: tuple[tuple[tuple[float, float], ...], ...] = ()
+    zones: tuple[ZoneSettings, ...] = ()
+    keep_out: tuple[Corners, ...] = ()
     keep_out_mask: str = ""
 
 

@@ -1,0 +1,157 @@
+"""``fasaco-edge serve``: a robot's mission as a live page in a browser, also of a phone."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from fasaco_edge.cli.console.arguments import Command, Exit, add_robot_on_bus, robot_on_bus
+from fasaco_edge.errors import BadConfiguration, MissingExtra
+from fasaco_edge.host.addresses import Address, read_address
+from fasaco_edge.text import one_line
+
+if TYPE_CHECKING:
+    import ssl
+
+    from fasaco_edge.serve.guard import Guard
+
+PORT = 8465
+EPILOG = f"""\
+examples:
+  fasaco-edge serve                                    http://127.0.0.1:{PORT}, to look only
+  fasaco-edge serve --allow-commands                   who is on this computer may command, too
+  fasaco-edge serve --listen 0.0.0.0:{PORT} --tokens /etc/fasaco-edge/page-tokens
+  fasaco-edge serve --connect tcp/192.168.1.20:7447 --robot hall2
+
+The page shows map, swept floor, path, zones and robot, and starts, pauses and sends home where that
+is allowed. It is a client of the bus as `watch` is, with the credentials of --config or --security;
+to command, these have to be an operator's.
+
+FILE of --tokens has lines `viewer: TOKEN` and `operator: TOKEN`; where it is not there it is made,
+with new ones. A page asks for a token, or has it behind the # of its address. Without --certificate
+tokens and pictures go over the network in the clear.
+
+exit codes: 0 ended by a signal; 1 it cannot listen there; 78 wrong configuration
+"""
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--listen",
+        default=f"127.0.0.1:{PORT}",
+        metavar="HOST:PORT",
+        help="address to serve at (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--allow-commands",
+        action="store_true",
+        help="let everybody on this computer command the robot",
+    )
+    parser.add_argument(
+        "--tokens",
+        type=Path,
+        metavar="FILE",
+        help="who may look, and who may command; needed to listen on other than loopback",
+    )
+    parser.add_argument(
+        "--name",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a host name by which the page is opened, beside addresses and this computer's name; "
+        "may be repeated",
+    )
+    parser.add_argument(
+        "--certificate", type=Path, metavar="FILE", help="serve over TLS with this certificate"
+    )
+    parser.add_argument("--private-key", type=Path, metavar="FILE", help="its key")
+    add_robot_on_bus(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until a signal."""
+    import asyncio
+    import logging
+
+    from fasaco_edge.host.processes import return_soon
+    from fasaco_edge.serve.guard import guard_for
+
+    try:
+        from fasaco_edge.serve.server import Server
+    except ImportError as error:
+        if (error.name or "").partition(".")[0] != "websockets":
+            raise
+        raise MissingExtra(
+            f"the live page needs websockets, which is not installed: {error}",
+            hint="pip install 'fasaco-edge[serve]'",
+        ) from error
+    from fasaco_edge.serve.served_view import ServedView
+    from fasaco_edge.watch.feed import Feed
+
+    address = read_address("--listen", args.listen, example=PORT)
+    guard = guard_for(address, args.tokens, args.name, allow_commands=args.allow_commands)
+    secured = _tls(args)
+    here = robot_on_bus(args)
+    return_soon()
+    # It tells of each connection.
+    logging.getLogger("websockets").setLevel(logging.WARNING)
+    with Feed(here.bus, here.keys, hears_fleet=True) as feed:
+        server = Server(feed, ServedView(here.keys), guard)
+        try:
+            _say(address, guard, args.tokens, secured is not None)
+            asyncio.run(server.run(address, secured))
+        except OSError as error:
+            why = f"--listen: cannot listen at {address.shown}: {error.strerror or error}"
+            print(one_line(f"fasaco-edge: {why}"), file=sys.stderr)
+            _leave(Exit.ERROR)
+    _leave(Exit.OK)
+
+
+def _tls(args: argparse.Namespace) -> ssl.SSLContext | None:
+    certificate, key = args.certificate, args.private_key
+    if certificate is None and key is None:
+        return None
+    if certificate is None or key is None:
+        raise BadConfiguration("--certificate and --private-key go together")
+    import ssl
+
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    try:
+        context.load_cert_chain(certificate, key)
+    except (OSError, ssl.SSLError) as error:
+        why = f"{certificate}, {key}: {error.strerror or error}"
+        raise BadConfiguration(f"--certificate, --private-key: {why}") from error
+    return context
+
+
+def _say(address: Address, guard: Guard, tokens: Path | None, secured: bool) -> None:
+    page = f"{'https' if secured else 'http'}://{address.shown}/"
+    if tokens is not None:
+        print(f"page at {page}; the tokens are in {one_line(str(tokens))}")
+        if sys.stdout.isatty():
+            for role, token in guard.tokens:
+                print(f"  {role}: {page}#{token}")
+    else:
+        print(
+            f"page at {page}, " + ("with commands" if guard.role == "operator" else "to look only")
+        )
+    sys.stdout.flush()
+
+
+def _leave(code: int) -> NoReturn:
+    """End the process here, see ``cli.watch``."""
+    sys.stdout.flush()
+    os._exit(code)
+
+
+COMMAND = Command(
+    description="Serve a page that shows a robot's mission live: map, swept floor, path and "
+    "robot, progress and what is left; with commands and zones drawn by hand where allowed. "
+    "Several may look at once. It runs on the robot or on any other machine of the bus.",
+    run=run,
+    add_options=_add_options,
+    epilog=EPILOG,
+)

@@ -1,0 +1,56 @@
+"""Addresses that a server of this package listens at."""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from typing import NamedTuple
+
+from fasaco_edge.errors import BadConfiguration
+
+_ADDRESS = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:]+)\]|(?P<four>[\w.]+)):(?P<port>\d{1,5})")
+
+
+class Address(NamedTuple):
+    """Where a server listens: host, an address as text, and port."""
+
+    host: str
+    port: int
+
+    @property
+    def is_loopback(self) -> bool:
+        """Whether only this computer can reach it."""
+        return ipaddress.ip_address(self.host).is_loopback
+
+    @property
+    def shown(self) -> str:
+        """The address as a URL has it."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{host}:{self.port}"
+
+
+def read_address(name: str, text: str, example: int) -> Address:
+    """Return the address that ``text``, the value of ``name``, says.
+
+    Args:
+        name: of the key or option.
+        text: address and port; localhost is 127.0.0.1.
+        example: a port for the message.
+
+    Raises:
+        BadConfiguration: it is no address with a port.
+    """
+    found = _ADDRESS.fullmatch(text)
+    wrong = BadConfiguration(
+        f"{name} must be an address and a port, as 127.0.0.1:{example} or [::1]:{example}, "
+        f"got {text!r}"
+    )
+    if found is None or not 0 < int(found["port"]) < 1 << 16:
+        raise wrong
+    host = found["six"] or found["four"]
+    host = "127.0.0.1" if host == "localhost" else host
+    try:
+        ipaddress.ip_address(host)
+    except ValueError as error:
+        raise wrong from error
+    return Address(host, int(found["port"]))

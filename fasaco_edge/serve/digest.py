@@ -1,0 +1,189 @@
+"""What a page tells of a robot: state, progress, areas and events, as plain documents."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from fasaco_edge.serve.pace import Way
+from fasaco_edge.watch import phrases
+from fasaco_edge.watch.events import EventLog
+from fasaco_edge.watch.robot_state import RobotState
+from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport, MissionReport
+from fasaco_edge.wire.documents.settings import KnownSettings
+from fasaco_edge.wire.documents.status import FleetReport, Status
+
+Digest = dict[str, object]
+
+# Of lists from elsewhere so much is shown.
+MOST_ENTRIES, MOST_AREAS, MOST_ROBOTS = 40, 100, 50
+MOST_CORNERS = 1_000
+# In these there is something to go.
+UNDERWAY = ("planning", "covering", "returning", "paused", "charging")
+
+
+def state(view: RobotState, way: Way, now: float) -> Digest:
+    """Return what the newest status says, and whether there is one at all; ``way`` is the path."""
+    status = view.status
+    others = sorted(view.robots - {view.robot})[:MOST_ROBOTS]
+    found: Digest = {"robot": view.robot, "absent": _absent(view, now), "others": others}
+    if status is None:
+        return found
+    mission, floor = status.mission, status.floor
+    return found | {
+        "state": status.state,
+        "reason": _reason(status),
+        "cells": status.coverage.fraction if status.coverage else None,
+        "floor": _floor(floor) if floor else None,
+        "to_go_s": _to_go_s(view, status, way),
+        "mission": _mission(mission),
+        "unreached": [
+            {"x": area.x, "y": area.y, "m2": area.m2, "reason": area.reason}
+            for area in mission.unreached.areas
+        ],
+        "battery": _battery(status),
+        "faults": list(_faults(status)),
+        "fleet": _fleet(status.fleet) if status.fleet else None,
+        "radius_m": view.settings.robot.radius_m,
+        "tool_m": view.settings.robot.tool_width_m,
+        "version": status.version,
+    }
+
+
+def _absent(view: RobotState, now: float) -> str:
+    """Return why there is nothing new to show; "" where there is."""
+    if view.trouble:
+        return f"waiting for the bus at {view.trouble}"
+    if view.gone_since is not None:
+        gone = phrases.age(round(now - view.gone_since))
+        return f"the daemon has been gone for {gone}; waiting for it to return"
+    if not view.is_here:
+        return f"waiting for a daemon of the name {view.robot}"
+    if view.status is None:
+        return "no status from the daemon yet"
+    silent = view.silent_s(now)
+    return f"the daemon has been silent for {phrases.age(round(silent))}" if silent else ""
+
+
+def _reason(status: Status) -> str:
+    path = status.path
+    if path is not None and status.reason == f"path {path.revision}":
+        return path.reason if path.steps else ""
+    return status.reason
+
+
+def _floor(floor: FloorReport) -> Digest:
+    return {
+        "swept_m2": floor.swept_m2,
+        "reached_m2": floor.reached_m2,
+        "reachable_m2": floor.reachable_m2,
+        "left": _parts(floor.left),
+        "out_of_reach": _parts(floor.out_of_reach),
+    }
+
+
+def _parts(parts: tuple[FloorLeft, ...] | None) -> list[Digest]:
+    return [{"m2": part.m2, "reason": part.reason} for part in parts or ()]
+
+
+def _to_go_s(view: RobotState, status: Status, way: Way) -> int | None:
+    left_s = way.left_s(view.walk.at, view.settings.robot, status.drive)
+    return None if left_s is None or status.state not in UNDERWAY else round(left_s)
+
+
+def _mission(mission: MissionReport) -> Digest:
+    return {
+        "ordered": mission.ordered,
+        "stage": mission.stage,
+        "paused": mission.paused,
+        "zone": mission.zone,
+        "pass": mission.pass_number,
+        "passes": mission.passes,
+        "zones": [
+            {
+                "name": zone.name,
+                "pass": zone.pass_number,
+                "passes": zone.passes,
+                "share": zone.covered / zone.cells if zone.cells else 0.0,
+            }
+            for zone in mission.zones[:MOST_AREAS]
+        ],
+        "keep_out": mission.keep_out,
+        "return_home": mission.return_home,
+        "home": [mission.home.x, mission.home.y] if mission.home else None,
+    }
+
+
+def _battery(status: Status) -> Digest | None:
+    battery = status.battery
+    if battery is None:
+        return None
+    return {"level": battery.level, "power": battery.power}
+
+
+def _faults(status: Status) -> Iterator[str]:
+    """Yield what is wrong, in words."""
+    if status.errors.total:
+        count = status.errors.total
+        yield f"refused or failed {count} times since the start, last: {status.errors.last}"
+    if status.ledger.fault:
+        yield f"progress on disk: {status.ledger.fault}"
+    recorder = status.recorder
+    if recorder is not None and recorder.state not in ("recording", "starting"):
+        yield f"recorder {recorder.state}: {recorder.reason or ''}"
+
+
+def _fleet(fleet: FleetReport) -> list[Digest]:
+    return [
+        {"name": member.name, "state": member.state, "away": member.away}
+        for member in fleet.members[:MOST_ROBOTS]
+    ]
+
+
+def areas(settings: KnownSettings, order: dict[str, Any]) -> Digest:
+    """Return zones and keep-outs: of the configuration, and of the order if it was heard."""
+    mission = settings.mission
+    standing = [
+        {"name": zone.name, "polygon": zone.polygon[:MOST_CORNERS], "is": "standing"}
+        for zone in mission.zones[:MOST_AREAS]
+    ]
+    ordered = [
+        {"name": str(zone.get("name", "")), "polygon": polygon, "is": "ordered"}
+        for zone in _items(order.get("zones"))
+        if isinstance(zone, dict) and (polygon := _polygon(zone.get("polygon")))
+    ]
+    kept_out = [
+        *({"polygon": each[:MOST_CORNERS], "is": "standing"} for each in mission.keep_out),
+        *(
+            {"polygon": polygon, "is": "ordered"}
+            for each in _items(order.get("keep_out"))
+            if (polygon := _polygon(each))
+        ),
+    ]
+    return {"zones": standing + ordered, "keep_out": kept_out[:MOST_AREAS]}
+
+
+def _items(value: object) -> list[Any]:
+    return value[:MOST_AREAS] if isinstance(value, list) else []
+
+
+def _polygon(value: object) -> list[list[float]]:
+    """Return corners (x, y) [m]; none where they are not such."""
+    corners = [
+        [float(x), float(y)]
+        for x, y in (pair for pair in _items(value) if isinstance(pair, list) and len(pair) == 2)
+        if isinstance(x, int | float) and isinstance(y, int | float)
+    ]
+    return corners if len(corners) >= 3 else []
+
+
+def lately(events: EventLog) -> list[Digest]:
+    """Return the newest entries, the newest first."""
+    entries = list(events.entries)[-MOST_ENTRIES:]
+    # What the wall clock showed; entries keep a steady time.
+    offset = time.time() - phrases.steady_now()
+    return [
+        {"at_s": round(entry.at_s + offset, 1), "text": entry.text, "tone": entry.tone}
+        for entry in reversed(entries)
+    ]

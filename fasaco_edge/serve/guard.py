@@ -1,0 +1,133 @@
+"""Who may open the page, and who may command: hosts, origins, tokens.
+
+A page of somewhere else in a browser on this computer may call this server, too: it names itself
+as the origin, or has its own name point here (DNS rebinding). An address as a host cannot be that.
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import re
+import secrets
+import socket
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+from typing import get_args
+
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.addresses import Address
+from fasaco_edge.host.durable import write_through
+from fasaco_edge.host.files import read_own
+from fasaco_edge.serve.messages import Role
+
+MOST_BYTES = 4096
+_TOKEN = re.compile(r"[\w.~-]{16,200}", re.ASCII)
+ROLES: tuple[Role, ...] = get_args(Role)
+
+
+@dataclass(frozen=True, slots=True)
+class Guard:
+    """Says what a caller may do.
+
+    Attributes:
+        names: host names that are this server's, beside addresses.
+        tokens: by role; none: no token is asked for, and all who get here have ``role``.
+        role: of all, where there are no tokens.
+    """
+
+    names: frozenset[str]
+    tokens: tuple[tuple[Role, str], ...] = ()
+    role: Role = "viewer"
+
+    def is_ours(self, host: str) -> bool:
+        """Tell whether a Host header names this server."""
+        if "%" in host:  # of an IPv6 address: anything may follow
+            return False
+        name, _, _ = host.rpartition(":") if re.search(r":\d+$", host) else (host, "", "")
+        try:
+            ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
+        except ValueError:
+            return name.lower() in self.names
+        return True
+
+    def role_of(self, token: str) -> Role | None:
+        """Return what who knows ``token`` may do; None for nothing."""
+        if not self.tokens:
+            return self.role
+        found: Role | None = None
+        # All are compared, each in a time that tells nothing.
+        for role, known in self.tokens:
+            if hmac.compare_digest(token.encode(), known.encode()):
+                found = role
+        return found
+
+
+def is_same_origin(origin: str | None, host: str) -> bool:
+    """Tell whether a page of ``host`` itself calls; only browsers name an origin."""
+    return origin is None or origin.lower().partition("://")[2] == host.lower()
+
+
+def guard_for(
+    address: Address, tokens: Path | None, names: list[str], *, allow_commands: bool
+) -> Guard:
+    """Return who may do what.
+
+    Args:
+        address: where the server listens.
+        tokens: the file with tokens; it is made where it is not there. None for none.
+        names: more host names of this server.
+        allow_commands: whether all may command, without a token.
+
+    Raises:
+        BadConfiguration: others could come in unasked, or the file of tokens is none.
+    """
+    if tokens is None and not address.is_loopback:
+        raise BadConfiguration(
+            f"--listen: {address.shown} lets other computers in, and nothing says who may",
+            hint="give --tokens FILE (a new file gets new tokens), or listen on 127.0.0.1",
+        )
+    if tokens is not None and allow_commands:
+        raise BadConfiguration(
+            "--allow-commands: with --tokens, who has the operator's token may command",
+            hint="leave out one of both",
+        )
+    ours = {"localhost", socket.gethostname().lower(), *(name.lower() for name in names)}
+    ours |= {f"{name}.local" for name in ours if "." not in name}
+    if tokens is None:
+        return Guard(frozenset(ours), role="operator" if allow_commands else "viewer")
+    return Guard(frozenset(ours), read_tokens(tokens))
+
+
+def read_tokens(file: Path) -> tuple[tuple[Role, str], ...]:
+    """Return the tokens in a file, lines as ``operator: TOKEN``; make them where it is not there.
+
+    Raises:
+        BadConfiguration: it cannot be read or made, others may read it, or a line is wrong.
+    """
+    try:
+        if not file.exists():
+            made = "".join(f"{role}: {secrets.token_urlsafe(24)}\n" for role in ROLES)
+            write_through(file, made.encode(), mode=0o600)
+        open_to = stat.S_IMODE(file.stat().st_mode) & 0o077
+        text = read_own(file, MOST_BYTES).decode()
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "not a text"
+        raise BadConfiguration(f"--tokens: {file}: {why}") from error
+    if open_to:
+        raise BadConfiguration(f"--tokens: {file} can be read by others", hint=f"chmod 600 {file}")
+    tokens: list[tuple[Role, str]] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        role, _, token = (part.strip() for part in line.partition(":"))
+        if not line.strip() or line.startswith("#"):
+            continue
+        if role not in ROLES or not _TOKEN.fullmatch(token):
+            raise BadConfiguration(
+                f"--tokens: {file}, line {number}: must be viewer: TOKEN or operator: TOKEN, "
+                "a token of 16 or more letters, digits and - _ . ~"
+            )
+        tokens.append((role, token))
+    if not tokens:
+        raise BadConfiguration(f"--tokens: {file} has no token", hint="delete it to have new ones")
+    return tuple(tokens)

@@ -1,0 +1,82 @@
+"""Messages between the server and its page: JSON, or a JSON head with a body of bytes.
+
+Whatever text is in them is cleaned here, once, before any page sees it; the page shows text as
+text only.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any, Literal
+
+import msgspec
+
+from fasaco_edge.text import one_line
+
+# What is shown of a text on a page [characters].
+MOST_TEXT = 400
+_LENGTH = struct.Struct("<I")
+
+Role = Literal["viewer", "operator"]
+# What the page may command: not to drop what was covered.
+Command = Literal["start", "pause", "resume", "home", "cancel", "replan"]
+
+
+class Hello(msgspec.Struct, tag="hello", tag_field="kind", forbid_unknown_fields=True):
+    """The first message of a page: who it is."""
+
+    token: str = ""
+
+
+class Wants(msgspec.Struct, tag="wants", tag_field="kind", forbid_unknown_fields=True):
+    """Whether the page shows the pheromone field."""
+
+    field: bool = False
+
+
+class Order(msgspec.Struct, tag="command", tag_field="kind", forbid_unknown_fields=True):
+    """A command for the robot.
+
+    Attributes:
+        id: comes back with the answer.
+        command: one of those a page may give.
+        order: what to cover, as ``protocol/schema/mission.json`` has it; with ``start`` alone.
+    """
+
+    id: int
+    command: Command
+    order: dict[str, Any] | None = None
+
+
+FromPage = Hello | Wants | Order
+_DECODER: msgspec.json.Decoder[FromPage] = msgspec.json.Decoder(FromPage)
+
+
+def from_page(text: str | bytes) -> FromPage:
+    """Return what a page says.
+
+    Raises:
+        msgspec.DecodeError: it is no such message.
+    """
+    return _DECODER.decode(text)
+
+
+def told(kind: str, **members: object) -> str:
+    """Return a message as JSON, all text in it cleaned."""
+    return msgspec.json.encode({"kind": kind} | _cleaned(members)).decode()
+
+
+def framed(kind: str, head: dict[str, object], body: bytes) -> bytes:
+    """Return a message with a body: the length of its head (uint32), its head as JSON, the body."""
+    said = told(kind, **head).encode()
+    return _LENGTH.pack(len(said)) + said + body
+
+
+def _cleaned(value: Any) -> Any:  # noqa: ANN401 - any JSON
+    if isinstance(value, str):
+        return one_line(value, MOST_TEXT)
+    if isinstance(value, dict):
+        return {one_line(str(key), MOST_TEXT): _cleaned(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_cleaned(item) for item in value]
+    return value

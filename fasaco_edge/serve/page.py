@@ -1,0 +1,43 @@
+"""The page itself: one file, nothing from the network but what this server sends."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from dataclasses import dataclass
+from importlib.resources import files
+
+# In this order they are one script.
+SCRIPTS = ("model.js", "view.js", "picture.js", "drawing.js", "panel.js", "link.js")
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A page and what a browser may do with it.
+
+    Attributes:
+        body: HTML, style and script in it.
+        policy: its Content-Security-Policy, less where it may connect to.
+    """
+
+    body: bytes
+    policy: str
+
+
+def load_page() -> Page:
+    """Return the page."""
+    folder = files("fasaco_edge.serve").joinpath("page")
+    style = folder.joinpath("style.css").read_text(encoding="utf-8")
+    parts = (folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
+    script = '"use strict";\n' + "\n".join(parts)
+    html = folder.joinpath("page.html").read_text(encoding="utf-8")
+    html = html.replace("/* style */", style).replace("/* script */", script)
+    policy = (
+        f"default-src 'none'; script-src '{_digest(script)}'; style-src '{_digest(style)}'; "
+        "img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+    return Page(html.encode(), policy)
+
+
+def _digest(text: str) -> str:
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"

@@ -1,0 +1,86 @@
+// Rooms and keep-outs drawn by hand: drag for a rectangle, or tap corner after corner.
+const drawing = { kind: "", corners: [], from: null, to: null };
+const drafts = [];
+const TAP_PIXELS = 12, CLOSE_PIXELS = 24;
+
+function beginDrawing(kind) {
+  Object.assign(drawing, { kind, corners: [], from: null, to: null });
+  if (kind) canvas.scrollIntoView({ block: "nearest" });
+  showDrawing();
+}
+
+function beginStroke(at) { drawing.from = drawing.to = at; }
+function dropStroke() { drawing.from = drawing.to = null; redraw(); }
+function goOnStroke(at) {
+  if (!drawing.from) return;
+  drawing.to = at;
+  redraw();
+}
+
+function endStroke(at) {
+  const from = drawing.from;
+  drawing.from = drawing.to = null;
+  if (!from) return;
+  if (Math.hypot(at[0] - from[0], at[1] - from[1]) > TAP_PIXELS) {
+    if (!drawing.corners.length) finish(rectangle(from, at));
+  } else {
+    const first = drawing.corners[0] && toScreen(...drawing.corners[0]);
+    const closes = drawing.corners.length >= 3 && Math.hypot(at[0] - first[0], at[1] - first[1]) < CLOSE_PIXELS;
+    if (closes) finish(drawing.corners);
+    else drawing.corners.push(toMap(...at));
+  }
+  showDrawing();
+}
+
+const rectangle = ([ax, ay], [bx, by]) => [[ax, ay], [bx, ay], [bx, by], [ax, by]].map((at) => toMap(...at));
+const rounded = (corners) => corners.map((corner) => corner.map((value) => Math.round(value * 100) / 100));
+
+function finish(corners) {
+  const kind = drawing.kind;
+  const taken = new Set(drafts.map((draft) => draft.name));
+  let number = 1;
+  while (taken.has(`room ${number}`)) number++;
+  drafts.push({ kind, polygon: rounded(corners), name: kind === "zone" ? `room ${number}` : "" });
+  Object.assign(drawing, { kind: "", corners: [] });
+  showDrafts();
+  document.getElementById("plan").scrollIntoView({ block: "nearest" });
+}
+
+function showDrawing() {
+  const bar = document.getElementById("drawbar"), count = drawing.corners.length;
+  bar.hidden = !drawing.kind;
+  document.getElementById("tools").hidden = Boolean(drawing.kind);
+  const what = drawing.kind === "zone" ? "room" : "keep-out";
+  document.getElementById("drawhint").textContent = count
+    ? `${count} corner${count > 1 ? "s" : ""} of the ${what}; tap the next`
+    : `Drag over the ${what}, or tap its corners`;
+  document.getElementById("drawdone").hidden = count < 3;
+  canvas.classList.toggle("draws", Boolean(drawing.kind));
+  redraw();
+}
+
+function drawDrafts(context) {
+  for (const draft of drafts) drawArea(context, draft.polygon, draft.kind === "zone" ? colours.zone : colours.keepout, draft.name, false);
+  if (!drawing.kind) return;
+  const colour = drawing.kind === "zone" ? colours.zone : colours.keepout;
+  if (drawing.from && Math.hypot(drawing.to[0] - drawing.from[0], drawing.to[1] - drawing.from[1]) > TAP_PIXELS && !drawing.corners.length) {
+    drawArea(context, rectangle(drawing.from, drawing.to), colour, "", false);
+  }
+  if (drawing.corners.length) {
+    trace(context, drawing.corners, false);
+    context.lineWidth = 2;
+    context.strokeStyle = colour;
+    context.stroke();
+    for (const corner of drawing.corners) {
+      context.beginPath();
+      context.arc(...toScreen(...corner), 6, 0, 2 * Math.PI);
+      context.fillStyle = colour;
+      context.fill();
+    }
+  }
+}
+
+document.getElementById("draw-zone").addEventListener("click", () => beginDrawing("zone"));
+document.getElementById("draw-keepout").addEventListener("click", () => beginDrawing("keepout"));
+document.getElementById("drawdone").addEventListener("click", () => { finish(drawing.corners); showDrawing(); });
+document.getElementById("drawstop").addEventListener("click", () => beginDrawing(""));

@@ -1,0 +1,103 @@
+// The link to the server: it comes back by itself; of a page nobody sees it goes.
+let socket = null, asked = 0, startId = -1, pause = 500, taking = Promise.resolve();
+const HIDDEN_MS = 30000;
+let token = "";
+
+function remembered() {
+  if (location.hash.length > 1) {
+    token = decodeURIComponent(location.hash.slice(1));
+    history.replaceState(null, "", location.pathname);
+  }
+  try {
+    if (token) sessionStorage.setItem("token", token);
+    token = token || sessionStorage.getItem("token") || "";
+  } catch (error) { /* a browser that keeps nothing: the token is asked for again */ }
+}
+
+const send = (message) => socket && socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
+const wants = () => send({ kind: "wants", field: showsField });
+
+function command(name, what) {
+  if (!socket || socket.readyState !== WebSocket.OPEN) {
+    say("no connection to the server", "bad");
+    return;
+  }
+  asked += 1;
+  if (name === "start") startId = asked;
+  const sent = { kind: "command", id: asked, command: name };
+  if (what) sent.order = what;
+  send(sent);
+}
+
+function showLink(on, title) {
+  find("link").classList.toggle("on", on);
+  find("link").title = title;
+  find("link").setAttribute("aria-label", title);
+}
+
+function join() {
+  const live = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
+  socket = live;
+  live.binaryType = "arraybuffer";
+  live.onopen = () => send({ kind: "hello", token });
+  live.onmessage = (event) => {
+    taking = taking.then(() => take(event.data)).then(show).catch((error) => console.error(error));
+  };
+  live.onclose = (event) => {
+    if (socket !== live) return;
+    socket = null;
+    showLink(false, "no connection; trying again");
+    if (event.code === 4401) return;
+    if (!find("absent").textContent || find("absent").hidden) {
+      find("absent").textContent = "no connection to the server; trying again";
+      find("absent").hidden = false;
+    }
+    if (!document.hidden) setTimeout(rejoin, pause);
+    pause = Math.min(2 * pause, 8000);
+  };
+}
+
+function rejoin() {
+  if (!socket) join();
+}
+
+function show(message) {
+  switch (message.kind) {
+    case "welcome":
+      model.role = message.role;
+      pause = 500;
+      showLink(true, message.role === "operator" ? "connected; may command" : "connected; to look only");
+      wants();
+      showCommands();
+      break;
+    case "denied":
+      try { sessionStorage.removeItem("token"); } catch (error) { /* nothing was kept */ }
+      find("login").showModal();
+      break;
+    case "answer": showAnswer(message); break;
+    case "state": showState(); redraw(); break;
+    case "events": showEvents(); break;
+    case "areas": showDrafts(); redraw(); break;
+    default: redraw();
+  }
+}
+
+find("login").addEventListener("close", () => {
+  token = find("token").value.trim();
+  find("token").value = "";
+  try { sessionStorage.setItem("token", token); } catch (error) { /* it is asked for again */ }
+  rejoin();
+});
+
+let sleeping = 0;
+document.addEventListener("visibilitychange", () => {
+  clearTimeout(sleeping);
+  if (document.hidden) sleeping = setTimeout(() => socket && socket.close(), HIDDEN_MS);
+  else rejoin();
+});
+
+readColours();
+remembered();
+showDrafts();
+redraw();
+join();

@@ -1,0 +1,217 @@
+// The picture: layers from the floor up to the robot, in the colours of the style sheet.
+let colours = {}, waiting = false, showsField = false;
+const dark = window.matchMedia("(prefers-color-scheme: dark)");
+
+function readColours() {
+  const style = getComputedStyle(document.documentElement);
+  for (const name of ["map", "free", "wall", "swept", "ahead", "driven", "robot", "keepout", "zone", "other", "ink", "card"]) {
+    colours[name] = style.getPropertyValue(`--${name}`).trim();
+  }
+  for (const kind of ["map", "floor", "field"]) if (model[kind]) model[kind].image = null;
+}
+dark.addEventListener("change", () => { readColours(); redraw(); });
+
+const channels = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+const SCALE = [[13, 8, 135], [84, 2, 163], [139, 10, 165], [185, 50, 137], [219, 92, 104], [244, 136, 73], [254, 188, 43]];
+
+// Colour and opacity of each mark of a kind: bits, of which the highest counts.
+function tints(kind) {
+  const table = new Uint8ClampedArray(4 * 256);
+  for (let mark = 1; mark < 256; mark++) {
+    const level = 32 - Math.clz32(mark);
+    let tint;
+    if (kind === "map") tint = [...channels(mark & 2 ? colours.wall : colours.free), mark & 3 ? 255 : 0];
+    else if (kind === "floor") tint = [...channels(colours.swept), 80 + 25 * Math.min(level, 7)];
+    else tint = [...SCALE[Math.min(level, 7) - 1], 215];
+    table.set(tint, 4 * mark);
+  }
+  return table;
+}
+
+function imageOf(grid) {
+  if (grid.image) return grid.image;
+  const image = document.createElement("canvas");
+  [image.width, image.height] = [grid.cols, grid.rows];
+  const context = image.getContext("2d"), pixels = context.createImageData(grid.cols, grid.rows);
+  const out = new Uint32Array(pixels.data.buffer), table = new Uint32Array(tints(grid.kind).buffer);
+  for (let i = 0; i < grid.marks.length; i++) out[i] = table[grid.marks[i]];
+  context.putImageData(pixels, 0, 0);
+  return (grid.image = image);
+}
+
+function drawGrid(context, grid) {
+  if (!grid) return;
+  context.save();
+  context.translate(...toScreen(grid.x, grid.y));
+  context.rotate(-grid.yaw);
+  const size = grid.pixel * view.scale;
+  // The first row is the southernmost, and the screen's y grows downwards.
+  context.scale(size, -size);
+  context.imageSmoothingEnabled = size < 1;
+  context.drawImage(imageOf(grid), 0, 0);
+  context.restore();
+}
+
+function trace(context, points, closed) {
+  context.beginPath();
+  points.forEach(([x, y], i) => context[i ? "lineTo" : "moveTo"](...toScreen(x, y)));
+  if (closed) context.closePath();
+}
+
+function drawArea(context, polygon, colour, name, dashed, opacity = 0.14) {
+  trace(context, polygon, true);
+  context.save();
+  context.globalAlpha = opacity;
+  context.fillStyle = colour;
+  context.fill();
+  context.restore();
+  context.setLineDash(dashed ? [6, 5] : []);
+  context.lineWidth = 2;
+  context.strokeStyle = colour;
+  context.stroke();
+  context.setLineDash([]);
+  if (!name) return;
+  const x = polygon.reduce((sum, p) => sum + p[0], 0) / polygon.length;
+  const y = polygon.reduce((sum, p) => sum + p[1], 0) / polygon.length;
+  drawLabel(context, name, ...toScreen(x, y), colour);
+}
+
+function drawLabel(context, text, px, py, colour) {
+  const shown = text.length > 24 ? `${text.slice(0, 23)}…` : text;
+  context.font = "600 13px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.lineWidth = 4;
+  context.strokeStyle = colours.card;
+  context.strokeText(shown, px, py);
+  context.fillStyle = colour;
+  context.fillText(shown, px, py);
+}
+
+function drawPath(context) {
+  const path = model.path, pose = model.pose;
+  if (!path || path.xy.length < 4) return;
+  // Without a path of the daemon's, as after its restart, none is shown.
+  if (pose && pose.path === 0 && path.revision > 0) return;
+  const at = pose && pose.path === path.revision ? pose.at : 0;
+  const points = [];
+  for (let i = 0; i < path.xy.length; i += 2) points.push([path.x + path.xy[i], path.y + path.xy[i + 1]]);
+  context.lineJoin = context.lineCap = "round";
+  const width = Math.min(Math.max(0.05 * view.scale, 1.2), 3);
+  const line = (some, colour, wide) => {
+    if (some.length < 2) return;
+    trace(context, some, false);
+    context.lineWidth = wide;
+    context.strokeStyle = colour;
+    context.stroke();
+  };
+  line(points.slice(0, at + 1), colours.driven, width);
+  const ahead = points.slice(at + 1);
+  if (pose) ahead.unshift([pose.x, pose.y]);
+  line(ahead, colours.ahead, width);
+}
+
+function drawRobot(context) {
+  const pose = model.pose;
+  if (!pose) return;
+  const radius = Math.max(((model.state && model.state.radius_m) || 0.18) * view.scale, 8);
+  context.save();
+  context.translate(...toScreen(pose.x, pose.y));
+  context.rotate(-pose.yaw);
+  context.beginPath();
+  context.arc(0, 0, radius, 0, 2 * Math.PI);
+  context.fillStyle = colours.robot;
+  context.strokeStyle = colours.card;
+  context.lineWidth = 2;
+  context.fill();
+  context.stroke();
+  context.beginPath();
+  context.moveTo(0.7 * radius, 0);
+  context.lineTo(-0.45 * radius, 0.5 * radius);
+  context.lineTo(-0.2 * radius, 0);
+  context.lineTo(-0.45 * radius, -0.5 * radius);
+  context.closePath();
+  context.fillStyle = colours.card;
+  context.fill();
+  context.restore();
+}
+
+function drawOthers(context) {
+  for (const other of model.others) {
+    const [px, py] = toScreen(other.x, other.y);
+    context.beginPath();
+    context.arc(px, py, 8, 0, 2 * Math.PI);
+    context.fillStyle = colours.other;
+    context.fill();
+    drawLabel(context, other.name, px, py - 18, colours.other);
+  }
+}
+
+function drawHome(context) {
+  const home = model.state && model.state.mission && model.state.mission.home;
+  if (!home) return;
+  const [px, py] = toScreen(...home);
+  context.beginPath();
+  context.moveTo(px - 8, py);
+  context.lineTo(px, py - 8);
+  context.lineTo(px + 8, py);
+  context.lineTo(px + 5, py);
+  context.lineTo(px + 5, py + 7);
+  context.lineTo(px - 5, py + 7);
+  context.lineTo(px - 5, py);
+  context.closePath();
+  context.lineWidth = 2;
+  context.strokeStyle = colours.card;
+  context.stroke();
+  context.fillStyle = colours.ink;
+  context.fill();
+}
+
+function drawScale(context) {
+  const most = Math.min(canvas.clientWidth / 4, 140) / view.scale;
+  const decade = 10 ** Math.floor(Math.log10(most));
+  const metres = [5, 2, 1].map((digit) => digit * decade).find((length) => length <= most) || decade;
+  const [x, y, width] = [canvas.clientWidth - 14, canvas.clientHeight - 14, metres * view.scale];
+  context.lineWidth = 2;
+  context.strokeStyle = colours.ink;
+  context.beginPath();
+  context.moveTo(x - width, y - 4);
+  context.lineTo(x - width, y);
+  context.lineTo(x, y);
+  context.lineTo(x, y - 4);
+  context.stroke();
+  drawLabel(context, metres < 1 ? `${Math.round(100 * metres)} cm` : `${metres} m`, x - width / 2, y - 12, colours.ink);
+}
+
+function draw() {
+  waiting = false;
+  const ratio = window.devicePixelRatio || 1;
+  const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
+  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+  if (view.fitted) fit();
+  else if (view.follows && model.pose) [view.x, view.y] = [model.pose.x, model.pose.y];
+  document.getElementById("empty").hidden = Boolean(model.map || model.floor);
+  const context = canvas.getContext("2d");
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.fillStyle = colours.map;
+  context.fillRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+  if (!view.scale) return;
+  drawGrid(context, model.map);
+  if (showsField) drawGrid(context, model.field);
+  else drawGrid(context, model.floor);
+  for (const zone of (model.areas && model.areas.zones) || []) drawArea(context, zone.polygon, colours.zone, zone.name, zone.is === "standing", zone.is === "standing" ? 0.03 : 0.14);
+  for (const area of (model.areas && model.areas.keep_out) || []) drawArea(context, area.polygon, colours.keepout, "", area.is === "standing");
+  if (!showsField) drawPath(context);
+  drawHome(context);
+  drawDrafts(context);
+  drawOthers(context);
+  drawRobot(context);
+  drawScale(context);
+}
+
+function redraw() {
+  if (!waiting) {
+    waiting = true;
+    requestAnimationFrame(draw);
+  }
+}

@@ -1,0 +1,202 @@
+"""A robot as its page shows it: its newest samples, as messages for browsers."""
+
+from __future__ import annotations
+
+import sys
+import zlib
+from array import array
+from collections.abc import Callable, Iterator
+
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.serve.digest import areas, lately, state
+from fasaco_edge.serve.marks import (
+    COVERAGE_MARKS,
+    FIELD_MARKS,
+    FLOOR_MARKS,
+    grid_message,
+    map_marks,
+)
+from fasaco_edge.serve.messages import framed, told
+from fasaco_edge.serve.pace import Way
+from fasaco_edge.watch.robot_state import PathProgress, RobotState
+from fasaco_edge.wire.documents.fleet import decode_member
+from fasaco_edge.wire.documents.json_text import decode_document
+from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.messages.grid_octets import GridOctets, read_field, read_grid, with_update
+from fasaco_edge.wire.messages.path_points import PathPoints
+
+# Of a path so much is shown; reading one takes some 4 us a point.
+MOST_POINTS = 20_000
+# Other robots, the newest heard of; they are heard once a second.
+MOST_OTHERS, OTHER_LASTS_S = 50, 10.0
+# How often each message is sent at most [s]; what has not changed is not sent again.
+PERIODS_S = {
+    "pose": 0.1,
+    "state": 0.2,
+    "path": 0.2,
+    "areas": 0.5,
+    "events": 0.5,
+    "map": 0.5,
+    "floor": 1.0,
+    "field": 1.0,
+    "others": 1.0,
+}
+
+
+class ServedView(RobotState):
+    """The newest of one robot; grids stay the bytes they came as."""
+
+    def __init__(self, keys: Keys) -> None:
+        super().__init__(keys.robot)
+        self._keys = keys
+        self._grids: dict[str, GridOctets] = {}
+        # What an order says of zones and keep-outs; the status names them only.
+        self._order: dict[str, object] = {}
+        self._others: dict[str, tuple[float, float, float]] = {}
+        self._path: Sample | None = None
+        self._way = Way()
+        self._readers |= {
+            "map": self._read_map,
+            "map_update": self._read_map_update,
+            "coverage": self._read_coverage,
+            "floor": self._read_floor,
+            "pheromone": self._read_field,
+            "path": self._read_path,
+            "fleet": self._read_fleet,
+        }
+        self._makers: dict[str, Callable[[float], str | bytes | None]] = {
+            "pose": lambda _: self._pose_message(),
+            "state": lambda now: told("state", **state(self, self._way, now)),
+            "path": self._path_message,
+            "areas": lambda _: told("areas", **areas(self.settings, self._order)),
+            "events": lambda _: told("events", entries=lately(self.events)),
+            "map": lambda _: self._map_message(),
+            "floor": lambda _: self._grid_message("floor", FLOOR_MARKS),
+            "field": lambda _: self._grid_message("field", FIELD_MARKS),
+            "others": lambda now: told("others", robots=list(self._near(now))),
+        }
+        self._made_at = dict.fromkeys(self._makers, float("-inf"))
+        # What the newest message of a kind was made of.
+        self._made_of: dict[str, object] = {}
+        self._said: dict[str, str] = {}
+
+    def news(self, now: float) -> dict[str, str | bytes]:
+        """Return the messages, by kind, that are due and tell something new."""
+        found: dict[str, str | bytes] = {}
+        for kind, make in self._makers.items():
+            if now - self._made_at[kind] < PERIODS_S[kind] or not self._is_new(kind, now):
+                continue
+            self._made_at[kind] = now
+            message = make(now)
+            if message is not None and message != self._said.get(kind):
+                if isinstance(message, str):
+                    self._said[kind] = message
+                found[kind] = message
+        return found
+
+    def _is_new(self, kind: str, now: float) -> bool:
+        source = self._source(kind, now)
+        if kind in self._made_of and self._made_of[kind] == source:
+            return False
+        self._made_of[kind] = source
+        return True
+
+    def _source(self, kind: str, now: float) -> object:
+        """Return what a message is made of: where that is the same, the message is."""
+        made_of: dict[str, object] = {
+            "pose": (self.pose, self.walk, self.walk.at),
+            "path": self._path,
+            "events": self.events.count,
+            "areas": (self.settings, self._order),
+            "map": (self._grids.get("map", self._grids.get("coverage")), self.settings.map),
+            "floor": self._grids.get("floor"),
+            "field": self._grids.get("field"),
+        }
+        # The others tell of time, too.
+        now_too = self.document, self.trouble, len(self.robots), int(now)
+        return made_of.get(kind, now_too)
+
+    def _read_map(self, sample: Sample, _: float) -> None:
+        self._grids["map"] = read_grid(sample.payload)
+
+    def _read_map_update(self, sample: Sample, _: float) -> None:
+        # Updates of a map that came before this process did are of no use to it.
+        if "map" in self._grids:
+            self._grids["map"] = with_update(self._grids["map"], sample.payload)
+
+    def _read_coverage(self, sample: Sample, _: float) -> None:
+        self._grids["coverage"] = read_grid(sample.payload)
+
+    def _read_floor(self, sample: Sample, _: float) -> None:
+        self._grids["floor"] = read_grid(sample.payload)
+
+    def _read_field(self, sample: Sample, _: float) -> None:
+        # Without an attachment it is what a cohort has left.
+        if sample.attachment:
+            self._grids["field"] = read_field(sample.payload)
+
+    def _read_path(self, sample: Sample, _: float) -> None:
+        # They are many: none is an event of its own.
+        self._path = sample
+
+    def _read_fleet(self, sample: Sample, now: float) -> None:
+        robot = self._keys.robot_of(sample.key)
+        fleet = self.status.fleet if self.status else None
+        if fleet is None or robot in ("", self.robot):
+            return
+        member = decode_member(sample.payload, fleet.name)
+        if member is not None and (robot in self._others or len(self._others) < MOST_OTHERS):
+            self._others[robot] = (now, member.x, member.y)
+
+    def _follow(self, document: dict[str, object], now: float) -> None:
+        super()._follow(document, now)
+        order = document.get("order")
+        if document.get("command") == "start":
+            self._order = order if isinstance(order, dict) else {}
+        elif document.get("command") in ("cancel", "reset"):
+            self._order = {}
+
+    def _near(self, now: float) -> Iterator[dict[str, object]]:
+        for robot, (at_s, x, y) in list(self._others.items()):
+            if now - at_s > OTHER_LASTS_S:
+                del self._others[robot]
+            else:
+                yield {"name": robot, "x": x, "y": y}
+
+    def _pose_message(self) -> str | None:
+        if self.pose is None:
+            return None
+        x, y, yaw = (round(value, 3) for value in (self.pose.x, self.pose.y, self.pose.yaw))
+        return told("pose", x=x, y=y, yaw=yaw, at=self.walk.at, path=self.walk.revision)
+
+    def _path_message(self, now: float) -> bytes | None:
+        if self._path is None:
+            return None
+        about = decode_document(self._path.attachment or b"{}", PathAttachment)
+        try:
+            points = PathPoints(self._path.payload)
+            xy = points.take(MOST_POINTS)
+        except FasacoError as error:
+            self.note_unreadable("path", error, now)
+            return None
+        self.walk, self._way = PathProgress(xy, about.revision), Way(xy)
+        # Far from 0 a float32 has no centimetres.
+        x, y = xy[0] if xy else (0.0, 0.0)
+        flat = array("f", (value for px, py in xy for value in (px - x, py - y)))
+        if sys.byteorder == "big":
+            flat.byteswap()
+        head: dict[str, object] = {"revision": about.revision, "x": x, "y": y, "more": points.left}
+        return framed("path", head, zlib.compress(flat.tobytes(), 1))
+
+    def _map_message(self) -> bytes | None:
+        if "map" in self._grids:
+            return grid_message("map", self._grids["map"], map_marks(self.settings.map))
+        # Under ROS 2, and after a map that nobody kept, the lattice shows what is free.
+        cells = self._grids.get("coverage")
+        return None if cells is None else grid_message("map", cells, COVERAGE_MARKS)
+
+    def _grid_message(self, kind: str, marks: bytes) -> bytes | None:
+        grid = self._grids.get(kind)
+        return None if grid is None else grid_message(kind, grid, marks)

@@ -1,0 +1,166 @@
+"""The server of the page: HTTP for the page, a WebSocket for each viewer, a thread for the bus."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import signal
+import ssl
+import threading
+from http import HTTPStatus
+
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from fasaco_edge.bus.queries import Reply
+from fasaco_edge.host.addresses import Address
+from fasaco_edge.serve.guard import Guard, is_same_origin
+from fasaco_edge.serve.page import load_page
+from fasaco_edge.serve.served_view import ServedView
+from fasaco_edge.serve.viewer import Viewer, attend
+from fasaco_edge.watch.feed import Feed
+from fasaco_edge.watch.phrases import steady_now
+from fasaco_edge.wire.topics import FLOOR, PHEROMONE
+
+LOG = logging.getLogger(__name__)
+
+MOST_VIEWERS = 20
+# The longest order is some hundred kilobytes.
+MOST_BYTES = 262_144
+# Pages get news at most so often; without any, whether there are viewers is looked at [s].
+FRAME_S, IDLE_S = 0.1, 0.2
+# A connection that is no page yet, and one whose computer is gone, ends after so long [s].
+OPEN_S, PING_S = 5.0, 15.0
+# What waits for a viewer in this process [bytes], beside the message being sent.
+WAITING_BYTES = 65_536
+
+
+class Server:
+    """Serves one robot's page.
+
+    Args:
+        feed: its samples.
+        view: what is made of them.
+        guard: who may do what.
+    """
+
+    def __init__(self, feed: Feed, view: ServedView, guard: Guard) -> None:
+        self._feed = feed
+        self._view = view
+        self._guard = guard
+        self._page = load_page()
+        self._viewers: set[Viewer] = set()
+        self._newest: dict[str, tuple[int, str | bytes]] = {}
+        self._ended = threading.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    def newest(self) -> list[tuple[str, int, str | bytes]]:
+        """Return the newest messages: kind, number, message."""
+        return [(kind, number, message) for kind, (number, message) in self._newest.items()]
+
+    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
+        """Ask the daemon; blocks."""
+        return self._feed.ask(query, payload, timeout_s)
+
+    async def run(self, address: Address, secured: ssl.SSLContext | None = None) -> None:
+        """Serve until SIGTERM or SIGINT.
+
+        Raises:
+            OSError: it cannot listen there.
+        """
+        self._loop = asyncio.get_running_loop()
+        stop = asyncio.Event()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            self._loop.add_signal_handler(number, stop.set)
+        async with serve(
+            self._attend,
+            *address,
+            ssl=secured,
+            process_request=self._answer,
+            compression=None,  # what is large is compressed once, for all
+            server_header=None,
+            open_timeout=OPEN_S,
+            ping_interval=PING_S,
+            ping_timeout=PING_S,
+            close_timeout=1.0,
+            max_size=MOST_BYTES,
+            max_queue=4,
+            write_limit=WAITING_BYTES,
+        ):
+            hearing = threading.Thread(target=self._hear, name="hear", daemon=True)
+            hearing.start()
+            await stop.wait()
+            self._ended.set()
+        hearing.join(2 * IDLE_S)
+
+    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Answer what is no WebSocket; None lets one begin."""
+        hosts = request.headers.get_all("Host")
+        host = hosts[0] if len(hosts) == 1 else ""
+        if not self._guard.is_ours(host):
+            why = "unknown host: open the page by its address, or name it with --name"
+            return self._response(HTTPStatus.MISDIRECTED_REQUEST, why)
+        place = request.path.partition("?")[0]
+        if place == "/":
+            return self._response(HTTPStatus.OK, self._page.body, host)
+        if place != "/live":
+            return self._response(HTTPStatus.NOT_FOUND, "the page is at /")
+        if not is_same_origin(request.headers.get("Origin"), host):
+            return self._response(HTTPStatus.FORBIDDEN, "a page of another server")
+        if len(self._viewers) >= MOST_VIEWERS:
+            why = f"there are {MOST_VIEWERS} viewers already"
+            return self._response(HTTPStatus.SERVICE_UNAVAILABLE, why)
+        return None
+
+    def _response(self, status: HTTPStatus, body: str | bytes, host: str = "") -> Response:
+        is_page = isinstance(body, bytes)
+        content = body if isinstance(body, bytes) else f"{body}\n".encode()
+        # Old browsers do not count a WebSocket to 'self'.
+        policy = f"{self._page.policy}; connect-src 'self' ws://{host} wss://{host}"
+        headers = {
+            "Content-Type": "text/html; charset=utf-8" if is_page else "text/plain; charset=utf-8",
+            "Content-Length": str(len(content)),
+            "Content-Security-Policy": policy if is_page else "default-src 'none'",
+            "Cache-Control": "no-store",
+            "Connection": "close",
+            "Cross-Origin-Opener-Policy": "same-origin",
+            "Cross-Origin-Resource-Policy": "same-origin",
+            "Referrer-Policy": "no-referrer",
+            "X-Content-Type-Options": "nosniff",
+            "X-Frame-Options": "DENY",
+        }
+        return Response(status.value, status.phrase, Headers(headers), content)
+
+    async def _attend(self, socket: ServerConnection) -> None:
+        viewer = Viewer(socket, self, self._guard)
+        self._viewers.add(viewer)
+        try:
+            await attend(viewer, socket)
+        except ConnectionClosed:
+            LOG.debug("a viewer is gone")
+        finally:
+            self._viewers.discard(viewer)
+
+    def _hear(self) -> None:
+        """Take in what comes, and make messages of it while somebody looks."""
+        while not self._ended.is_set():
+            items = self._feed.take(IDLE_S)
+            now = steady_now()
+            for topic, item in items:
+                self._view.take(topic, item, now)
+            self._view.trouble = self._feed.trouble
+            viewers = tuple(self._viewers)
+            self._feed.want(FLOOR, bool(viewers))
+            self._feed.want(PHEROMONE, any(viewer.wants_field for viewer in viewers))
+            if viewers and (news := self._view.news(now)) and self._loop is not None:
+                self._loop.call_soon_threadsafe(self._publish, news)
+            self._ended.wait(max(FRAME_S - (steady_now() - now), 0.0))
+
+    def _publish(self, news: dict[str, str | bytes]) -> None:
+        for kind, message in news.items():
+            number, _ = self._newest.get(kind, (0, b""))
+            self._newest[kind] = number + 1, message
+        for viewer in self._viewers:
+            viewer.news.set()

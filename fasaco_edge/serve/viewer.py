@@ -1,0 +1,138 @@
+"""One browser: what it was sent, what it asks, and its end where it hangs."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from typing import TYPE_CHECKING, Protocol
+
+import msgspec
+
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.serve.messages import Hello, Order, Role, Wants, from_page, told
+from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
+from fasaco_edge.wire.documents.replies import Error
+from fasaco_edge.wire.documents.replies import Reply as Answer
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
+
+    from fasaco_edge.bus.queries import Reply
+    from fasaco_edge.serve.guard import Guard
+
+LOG = logging.getLogger(__name__)
+
+# Who does not say who it is, does not read, or says no token, goes after so long [s].
+HELLO_S, SEND_S, REFUSED_S = 5.0, 10.0, 1.0
+ANSWER_S = 8.0
+# Codes of the end of a connection, from those free for applications.
+DENIED, MALFORMED = 4401, 4400
+
+
+class Source(Protocol):
+    """What viewers are shown, and whom they command."""
+
+    def newest(self) -> list[tuple[str, int, str | bytes]]:
+        """Return the newest messages: kind, number, message."""
+
+    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
+        """Ask the daemon; blocks."""
+
+
+class Viewer:
+    """A connection of one page. Nothing waits for it here: it gets what is newest when it can.
+
+    Attributes:
+        wants_field: whether it shows the pheromone field.
+        news: is set when there is something newer.
+    """
+
+    def __init__(self, socket: ServerConnection, source: Source, guard: Guard) -> None:
+        self.wants_field = False
+        self.news = asyncio.Event()
+        self._socket = socket
+        self._source = source
+        self._guard = guard
+
+    async def greet(self) -> Role | None:
+        """Return what it may do; None where it is sent away."""
+        async with asyncio.timeout(HELLO_S):
+            said = from_page(await self._socket.recv())
+        role = self._guard.role_of(said.token) if isinstance(said, Hello) else None
+        if role is None:
+            # Who tries tokens tries one a second on each connection.
+            await asyncio.sleep(REFUSED_S)
+            await self._send(told("denied", asks=isinstance(said, Hello) and not said.token))
+            await self._socket.close(DENIED)
+            return None
+        await self._send(told("welcome", role=role))
+        return role
+
+    async def serve(self, role: Role) -> None:
+        """Send what is new and do what it asks, until it goes or hangs."""
+        sending = asyncio.create_task(self._send_news())
+        try:
+            async for text in self._socket:
+                match from_page(text):
+                    case Wants(field):
+                        self.wants_field = field
+                        self.news.set()
+                    case Order() as order:
+                        await self._send(await self._carry_out(order, role))
+                    case Hello():
+                        pass
+        finally:
+            sending.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await sending
+
+    async def _send_news(self) -> None:
+        sent: dict[str, int] = {}
+        while True:
+            self.news.clear()
+            for kind, number, message in self._source.newest():
+                if sent.get(kind) != number and (kind != "field" or self.wants_field):
+                    sent[kind] = number
+                    await self._send(message)
+            await self.news.wait()
+
+    async def _send(self, message: str | bytes) -> None:
+        try:
+            async with asyncio.timeout(SEND_S):
+                await self._socket.send(message)
+        except TimeoutError:
+            LOG.info("a viewer that does not read is dropped")
+            self._socket.transport.abort()
+
+    async def _carry_out(self, order: Order, role: Role) -> str:
+        if role != "operator":
+            why = "this page may only look; its server says who may command"
+            return told("answer", id=order.id, ok=False, text=why, hint="")
+        asked: dict[str, object] = {"command": order.command}
+        if order.command == "start":
+            asked["order"] = order.order or {}
+        try:
+            payload = encode_json(asked)
+            found = await asyncio.to_thread(self._source.ask, "mission", payload, ANSWER_S)
+        except FasacoError as error:
+            return told("answer", id=order.id, ok=False, text=str(error), hint=error.hint)
+        if not found:
+            why = "no answer from the daemon"
+            return told("answer", id=order.id, ok=False, text=why, hint="")
+        if found[0].is_error:
+            wrong = decode_tolerant(found[0].payload, Error)
+            return told("answer", id=order.id, ok=False, text=wrong.message, hint=wrong.hint)
+        answer = decode_tolerant(found[0].payload, Answer)
+        text = f"{answer.state}: {answer.reason}"
+        return told("answer", id=order.id, ok=True, text=text, hint="")
+
+
+async def attend(viewer: Viewer, socket: ServerConnection) -> None:
+    """Greet and serve a viewer; end the connection of one that says what no page does."""
+    try:
+        role = await viewer.greet()
+        if role is not None:
+            await viewer.serve(role)
+    except (msgspec.DecodeError, TimeoutError, RecursionError):
+        await socket.close(MALFORMED)

@@ -1,0 +1,198 @@
+"""The page in a real browser, by its DevTools: seen, and a mission ordered by finger."""
+
+from __future__ import annotations
+
+import base64
+import io
+import itertools
+import json
+import os
+import shutil
+import signal
+import subprocess
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+pytest.importorskip("websockets")
+
+from websockets.sync.client import ClientConnection, connect
+
+from tests.serve.serving import served, until
+from tests.support.outsider import TIMEOUT_S, Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import HALL, lanes, map_bytes, pose_bytes
+
+BROWSER = shutil.which("chromium")
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="needs chromium")
+PHONE, LAPTOP = (390, 844), (1280, 800)
+
+
+@dataclass
+class Tab:
+    """A tab of the browser."""
+
+    socket: ClientConnection
+    complaints: list[str] = field(default_factory=list)
+    numbers: Iterator[int] = field(default_factory=itertools.count)
+
+    def call(self, method: str, **params: Any) -> dict[str, Any]:
+        """Call a method of the DevTools protocol."""
+        number = next(self.numbers)
+        self.socket.send(json.dumps({"id": number, "method": method, "params": params}))
+        while True:
+            said = json.loads(self.socket.recv(TIMEOUT_S))
+            if said.get("method") == "Runtime.exceptionThrown" or (
+                said.get("method") == "Log.entryAdded"
+                and said["params"]["entry"]["level"] in ("warning", "error")
+            ):
+                self.complaints.append(json.dumps(said["params"]))
+            if said.get("id") == number:
+                result: dict[str, Any] = said["result"]
+                return result
+
+    def js(self, text: str) -> Any:
+        """Return the value of an expression."""
+        return self.call("Runtime.evaluate", expression=text)["result"].get("value")
+
+    def click(self, name: str) -> None:
+        """Click a button that can be seen."""
+        until(lambda: self.js(f"find({name!r}).offsetParent !== null"), lambda: name)
+        self.js(f"find({name!r}).click()")
+
+    def size(self, size: tuple[int, int], scheme: str) -> None:
+        """Be a screen of that size, light or dark."""
+        width, height = size
+        screen = {"width": width, "height": height, "deviceScaleFactor": 1}
+        self.call("Emulation.setDeviceMetricsOverride", **screen, mobile=size == PHONE)
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        self.call("Emulation.setEmulatedMedia", features=features)
+
+    def picture(self) -> np.ndarray:
+        """Return what is seen, uint8 (rows, cols, 3)."""
+        data = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+
+    def touch(self, *way: tuple[float, float]) -> None:
+        """Draw a finger over the screen."""
+        for index, (x, y) in enumerate(way):
+            kind = "touchMove" if index else "touchStart"
+            self.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y}])
+        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
+    def on_screen(self, x: float, y: float) -> tuple[float, float]:
+        """Return where a point of the map is on the screen."""
+        box = "canvas.getBoundingClientRect()"
+        text = f"JSON.stringify([toScreen({x}, {y}), {box}.left, {box}.top])"
+        (px, py), left, top = json.loads(self.js(text))
+        return px + left, py + top
+
+
+@contextmanager
+def browsing(url: str, folder: Path) -> Iterator[Tab]:
+    """Open a page in a browser of its own."""
+    options = ("--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0")
+    words = (*options, f"--user-data-dir={folder}", "about:blank")
+    quiet = subprocess.DEVNULL
+    process = subprocess.Popen(
+        [str(BROWSER), *words], stdout=quiet, stderr=quiet, start_new_session=True
+    )
+    port = folder / "DevToolsActivePort"
+    try:
+        until(lambda: port.exists() and bool(port.read_text().strip()))
+        listed = f"http://127.0.0.1:{port.read_text().split()[0]}/json/list"
+        with urllib.request.urlopen(listed) as answer:
+            tabs = json.loads(answer.read())
+        address = next(tab for tab in tabs if tab["type"] == "page")["webSocketDebuggerUrl"]
+        with connect(address, max_size=None, compression=None) as socket:
+            tab = Tab(socket)
+            for domain in ("Page", "Runtime", "Log"):
+                tab.call(f"{domain}.enable")
+            tab.size(PHONE, "light")
+            tab.call("Emulation.setTouchEmulationEnabled", enabled=True)
+            tab.call("Page.navigate", url=url)
+            yield tab
+    finally:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def has(picture: np.ndarray, colour: str) -> int:
+    """Return how many pixels have a colour."""
+    wanted = [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
+    return int((picture == wanted).all(axis=-1).sum())
+
+
+@needs_browser
+def test_a_mission_is_ordered_by_finger(tmp_path):
+    with (
+        daemon_process(tmp_path, mission={"autostart": False}) as daemon,
+        Outsider(daemon.endpoint) as outsider,
+        served(tmp_path, daemon.endpoint, "--allow-commands") as page,
+        browsing(page.url, tmp_path / "browser") as tab,
+    ):
+        until(lambda: tab.js("model.role") == "operator")
+        outsider.put("map", map_bytes(HALL))
+        outsider.put("pose", pose_bytes(*lanes(1)[0]))
+        until(lambda: tab.js("find('state').textContent") == "idle")
+        until(lambda: tab.js("Boolean(model.map && model.map.pixel === 0.05 && model.pose)"))
+        tab.js("find('plan').open = true")
+        tab.click("draw-zone")
+        (x0, y0), (x1, y1) = tab.on_screen(0.5, 0.5), tab.on_screen(3.0, 3.0)
+        tab.touch((x0, y0), ((x0 + x1) / 2, (y0 + y1) / 2), (x1, y1))
+        tab.click("draw-keepout")
+        for corner in ((2.0, 2.0), (2.4, 2.0), (2.4, 2.4)):
+            tab.touch(tab.on_screen(*corner))
+        until(lambda: tab.js("drawing.corners.length") == 3)
+        tab.click("drawdone")
+        tab.click("order")
+        mission = outsider.wait_status(lambda status: status["state"] == "covering")["mission"]
+        assert [zone["name"] for zone in mission["zones"]] == ["room 1"]
+        assert mission["keep_out"] == 1
+        until(lambda: tab.js("model.areas.zones.length") == 1)
+        corners = json.loads(tab.js("JSON.stringify(model.areas.zones[0].polygon)"))
+        assert np.abs(np.array(corners) - [[0.5, 0.5], [3, 0.5], [3, 3], [0.5, 3]]).max() < 0.1
+        for size, scheme in itertools.product((PHONE, LAPTOP), ("light", "dark")):
+            tab.size(size, scheme)
+            # Robot and path in the colours of the style, once it is drawn anew.
+            until(
+                lambda: all(
+                    has(tab.picture(), tab.js(f"colours.{of}")) for of in ("robot", "ahead")
+                )
+            )
+            assert tab.js("document.documentElement.scrollWidth <= innerWidth")
+        tab.click("pause")
+        outsider.wait_status(lambda status: status["state"] == "paused")
+        tab.click("resume")
+        outsider.wait_status(lambda status: status["state"] == "covering")
+        tab.click("cancel")
+        assert outsider.ask_status()["mission"]["ordered"] == "command"
+        tab.click("cancel")
+        outsider.wait_status(lambda status: status["mission"]["ordered"] is None)
+        tab.click("trail")
+        until(lambda: tab.js("Boolean(model.field)"))
+        assert tab.complaints == []
+
+
+@needs_browser
+def test_a_page_asks_for_its_token(tmp_path):
+    file = tmp_path / "tokens"
+    with (
+        daemon_process(tmp_path) as daemon,
+        served(tmp_path, daemon.endpoint, "--tokens", str(file)) as page,
+    ):
+        token = file.read_text().split("operator: ")[1].strip()
+        with browsing(page.url, tmp_path / "one") as tab:
+            until(lambda: tab.js("find('login').open"))
+            tab.js(f"find('token').value = {token!r}; find('login').close()")
+            until(lambda: tab.js("model.role") == "operator")
+        with browsing(f"{page.url}#{token}", tmp_path / "two") as tab:
+            until(lambda: tab.js("model.role") == "operator")
+            assert tab.js("location.hash") == ""
