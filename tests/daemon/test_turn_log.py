@@ -7,28 +7,44 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.loop.inbox import Batch, Received
 from fasaco_edge.daemon.loop.turn_log import TurnLog, TurnNote
 from fasaco_edge.mission.core.events import Decision
+from fasaco_edge.samples import SampleDecoder
+from fasaco_edge.wire.documents.turns import decode_turns
 
 
-class Deaf:
+class Publisher:
     """A publisher that nobody hears yet."""
 
     def __init__(self):
-        self.sent = []
+        self.is_heard, self.sent = False, []
 
     def has_listeners(self):
-        return bool(self.sent)
+        return self.is_heard
 
     def put(self, payload):
         self.sent.append(payload)
 
 
 def test_of_a_long_wait_for_a_map_the_newest_pose_and_charge_are_kept():
-    log = TurnLog(Deaf(), DaemonConfig(), None)
+    log = TurnLog(publisher := Publisher(), DaemonConfig(), None)
+
+    def note(number):
+        kind = "pose" if number % 10 else "battery"
+        received = Received(kind, Sample(kind, b"%50d" % number), 0.1 * number)
+        log.note(TurnNote(received.at, Batch(samples=[received]), (), Decision()), None)
+
     for number in range(5_000):
-        now = 0.1 * number
-        kinds = ["pose"] if number % 10 else ["battery"]
-        samples = [Received(kind, Sample(kind, b"%50d" % number), now) for kind in kinds]
-        log.note(TurnNote(now, Batch(samples=samples), (), Decision()), None)
-    assert log._is_open
-    assert [cycle.samples[0].topic for cycle in log._turns] == ["battery", "pose"]
-    assert len(log._times) == 2
+        note(number)
+    assert publisher.sent == []
+    publisher.is_heard = True
+    note(5_001)
+    (payload,) = publisher.sent
+    batch = decode_turns(payload)
+    assert batch.first == 1
+    assert batch.beginning is not None
+    assert batch.times == [0.1 * number for number in (4_990, 4_999, 5_001)]
+    assert [turn.number for turn in batch.turns] == [1, 2, 3]
+    assert not any(turn.is_begun for turn in batch.turns)
+    arrivals = [numbered.arrival for numbered in SampleDecoder().samples(batch.told)]
+    told = [(arrival.topic, int(arrival.sample.payload)) for arrival in arrivals]
+    assert told == [("battery", 4_990), ("pose", 4_999), ("pose", 5_001)]
+    assert [turn.samples[0].topic for turn in batch.turns] == [topic for topic, _ in told]
