@@ -1,0 +1,89 @@
+"""What a page is told of a robot, sample by sample."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.serve import served_view
+from fasaco_edge.serve.served_view import OTHER_LASTS_S, ServedView
+from fasaco_edge.wire.documents.fleet import FleetMember
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.messages.paths import encode_path
+
+CORNERS = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
+
+
+def tell(view: ServedView, topic: str, document: Any, now: float, key: str = "") -> None:
+    """Let a document come."""
+    view.take(topic, Sample(key, encode_json(document)), now)
+
+
+def heard(view: ServedView, kind: str, now: float) -> Any:
+    """Return the message of a kind that is news now; None where there is none."""
+    message = view.news(now).get(kind)
+    return json.loads(message) if isinstance(message, str) else message
+
+
+def test_other_robots_of_the_fleet_are_shown_while_they_are_heard():
+    view = ServedView(Keys("one"))
+    member = FleetMember(1, "hall", 0.3, "map", "covering", 2.0, 3.0, 1.0, 1, 0, 5, ())
+    tell(view, "fleet", member, 1.0, "fasaco/@v1/two/fleet")
+    assert heard(view, "others", 1.0) == {"kind": "others", "robots": []}
+    tell(view, "status", {"state": "covering", "fleet": {"name": "hall"}}, 2.0)
+    for robot in ("one", "two", "two"):
+        tell(view, "fleet", member, 3.0, f"fasaco/@v1/{robot}/fleet")
+    assert heard(view, "others", 3.5)["robots"] == [{"name": "two", "x": 2.0, "y": 3.0}]
+    assert heard(view, "others", 4.0 + OTHER_LASTS_S)["robots"] == []
+
+
+def test_an_order_is_drawn_until_it_is_cancelled():
+    view = ServedView(Keys())
+    order = {
+        "zones": [{"name": "hall", "polygon": CORNERS}, {"name": "of old"}],
+        "keep_out": [CORNERS],
+    }
+    tell(view, "command", {"command": "start", "order": order}, 1.0)
+    tell(view, "command", {"command": "pause"}, 1.0)
+    areas = heard(view, "areas", 1.0)
+    assert [zone["name"] for zone in areas["zones"]] == ["hall"]
+    assert areas["keep_out"] == [{"polygon": CORNERS, "is": "ordered"}]
+    tell(view, "command", {"command": "cancel"}, 2.0)
+    assert heard(view, "areas", 2.0)["zones"] == []
+
+
+def test_what_has_not_changed_is_not_said_again():
+    view = ServedView(Keys())
+    tell(view, "status", {"state": "idle"}, 1.0)
+    assert heard(view, "state", 1.0)["state"] == "idle"
+    assert view.news(1.05) == {}
+    tell(view, "status", {"state": "idle", "uptime_s": 1.0}, 2.0)
+    assert "state" not in view.news(2.0)
+
+
+def test_of_a_long_path_the_beginning_is_shown(monkeypatch):
+    monkeypatch.setattr(served_view, "MOST_POINTS", 10)
+    view = ServedView(Keys())
+    xy = np.stack([np.arange(25.0), np.zeros(25)], axis=-1)
+    note = encode_json({"revision": 3, "steps": 24, "reason": "test"})
+    view.take("path", Sample("", encode_path(xy, np.zeros(25), "map", 1), "", note), 1.0)
+    message = view.news(1.0)["path"]
+    assert isinstance(message, bytes)
+    head = json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
+    assert (head["revision"], head["more"]) == (3, 15)
+    assert len(view.walk.xy) == 10
+
+
+def test_a_sample_that_cannot_be_read_is_told_and_costs_no_other():
+    view = ServedView(Keys())
+    for topic in ("map", "floor", "path", "coverage"):
+        view.take(topic, Sample("", b"nonsense"), 1.0)
+    tell(view, "status", {"state": "idle"}, 1.0)
+    news = view.news(1.0)
+    assert set(news) >= {"state", "events"}
+    assert "cannot be read" in str(news["events"])
+    assert not {"map", "floor", "path"} & set(news)
