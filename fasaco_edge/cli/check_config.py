@@ -51,6 +51,8 @@ def run(args: argparse.Namespace) -> int:
         print(yaml.safe_dump(config_document(config), sort_keys=False), end="")
     else:
         print(f"{args.file}: in order")
+        if assumed := config.robot.assumed:
+            print(f"  {assumed}")
     return Exit.OK if config is not None else Exit.CONFIG
 
 

@@ -37,8 +37,9 @@ WAYS = {
 }
 HEAD = "# Every key, with its default and what it means: deploy/fasaco-edge.yaml\n"
 EPILOG = """\
-What is not given is asked for at a terminal; elsewhere the radius, the width and --map-by have to
-be given. The file has what differs from the defaults, and is checked as `check-config` does.
+What is not given is asked for at a terminal; elsewhere radius or size, the tool's width and
+--map-by have to be given. The file has what differs from the defaults, and is checked as
+`check-config` does.
 
 examples:
   fasaco-edge init
@@ -59,6 +60,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--robot-radius", type=float, metavar="M", help="of the disc around the robot [m]"
+    )
+    parser.add_argument(
+        "--robot-size",
+        type=_size,
+        metavar="WxL",
+        help="in its place, of a rectangular robot: width and length [m], 0.5x0.6 say; it is "
+        "planned with the disc around that",
     )
     parser.add_argument(
         "--tool-width", type=float, metavar="M", help="of the brush, mop or mower [m]"
@@ -85,6 +93,14 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     add_json(parser, "the configuration and what was heard")
 
 
+def _size(text: str) -> dict[str, float]:
+    try:
+        width_m, length_m = (float(part) for part in text.split("x"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be like 0.5x0.6, got {text!r}") from None
+    return {"width_m": width_m, "length_m": length_m}
+
+
 def run(args: argparse.Namespace) -> int:
     """Ask for what is missing, write the file, and tell what is heard on the bus."""
     file: Path = args.file
@@ -103,14 +119,24 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print_json({"file": str(file), "config": document, "heard": heard and asdict(heard)})
     else:
-        _print(file, text, heard)
+        _print(file, text, config.robot.assumed, heard)
     return Exit.OK
 
 
 def document_of(args: argparse.Namespace) -> dict[str, object]:
     """Return what differs from the defaults."""
-    robot = {"name": args.name, "radius_m": args.robot_radius, "tool_width_m": args.tool_width}
-    usual = {"name": "robot", "radius_m": DEFAULT_RADIUS_M, "tool_width_m": DEFAULT_CELL_M}
+    robot = {
+        "name": args.name,
+        "radius_m": args.robot_radius,
+        "footprint": args.robot_size,
+        "tool_width_m": args.tool_width,
+    }
+    usual = {
+        "name": "robot",
+        "radius_m": DEFAULT_RADIUS_M,
+        "footprint": None,
+        "tool_width_m": DEFAULT_CELL_M,
+    }
     ros = {"domain": args.domain, "namespace": args.namespace}
     parts: dict[str, dict[str, object]] = {
         "robot": {k: v for k, v in robot.items() if v not in (None, usual[k])},
@@ -135,12 +161,14 @@ def _ask(args: argparse.Namespace) -> None:
     """
     needed = ("robot_radius", "tool_width", "map_by")
     missing = [name for name in needed if getattr(args, name) is None]
+    if args.robot_size is not None and "robot_radius" in missing:
+        missing.remove("robot_radius")
     if not missing:
         return
     if not (sys.stdin.isatty() and err().is_terminal):
         options = ", ".join(f"--{name.replace('_', '-')}" for name in missing)
         raise BadConfiguration(f"{options} must be given: there is no terminal to ask at")
-    if args.robot_radius is None:
+    if args.robot_radius is None and args.robot_size is None:
         args.robot_radius = _number("Radius of the disc around the robot [m]", DEFAULT_RADIUS_M)
     if args.tool_width is None:
         args.tool_width = _number("Width of its tool [m]", DEFAULT_CELL_M)
@@ -188,11 +216,13 @@ def _listen(config: DaemonConfig, listen_s: float) -> Finding:
     return peers(CheckContext(config), listen_s)
 
 
-def _print(file: Path, text: str, heard: Finding | None) -> None:
+def _print(file: Path, text: str, assumed: str, heard: Finding | None) -> None:
     console = out()
     console.print(f"{file}:", soft_wrap=True)
     for line in text.splitlines():
         console.print(f"  {line}", markup=False, highlight=False, soft_wrap=True)
+    if assumed:
+        console.print(f"assumed:    {assumed}", soft_wrap=True)
     if heard is not None:
         console.print(f"on the bus: {heard.found}", soft_wrap=True)
         for line in heard.details:

@@ -13,6 +13,7 @@ from msgspec import Meta
 
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.config.footprint import FootprintConfig
 from fasaco_edge.config.metrics import MetricsConfig
 from fasaco_edge.config.reading import Section
 from fasaco_edge.config.ros import RosConfig
@@ -41,6 +42,7 @@ else:
     PlannerName = Literal[PLANNER_NAMES]
 
 Metres = Annotated[float, Meta(gt=0, le=10)]
+DEFAULT_RADIUS_M = 0.18
 Percent = Annotated[int, Meta(ge=0, le=100)]
 
 
@@ -52,10 +54,12 @@ class RobotConfig(Section, frozen=True):
     robot's limits count in its place: the rate of turning [deg/s], its acceleration [deg/s2], that
     of driving [m/s2], and the largest bend that is steered while driving [deg]. ``overlap`` is by
     what share of the tool's width lanes overlap where a line is driven (``planner.line``).
+    ``footprint`` stands in place of ``radius_m``: the disc around it is planned with.
     """
 
     name: str = "robot"
-    radius_m: Metres = 0.18
+    radius_m: Metres = DEFAULT_RADIUS_M
+    footprint: FootprintConfig | msgspec.UnsetType = msgspec.UNSET
     tool_width_m: Metres = 0.3
     speed_m_s: Annotated[float, Meta(gt=0, le=10)] = 0.25
     quarter_turn_s: Annotated[float, Meta(ge=0, le=600)] = 1.5
@@ -64,6 +68,23 @@ class RobotConfig(Section, frozen=True):
     acceleration_m_s2: Annotated[float, Meta(ge=0.01, le=100)] = 0.5
     steered_deg: Annotated[float, Meta(ge=0, le=45)] = 1.0
     overlap: Annotated[float, Meta(ge=0, le=0.5)] = 0.08
+
+    def __post_init__(self) -> None:
+        """Have the radius of the disc around the footprint, where there is one."""
+        if self.footprint and self.radius_m == DEFAULT_RADIUS_M:
+            radius_m = self.footprint.radius() or DEFAULT_RADIUS_M
+            msgspec.structs.force_setattr(self, "radius_m", radius_m)
+
+    @property
+    def assumed(self) -> str:
+        """What is assumed of the robot's shape; "" where it is the disc that was given."""
+        if not self.footprint:
+            return ""
+        return (
+            f"the robot is planned with the disc around its footprint, of radius "
+            f"{self.radius_m:.3g} m: it may turn on the spot anywhere, passages narrower than "
+            f"{2.0 * self.radius_m:.3g} m are left out, and its tool is where it turns about"
+        )
 
     def cost(self, cell_m: float | None = None) -> CoverageCost:
         """Return what a step over a cell, by default one as wide as the tool, and a turn cost.

@@ -133,6 +133,16 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
     yield from _refused("bus.", lambda: Keys(base=config.bus.base))
     yield from _refused("robot.name: ", lambda: Keys(robot=config.robot.name))
     yield from _refused("robot: ", config.robot.cost)
+    if footprint := config.robot.footprint:
+        faults = list(footprint.faults())
+        for error in faults:
+            yield BadConfiguration(f"robot.footprint: {error}")
+        radius_m = config.robot.radius_m
+        if not faults and abs(radius_m - footprint.radius()) > 1e-6:
+            yield BadConfiguration(
+                f"robot.radius_m must be left out beside robot.footprint, whose disc has "
+                f"{footprint.radius():.3g} m, got {radius_m:g}"
+            )
     yield from _refused("planner.", config.planner.colony)
     yield from _refused("", config.mission.check_zones)
 

@@ -77,7 +77,8 @@ def findings(
     deadline = time.monotonic() + PATIENCE_S
     try:
         config, refused = load_config(path), None
-        yield "configuration", ok(str(path or "defaults, without a file"))
+        assumed = [said] if (said := config.robot.assumed) else []
+        yield "configuration", ok(str(path or "defaults, without a file"), details=assumed)
     except BadConfiguration as error:
         config, refused = DaemonConfig(), error
         yield "configuration", fail(str(error), error.hint)
