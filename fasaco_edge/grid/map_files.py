@@ -29,6 +29,7 @@ from fasaco_edge.grid.geometry import (
 )
 from fasaco_edge.grid.map_images import MapImage, check_size, read_image
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from fasaco_edge.host.files import check_plain
 from fasaco_edge.host.plain_yaml import PlainYamlError, load, read_bounded
 from fasaco_edge.host.resources import folder
 from fasaco_edge.text import shown
@@ -151,6 +152,7 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
             dimension, empty or too large.
     """
     try:
+        check_plain(path)
         # Mapped first, so that a header that promises too much costs nothing.
         array = np.load(path, mmap_mode="r", allow_pickle=False)
     except (OSError, ValueError, EOFError, OverflowError, TypeError) as error:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import MapFileError
+from fasaco_edge.host.files import check_plain
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -102,6 +103,7 @@ def read_image(path: Path, most_bytes: int | None = None) -> MapImage:
     from PIL import Image, UnidentifiedImageError  # noqa: PLC0415
 
     try:
+        check_plain(path)
         with warnings.catch_warnings():
             # check_size has the smaller limit.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)

@@ -68,6 +68,22 @@ def _open_plain(path: str | Path, check: Callable[[os.stat_result], None]) -> Bi
         raise
 
 
+def check_plain(path: str | Path) -> None:
+    """Check that a file which somebody names to be read is a plain one, or a link to one.
+
+    To open a pipe waits until somebody writes to it, and a device may never end.
+
+    Raises:
+        OSError: it is none, or is not there.
+    """
+    mode = os.stat(path).st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if not stat.S_ISREG(mode):
+        kind = "a pipe" if stat.S_ISFIFO(mode) else "a device or a socket"
+        raise OSError(errno.EINVAL, f"{kind}, no plain file", str(path))
+
+
 def make_own_folder(folder: Path) -> None:
     """Make a folder, or take an existing one that is ours and no link of another user's.
 

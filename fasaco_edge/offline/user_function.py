@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 
 from fasaco_edge.errors import BadConfiguration, PlannerFailed
+from fasaco_edge.host.files import check_plain
 
 
 def load_function(place: str) -> FunctionType:
@@ -24,6 +25,7 @@ def load_function(place: str) -> FunctionType:
     name, _, member = place.rpartition(":")
     file = Path(name).expanduser()
     try:
+        check_plain(file)
         source = file.read_bytes()
     except OSError as error:
         raise BadConfiguration(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -139,6 +140,34 @@ def test_a_word_nobody_understands_is_named(folder, capsys, words, said):
     told = capsys.readouterr()
     assert told.out == ""
     assert said in told.err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("review", "{}.rrd"),
+        ("review", "{}.rrd", "--html", "page.html"),
+        ("replay", "{}.rrd"),
+        ("plan", "{}.npy"),
+        ("plan", "{}.png", "--resolution", "0.05"),
+        ("plan", "{}.yaml"),
+        ("plan", "good.npy", "--planner", "{}.py:walk"),
+    ],
+    ids=lambda words: " ".join(words[:2]),
+)
+@pytest.mark.parametrize("make", [os.mkfifo, lambda name: os.symlink("/dev/zero", name)])
+def test_a_pipe_or_a_device_holds_nobody_up(folder, words, make):
+    """To open a pipe waits for whoever writes to it; a device never ends."""
+    pytest.importorskip("pyarrow")
+    for ending in ("rrd", "npy", "png", "yaml", "py"):
+        make(f"it.{ending}")
+    command = [*PROGRAM, *(word.format("it") for word in words)]
+    ended = subprocess.run(
+        command, check=False, env=ENVIRONMENT, capture_output=True, text=True, timeout=120
+    )
+    assert ended.returncode != 0
+    assert "it." in ended.stderr
+    assert "Traceback" not in ended.stderr
 
 
 def test_a_mistake_ends_a_process_in_order(folder):

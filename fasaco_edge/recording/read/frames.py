@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from fasaco_edge.errors import MalformedMessage, UnreadableRecording
+from fasaco_edge.host.files import check_plain
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.repair import (
@@ -77,6 +78,7 @@ def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
         UnreadableRecording: the file is missing, is no recording, or is broken.
     """
     try:
+        check_plain(path)
         with path.open("rb") as recording:
             scan = scan_recording(recording)
             if scan is None:

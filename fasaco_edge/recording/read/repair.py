@@ -22,6 +22,7 @@ from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
 from fasaco_edge.errors import MissingExtra, ProcessEnded
+from fasaco_edge.host.files import check_plain
 from fasaco_edge.host.processes import python_program
 
 MAGIC = b"RRF"
@@ -188,6 +189,7 @@ def _whole_part(path: Path) -> Iterator[Path | None]:
         ValueError: it is no recording.
         OSError: it cannot be read, or there is no space for the copy.
     """
+    check_plain(path)
     with path.open("rb") as recording:
         scan = scan_recording(recording)
         if scan is None:
