@@ -135,6 +135,24 @@ def test_a_pipe_in_place_of_the_lock_holds_nobody_up(tmp_path):
         second.lock()
 
 
+@pytest.mark.parametrize(
+    ("make", "kind"),
+    [(Path.mkdir, "a folder"), (lambda path: path.symlink_to("nowhere"), "a link")],
+)
+def test_what_lies_in_place_of_the_lock_is_told(tmp_path, make, kind):
+    """That the ledger could not be opened was said, not what lay there."""
+    lock = tmp_path / "robot.ledger.lock"
+    make(lock)
+    file = LedgerFile(tmp_path, "robot")
+    file.lock()
+    with pytest.raises(OSError, match=f"{kind} lies in place of {lock}: remove it"):
+        file.write(lane(4))
+    assert os.path.lexists(lock)
+    lock.rmdir() if kind == "a folder" else lock.unlink()
+    file.write(lane(4))
+    assert contents(load(tmp_path).ledger) == contents(lane(4))
+
+
 def test_a_lock_that_was_deleted_is_taken_again(tmp_path):
     folder = tmp_path / "state"
     first, second = LedgerFile(folder, "robot"), LedgerFile(folder, "robot")

@@ -144,7 +144,15 @@ class LedgerFile:
         make_folder(self.path.parent)
         # Not open for writing: that would keep the disk from turning read-only.
         # Whatever lies under its name: to open a pipe would wait for somebody who writes to it.
-        lock = open_own(f"{self.path}.lock", os.O_RDONLY | os.O_NONBLOCK)
+        name = Path(f"{self.path}.lock")
+        try:
+            lock = open_own(name, os.O_RDONLY | os.O_NONBLOCK)
+        except OSError as error:
+            kind = "a link" if name.is_symlink() else "a folder" if name.is_dir() else ""
+            if not kind:
+                raise
+            # Left alone: set aside, a link of another user's would be followed by a ledger of ours.
+            raise OSError(error.errno, f"{kind} lies in place of {name}: remove it") from error
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
