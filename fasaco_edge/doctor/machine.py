@@ -15,6 +15,7 @@ from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 
+from fasaco_edge.daemon.ledger.file import lock_file, why_no_lock
 from fasaco_edge.daemon.memory import afforded, limits_mib, needed_bytes
 from fasaco_edge.doctor.finding import CheckContext, Finding, Level, fail, ok, warn, worst
 from fasaco_edge.host.files import why_not_trusted
@@ -211,7 +212,11 @@ def _read(file: Path) -> str:
 def disk(context: CheckContext) -> Finding:
     """Check the free space where the daemon writes."""
     least_mb = LEAST_MB | {"recordings": float(context.config.recording.least_free_mb)}
-    rooms = [_room(name, folder, least_mb[name]) for name, folder in _folders(context).items()]
+    folders = _folders(context)
+    rooms = [_room(name, folder, least_mb[name]) for name, folder in folders.items()]
+    lock = lock_file(folders["state"], context.config.robot.name)
+    if why := why_no_lock(lock):
+        rooms.append(fail(f"no progress is written: {why}", f"remove {lock}"))
     bad = worst(rooms)
     details = tuple(room.found for room in rooms)
     if bad.level is Level.OK:

@@ -208,6 +208,17 @@ def test_a_read_only_disk_is_told(tmp_path):
     assert "read-only" in machine.disk(CheckContext(config)).found
 
 
+def test_what_lies_in_place_of_the_ledgers_lock(tmp_path):
+    config = DaemonConfig(mission=MissionSettings(state_dir=str(tmp_path)))
+    assert machine.disk(CheckContext(config)).level is Level.OK
+    lock = tmp_path / "robot.ledger.lock"
+    lock.symlink_to("nowhere")
+    found = machine.disk(CheckContext(config))
+    assert found.level is Level.FAIL
+    assert found.found == f"no progress is written: a link lies in place of {lock}"
+    assert found.to_do == f"remove {lock}"
+
+
 def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch):
     told = {"Environment": f"NUMBA_CACHE_DIR={tmp_path}", "DynamicUser": "yes"}
     context = CheckContext(DaemonConfig(), unit=Unit(told | {"CacheDirectory": "fasaco-edge"}))

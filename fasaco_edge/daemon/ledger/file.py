@@ -36,6 +36,20 @@ class LoadedLedger:
     fault: FasacoError | None = None
 
 
+def lock_file(folder: Path, robot: str) -> Path:
+    """Return the file whose lock keeps other daemons from writing a robot's ledger."""
+    return folder / f"{robot}.ledger.lock"
+
+
+def why_no_lock(name: Path) -> str:
+    """Return what lies in place of a lock file, "" where one can be.
+
+    It is left alone: set aside, a link of another user's would be followed by a ledger of ours.
+    """
+    kind = "a link" if name.is_symlink() else "a folder" if name.is_dir() else ""
+    return f"{kind} lies in place of {name}" if kind else ""
+
+
 class LedgerFile:
     """The files of one robot in a folder; made for one process at a time.
 
@@ -144,15 +158,13 @@ class LedgerFile:
         make_folder(self.path.parent)
         # Not open for writing: that would keep the disk from turning read-only.
         # Whatever lies under its name: to open a pipe would wait for somebody who writes to it.
-        name = Path(f"{self.path}.lock")
+        name = lock_file(self.path.parent, self.path.stem)
         try:
             lock = open_own(name, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
-            kind = "a link" if name.is_symlink() else "a folder" if name.is_dir() else ""
-            if not kind:
-                raise
-            # Left alone: set aside, a link of another user's would be followed by a ledger of ours.
-            raise OSError(error.errno, f"{kind} lies in place of {name}: remove it") from error
+            if why := why_no_lock(name):
+                raise OSError(error.errno, f"{why}: remove it") from error
+            raise
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
