@@ -127,7 +127,9 @@ def checked(robot: RobotConfig) -> RobotConfig:
         BadConfiguration: one is not; the error names it.
     """
     try:
-        return msgspec.convert(msgspec.structs.asdict(robot), RobotConfig)
+        members = msgspec.structs.asdict(robot).items()
+        given = {name: value for name, value in members if value is not msgspec.UNSET}
+        return msgspec.convert(given, RobotConfig)
     except msgspec.ValidationError as error:
         raise BadConfiguration(f"robot: {error}") from error
 

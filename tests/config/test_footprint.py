@@ -6,9 +6,12 @@ import msgspec
 import pytest
 import yaml
 
+import fasaco_edge as fe
 from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.footprint import FootprintConfig
 from fasaco_edge.config.loading import inspect_config
 from fasaco_edge.daemon.loop.answers import config_document
+from fasaco_edge.offline.plan import checked
 from tests.support.processes import fasaco_edge
 
 SCRUBBER = {"width_m": 0.5, "length_m": 0.6}
@@ -34,6 +37,11 @@ def test_the_disc_around_it_is_planned_with(tmp_path, footprint, radius_m):
     assert faults == ()
     assert config.robot.radius_m == pytest.approx(radius_m)
     assert f"of radius {radius_m:.3g} m" in config.robot.assumed
+
+
+def test_plans_from_python_take_it():
+    for robot in (fe.Robot(), fe.Robot(footprint=FootprintConfig(**SCRUBBER))):
+        assert checked(robot) == robot
 
 
 def test_a_disc_assumes_nothing(tmp_path):
