@@ -10,7 +10,6 @@ Humble has no type hashes: it writes ``TypeHashNotSupported``, and does not hear
 
 from __future__ import annotations
 
-import hashlib
 import struct
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -137,7 +136,10 @@ def gid_of(token: str) -> bytes:
     rmw_zenoh takes XXH3 for that, and tells samples apart by it. Who looks a sample's publisher
     up in the graph by its gid does not find ours there.
     """
-    return hashlib.blake2b(token.encode(), digest_size=GID_BYTES).digest()
+    # With OpenSSL, three megabytes that a follower without ROS has no use for.
+    from hashlib import blake2b  # noqa: PLC0415
+
+    return blake2b(token.encode(), digest_size=GID_BYTES).digest()
 
 
 def attachment(sequence: int, time_ns: int, gid: bytes) -> bytes:
