@@ -49,8 +49,9 @@ RETRY_S, MOST_RETRY_S = 1.0, 30.0
 # then the result is asked for again, as it may have been lost, and after longer the goal is given
 # up [s].
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
-# Requests to cancel are repeated [s].
+# Requests to cancel are repeated [s], for so many goals, the newest ones: Nav2 drives no other.
 CANCEL_EVERY_S = 1.0
+MOST_DOOMED = 8
 
 
 @dataclass(slots=True)
@@ -179,8 +180,15 @@ class Nav2Follower(Supervision):
         self._stop()
         return [CancelGoal(goal_id) for goal_id in self._doomed]
 
+    def take_unsent(self, goal_id: bytes, why: str, now: float) -> None:
+        """Take in that a goal could not be sent."""
+        if self._pending is not None and self._pending.id == goal_id:
+            self._pending = None
+            self._fail(State.NO_NAV2, why, now)
+        self._doomed.pop(goal_id, None)
+
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
-        """Take in whether Nav2 took a goal; None where it did not say."""
+        """Take in whether Nav2 took a goal; None where it did not say: then it has to end it."""
         if goal_id in self._doomed:
             self._doomed[goal_id] = Doomed()
             if accepted is False:
@@ -195,15 +203,20 @@ class Nav2Follower(Supervision):
             self._asked_again = now
             self._requests_later.append(AskResult(goal_id))
             return
+        if accepted is None:
+            self._doom(goal_id)
         state = State.REFUSED if accepted is False else State.NO_NAV2
         self._fail(state, why or "is its controller server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
-        """Take in how a goal ended; None where Nav2 did not say, and will not."""
-        self._doomed.pop(goal_id, None)
+        """Take in how a goal ended; None where Nav2 did not say, and will not: it may drive it."""
+        if ending is not None:
+            self._doomed.pop(goal_id, None)
         if self._active is None or self._active.id != goal_id:
             return
         goal, self._active = self._active, None
+        if ending is None:
+            self._doom(goal_id)
         self._requests_later.clear()
         if self._pending is not None:
             # It goes over to the next one.
@@ -344,7 +357,7 @@ class Nav2Follower(Supervision):
         if stands_s > STANDS_S:
             self.state, self.detail = State.STANDS, f"for {stands_s:.0f} s"
         if stands_s > GIVE_UP_S:
-            self._doomed[goal.id] = Doomed()
+            self._doom(goal.id)
             self._active = None
             self._fail(State.GIVEN_UP, f"stood for {stands_s:.0f} s without an error", now)
         elif now - self._asked_again > longest_s:
@@ -371,9 +384,15 @@ class Nav2Follower(Supervision):
         """Have all goals end."""
         for goal, is_known in ((self._active, True), (self._pending, False)):
             if goal is not None:
-                self._doomed[goal.id] = Doomed(is_known=is_known)
+                self._doom(goal.id, is_known=is_known)
         self._active = self._pending = None
         self._requests_later.clear()
+
+    def _doom(self, goal_id: bytes, *, is_known: bool = True) -> None:
+        """Have a goal end."""
+        self._doomed[goal_id] = Doomed(is_known=is_known)
+        while len(self._doomed) > MOST_DOOMED:
+            del self._doomed[next(iter(self._doomed))]
 
     def _moved_to(self, pose: Pose2D, now: float) -> None:
         self._here, self._came_at = (pose.x, pose.y), now

@@ -119,7 +119,7 @@ class Nav2Node:
             call: Call = "send_goal"
             release, why = self._release_at(keys)
             if release is None:
-                follower.take_accepted(goal_id, None, why, now)
+                follower.take_unsent(goal_id, why, now)
                 return
             plugins = self._plugins[: RELEASES[release]]
             payload = encode_goal(goal_id, request.points, request.frame, 0, plugins)

@@ -8,6 +8,7 @@ import pytest
 
 from fasaco_edge.follow.nav2 import (
     GIVE_UP_S,
+    MOST_DOOMED,
     RETRY_S,
     STANDS_S,
     AskResult,
@@ -185,9 +186,11 @@ def test_a_server_that_was_started_anew_gets_the_goal_again(ending):
     goal = drive.begun()
     drive.step(1.0)
     drive.follower.take_ending(goal.id, ending, "went away", drive.now)
-    drive.step(1.0)
+    # It may be the way to it that is lost: then it drives on.
+    assert drive.step(1.0) == ([CancelGoal(goal.id)] if ending is NO_ANSWER else [])
     assert drive.state is State.NO_NAV2
-    (again,) = drive.step(1.0, after=RETRY_S)
+    again = drive.step(1.0, after=RETRY_S)[0]
+    assert isinstance(again, SendGoal)
     assert again.points[0][0] == pytest.approx(1.0)
 
 
@@ -195,10 +198,46 @@ def test_no_answer_to_a_goal_is_another_goal():
     drive = Drive(*LONG)
     (goal,) = drive.step(0.0)
     drive.follower.take_accepted(goal.id, None, "did not answer", drive.now)
-    assert drive.step(0.0) == []
+    # Nav2 may have taken it, and drive.
+    assert drive.step(0.0) == [CancelGoal(goal.id)]
     assert (drive.state, drive.follower.detail) == (State.NO_NAV2, "did not answer")
+    drive.follower.take_cancelled(goal.id, TAKEN)
     (again,) = drive.step(0.0, after=RETRY_S)
+    assert isinstance(again, SendGoal)
     assert again.id != goal.id
+
+
+def test_a_goal_that_could_not_be_sent_is_not_canceled():
+    drive = Drive(*LONG)
+    (goal,) = drive.step(0.0)
+    drive.follower.take_unsent(goal.id, "no server", drive.now)
+    assert drive.step(0.0) == []
+    assert (drive.state, drive.follower.detail) == (State.NO_NAV2, "no server")
+
+
+@pytest.mark.parametrize("lost", ["accepted", "ending"])
+def test_a_goal_whose_answer_was_lost_ends_with_the_path(lost):
+    drive = Drive(*LONG)
+    if lost == "accepted":
+        (goal,) = drive.step(0.0)
+        drive.follower.take_accepted(goal.id, None, "did not answer", drive.now)
+    else:
+        goal = drive.begun()
+        drive.follower.take_ending(goal.id, None, "went away", drive.now)
+    drive.path()
+    assert drive.step(0.1) == [CancelGoal(goal.id)]
+    assert drive.follower.end() == [CancelGoal(goal.id)]
+
+
+def test_without_any_answer_only_so_many_goals_are_canceled():
+    drive = Drive(*LONG)
+    asked = []
+    for _ in range(500):
+        asked = drive.step(0.0, after=1.0)
+        for request in asked:
+            if isinstance(request, SendGoal):
+                drive.follower.take_accepted(request.id, None, "", drive.now)
+    assert len(asked) <= MOST_DOOMED + 1
 
 
 def test_a_refusal_is_said():
