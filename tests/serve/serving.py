@@ -136,7 +136,10 @@ class Looker:
 @contextmanager
 def looking(page: Served, token: str = "", **options: Any) -> Iterator[Looker]:
     """Open a page as a viewer."""
-    with connect(f"ws://{page.address}/live", max_size=None, compression=None, **options) as socket:
+    # One that is not read for a while, as a daemon starts, goes on to answer pings.
+    unbounded: dict[str, Any] = {"max_size": None, "max_queue": None, "ping_interval": None}
+    url = f"ws://{page.address}/live"
+    with connect(url, compression=None, open_timeout=TIMEOUT_S, **unbounded, **options) as socket:
         looker = Looker(socket)
         looker.send(kind="hello", token=token)
         yield looker

@@ -123,11 +123,10 @@ def test_a_viewer_sees_the_mission(covering, page):
         areas = looker.wait("areas", lambda areas: areas["zones"])
         assert [zone["name"] for zone in areas["zones"]] == ["corner"]
         assert areas["keep_out"][0]["is"] == "standing"
-        floor = looker.wait("floor")
-        assert max(floor["body"]) == 127
+        looker.wait("floor", lambda floor: max(floor["body"]) == 127)
         assert "field" not in looker.seen
         looker.send(kind="wants", field=True)
-        assert max(looker.wait("field")["body"]) == 127
+        looker.wait("field", lambda field: max(field["body"]) == 127)
         with Outsider(covering.endpoint) as outsider:
             x, y = lanes(2)[1]
             outsider.put("pose", pose_bytes(x, y))
@@ -309,7 +308,8 @@ def test_a_viewer_that_hangs_is_dropped_and_holds_nobody_up(tmp_path):
         served(tmp_path, daemon.endpoint) as page,
         looking(page) as looker,
     ):
-        looker.wait("welcome")
+        # From here on it opens nothing more but viewers.
+        looker.wait("state", lambda state: state.get("state"))
         before = page.descriptors()
         with hanging(page) as hung:
             until(lambda: page.descriptors() > before)
@@ -358,8 +358,8 @@ def hanging(page: Served) -> socket.socket:
 def test_it_outlives_the_daemon(tmp_path):
     endpoint = free_endpoint()
     with served(tmp_path, endpoint) as page, looking(page) as looker:
-        waiting = looker.wait("state")
-        assert f"waiting for the bus at {endpoint}" in waiting["absent"]
+        waiting = f"waiting for the bus at {endpoint}"
+        looker.wait("state", lambda state: waiting in state["absent"])
         with daemon_process(tmp_path, bus={"listen": [endpoint]}):
             looker.wait("state", lambda state: state.get("state") == "waiting for map")
         looker.wait("state", lambda state: "has been gone" in state["absent"])
