@@ -19,6 +19,10 @@ Digest = dict[str, object]
 # Of lists from elsewhere so much is shown.
 MOST_ENTRIES, MOST_AREAS, MOST_ROBOTS = 40, 100, 50
 MOST_CORNERS = 1_000
+# Longer is a speed of next to nothing [s].
+MOST_TO_GO_S = 1e8
+# Further off is no place [m].
+MOST_M = 1e6
 # In these there is something to go.
 UNDERWAY = ("planning", "covering", "returning", "paused", "charging")
 
@@ -89,7 +93,9 @@ def _parts(parts: tuple[FloorLeft, ...] | None) -> list[Digest]:
 
 def _to_go_s(view: RobotState, status: Status, way: Way) -> int | None:
     left_s = way.left_s(view.walk.at, view.settings.robot, status.drive)
-    return None if left_s is None or status.state not in UNDERWAY else round(left_s)
+    if left_s is None or left_s > MOST_TO_GO_S or status.state not in UNDERWAY:
+        return None
+    return round(left_s)
 
 
 def _mission(mission: MissionReport) -> Digest:
@@ -164,16 +170,17 @@ def areas(settings: KnownSettings, order: dict[str, Any]) -> Digest:
     return {"zones": standing + ordered, "keep_out": kept_out[:MOST_AREAS]}
 
 
-def _items(value: object) -> list[Any]:
-    return value[:MOST_AREAS] if isinstance(value, list) else []
+def _items(value: object, most: int = MOST_AREAS) -> list[Any]:
+    return value[:most] if isinstance(value, list) else []
 
 
 def _polygon(value: object) -> list[list[float]]:
     """Return corners (x, y) [m]; none where they are not such."""
+    pairs = (pair for pair in _items(value, MOST_CORNERS) if isinstance(pair, list))
     corners = [
         [float(x), float(y)]
-        for x, y in (pair for pair in _items(value) if isinstance(pair, list) and len(pair) == 2)
-        if isinstance(x, int | float) and isinstance(y, int | float)
+        for x, y in (pair for pair in pairs if len(pair) == 2)
+        if all(isinstance(v, int | float) and abs(v) < MOST_M for v in (x, y))
     ]
     return corners if len(corners) >= 3 else []
 

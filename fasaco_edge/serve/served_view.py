@@ -174,8 +174,8 @@ class ServedView(RobotState):
     def _path_message(self, now: float) -> bytes | None:
         if self._path is None:
             return None
-        about = decode_document(self._path.attachment or b"{}", PathAttachment)
         try:
+            about = decode_document(self._path.attachment or b"{}", PathAttachment)
             points = PathPoints(self._path.payload)
             xy = points.take(MOST_POINTS)
         except FasacoError as error:

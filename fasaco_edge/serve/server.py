@@ -89,11 +89,12 @@ class Server:
             max_queue=4,
             write_limit=WAITING_BYTES,
         ):
-            hearing = threading.Thread(target=self._hear, name="hear", daemon=True)
-            hearing.start()
+            hearing = asyncio.create_task(asyncio.to_thread(self._hear))
+            # Where it fails the server ends, too: a page must not show for ever what was last.
+            hearing.add_done_callback(lambda _: stop.set())
             await stop.wait()
             self._ended.set()
-        hearing.join(2 * IDLE_S)
+        await hearing
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer what is no WebSocket; None lets one begin."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import hashlib
 import re
@@ -20,9 +21,15 @@ pytest.importorskip("websockets")
 
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from fasaco_edge.serve.server import MOST_VIEWERS
+from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.host.addresses import Address
+from fasaco_edge.serve.guard import Guard
+from fasaco_edge.serve.served_view import ServedView
+from fasaco_edge.serve.server import MOST_VIEWERS, Server
+from fasaco_edge.watch.feed import Feed
+from fasaco_edge.wire.keys import Keys
 from tests.serve.serving import Served, listens, looking, served, until
-from tests.support.outsider import Outsider
+from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import (
     Daemon,
     daemon_process,
@@ -185,6 +192,7 @@ def test_a_mission_is_run_from_the_page(tmp_path):
             outsider.put("map", map_bytes(HALL))
             outsider.put("pose", pose_bytes(*lanes(1)[0]))
             outsider.wait_status(lambda status: status["state"] == "idle")
+            looker.wait("state", lambda state: state.get("state"))
             keep_out = [[2.0, 2.0], [2.4, 2.0], [2.4, 2.4], [2.0, 2.4]]
             order = {"zones": [ROOM], "keep_out": [keep_out], "passes": 2, "return_home": True}
             assert looker.command("start", order)["ok"]
@@ -229,6 +237,7 @@ def test_tokens_say_who_may_look_and_who_may_command(covering, tmp_path):
         for role, token in tokens.items():
             with looking(page, token) as looker:
                 assert looker.wait("welcome")["role"] == role
+                looker.wait("state", lambda state: state.get("state"))  # it has joined the bus
                 assert looker.command("replan")["ok"] is (role == "operator")
         for wrong in ("", "x" * 32, tokens["viewer"][:-1], "é"):
             with looking(page, wrong) as looker:
@@ -259,6 +268,20 @@ def test_it_listens_to_others_only_where_it_is_told_who_may(tmp_path):
         ended = fasaco_edge(*words, *more)
         assert ended.code == 78, ended.err
         assert said in ended.err
+
+
+def test_a_server_that_hears_no_more_ends():
+    """Else a page would show for ever what was last."""
+
+    class Deaf(Feed):
+        def take(self, timeout_s: float) -> list[tuple[str, object]]:
+            raise RuntimeError("deaf")
+
+    with Deaf(BusSettings("client", (free_endpoint(),)), Keys()) as feed:
+        server = Server(feed, ServedView(Keys()), Guard(frozenset()))
+        serving = server.run(Address("127.0.0.1", 0))
+        with pytest.raises(RuntimeError, match="deaf"):
+            asyncio.run(asyncio.wait_for(serving, TIMEOUT_S))
 
 
 def test_a_taken_address_is_an_error(page):

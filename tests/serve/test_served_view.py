@@ -56,6 +56,18 @@ def test_an_order_is_drawn_until_it_is_cancelled():
     assert heard(view, "areas", 2.0)["zones"] == []
 
 
+def test_an_order_is_drawn_with_all_its_corners_and_without_what_is_no_place():
+    view = ServedView(Keys())
+    many = [[float(index), float(index % 2)] for index in range(300)]
+    places = [CORNERS[0], [10**400, 0], [1.0, True], *CORNERS[1:]]
+    order = {"zones": [{"name": "hall", "polygon": many}], "keep_out": [places]}
+    payload = json.dumps({"command": "start", "order": order}).encode()
+    view.take("command", Sample("", payload), 1.0)
+    areas = heard(view, "areas", 1.0)
+    assert areas["zones"][0]["polygon"] == many
+    assert [0.0, 0.0] in areas["keep_out"][0]["polygon"]
+
+
 def test_what_has_not_changed_is_not_said_again():
     view = ServedView(Keys())
     tell(view, "status", {"state": "idle"}, 1.0)
@@ -87,3 +99,23 @@ def test_a_sample_that_cannot_be_read_is_told_and_costs_no_other():
     assert set(news) >= {"state", "events"}
     assert "cannot be read" in str(news["events"])
     assert not {"map", "floor", "path"} & set(news)
+
+
+def test_a_path_whose_note_cannot_be_read_is_told_and_costs_no_other():
+    view = ServedView(Keys())
+    xy = np.stack([np.arange(5.0), np.zeros(5)], axis=-1)
+    tell(view, "status", {"state": "covering"}, 1.0)
+    view.take("path", Sample("", encode_path(xy, np.zeros(5), "map", 1), "", b"nonsense"), 1.0)
+    news = view.news(1.0)
+    assert "state" in news
+    assert "path cannot be read" in str(news["events"])
+
+
+def test_a_speed_of_next_to_nothing_leaves_no_end():
+    view = ServedView(Keys())
+    xy = np.stack([1e4 * np.arange(5.0), np.zeros(5)], axis=-1)
+    tell(view, "status", {"state": "covering", "drive": {"speed_m_s": 1e-308}}, 1.0)
+    view.take("path", Sample("", encode_path(xy, np.zeros(5), "map", 1)), 1.0)
+    view.news(1.0)
+    tell(view, "status", {"state": "covering", "drive": {"speed_m_s": 1e-308}, "uptime_s": 2}, 2.0)
+    assert heard(view, "state", 2.0)["to_go_s"] is None
