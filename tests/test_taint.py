@@ -6,6 +6,7 @@ an override, a line end, mark-up and a script; so do tokens, recordings and the 
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import re
@@ -46,7 +47,7 @@ from tests.serve.serving import looking, served
 from tests.support.outsider import Outsider
 from tests.support.processes import COMMAND_S, ENVIRONMENT, PROGRAM, daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pose_bytes, room
-from tests.test_text import HIDDEN
+from tests.test_text import hidden
 from tests.wire.schemas import NAMES, schema
 
 SCRIPT = "<script>alert(1)</script>"
@@ -54,7 +55,6 @@ TAINT = f"=T\x1b]0;title\x07\x1b[2J\x9b31m\x7f\u202e\u2028\u200b\nINJECTED [red]
 # What a key of Zenoh may hold.
 TOKEN = "evil\x1b]0;title\x07\x9b31m\u202e\nINJECTED<script>[red]"
 FILE = TAINT.replace("/", "|").replace("\x07", "") + "\udcff"
-RAW = re.compile("[" + "".join(re.escape(mark) for mark in HIDDEN if mark not in "\n\t") + "]")
 PREFIX = "fasaco/@v1/robot"
 BEGAN_NS = 1_767_225_600 * 10**9
 
@@ -90,9 +90,16 @@ def _tainted(part: Any, name: str) -> Any:
     return plain.get(kind, TAINT)
 
 
+@functools.cache
+def raw() -> re.Pattern[str]:
+    """Return what finds signs that a terminal obeys or nobody sees."""
+    signs = (re.escape(sign) for sign in hidden() if sign not in "\n\t")
+    return re.compile("[" + "".join(signs) + "]")
+
+
 def judge(said: str) -> None:
     """Check that nothing raw is in a text, and that no line of it is another's."""
-    found = RAW.search(said)
+    found = raw().search(said)
     assert found is None, (found, said[max(found.start() - 80, 0) : found.end() + 80])
     assert not re.search(r"^\s{0,3}INJECTED", said, re.MULTILINE), said
 

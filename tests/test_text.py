@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import unicodedata
 
@@ -15,9 +16,9 @@ SEEN = {0x600, 0x601, 0x602, 0x603, 0x604, 0x605, 0x6DD, 0x70F, 0x890, 0x891, 0x
 SEEN |= {0x110BD, 0x110CD} | set(range(0x13430, 0x13440))
 
 
-@pytest.fixture(scope="module")
+@functools.cache
 def hidden():
-    """All signs of Unicode that are not to be seen."""
+    """Return all signs of Unicode that are not to be seen."""
     return [
         mark
         for mark in map(chr, range(0x110000))
@@ -43,11 +44,11 @@ def test_what_would_do_something_is_seen(text, seen):
     assert one_line(text) == seen
 
 
-def test_all_that_unicode_hides_is_seen(hidden):
-    for mark in hidden:
+def test_all_that_unicode_hides_is_seen():
+    for mark in hidden():
         assert one_line(mark).isprintable()
         assert one_line(mark).isascii()
-    assert lines("".join(hidden)).replace("\n", "").replace("\t", "").isprintable()
+    assert lines("".join(hidden())).replace("\n", "").replace("\t", "").isprintable()
 
 
 def test_line_ends_and_tabs_stay_where_they_are_meant():
@@ -77,9 +78,9 @@ def test_on_a_page_text_is_no_mark_up():
     )
 
 
-def test_json_has_escapes_of_its_own(hidden):
+def test_json_has_escapes_of_its_own():
     # Two halves of a pair beside each other would be one sign.
-    text = "-".join(hidden)
+    text = "-".join(hidden())
     document = {text: [text, 1.5, None]}
     line = json_line(document)
     assert line.isascii()
