@@ -189,6 +189,19 @@ def test_a_split_is_the_best_there_is(data):
     cells = st.integers(0, rows * cols - 1)
     ways = np.array([ways_from(steps, data.draw(cells)) for _ in range(2)])
     assert (ways < FAR).all()
+    check_split(steps, loop, ways)
+
+
+def test_of_two_robots_either_may_take_either_part():
+    """The one that gains less by the long part may be so much nearer to it that it ends first."""
+    steps = CoverageLattice.from_free(np.ones((4, 3), np.bool_)).steps
+    ways = np.array([ways_from(steps, 11), ways_from(steps, 1)])
+    check_split(steps, np.array([2, 5, 4, 3, 4, 5], np.int32), ways)
+
+
+def check_split(steps, loop, ways):
+    """Check that a closed walk is split among two robots as well as can be."""
+    cols = steps.shape[1]
     found, order = np.zeros(5, np.int64), np.zeros(2, np.int64)
     costs_us = np.arange(2 * len(loop) + 1, dtype=np.int64) * 7
     offsets = np.array([1, cols, -1, -cols])

@@ -118,6 +118,9 @@ class _Shares(NamedTuple):
 def _deal(shares: _Shares, first_us: int, second_us: int) -> tuple[int, int]:
     """Deal robots out to two parts of a walk by their ways; return the score, and how many.
 
+    By what the one part is nearer to them than the other; the two about whom that is closest may
+    change places, as the sum of all ways says little of the worst share.
+
     ``shares.order`` has the robots then, those of the first part first.
     """
     gains, order, ways = shares.gains, shares.order, shares.ways
@@ -131,16 +134,24 @@ def _deal(shares: _Shares, first_us: int, second_us: int) -> tuple[int, int]:
             at -= 1
         gains[at], order[at] = gain, robot
         second += ways[1, robot]
-    first, best, share = 0, -1, 0
+    first, best, share, is_changed = 0, -1, 0, False
     for count in range(1, robots):
-        robot = order[count - 1]
-        first += ways[0, robot]
-        second -= ways[1, robot]
-        one_us, other_us = first_us + first * out_and_back_us, second_us + second * out_and_back_us
-        worst = max(one_us // count, other_us // (robots - count))
-        score = WORST * worst + one_us + other_us
-        if best < 0 or score < best:
-            best, share = score, count
+        last, following = order[count - 1], order[count]
+        first += ways[0, last]
+        second -= ways[1, last]
+        for change in range(2):
+            to_first, to_second = first, second
+            if change:
+                to_first += ways[0, following] - ways[0, last]
+                to_second += ways[1, last] - ways[1, following]
+            one_us = first_us + to_first * out_and_back_us
+            other_us = second_us + to_second * out_and_back_us
+            worst = max(one_us // count, other_us // (robots - count))
+            score = WORST * worst + one_us + other_us
+            if best < 0 or score < best:
+                best, share, is_changed = score, count, change == 1
+    if is_changed:
+        order[share - 1], order[share] = order[share], order[share - 1]
     return best, share
 
 
