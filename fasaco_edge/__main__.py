@@ -1,7 +1,5 @@
 """``python -m fasaco_edge``."""
 
-import sys
+from fasaco_edge.cli import program
 
-from fasaco_edge.cli import main
-
-sys.exit(main())
+program()

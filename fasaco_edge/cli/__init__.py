@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import argparse
 import errno
+import logging
 import os
 import sys
 import textwrap
 from collections.abc import Sequence
 from importlib import import_module
+from typing import NoReturn
 
 from fasaco_edge import __version__
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, with_negative_pairs
@@ -58,6 +60,25 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the process's exit code."""
     words = sys.argv[1:] if argv is None else argv
     return run_command(_parser(words), words)
+
+
+def program() -> NoReturn:
+    """Run one command as a process of its own, and end that with the command's exit code.
+
+    A session of Zenoh leaves threads behind that still release callbacks after it was closed (Zenoh
+    1.10). Where the interpreter ends meanwhile, the C library aborts the process with "FATAL:
+    exception not rethrown", or the interpreter waits for ever. So it does not end by itself then;
+    but where Rerun was loaded, which writes what is left at the interpreter's end.
+    """
+    code = main()
+    if "zenoh" not in sys.modules or "rerun" in sys.modules:
+        sys.exit(code)
+    logging.shutdown()
+    try:
+        sys.stdout.flush()
+    except OSError:
+        code = code or Exit.ERROR
+    os._exit(code)
 
 
 def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:

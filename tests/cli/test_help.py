@@ -58,3 +58,18 @@ def test_the_maps_are_listed_and_can_be_planned_on(capsys):
     told = capsys.readouterr().out
     for name in ("office", "flat", "basement", "warehouse"):
         assert name in told
+
+
+@pytest.mark.parametrize(("module", "ends"), [("zenoh", False), ("json", True)])
+def test_after_a_session_of_zenoh_the_interpreter_does_not_end(module, ends):
+    """Threads that a session left behind aborted the process then, now and then."""
+    program = (
+        f"import atexit, sys, {module}; from fasaco_edge.cli import program\n"
+        "atexit.register(print, 'the interpreter ends')\n"
+        "sys.argv = ['fasaco-edge', 'maps']; program()"
+    )
+    command = [sys.executable, "-c", program]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert "office" in ended.stdout
+    assert ended.stdout.endswith("the interpreter ends\n") == ends
