@@ -33,7 +33,8 @@ from fasaco_edge.wire.documents.settings import Settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.topics import COMMAND, RECORDED_INPUTS, TURNS
 
-# How long the mission runs after the last sample [s]: plans finish, timeouts expire.
+# How long the mission runs after the last sample [s], of an input or not: plans finish, timeouts
+# expire.
 TAIL_S = 3.0
 # Samples this close together are taken in one cycle: the daemon's loop needs about as long to
 # wake up.
@@ -168,12 +169,18 @@ class Replay:
         self._base_ns = 0
 
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
-        """Yield each cycle; samples that are no input of the mission are ignored."""
+        """Yield each cycle; of samples that are no input of the mission only the time counts.
+
+        A daemon that loads slowly begins its mission with inputs that came long before, and maybe
+        last of all: what it says of that comes later.
+        """
         together: list[Arrival] = []
+        last = 0.0
         for arrival in samples:
             if self._drive.began is None:
                 self._base_ns = arrival.at_ns - arrival.wall_ns
                 self._drive.began = self._now = 1e-9 * arrival.at_ns
+            last = max(last, self._at(arrival))
             if arrival.topic not in INPUTS:
                 continue
             if together and arrival.wall_ns - together[0].wall_ns > TOGETHER_NS:
@@ -182,12 +189,15 @@ class Replay:
             together.append(arrival)
         if together:
             yield from self._take(together)
-        yield from self._wait(self._now + TAIL_S)
+        yield from self._wait(max(last, self._now) + TAIL_S)
+
+    def _at(self, arrival: Arrival) -> float:
+        """Return when a sample came [s]: by the wall clock, which runs on over a restart."""
+        return 1e-9 * (arrival.wall_ns + self._base_ns)
 
     def _take(self, arrivals: list[Arrival]) -> Iterator[ReplayStep]:
         """Take samples in one cycle, after those that come before it."""
-        # By the wall clock, which runs on while the machine restarts.
-        now = max(1e-9 * (arrivals[0].wall_ns + self._base_ns), self._now)
+        now = max(self._at(arrivals[0]), self._now)
         yield from self._wait(now)
         yield self._cycle(now, arrivals)
 

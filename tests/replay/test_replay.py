@@ -222,6 +222,17 @@ def test_the_robot_says_only_once_where_it_is(samples, config):
     assert story.visited <= {(2, 2)}
 
 
+def test_a_mission_that_begins_long_after_the_last_input_is_played(samples, config):
+    """On a slow machine a daemon still loads what it plans with when its last input comes."""
+    statuses = [sample for sample in samples if sample.topic == "status"]
+    told = [*places(samples, "status"), *places(samples, PATH_DIGEST)]
+    inputs = scenarios.without(samples, told)[:40]
+    later_ns = inputs[-1].wall_ns - samples[0].wall_ns + 20_000_000_000
+    story = played([*inputs, *(scenarios.moved(status, later_ns) for status in statuses)], config)
+    assert story.mission.state == "covering"
+    assert story.news[0].at_s > 20.0
+
+
 def test_with_other_work_paths_are_others(samples, config, run):
     replay = Replay(config, run, work=0)
     steps = [step for step in replay.steps(samples) if step.decision.path is not None]
