@@ -18,7 +18,7 @@ from fasaco_edge.cli.console.arguments import (
     Command,
     Exit,
     add_json,
-    check_output,
+    check_outputs,
     seconds,
     writing,
 )
@@ -108,13 +108,13 @@ def run(args: argparse.Namespace) -> int:
         raise BadConfiguration(
             f"{file} is there already", hint="name another file, or replace it with --force"
         )
-    check_output(file)
+    check_outputs([file])
     _ask(args)
     document = document_of(args)
     text = HEAD + (yaml.safe_dump(document, sort_keys=False) if document else "")
     config = _checked(text)
-    with writing(file):
-        file.write_text(text, encoding="utf-8")
+    with writing(file) as new:
+        new.write_text(text, encoding="utf-8")
     heard = None if args.no_try else _listen(config, args.listen)
     if args.json:
         print_json({"file": str(file), "config": document, "heard": heard and asdict(heard)})

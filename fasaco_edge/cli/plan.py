@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fasaco_edge.cli.console import terminal
-from fasaco_edge.cli.console.arguments import Command, Exit, check_output, writing
+from fasaco_edge.cli.console.arguments import Command, Exit, check_outputs, writing
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.planning.options import EPILOG, add_options
 from fasaco_edge.cli.planning.progress import watching
 from fasaco_edge.cli.planning.request import read_request
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.grid.map_files import find_map
+from fasaco_edge.grid.map_files import find_map, map_sources
 from fasaco_edge.host.processes import ctrl_c_asks
 from fasaco_edge.planners.planner import ColonySnapshot, Interrupt, ignore
 
@@ -34,8 +34,10 @@ def run(args: argparse.Namespace) -> int:
     request = read_request(args)
     robot, search = request.robot, request.search
     search.colony()  # what is wrong with it is said before kernels are compiled
-    for output in (args.path_out, args.xy_out, args.png, args.pheromone_png):
-        check_output(output)
+    check_outputs(
+        (args.path_out, args.xy_out, args.png, args.pheromone_png),
+        [*map_sources(find_map(args.map)), *request.sources],
+    )
     if args.robots or args.robots_xy:
         from fasaco_edge.cli.planning.fleet import plan_fleet
 
@@ -45,7 +47,6 @@ def run(args: argparse.Namespace) -> int:
             "--pheromone-png: the planner leaves no pheromone",
             hint=f"choose --planner {' or '.join(WITH_PHEROMONE)}",
         )
-    find_map(args.map)
     compile_kernels()
     # After that, as they import the compiler.
     from fasaco_edge.offline.maps import load_map
@@ -79,14 +80,14 @@ def run(args: argparse.Namespace) -> int:
             observe=trails.append if args.pheromone_png else ignore,
         )
     if args.path_out is not None:
-        with writing(args.path_out):
-            np.savetxt(args.path_out, planned.cells, "%d", ",", header="row,col", comments="")
+        with writing(args.path_out) as file:
+            np.savetxt(file, planned.cells, "%d", ",", header="row,col", comments="")
     if args.xy_out is not None:
-        with writing(args.xy_out):
-            np.savetxt(args.xy_out, planned.xy, "%.6f", ",", header="x_m,y_m", comments="")
+        with writing(args.xy_out) as file:
+            np.savetxt(file, planned.xy, "%.6f", ",", header="x_m,y_m", comments="")
     if args.png is not None:
-        with writing(args.png):
-            planned.plot(args.png)
+        with writing(args.png) as file:
+            planned.plot(file)
     if args.pheromone_png is not None:
         _draw_pheromone(args.pheromone_png, planned, trails)
     _print(args, planned)
@@ -101,8 +102,8 @@ def _draw_pheromone(file: Path, planned: Plan, trails: Sequence[ColonySnapshot])
             f"{file}: the search ended before its first cohort of ants",
             hint="give it a larger --budget, or none",
         )
-    with writing(file):
-        pheromone_picture_of(planned, trails[0].tau).save(file, "PNG")
+    with writing(file) as new:
+        pheromone_picture_of(planned, trails[0].tau).save(new, "PNG")
 
 
 def _print(args: argparse.Namespace, planned: Plan) -> None:

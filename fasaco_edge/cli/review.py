@@ -115,10 +115,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Review."""
-    from fasaco_edge.cli.console.arguments import check_output, writing
+    from fasaco_edge.cli.console.arguments import check_outputs, naming, writing
 
-    for file in (args.png, args.html):
-        check_output(file)
+    check_outputs((args.png, args.html), [*args.recordings, *(args.against or ())])
     review = _read(args.recordings, "recording")
     if args.at is not None or args.point:
         return _answer(args, review)
@@ -136,17 +135,17 @@ def run(args: argparse.Namespace) -> int:
     if args.png:
         from fasaco_edge.review.pictures import draw_review
 
-        with writing(args.png):
-            draw_review(review).save(args.png, "PNG")
+        with writing(args.png) as file:
+            draw_review(review).save(file, "PNG")
     if args.html:
         from fasaco_edge.review.page import page_of
 
-        with writing(args.html):
-            args.html.write_text(page_of(review, other), encoding="utf-8")
+        with writing(args.html) as file:
+            file.write_text(page_of(review, other), encoding="utf-8")
     if args.export:
         from fasaco_edge.review.export import export
 
-        with writing(args.export):
+        with naming(args.export):
             export(review, args.export, args.export_as)
     if args.view:
         from fasaco_edge.recording.read.repair import view
@@ -186,8 +185,8 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
                 f"no picture: {review.no_lattice or 'there is no map yet'}",
                 hint="the answer is complete without --png",
             )
-        with writing(args.png):
-            picture.save(args.png, "PNG")
+        with writing(args.png) as file:
+            picture.save(file, "PNG")
     return 0
 
 

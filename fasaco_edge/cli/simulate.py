@@ -12,14 +12,14 @@ from fasaco_edge.cli.console.arguments import (
     DEFAULT_RADIUS_M,
     Command,
     add_robot_on_bus,
-    check_output,
+    check_outputs,
     pair_of_floats,
     robot_on_bus,
     writing,
 )
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.grid.map_files import find_map, read_map
+from fasaco_edge.grid.map_files import find_map, map_sources, read_map
 
 if TYPE_CHECKING:
     from fasaco_edge.simulation.node import Progress
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.simulation.world import World
 
     path = find_map(args.map)
-    check_output(args.trail_out)
+    check_outputs([args.trail_out], map_sources(path))
     config = SimulationConfig(
         robot_radius_m=args.robot_radius,
         range_m=args.range,
@@ -86,8 +86,8 @@ def run(args: argparse.Namespace) -> int:
         world, here.keys, here.bus, speed=args.speed, driver=args.driver, report=_report
     )
     if args.trail_out is not None:
-        with writing(args.trail_out):
-            np.savetxt(args.trail_out, world.track, "%.4f", ",", header="x,y", comments="")
+        with writing(args.trail_out) as file:
+            np.savetxt(file, world.track, "%.4f", ",", header="x,y", comments="")
     print(
         f"drove {result.distance_m:.1f} m in {result.sim_s:.0f} simulated s, "
         f"{result.collisions} collisions, {result.stops} stops before a wall, "

@@ -144,6 +144,17 @@ def _grid(geometry: GridGeometry, stripes: Iterator[NDArray[np.int8]]) -> Occupa
     return OccupancyGrid(geometry, cells)
 
 
+def map_sources(path: Path) -> list[Path]:
+    """Return the files that a map is read from: itself, and the image that a YAML file names.
+
+    Raises:
+        MapFileError: a YAML file is none, or names no image.
+    """
+    if path.suffix.lower() in (*IMAGE_SUFFIXES, ".npy"):
+        return [path]
+    return [path, _YamlKeys(path, _load_yaml(path)).image()]
+
+
 def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
     """Return the coverage grid, bool (rows, cols), True = coverable, of a .npy file.
 

@@ -23,6 +23,7 @@ from fasaco_edge.drawing.pictures import draw_walk
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.drawing.trail import draw_trail
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.host.outputs import whole
 from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.settings import CELLS, Search
@@ -108,7 +109,8 @@ class Plan:
         """Return a picture, RGB, of the walk or the line over the map; as PNG, too."""
         picture = picture_of(self)
         if file is not None:
-            picture.save(file, "PNG")
+            with whole(Path(file)) as new:
+                picture.save(new, "PNG")
         return picture
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.host.outputs import whole
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.tables import Column, Table, tables_of
@@ -61,7 +62,7 @@ def export(review: Review, folder: Path, form: str = CSV) -> None:
 
 
 def _write_csv(table: Table, file: Path) -> None:
-    with file.open("w", encoding="utf-8", newline="") as target:
+    with whole(file) as new, new.open("w", encoding="utf-8", newline="") as target:
         writer = csv.writer(target)
         writer.writerow(column.name for column in table.columns)
         writer.writerows([_cell(value) for value in row] for row in table.rows)
@@ -81,7 +82,7 @@ def _write_parquet(table: Table, file: Path) -> None:
         ],
         metadata={"description": table.about},
     )
-    with parquet.ParquetWriter(file, schema) as writer:
+    with whole(file) as new, parquet.ParquetWriter(new, schema) as writer:
         rows: list[Sequence[object]] = []
         for row in table.rows:
             rows.append([one_line(value) if isinstance(value, str) else value for value in row])
@@ -127,4 +128,5 @@ def _write_arrays(review: Review, file: Path) -> None:
             "cell_m": np.array(lattice.cell_m),
         }
     # As NumPy's own readers take it; its stub takes the first array for an option.
-    np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+    with whole(file) as new:
+        np.savez_compressed(new, **arrays)  # type: ignore[arg-type]

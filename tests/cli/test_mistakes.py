@@ -11,12 +11,14 @@ import time
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from fasaco_edge.cli import main
 from fasaco_edge.host.processes import cpu_seconds
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge, free_endpoint
 
 NOBODY = "tcp/127.0.0.1:1"
+MAP = "{image: map.png, resolution: 0.05, origin: [0, 0, 0], negate: 0}"
 
 
 @pytest.fixture
@@ -35,6 +37,11 @@ def folder(tmp_path, monkeypatch):
     np.save("numbers.npy", np.ones((6, 6)))
     (tmp_path / "text.yaml").write_text("image: nowhere.pgm\n")
     (tmp_path / "text.npy").write_text("no grid")
+    (tmp_path / "mine.py").write_text("def f(problem): pass")
+    Image.new("L", (60, 60), 255).save("map.png")
+    (tmp_path / "map.yaml").write_text(MAP)
+    (tmp_path / "link.png").symlink_to("map.png")
+    (tmp_path / "around").symlink_to("around")
     return tmp_path
 
 
@@ -79,6 +86,16 @@ def folder(tmp_path, monkeypatch):
         ("plan good.npy --seed -1", 78, "seed must be in 0..2^63 - 1, got -1"),
         ("plan good.npy --png no/walk.png", 78, "cannot write no/walk.png: there is no folder no"),
         ("plan good.npy --png .", 78, "cannot write .: that is a folder"),
+        ("plan good.npy --path-out good.npy", 78, "cannot write good.npy: it is read from"),
+        ("plan good.npy --png w --path-out ./w", 78, "cannot write w: something else is written"),
+        ("plan map.yaml --png map.png", 78, "cannot write map.png: it is read from"),
+        ("plan map.yaml --png link.png", 78, "cannot write link.png: it is read from"),
+        ("plan good.npy --planner mine.py:f --png mine.py", 78, "cannot write mine.py: it is read"),
+        ("simulate map.yaml --trail-out map.png", 78, "cannot write map.png: it is read from"),
+        ("review a.rrd --html a.rrd", 78, "cannot write a.rrd: it is read from"),
+        ("review a.rrd --against b.rrd --png b.rrd", 78, "cannot write b.rrd: it is read from"),
+        ("plan good.npy --png around", 78, "cannot write around: Too many levels of symbolic"),
+        (f"plan good.npy --png {'w' * 300}", 78, "File name too long"),
         ("plan good.npy --path-out no/w.csv", 78, "cannot write no/w.csv: there is no folder no"),
         ("plan good.npy --path-out /proc/w.csv", 78, "cannot write /proc/w.csv"),
         (

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import os
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import IntEnum
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.outputs import whole
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.settings import BusSettings
@@ -216,25 +217,39 @@ def _client(connect: tuple[str, ...], security_file: str | None) -> BusSettings:
     return BusSettings("client", connect, secured=security.of_client())
 
 
-def check_output(file: Path | None) -> None:
-    """Check that ``file`` can be written; None is no file at all.
+def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -> None:
+    """Check that files can be written; None is no file at all.
+
+    Args:
+        outputs: what is to be written.
+        inputs: what is read: none of it may be written over.
 
     Raises:
-        BadConfiguration: it is a folder, its folder is missing, or neither may be written to.
+        BadConfiguration: one is a folder, its folder is missing, neither may be written to, it is
+            read from, or two are one and the same.
     """
-    if file is None:
-        return
-    if file.is_dir():
-        raise _unwritable(file, "that is a folder")
-    if not file.parent.is_dir():
-        raise _unwritable(file, f"there is no folder {file.parent}")
-    if not os.access(file if file.exists() else file.parent, os.W_OK):
-        raise _unwritable(file, "no permission")
+    # Unlike Path's methods these do not raise on names no file system takes.
+    taken = {os.path.realpath(file): "it is read from" for file in inputs}
+    for file in filter(None, outputs):
+        target = os.path.realpath(file)
+        if os.path.isdir(target):
+            raise _unwritable(file, "that is a folder")
+        folder = os.path.dirname(target)
+        if not os.path.isdir(folder):
+            shown = folder if os.path.islink(file) else file.parent
+            raise _unwritable(file, f"there is no folder {shown}")
+        is_there = os.path.exists(target)
+        if not os.access(target if is_there else folder, os.W_OK):
+            raise _unwritable(file, "no permission")
+        if target in taken:
+            raise _unwritable(file, taken[target])
+        if os.path.isfile(target) or not is_there:
+            taken[target] = "something else is written there, too"
 
 
 @contextmanager
-def writing(file: Path) -> Iterator[None]:
-    """Name ``file`` where the block fails to write it, on a full disk, say.
+def naming(place: Path) -> Iterator[None]:
+    """Name ``place`` where the block fails to write there, on a full disk, say.
 
     Raises:
         BadConfiguration: the block raised OSError.
@@ -242,7 +257,18 @@ def writing(file: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise _unwritable(file, error.strerror or str(error)) from error
+        raise _unwritable(place, error.strerror or str(error)) from error
+
+
+@contextmanager
+def writing(file: Path) -> Iterator[Path]:
+    """Yield the name by which ``file`` is to be written, see ``host.outputs.whole``.
+
+    Raises:
+        BadConfiguration: it cannot be written.
+    """
+    with naming(file), whole(file) as new:
+        yield new
 
 
 def _unwritable(file: Path, why: str) -> BadConfiguration:

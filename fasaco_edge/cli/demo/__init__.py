@@ -11,7 +11,7 @@ from fasaco_edge.cli.console.arguments import (
     DEFAULT_RADIUS_M,
     Command,
     add_json,
-    writing,
+    naming,
 )
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.cli.warmup import compile_kernels
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.speed > 0:
         raise BadConfiguration(f"--speed must be above 0, got {args.speed}")
     out: Path = args.out or RUNS / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
-    with writing(out):
+    with naming(out):
         if args.out is None:
             # Its name was not given, and anybody may have made it.
             make_own_folder(RUNS)

@@ -176,14 +176,14 @@ def _write(
     figures: dict[str, object],
 ) -> None:
     if args.path_out is not None:
-        with writing(args.path_out):
-            _write_rows(args.path_out, "robot,row,col", "%d", division.walks)
+        with writing(args.path_out) as file:
+            _write_rows(file, "robot,row,col", "%d", division.walks)
     if args.xy_out is not None:
         from fasaco_edge.offline.ground import line_through
 
         lines = [line_through(lattice, walk) for walk in division.walks]
-        with writing(args.xy_out):
-            _write_rows(args.xy_out, "robot,x_m,y_m", ("%d", "%.6f", "%.6f"), lines)
+        with writing(args.xy_out) as file:
+            _write_rows(file, "robot,x_m,y_m", ("%d", "%.6f", "%.6f"), lines)
     if args.png is not None:
         from fasaco_edge.drawing.fleet import draw_fleet
 
@@ -194,9 +194,9 @@ def _write(
             f"{figures['swept_twice']} cells passed by two or more",
         ]
         title = f"{figures['planner']}, {len(division.walks)} robots, seed {figures['seed']}"
-        with writing(args.png):
+        with writing(args.png) as file:
             draw_fleet(lattice, division.walks, grid=grid, title=title, lines=lines_below).save(
-                args.png, "PNG"
+                file, "PNG"
             )
 
 

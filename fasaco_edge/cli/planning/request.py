@@ -40,12 +40,14 @@ class PlanRequest:
         search: how to search.
         line: which line is made.
         own: the user's planner in place of the search; None for none.
+        sources: files that this was read from.
     """
 
     robot: RobotConfig
     search: Search
     line: str
     own: FunctionType | None
+    sources: tuple[Path, ...] = ()
 
 
 def read_request(args: argparse.Namespace) -> PlanRequest:
@@ -77,7 +79,9 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
         allowed = 0.0 <= args.overlap <= 0.5
         require(allowed, "--overlap", "be in [0, 0.5], of the tool's width", args.overlap)
     changes = _given(args, ROBOT_OPTIONS) | turning_of(args, robot)
-    return PlanRequest(msgspec.structs.replace(robot, **changes), search, line, own)
+    named = args.config, Path(own.__code__.co_filename) if own else None
+    sources = tuple(file for file in named if file is not None)
+    return PlanRequest(msgspec.structs.replace(robot, **changes), search, line, own, sources)
 
 
 def _search(config: DaemonConfig | None) -> Search:
