@@ -25,6 +25,8 @@ MOST_TOKENS = 16_384
 # question that is not even ended by then is asked again after twice as long [s].
 ANSWER_S = 2.0
 LOST_S = 2 * ANSWER_S
+# What Zenoh itself says as an error where somebody was asked and did not answer in time.
+TIMEOUT = b"Timeout"
 
 
 def ask_for_tokens(

@@ -20,6 +20,7 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Asker, LatchedSubscription, Subscription
 from fasaco_edge.bus.publisher import JSON, Publisher
 from fasaco_edge.bus.queries import (
+    TIMEOUT,
     Question,
     Reply,
     Request,
@@ -184,6 +185,8 @@ class Bus:
     def get(self, selector: str, timeout_s: float = 2.0, payload: bytes = b"") -> list[Reply]:
         """Ask ``selector`` (a key, parameters behind ``?``) and return all answers.
 
+        Who does not answer in time has given none.
+
         Args:
             selector: what to ask.
             timeout_s: how long to wait for answers [s].
@@ -193,7 +196,8 @@ class Bus:
         replies = self._session.get(
             selector, timeout=timeout_s, payload=payload or None, encoding=encoding
         )
-        return [reply_of(reply) for reply in replies]
+        answers = map(reply_of, replies)
+        return [reply for reply in answers if not (reply.is_error and reply.payload == TIMEOUT)]
 
     def ask(
         self,

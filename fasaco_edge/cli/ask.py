@@ -89,6 +89,11 @@ TIMEOUT_S = 5.0
 
 def nobody_answers(prefix: str, robots: Collection[str]) -> NobodyAnswersError:
     """Return the error that no daemon answers at ``prefix``, where these robots are."""
+    if prefix.rpartition("/")[2] in robots:
+        return NobodyAnswersError(
+            f"the daemon at {prefix} is on the bus, but has not answered in time",
+            hint="its process may be held up or frozen: look after the robot, and ask again",
+        )
     names = one_line(", ".join(sorted(robots)))
     there = f"there are {names}: give one as --robot" if names else "there is none"
     return NobodyAnswersError(

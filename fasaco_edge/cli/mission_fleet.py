@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,11 +14,11 @@ from fasaco_edge.cli.ask import nobody_answers
 from fasaco_edge.cli.console.arguments import Exit, robot_on_bus
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
-from fasaco_edge.errors import NobodyAnswersError
+from fasaco_edge.errors import MalformedMessage, NobodyAnswersError
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import phrases
 from fasaco_edge.wire.documents import replies
-from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
+from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, tolerant
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import VERSION, Keys, is_chunk
 
@@ -25,16 +27,23 @@ if TYPE_CHECKING:
     from fasaco_edge.bus.session import Bus
 
 
+# Whom a robot has heard within this time is asked, too, though it may be silent by now [s].
+HEARD_S = 600.0
+# So many are asked at a time: who does not answer holds up none of them.
+AT_ONCE = 64
+
+
 @dataclass(frozen=True, slots=True)
 class _Member:
-    """A robot of the fleet, and its answer; None where it gave none."""
+    """A robot of the fleet, and the document of its answer, if that is one.
+
+    Attributes:
+        refused: why it has not taken the command; "" where it has.
+    """
 
     robot: str
-    answer: Reply | None
-
-    @property
-    def has_taken(self) -> bool:
-        return self.answer is not None and not self.answer.is_error
+    document: dict[str, object] | None
+    refused: str
 
 
 def command_fleet(args: argparse.Namespace, payload: bytes) -> int:
@@ -49,22 +58,36 @@ def command_fleet(args: argparse.Namespace, payload: bytes) -> int:
     keys, settings, _ = robot_on_bus(args)
     with open_bus(settings) as bus:
         robots = _robots(bus, keys, args.fleet, args.timeout)
-        members = []
-        for robot in robots:
-            found = bus.get(Keys(robot, keys.base).rpc("mission"), args.timeout, payload)
-            members.append(_Member(robot, found[0] if found else None))
+
+        def command(robot: str) -> _Member:
+            key = Keys(robot, keys.base).rpc("mission")
+            return _member(robot, bus.get(key, args.timeout, payload))
+
+        with ThreadPoolExecutor(min(len(robots), AT_ONCE)) as pool:
+            members = list(pool.map(command, robots))
     if args.json:
-        print_json({member.robot: _document(member) for member in members})
+        print_json({member.robot: member.document for member in members})
     else:
         out().print(_table(args.fleet, members))
-    return Exit.OK if all(member.has_taken for member in members) else Exit.ERROR
+    return Exit.ERROR if any(member.refused for member in members) else Exit.OK
 
 
 def _robots(bus: Bus, keys: Keys, fleet: str, timeout_s: float) -> list[str]:
-    """Return the names of the robots of a fleet, in order."""
-    found = bus.get(f"{keys.base}/{VERSION}/*/@rpc/status", timeout_s)
-    statuses = [decode_tolerant(reply.payload, Status) for reply in found if not reply.is_error]
-    names = {status.robot for status in statuses if _fleet(status) == fleet}
+    """Return the names of the robots of a fleet, in order.
+
+    Those that answer, and those that they have heard of lately: one that is frozen, or that a
+    network has lost, may drive all the same.
+    """
+    statuses = []
+    for reply in bus.get(f"{keys.base}/{VERSION}/*/@rpc/status", timeout_s):
+        # What somebody answers that is no status concerns nobody else.
+        with suppress(MalformedMessage):
+            statuses += [] if reply.is_error else [decode_tolerant(reply.payload, Status)]
+    names = set[str]()
+    for status in statuses:
+        if status.fleet and status.fleet.name == fleet:
+            heard = (member for member in status.fleet.members if member.heard_s <= HEARD_S)
+            names |= {status.robot, *(member.name for member in heard)}
     if robots := sorted(name for name in names if is_chunk(name)):
         return robots
     fleets = one_line(", ".join(sorted({_fleet(status) for status in statuses} - {""})))
@@ -81,24 +104,28 @@ def _fleet(status: Status) -> str:
     return status.fleet.name if status.fleet else ""
 
 
-def _document(member: _Member) -> dict[str, object] | None:
-    return None if member.answer is None else decode_json(member.answer.payload)
+def _member(robot: str, found: list[Reply]) -> _Member:
+    if not found:
+        return _Member(robot, None, "no answer")
+    try:
+        document = decode_json(found[0].payload)
+    except MalformedMessage as error:
+        return _Member(robot, None, f"its answer cannot be read: {error}")
+    refused = f"refused: {tolerant(document, replies.Error).message}" if found[0].is_error else ""
+    return _Member(robot, document, refused)
 
 
 def _table(fleet: str, members: list[_Member]) -> Table:
     title = f"Fleet {one_line(fleet)}"
     table = Table("robot", "state", "covered", "answer", title=title, title_justify="left")
     for member in members:
-        table.add_row(one_line(member.robot), *_cells(member.answer))
+        table.add_row(one_line(member.robot), *_cells(member))
     return table
 
 
-def _cells(reply: Reply | None) -> tuple[str, str, str]:
-    if reply is None:
-        return "-", "-", "no answer"
-    if reply.is_error:
-        error = decode_tolerant(reply.payload, replies.Error)
-        return "-", "-", one_line(f"refused: {error.message}")
-    answer = decode_tolerant(reply.payload, replies.Reply)
+def _cells(member: _Member) -> tuple[str, str, str]:
+    if member.refused or member.document is None:
+        return "-", "-", one_line(member.refused)
+    answer = tolerant(member.document, replies.Reply)
     covered = phrases.covered(answer.coverage) if answer.coverage else "-"
     return one_line(answer.state), covered, one_line(answer.reason)

@@ -115,15 +115,15 @@ class Viewer:
         try:
             payload = encode_json(asked)
             found = await asyncio.to_thread(self._source.ask, "mission", payload, ANSWER_S)
+            if not found:
+                why = "no answer from the daemon"
+                return told("answer", id=order.id, ok=False, text=why, hint="")
+            if found[0].is_error:
+                wrong = decode_tolerant(found[0].payload, Error)
+                return told("answer", id=order.id, ok=False, text=wrong.message, hint=wrong.hint)
+            answer = decode_tolerant(found[0].payload, Answer)
         except FasacoError as error:
             return told("answer", id=order.id, ok=False, text=str(error), hint=error.hint)
-        if not found:
-            why = "no answer from the daemon"
-            return told("answer", id=order.id, ok=False, text=why, hint="")
-        if found[0].is_error:
-            wrong = decode_tolerant(found[0].payload, Error)
-            return told("answer", id=order.id, ok=False, text=wrong.message, hint=wrong.hint)
-        answer = decode_tolerant(found[0].payload, Answer)
         text = f"{answer.state}: {answer.reason}"
         return told("answer", id=order.id, ok=True, text=text, hint="")
 

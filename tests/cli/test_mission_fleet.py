@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import json
+import signal
 
 import pytest
 
 from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.cli import main
-from tests.support.outsider import Outsider
+from tests.support.outsider import Outsider, open_client
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pose_bytes, room
 
@@ -18,12 +19,17 @@ ROBOTS = {"r1": "hall", "r2": "hall", "r3": "yard"}
 
 
 @pytest.fixture(scope="module")
-def router(tmp_path_factory):
+def endpoint():
     endpoint = free_endpoint()
+    with open_bus(BusSettings("router", (), (endpoint,))):
+        yield endpoint
+
+
+@pytest.fixture(scope="module")
+def daemons(endpoint, tmp_path_factory):
     with contextlib.ExitStack() as stack:
-        stack.enter_context(open_bus(BusSettings("router", (), (endpoint,))))
-        for name, fleet in ROBOTS.items():
-            stack.enter_context(
+        yield {
+            name: stack.enter_context(
                 daemon_process(
                     tmp_path_factory.mktemp(name),
                     bus={"mode": "client", "listen": [], "connect": [endpoint]},
@@ -31,6 +37,13 @@ def router(tmp_path_factory):
                     fleet={"name": fleet},
                 )
             )
+            for name, fleet in ROBOTS.items()
+        }
+
+
+@pytest.fixture(scope="module")
+def router(endpoint, daemons):
+    with contextlib.ExitStack() as stack:
         seats = {name: stack.enter_context(Outsider(endpoint, name)) for name in ROBOTS}
         seats["r1"].put("map", map_bytes(room(3.0, 3.0)))
         seats["r1"].put("pose", pose_bytes(0.75, 0.75))
@@ -73,3 +86,51 @@ def test_a_fleet_that_nobody_is_of(router, capsys):
     error = capsys.readouterr().err
     assert "no robot of a fleet 'garden' answers" in error
     assert "3 robots answer, of these fleets: hall, yard" in error
+
+
+def test_what_is_no_status_holds_up_no_fleet(router, capsys):
+    stranger = open_client(router)
+    noise = {"a junk": b"\xff\xfe", "a list": b"[1]", "long": b'"' + b"a" * 2**21 + b'"'}
+    for number, payload in enumerate(noise.values()):
+        key = f"fasaco/@v1/noise{number}/@rpc/status"
+        stranger.declare_queryable(key, answering(key, payload))
+    # This one says that it is of the fleet, and answers the command with nothing to be read.
+    liar = {"robot": "liar", "fleet": {"name": "hall"}}
+    for name, payload in (("status", json.dumps(liar).encode()), ("mission", b"\xff\xfe")):
+        key = f"fasaco/@v1/liar/@rpc/{name}"
+        stranger.declare_queryable(key, answering(key, payload))
+    try:
+        assert command(router, "pause", "--fleet", "hall", "--json") == 1
+        answers = json.loads(capsys.readouterr().out)
+        assert {robot: answer and answer["state"] for robot, answer in answers.items()} == {
+            "liar": None,
+            "r1": "paused",
+            "r2": "paused",
+        }
+        assert command(router, "resume", "--fleet", "hall") == 1
+        assert "its answer cannot be read" in " ".join(capsys.readouterr().out.split())
+    finally:
+        stranger.close()
+
+
+def answering(key, payload):
+    return lambda query: query.reply(key, payload)
+
+
+def test_a_robot_that_is_frozen_is_told_and_holds_up_no_other(router, daemons, capsys):
+    with Outsider(router, "r2") as second, Outsider(router, "r1") as first:
+        second.put("map", map_bytes(room(3.0, 3.0)))
+        second.put("pose", pose_bytes(0.75, 0.75))
+        first.wait_status(lambda status: bool(status["fleet"]["members"]))
+    daemons["r2"].process.send_signal(signal.SIGSTOP)
+    try:
+        assert command(router, "pause", "--robot", "r2", "--timeout", "1") == 1
+        assert "is on the bus, but has not answered in time" in capsys.readouterr().err
+        assert command(router, "pause", "--fleet", "hall", "--json", "--timeout", "2") == 1
+        answers = json.loads(capsys.readouterr().out)
+        assert answers["r1"]["state"] == "paused"
+        assert answers["r2"] is None
+        assert command(router, "resume", "--fleet", "hall", "--timeout", "2") == 1
+        assert "no answer" in capsys.readouterr().out
+    finally:
+        daemons["r2"].process.send_signal(signal.SIGCONT)
