@@ -1,28 +1,28 @@
 """Nav2's controller as follower: paths, poses, signs of the daemon and answers in, requests out.
 
 A goal is a piece of the path that begins where the robot is. The next one is sent while the robot
-is still on its way to the end: Nav2 goes over to it without standing. At a sharp corner that is
-not possible, and the next goal goes out when the one before is done. No clock, no session.
+is still on its way to the end: Nav2 goes over to it without standing. Where the path comes back to
+itself, that piece may begin only shortly before the end; it is sent as much earlier as Nav2 takes
+to answer. No clock, no session.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
+from fasaco_edge.follow.nav2_requests import AskResult, Cancellations, Request, SendGoal
+from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece, start_of_piece
 from fasaco_edge.follow.supervision import Patience, State, Supervision
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.messages.follow_path import (
     ABORTED,
     CANCELED,
-    ENDED_BEFORE,
     ERRORS,
-    NO_SUCH_GOAL,
     SUCCEEDED,
-    TAKEN,
     Ending,
 )
 from fasaco_edge.wire.messages.path_points import PathPoints
@@ -31,8 +31,10 @@ from fasaco_edge.wire.messages.path_points import PathPoints
 # drives in so many seconds; and only if it leads on by so much [m].
 AHEAD_M, AHEAD_S = 0.5, 3.0
 GAIN_M = 0.3
-# How far a goal would lead is looked at again after so far [m].
-LOOK_M = 0.2
+# A goal is sent where it begins so far ahead of the robot [m], as controllers are done so near to
+# the end of the one before, too; and as much further as the robot drives while a request is on its
+# way, by the fastest of so many answers: one that came too early would cut a part of the path off.
+EARLY_M, ANSWERS = 0.1, 8
 # Where a path begins further off, it is not driven [m]; how far on it the robot may be by then.
 BEGINNING_M = 1.0
 # Where two paths are as near as this to each other they are the same [m].
@@ -49,9 +51,6 @@ RETRY_S, MOST_RETRY_S = 1.0, 30.0
 # then the result is asked for again, as it may have been lost, and after longer the goal is given
 # up [s].
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
-# Requests to cancel are repeated [s], for so many goals, the newest ones: Nav2 drives no other.
-CANCEL_EVERY_S = 1.0
-MOST_DOOMED = 8
 
 
 @dataclass(slots=True)
@@ -61,46 +60,16 @@ class Goal:
     Attributes:
         id: of the goal, 16 bytes.
         start, end: on the line [m].
+        sent_at: when it was sent [s].
+        next_start: where the next one may begin, infinite where it has to wait for the end of this
+            one; None as long as nobody looked [m].
     """
 
     id: bytes
     start: float
     end: float
-
-
-@dataclass(frozen=True, slots=True)
-class SendGoal:
-    """Have Nav2 follow points [m] in a frame."""
-
-    id: bytes
-    points: list[Point]
-    frame: str
-
-
-@dataclass(frozen=True, slots=True)
-class AskResult:
-    """Ask how a goal ended; the answer comes when it has."""
-
-    id: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class CancelGoal:
-    """Have Nav2 end a goal."""
-
-    id: bytes
-
-
-Request = SendGoal | AskResult | CancelGoal
-
-
-@dataclass(slots=True)
-class Doomed:
-    """A goal that is to end, and when that was last asked for [s]."""
-
-    asked_at: float = -math.inf
-    # Whether Nav2 has said if it took the goal: before, it may not know it yet.
-    is_known: bool = True
+    sent_at: float
+    next_start: float | None = None
 
 
 @dataclass(slots=True)
@@ -133,20 +102,23 @@ class Nav2Follower(Supervision):
         self.tally = Tally()
         self._near = near
         self._ahead = AHEAD_M + AHEAD_S * speed
+        self._speed = speed
+        # How long Nav2's last answers took [s].
+        self._answers: deque[float] = deque(maxlen=ANSWERS)
         self._new_id = new_id
         self._here: Point | None = None
         self._came_at: float | None = None
         self._line: Line | None = None
         # What takes its place, once Nav2 has answered what it was sent.
         self._next: Line | None = None
-        # Where the robot is along the line, and where that was last looked at for the next goal.
-        self._way = self._looked = 0.0
+        # Where the robot is along the line.
+        self._way = 0.0
         # Where the last goal was done: from there the next one goes on, wherever the robot stopped.
         self._done = -1.0
         # What Nav2 drives, and what it was sent and has not answered yet.
         self._active: Goal | None = None
         self._pending: Goal | None = None
-        self._doomed: dict[bytes, Doomed] = {}
+        self._cancellations = Cancellations()
         self._moved_last: tuple[Point, float] | None = None
         self._asked_again = -math.inf
         self._retry_at, self._retry_s = -math.inf, RETRY_S
@@ -169,33 +141,28 @@ class Nav2Follower(Supervision):
             self._have_none(State.BAD_PATH, str(error))
             self.state, self.detail = State.BAD_PATH, str(error)
             self._stop()
-        for goal_id, doomed in self._doomed.items():
-            if now - doomed.asked_at >= CANCEL_EVERY_S:
-                doomed.asked_at = now
-                self._requests.append(CancelGoal(goal_id))
-        return self._requests
+        return self._requests + self._cancellations.due(now)
 
     def end(self) -> list[Request]:
         """Return what ends all goals."""
         self._stop()
-        return [CancelGoal(goal_id) for goal_id in self._doomed]
+        return self._cancellations.due(math.inf)
 
     def take_unsent(self, goal_id: bytes, why: str, now: float) -> None:
         """Take in that a goal could not be sent."""
         if self._pending is not None and self._pending.id == goal_id:
             self._pending = None
             self._fail(State.NO_NAV2, why, now)
-        self._doomed.pop(goal_id, None)
+        self._cancellations.drop(goal_id)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
         """Take in whether Nav2 took a goal; None where it did not say: then it has to end it."""
-        if goal_id in self._doomed:
-            self._doomed[goal_id] = Doomed()
-            if accepted is False:
-                del self._doomed[goal_id]
+        self._cancellations.take_accepted(goal_id, accepted)
         if self._pending is None or self._pending.id != goal_id:
             return
         goal, self._pending = self._pending, None
+        if accepted is not None:
+            self._answers.append(now - goal.sent_at)
         if accepted:
             self._active = goal
             self._moved_last = None
@@ -204,19 +171,19 @@ class Nav2Follower(Supervision):
             self._requests_later.append(AskResult(goal_id))
             return
         if accepted is None:
-            self._doom(goal_id)
+            self._cancellations.add(goal_id)
         state = State.REFUSED if accepted is False else State.NO_NAV2
         self._fail(state, why or "is its controller server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
         """Take in how a goal ended; None where Nav2 did not say, and will not: it may drive it."""
         if ending is not None:
-            self._doomed.pop(goal_id, None)
+            self._cancellations.drop(goal_id)
         if self._active is None or self._active.id != goal_id:
             return
         goal, self._active = self._active, None
         if ending is None:
-            self._doom(goal_id)
+            self._cancellations.add(goal_id)
         self._requests_later.clear()
         if self._pending is not None:
             # It goes over to the next one.
@@ -237,9 +204,7 @@ class Nav2Follower(Supervision):
 
     def take_cancelled(self, goal_id: bytes, code: int | None) -> None:
         """Take in what becomes of a request to cancel; None where Nav2 did not say."""
-        doomed = self._doomed.get(goal_id)
-        if doomed and doomed.is_known and code in (TAKEN, NO_SUCH_GOAL, ENDED_BEFORE):
-            del self._doomed[goal_id]
+        self._cancellations.take_answer(goal_id, code)
 
     def _drive(self, now: float) -> None:
         self._requests += self._requests_later
@@ -255,7 +220,7 @@ class Nav2Follower(Supervision):
         elif goal is self._active:
             self._watch(goal, now)
             if goal.end - self._way <= self._ahead and goal.end < whole:
-                self._send_next(goal)
+                self._send_next(goal, now)
 
     def _begin(self, whole: float, now: float) -> None:
         """Send a goal where Nav2 has none."""
@@ -264,24 +229,27 @@ class Nav2Follower(Supervision):
         if whole - self._way <= STEP_M:
             self.state, self.detail = State.DRIVEN, ""
         elif now >= self._retry_at:
-            assert self._line is not None
-            self._send(end_of_piece(self._line, self._way, self._near))
+            self._send(self._way, now)
 
-    def _send_next(self, goal: Goal) -> None:
-        """Send the next goal ahead, if it leads on."""
-        if self._way - self._looked < LOOK_M:
-            return
-        self._looked = self._way
+    def _send_next(self, goal: Goal, now: float) -> None:
+        """Send the next goal, once the robot is near enough to where that begins."""
         assert self._line is not None
-        end = end_of_piece(self._line, self._way, self._near)
-        if end >= goal.end + GAIN_M:
-            self._send(end)
+        if goal.next_start is None:
+            first = max(goal.end - self._ahead, goal.start)
+            goal.next_start = start_of_piece(
+                self._line, first, goal.end, goal.end + GAIN_M, self._near
+            )
+        start = max(goal.next_start, self._way)
+        early = EARLY_M + 0.5 * self._speed * min(self._answers, default=0.0)
+        # What lies between robot and goal is not driven along the line, so it has to be straight.
+        if start - self._way <= early and not self._line.corners(self._way + STEP_M, start):
+            self._send(start, now)
 
-    def _send(self, end: float) -> None:
+    def _send(self, start: float, now: float) -> None:
+        """Send the piece that begins there."""
         assert self._line is not None
-        goal = Goal(self._new_id(), self._way, end)
-        self._pending = goal
-        self._looked = self._way
+        end = end_of_piece(self._line, start, self._near)
+        goal = self._pending = Goal(self._new_id(), start, end, now)
         self.tally.goals += 1
         points = self._line.poses(goal.start, goal.end)
         self._requests.append(SendGoal(goal.id, points, self._path_frame))
@@ -301,16 +269,18 @@ class Nav2Follower(Supervision):
         goal = self._active
         shift = self._shift(line, way, goal) if goal is not None else 0.0
         self._line, self._next = line, None
-        self._way, self._looked, self._done = way, -math.inf, -1.0
+        self._way, self._done = way, -1.0
         self._retry_at, self._retry_s = now, RETRY_S
         self._trouble_of_nav2 = None
         if goal is None:
             return True
         if shift is None:
             # Nav2 goes over to it from what it drives.
-            self._send(end_of_piece(line, way, self._near))
+            self._send(way, now)
         else:
             goal.start, goal.end = goal.start + shift, goal.end + shift
+            # What follows may be another line.
+            goal.next_start = None
         return True
 
     def _shift(self, line: Line, way: float, goal: Goal) -> float | None:
@@ -357,7 +327,7 @@ class Nav2Follower(Supervision):
         if stands_s > STANDS_S:
             self.state, self.detail = State.STANDS, f"for {stands_s:.0f} s"
         if stands_s > GIVE_UP_S:
-            self._doom(goal.id)
+            self._cancellations.add(goal.id)
             self._active = None
             self._fail(State.GIVEN_UP, f"stood for {stands_s:.0f} s without an error", now)
         elif now - self._asked_again > longest_s:
@@ -384,15 +354,9 @@ class Nav2Follower(Supervision):
         """Have all goals end."""
         for goal, is_known in ((self._active, True), (self._pending, False)):
             if goal is not None:
-                self._doom(goal.id, is_known=is_known)
+                self._cancellations.add(goal.id, is_known=is_known)
         self._active = self._pending = None
         self._requests_later.clear()
-
-    def _doom(self, goal_id: bytes, *, is_known: bool = True) -> None:
-        """Have a goal end."""
-        self._doomed[goal_id] = Doomed(is_known=is_known)
-        while len(self._doomed) > MOST_DOOMED:
-            del self._doomed[next(iter(self._doomed))]
 
     def _moved_to(self, pose: Pose2D, now: float) -> None:
         self._here, self._came_at = (pose.x, pose.y), now

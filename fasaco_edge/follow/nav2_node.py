@@ -16,7 +16,8 @@ from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.follow.inputs import Inputs, patience_of
-from fasaco_edge.follow.nav2 import AskResult, CancelGoal, Nav2Follower, Request, SendGoal
+from fasaco_edge.follow.nav2 import Nav2Follower
+from fasaco_edge.follow.nav2_requests import AskResult, CancelGoal, Request, SendGoal
 from fasaco_edge.follow.node import Told
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.wire.messages.follow_path import (

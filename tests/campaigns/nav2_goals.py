@@ -1,8 +1,9 @@
 """Coverage lines driven by a look-alike of Nav2: aborts, delays, restarts, lost replies.
 
-``python -m tests.campaigns.nav2_goals [--missions 50] [--length 40] [--seed 0]``; prints a row for
-each mission and what became of all. A mission is part of a line over a bundled map, so many metres
-long; daemon, path and status are stood in for, the follower and the look-alike are processes.
+``python -m tests.campaigns.nav2_goals [--missions 50] [--length 40] [--speed 1] [--seed 0]`` prints
+a row for each mission and what became of all. A mission is part of a line over a bundled map, so
+many metres long; daemon, path and status are stood in for, the follower and the look-alike are
+processes.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import fasaco_edge as fe
 from tests.follow.nav2_missions import Point, kind_of, nav2_follower, nav2_robot, passed
 from tests.support.driven_base import DrivenBase
 
-SPEED_M_S = 1.0
+LIMIT_S = 600.0
 FAULTS: dict[str, dict[str, float]] = {
     "none": {},
     "delays of a second": {"delay_s": 1.0},
@@ -67,24 +68,24 @@ def line_of(length_m: float, seed: int) -> list[Point]:
     return points
 
 
-def run_mission(faults: str, length_m: float, seed: int, limit_s: float = 600.0) -> Mission:
+def run_mission(faults: str, length_m: float, speed_m_s: float, seed: int) -> Mission:
     """Drive one line to its end."""
     line = line_of(length_m, seed)
     base, domain = DrivenBase(), 7 if seed % 2 else None
     base.says_poses = False
     robot = {
-        "endpoint": base.endpoint, "domain": domain, "start": line[0], "speed": SPEED_M_S,
+        "endpoint": base.endpoint, "domain": domain, "start": line[0], "speed": speed_m_s,
         "seed": seed, **FAULTS[faults],
     }  # fmt: skip
     try:
         with (
             tempfile.TemporaryDirectory() as folder,
             nav2_robot(**robot) as nav2,
-            nav2_follower(Path(folder), base.endpoint, kind_of(domain), speed_m_s=SPEED_M_S) as log,
+            nav2_follower(Path(folder), base.endpoint, kind_of(domain), speed_m_s=speed_m_s) as log,
         ):
             base.plans()
             base.send_path(*line)
-            ends = time.monotonic() + limit_s
+            ends = time.monotonic() + LIMIT_S / speed_m_s
             while "standing, the path is driven" not in (said := log.read_text()):
                 if time.monotonic() > ends:
                     break
@@ -111,12 +112,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--missions", type=int, default=50)
     parser.add_argument("--length", type=float, default=40.0)
+    parser.add_argument("--speed", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
     missions = []
     for number in range(args.missions):
         faults = list(FAULTS)[number % len(FAULTS)]
-        mission = run_mission(faults, args.length, args.seed + number)
+        mission = run_mission(faults, args.length, args.speed, args.seed + number)
         missions.append(mission)
         figures = {name: value for name, value in mission.figures.items() if name != "log"}
         print(
