@@ -103,7 +103,8 @@ class LatticeChange:
         """
         window = lattice_window(grids[1].geometry, footprint.cell_m, max_cells)
         placement = placement_of(grids[1].geometry, footprint)
-        stale = stale_cells(grids, lattice, window, placement, footprint.thresholds, within)
+        stale = cells_near_changes(grids, window, placement, footprint.thresholds, within)
+        stale |= new_cells(lattice.window, window)
         if window == lattice.window and not stale.any():
             return cls(lattice, lattice, np.empty((0, 2), np.int32))
         states = carried(lattice.states, lattice.window, window).copy()
@@ -126,7 +127,7 @@ class LatticeChange:
             new,
         )
         if new != old:
-            lost = (before.states != UNKNOWN) & _new_to(new, old)
+            lost = (before.states != UNKNOWN) & new_cells(new, old)
             changed = np.concatenate((changed, _cells_where(lost, old)))
         elif not len(changed):
             return cls(before, before, changed)
@@ -176,19 +177,19 @@ def carried(array: NDArray[Scalar], old: Window, new: Window, beyond: float = 0)
     return result
 
 
-def stale_cells(
+def cells_near_changes(
     grids: tuple[OccupancyGrid, OccupancyGrid],
-    lattice: CoverageLattice,
     window: Window,
     placement: Placement,
     thresholds: Thresholds,
     within: Window | None,
 ) -> NDArray[np.bool_]:
-    """Return which cells of the new window must be classified again, bool (rows, cols).
+    """Return near which cells of the new window pixels have changed, bool (rows, cols).
+
+    What lies beyond a map is unknown: where one has grown by unknown pixels, none has changed.
 
     Args:
         grids: the map before and the new one.
-        lattice: over the map before.
         window: of the lattice over the new one.
         placement: where its cells lie; a pixel matters for a cell as far as ``reach_of`` says.
         thresholds: what counts as free and as occupied.
@@ -197,7 +198,7 @@ def stale_cells(
     regions = _regions_to_compare(grids, window, placement, within)
     if regions is None:
         return np.ones((window.rows, window.cols), np.bool_)
-    stale = _new_to(lattice.window, window)
+    near = np.zeros((window.rows, window.cols), np.bool_)
     before, after = (pixels_of(grid) for grid in grids)
     for region in regions:
         mark_stale(
@@ -206,19 +207,20 @@ def stale_cells(
             Box(region.row0, region.col0, region.row1, region.col1),
             thresholds,
             placement,
-            stale,
+            near,
             window.row0,
             window.col0,
         )
-    return stale
+    return near
 
 
-def _new_to(old: Window, new: Window) -> NDArray[np.bool_]:
+def new_cells(old: Window, new: Window) -> NDArray[np.bool_]:
     """Mark the cells of the new window that the old one lacks, bool (rows, cols).
 
-    Nothing need have changed around them: a robot wider than its tool may have been blocked
-    where the old lattice did not reach. Of the others none has a step there, unless pixels
-    have changed near by: what lies beyond a window lies beyond its map, and is unknown.
+    They are to be classified, too. Nothing need have changed around them: a robot wider than its
+    tool may have been blocked where the old lattice did not reach. Of the others none has a step
+    there, unless pixels have changed near by: what lies beyond a window lies beyond its map, and is
+    unknown.
     """
     return ~carried(np.ones((old.rows, old.cols), np.bool_), old, new)
 

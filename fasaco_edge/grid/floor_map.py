@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.changes import LatticeChange, stale_cells
+from fasaco_edge.grid.changes import LatticeChange, cells_near_changes, new_cells
 from fasaco_edge.grid.fine_raster import (
     PolygonsOnRaster,
     RobotDiscs,
@@ -120,10 +120,11 @@ class FloorMap:
         wide = placement_of(grids[1].geometry, self._footprint)
         scale = self._footprint.cell_m / grids[1].geometry.resolution
         wide = wide._replace(radius=wide.radius + REACH_CELLS * scale + REACH_PX)
-        stale = stale_cells(grids, before, plain.window, wide, self._footprint.thresholds, within)
+        near = cells_near_changes(grids, plain.window, wide, self._footprint.thresholds, within)
         self.revision += 1
         self.shift = (old.row0 - new.row0) * parts, (old.col0 - new.col0) * parts
-        self.touched = self._pixels_of(stale, plain.window, geometry)
+        # A map that grows on two sides has new cells all along them, and little new floor.
+        self.touched = self._pixels_of(near, plain.window, geometry)
         if self.touched is None and old == new:
             return LatticeChange.to(before, self._with_states(plain))
         if old != new:
@@ -131,7 +132,7 @@ class FloorMap:
             self._look(grids[1], parts, 0, geometry.rows)
         elif self.touched is not None:
             self._look(grids[1], parts, self.touched.row0, self.touched.row1)
-        self._settle(plain, stale)
+        self._settle(plain, near | new_cells(before.window, plain.window))
         return self._compared(before)
 
     def keeping_out(

@@ -48,6 +48,25 @@ def assert_same(found, expected):
         assert np.array_equal(now, anew) if name != "window" else now == anew
 
 
+def pixels_of(floor):
+    """Return what is blocked, and where the robot may be, bool (2, rows, cols)."""
+    return np.stack([unpacked(bits, floor.geometry.cols) for bits in (floor.blocked, floor.places)])
+
+
+def assert_touched(floor, before):
+    """What is not as it was before, on pixels that have moved, lies in the part touched."""
+    after = pixels_of(floor)
+    _, rows, cols = before.shape
+    old, new = Window(0, 0, rows, cols).moved(*floor.shift), Window(0, 0, *after.shape[1:])
+    beyond = np.stack([np.ones(after.shape[1:], np.bool_), np.zeros(after.shape[1:], np.bool_)])
+    common = old.intersection(new)
+    beyond[(slice(None), *common.slices_in(new))] = before[(slice(None), *common.slices_in(old))]
+    different = (beyond != after).any(axis=0)
+    if floor.touched is not None:
+        different[floor.touched.slices_in(new)] = False
+    assert not different.any()
+
+
 @pytest.mark.parametrize("yaw", [0.0, 0.3])
 def test_changes_lead_where_a_new_look_does(yaw):
     rng = np.random.default_rng(7)
@@ -66,10 +85,11 @@ def test_changes_lead_where_a_new_look_does(yaw):
                 size = rng.integers(1, 9, 2)
                 cells[row : row + size[0], col : col + size[1]] = rng.choice([0, 50, 100, -1])
             new = OccupancyGrid(known.geometry, cells)
-        before = floor.stands.lattice
+        before, pixels = floor.stands.lattice, pixels_of(floor)
         plain = LatticeChange.between((known, new), plain, FOOTPRINT).after
         change = floor.change((known, new), plain)
         assert_same(floor, over(new))
+        assert_touched(floor, pixels)
         assert change.before is before
         assert change.after is floor.stands.lattice
         expected = LatticeChange.to(before, over(new).stands.lattice)
@@ -118,6 +138,26 @@ def test_pixels_that_move_say_by_how_much():
     floor = over(first)
     floor.change((first, grown), CoverageLattice.from_map(grown, FOOTPRINT))
     assert floor.shift == (2, 6)  # pixels of 0.05 m have two parts
+
+
+def test_where_a_map_grows_on_two_sides_by_what_is_unknown_little_is_touched():
+    """It was all that a box round the new cells holds: the whole map, each time it grew so."""
+    whole = room(3.0, 2.0)
+    cells = np.pad(whole.cells, 60, constant_values=-1)
+    x, y = whole.geometry.to_map(-60, -60)
+    grown = OccupancyGrid(GridGeometry(*cells.shape, 0.05, Pose2D(x, y, 0.0)), cells)
+    known = part_of(grown, 50, 50, *cells.shape)
+    floor, plain = over(known), CoverageLattice.from_map(grown, FOOTPRINT)
+    floor.change((known, grown), plain)
+    assert floor.touched is None
+    assert_same(floor, over(grown))
+    cells = known.cells.copy()
+    cells[30, 40] = 100  # which the grown map shows no more
+    known, floor = OccupancyGrid(known.geometry, cells), over(known)
+    floor.change((known, grown), plain)
+    assert floor.touched is not None
+    assert 4 * floor.touched.rows * floor.touched.cols < floor.geometry.rows * floor.geometry.cols
+    assert_same(floor, over(grown))
 
 
 def test_what_is_unknown_stays_so():

@@ -14,7 +14,7 @@ from fasaco_edge.daemon.loop.status import floor_report
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
-from fasaco_edge.kernels.floor.driven import DRIVEN, OPEN, WANTED
+from fasaco_edge.kernels.floor.driven import CAUSE, CAUSE_SHIFT, DRIVEN, OPEN, WANTED
 from fasaco_edge.kernels.floor.sweeps import NEVER
 from fasaco_edge.mission.config import MissionConfig, Sweeping
 from fasaco_edge.mission.core.events import (
@@ -26,6 +26,7 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
+from fasaco_edge.mission.line.out_of_reach import Cause
 from fasaco_edge.mission.line.pieces import POLISHED
 from fasaco_edge.mission.line.polisher import AHEAD_M
 from fasaco_edge.mission.line.tally import SweepTally
@@ -120,6 +121,12 @@ def check_tally(mission):
     padded = np.zeros([size * 8 for size in ahead.tally.sweeps.left.shape], int)
     padded[: left.shape[0], : left.shape[1]] = left
     high, wide = ahead.tally.sweeps.left.shape
+    tally = ahead.tally
+    assert tally._wanted_pixels == np.count_nonzero(state & WANTED)
+    assert tally._open_pixels == np.count_nonzero(state & OPEN)
+    for cause in Cause:
+        pixels = np.count_nonzero((state & np.uint8(CAUSE)) >> CAUSE_SHIFT == cause)
+        assert tally._beyond_pixels[cause] == pixels
     blocks = padded.reshape(high, 8, wide, 8).sum(axis=(1, 3))
     assert (blocks == ahead.tally.sweeps.left).all()
 

@@ -60,13 +60,15 @@ class SweepTally:
         """Lie on a raster of another shape, (rows, cols), on which pixels have moved."""
         rows, cols = self.shape
         old, new = Window(*by, by[0] + rows, by[1] + cols), Window(0, 0, *shape)
+        for part in old.without(new):
+            lost = self._state[part.slices_in(old)]
+            self._wanted_pixels -= int(np.count_nonzero(lost & WANTED))
+            self._open_pixels -= int(np.count_nonzero(lost & OPEN))
+            self._beyond_pixels -= _count_causes(lost)
         self._state = carried(self._state, old, new)
         counts = carried(self.sweeps.counts, old, new, NEVER)
         self.sweeps = Sweeps(counts, np.zeros(blocks_of(shape), np.int32))
         count_blocks(self.sweeps, new)
-        self._wanted_pixels = int(np.count_nonzero(self._state & WANTED))
-        self._open_pixels = int(np.count_nonzero(self._state & OPEN))
-        self._beyond_pixels = _count_causes(self._state)
 
     def exchange(self, goes: NDArray[np.float64], comes: NDArray[np.float64]) -> None:
         """Count edges out and others in, float64 (n, 4): y, x and y, x of their ends [pixels]."""
