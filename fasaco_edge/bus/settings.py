@@ -13,13 +13,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
-
-import zenoh
+from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
+
+if TYPE_CHECKING:
+    import zenoh
 
 # Timeout of the handshake of an incoming connection [ms], and how many may be pending.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
@@ -56,6 +57,9 @@ def check_settings(settings: BusSettings) -> None:
     Raises:
         BusUnavailable: Zenoh does not take it.
     """
+    # Who only reads a configuration does without it.
+    import zenoh  # noqa: PLC0415
+
     try:
         session_config(settings)
     except zenoh.ZError as error:
@@ -68,6 +72,8 @@ def session_config(settings: BusSettings) -> zenoh.Config:
     Raises:
         zenoh.ZError: it has unknown keys or impossible values.
     """
+    import zenoh  # noqa: PLC0415
+
     is_client = settings.mode == "client"
     own = {
         "mode": settings.mode,

@@ -13,7 +13,6 @@ from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import inspect_config
 from fasaco_edge.config.reading import Fault
-from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.errors import BadConfiguration
 
 EPILOG = """\
@@ -39,6 +38,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     add_json(parser, "the result")
 
 
+def _shown(config: DaemonConfig) -> dict[str, object]:
+    # It comes with all of the daemon.
+    from fasaco_edge.daemon.loop.answers import config_document
+
+    return config_document(config)
+
+
 def run(args: argparse.Namespace) -> int:
     """Check, and tell."""
     config, found = inspect_config(args.file)
@@ -48,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     elif config is None:
         _print(args.file, faults)
     elif args.show:
-        print(yaml.safe_dump(config_document(config), sort_keys=False), end="")
+        print(yaml.safe_dump(_shown(config), sort_keys=False), end="")
     else:
         print(f"{args.file}: in order")
         if assumed := config.robot.assumed:
@@ -74,7 +80,7 @@ def _document(
         ],
     }
     if args.show:
-        document["config"] = config_document(config) if config is not None else None
+        document["config"] = _shown(config) if config is not None else None
     return document
 
 

@@ -5,21 +5,17 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
-from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, robot_on_bus
-from fasaco_edge.config.config import (
-    BusConfig,
-    DaemonConfig,
-    PoseConfig,
-    RecordingConfig,
-    RobotConfig,
-)
-from fasaco_edge.config.loading import decode_config, load_config
-from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.wire.schemas import POSE_SCHEMAS, POSE_STAMPED
+
+if TYPE_CHECKING:
+    from fasaco_edge.bus.settings import BusSettings
+    from fasaco_edge.config.config import DaemonConfig
+    from fasaco_edge.config.ros import RosConfig
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
 
@@ -62,6 +58,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def ros_config(text: str) -> RosConfig:
     """Read the block ``ros2`` of a configuration."""
+    from fasaco_edge.config.ros import RosConfig
+
     try:
         config = msgspec.json.decode(text, type=RosConfig)
     except msgspec.DecodeError as error:
@@ -126,6 +124,14 @@ def run(args: argparse.Namespace) -> int:
 
 def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettings]:
     """Return the configuration that the options state, and how to join the bus."""
+    from fasaco_edge.config.config import (
+        BusConfig,
+        DaemonConfig,
+        PoseConfig,
+        RecordingConfig,
+        RobotConfig,
+    )
+
     keys, bus, _ = robot_on_bus(args)
     config = DaemonConfig(
         robot=RobotConfig(name=keys.robot),
@@ -148,6 +154,8 @@ def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
     Raises:
         BadConfiguration: the file, or the document on standard input, is wrong.
     """
+    from fasaco_edge.config.loading import decode_config, load_config
+
     on_input = str(file) == "-"
     config = decode_config(sys.stdin.buffer.read()) if on_input else load_config(file)
     return config, config.bus.of_client()

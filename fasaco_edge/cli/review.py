@@ -8,28 +8,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import msgspec
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-
 from fasaco_edge.cli.console import terminal
-from fasaco_edge.cli.console.arguments import Command, pair_of_floats
+from fasaco_edge.cli.console.arguments import (
+    Command,
+    check_outputs,
+    naming,
+    pair_of_floats,
+    writing,
+)
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.review import rows
-from fasaco_edge.review.comparison import (
-    compared_rows,
-    reason_counts,
-    setup_differences,
-    setup_words,
-    side_by_side,
-)
-from fasaco_edge.review.document import ReviewDocument, explanations
-from fasaco_edge.review.figures import document_of
-from fasaco_edge.review.spot import spots_left
-from fasaco_edge.review.wording import clock
-from fasaco_edge.text import one_line
+from fasaco_edge.recording.read.repair import open_part
+from fasaco_edge.review.document import explanations
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
@@ -115,9 +105,17 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Review."""
-    from fasaco_edge.cli.console.arguments import check_outputs, naming, writing
+    recordings = [*args.recordings, *(args.against or ())]
+    check_outputs((args.png, args.html), recordings)
+    for file in recordings:
+        with open_part(file):  # what is none is told before all else is loaded
+            pass
+    import msgspec
 
-    check_outputs((args.png, args.html), [*args.recordings, *(args.against or ())])
+    from fasaco_edge.cli.review_screen import print_comparison, print_review
+    from fasaco_edge.review.comparison import side_by_side
+    from fasaco_edge.review.figures import document_of
+
     review = _read(args.recordings, "recording")
     if args.at is not None or args.point:
         return _answer(args, review)
@@ -150,16 +148,19 @@ def run(args: argparse.Namespace) -> int:
     if args.view:
         from fasaco_edge.recording.read.repair import view
 
-        view([*args.recordings, *(args.against or ())])
+        view(recordings)
     return 0
 
 
 def _answer(args: argparse.Namespace, review: Review) -> int:
     """Answer questions about a moment, and about spots."""
-    from fasaco_edge.cli.console.arguments import writing
+    import msgspec
+
+    from fasaco_edge.review import rows
     from fasaco_edge.review.instant import scene_at
     from fasaco_edge.review.pictures import draw_scene, draw_spots
     from fasaco_edge.review.spot import explain
+    from fasaco_edge.review.wording import clock
 
     if args.at is not None and args.at > review.duration_s:
         raise BadConfiguration(
@@ -213,123 +214,6 @@ def _epilog() -> str:
         96,
     )
     return "\n".join(lines)
-
-
-PLOT_WIDTH, PLOT_HEIGHT, SCREEN_PLOT_HEIGHT = 64, 6, 4
-MOST_VERDICTS = 4
-
-
-def print_review(review: Review, document: ReviewDocument, *, full: bool) -> None:
-    """Print a review, whose document is given, too: in ``full``, or what fits on a screen."""
-    console = terminal.out()
-    colours = {True: "green", False: "red", None: "yellow"}
-    verdicts = rows.verdicts(document)
-    for complete, text in verdicts if full else verdicts[:MOST_VERDICTS]:
-        verdict = Text(one_line(text), colours[complete])
-        if full:
-            console.print(f"{document.recording}:", verdict, style="bold", soft_wrap=True)
-        else:
-            console.print(_fitting(verdict, console.width))
-    if not full:
-        _print_screen(console, review, document, more=len(verdicts) - MOST_VERDICTS)
-        return
-    console.print(terminal.figures(rows.card_rows(document)))
-    _print_curve(console, review, PLOT_HEIGHT)
-    console.print(terminal.figures(rows.figure_rows(document)))
-    _print_table(console, "Orders", rows.ORDERS, rows.order_rows(document))
-    if commands := rows.command_rows(document):
-        console.print("Commands", style="bold")
-        console.print(terminal.figures(commands))
-    _print_table(console, "Not reached", rows.UNREACHED, rows.unreached_rows(document))
-    _print_table(console, "Floor left", rows.LEFT, rows.left_rows(document, spots_left(review)))
-    _print_table(console, "Reasons of replans", rows.REASONS, rows.reason_rows(document))
-    _print_table(console, "The slowest replans", rows.REPLANS, rows.replan_rows(review))
-    _print_table(console, "Replans in order of time", rows.REPLANS, rows.replans_in_time(review))
-    moments = rows.moment_rows(review)
-    _print_table(console, "Worst moments", ("what", "how much", "at", "context"), moments)
-    troubles = rows.trouble_rows(review.troubles)
-    _print_table(console, "Troubles", ("state", "at", "for", "reason"), troubles)
-    _print_table(console, "Charges", rows.CHARGES, rows.charge_rows(document))
-    _print_table(console, "Refused messages", ("code", "messages"), rows.fault_rows(document))
-    _print_remarks(console, document)
-
-
-def _print_screen(console: Console, review: Review, document: ReviewDocument, *, more: int) -> None:
-    """Print what matters most; with up to ``MOST_VERDICTS`` verdicts it takes 24 lines."""
-    if more > 0:
-        console.print(f"and {more} more orders")
-    _print_curve(console, review, SCREEN_PLOT_HEIGHT)
-    for name, text in rows.screen_rows(review, document):
-        line = Text.assemble((f"{name:<12}", "cyan"), one_line(text))
-        console.print(_fitting(line, console.width))
-    hint = "more: --long; a moment: --at MM:SS; a spot: --point X,Y; a page: --html FILE"
-    console.print(_fitting(Text(hint), console.width))
-
-
-def _fitting(text: Text, width: int) -> Text:
-    """Return a text that takes one line of the terminal."""
-    if text.cell_len > width:
-        text.truncate(width - 3)
-        text.append("...")
-    return text
-
-
-def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
-    """Print the figures of two documents side by side."""
-    console = terminal.out()
-    names = (one.recording, other.recording)
-    console.print(setup_words(one, other), style="bold", soft_wrap=True)
-    _print_table(console, "Set-up", ("", *names), setup_differences(one, other))
-    compared = compared_rows(one, other)
-    _print_table(console, "Two runs", ("", *names, "difference"), compared)
-    counts = [
-        (kind, str(mine), str(theirs), f"{mine - theirs:+d}")
-        for kind, (mine, theirs) in reason_counts([one, other])
-    ]
-    _print_table(console, "Reasons of replans", ("reason", *names, "difference"), counts)
-    for document in (one, other):
-        _print_remarks(console, document)
-
-
-def _print_curve(console: Console, review: Review, height: int) -> None:
-    from fasaco_edge.review.panels import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
-
-    at_s, shares = covered_share(review)
-    if not len(at_s):
-        return
-    marks = EIGHTHS if console.encoding.startswith("utf") else PLAIN_EIGHTHS
-    lines = curve(at_s, shares, review.duration_s, PLOT_WIDTH, height, marks)
-    labels = ["100 %", *[""] * (height - 2), "0 %"]
-    console.print(Text("Coverage over time", "bold"), "of the cells coverable at the end")
-    for label, line in zip(labels, lines, strict=True):
-        console.print(f"{label:>6}", Text(line, "cyan"))
-    end = clock(review.duration_s)
-    console.print(f"{'':>6} 0:00{end:>{PLOT_WIDTH - 4}}")
-
-
-def _print_remarks(console: Console, document: ReviewDocument) -> None:
-    for part in document.files:
-        if part.torn_bytes:
-            torn = f"torn, its last {part.torn_bytes} bytes are lost"
-            console.print(f"{part.path}: {torn}", soft_wrap=True)
-    for remark in document.remarks:
-        console.print(f"recorder: {remark}", soft_wrap=True)
-    for line in rows.unknown_lines(document):
-        console.print(line, soft_wrap=True)
-
-
-def _print_table(
-    console: Console, title: str, columns: Sequence[str], cells: Sequence[Sequence[str]]
-) -> None:
-    if not cells:
-        return
-    table = Table(title=title, title_justify="left", title_style="bold")
-    for index, column in enumerate(columns):
-        last = index == len(columns) - 1 and index > 1
-        table.add_column(column, overflow="fold", justify="left" if last or not index else "right")
-    for row in cells:
-        table.add_row(*row)
-    console.print(table)
 
 
 COMMAND = Command(

@@ -47,6 +47,28 @@ def test_the_list_of_commands_imports_none_of_them():
     assert (ended.returncode, ended.stderr) == (0, "")
 
 
+@pytest.mark.parametrize(
+    ("words", "heavy"),
+    [
+        ("plan --help", "zenoh numba"),
+        ("review --help", "numpy numba pyarrow zenoh"),
+        ("review nowhere.rrd", "numba pyarrow"),
+        ("record --help", "numpy zenoh"),
+        ("check-config --help", "zenoh"),
+    ],
+)
+def test_a_command_imports_what_is_heavy_only_where_it_is_used(words, heavy):
+    check = (
+        "import sys; from fasaco_edge.cli import main\n"
+        f"try: main({words.split()})\n"
+        "except SystemExit: pass\n"
+        f"print('loaded:', *sorted({set(heavy.split())} & set(sys.modules)))"
+    )
+    command = [sys.executable, "-c", check]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.stdout.splitlines()[-1] == "loaded:", ended.stderr
+
+
 def test_the_version_is_told(capsys):
     with pytest.raises(SystemExit, match="0"):
         main(["--version"])

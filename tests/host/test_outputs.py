@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import os
 import stat
+from pathlib import Path
 
 import pytest
 
 from fasaco_edge.host.outputs import whole
 
 
+def break_off(file: Path, error: BaseException) -> None:
+    with whole(file) as new:
+        new.write_text("half of")
+        raise error
+
+
 def test_a_file_that_cannot_be_written_leaves_the_one_before(tmp_path):
     file = tmp_path / "line.csv"
     file.write_text("good")
-    with pytest.raises(OSError, match="full"), whole(file) as new:
-        new.write_text("half of")
-        raise OSError("full")
+    with pytest.raises(OSError, match="full"):
+        break_off(file, OSError("full"))
     assert file.read_text() == "good"
     assert os.listdir(tmp_path) == ["line.csv"]
 
 
 def test_an_interrupted_first_file_leaves_nothing(tmp_path):
-    with pytest.raises(KeyboardInterrupt), whole(tmp_path / "line.csv") as new:
-        new.write_text("half of")
-        raise KeyboardInterrupt
+    with pytest.raises(KeyboardInterrupt):
+        break_off(tmp_path / "line.csv", KeyboardInterrupt())
     assert os.listdir(tmp_path) == []
 
 

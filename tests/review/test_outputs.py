@@ -18,7 +18,7 @@ pytest.importorskip("rerun")
 from pyarrow import parquet
 
 from fasaco_edge.cli import main
-from fasaco_edge.cli.review import print_review
+from fasaco_edge.cli.review_screen import print_review
 from fasaco_edge.drawing import palette
 from fasaco_edge.grid.geometry import FARTHEST_M, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
-from fasaco_edge.recording.read.frames import Chunk, chunks, column, open_part, wall_ns
+from fasaco_edge.recording.read.frames import Chunk, chunks, column, wall_ns
+from fasaco_edge.recording.read.repair import open_part
 
 # Most that are kept; of more every other one is dropped.
 MOST_FIELDS = 64

@@ -10,24 +10,12 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import BinaryIO
 
-from fasaco_edge.errors import MalformedMessage, UnreadableRecording
-from fasaco_edge.host.files import check_plain
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
-from fasaco_edge.recording.read.repair import (
-    FOOTER_KIND,
-    FRAME,
-    HEADER_BYTES,
-    Scan,
-    scan_recording,
-)
-
-HINT = "name the .rrd files that a recorder has written"
+from fasaco_edge.recording.read.repair import FOOTER_KIND, FRAME, HEADER_BYTES, Scan
 
 CHUNK_KIND = 2
 # Of a chunk, unpacked: the largest that a recorder writes is a map of 64 million pixels.
@@ -68,26 +56,6 @@ class Chunk:
     is_static: bool
     batch: pa.RecordBatch
     bytes: int
-
-
-@contextmanager
-def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
-    """Open a part of a recording; what goes wrong while it is read is raised with its name.
-
-    Raises:
-        UnreadableRecording: the file is missing, is no recording, or is broken.
-    """
-    try:
-        check_plain(path)
-        with path.open("rb") as recording:
-            scan = scan_recording(recording)
-            if scan is None:
-                raise ValueError("this is no recording")
-            yield recording, scan
-    except OSError as error:
-        raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
-    except (ValueError, MalformedMessage) as error:
-        raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error
 
 
 def chunks(recording: BinaryIO, scan: Scan) -> Iterator[Chunk | None]:

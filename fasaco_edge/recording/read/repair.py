@@ -21,7 +21,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
-from fasaco_edge.errors import MissingExtra, ProcessEnded
+from fasaco_edge.errors import MalformedMessage, MissingExtra, ProcessEnded, UnreadableRecording
 from fasaco_edge.host.files import check_plain
 from fasaco_edge.host.processes import python_program
 
@@ -34,6 +34,7 @@ LAST_KIND = 3
 # own a frame ends with a zero now and then, and what follows the footer with three.
 MOST_ZEROS = 3
 _BLOCK = 65536
+HINT = "name the .rrd files that a recorder has written"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +103,26 @@ def scan_recording(recording: BinaryIO, known_bytes: int = HEADER_BYTES) -> Scan
         frames += 1
         has_footer = kind == FOOTER_KIND
     return Scan(frames, end, total, has_footer)
+
+
+@contextmanager
+def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
+    """Open a part of a recording; what goes wrong while it is read is raised with its name.
+
+    Raises:
+        UnreadableRecording: the file is missing, is no recording, or is broken.
+    """
+    try:
+        check_plain(path)
+        with path.open("rb") as recording:
+            scan = scan_recording(recording)
+            if scan is None:
+                raise ValueError("this is no recording")
+            yield recording, scan
+    except OSError as error:
+        raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
+    except (ValueError, MalformedMessage) as error:
+        raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error
 
 
 def _end_of_data(recording: BinaryIO, total: int) -> int:

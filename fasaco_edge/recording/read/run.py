@@ -20,7 +20,8 @@ from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecord
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.drawn import DrawnField, FieldSampler
-from fasaco_edge.recording.read.frames import HINT, Chunk, chunks, column, open_part, wall_ns
+from fasaco_edge.recording.read.frames import Chunk, chunks, column, wall_ns
+from fasaco_edge.recording.read.repair import HINT, open_part
 from fasaco_edge.samples import Place, SampleDecoder, place_of
 
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
