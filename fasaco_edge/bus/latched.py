@@ -27,7 +27,7 @@ from fasaco_edge.bus.queries import ask_for_tokens
 # Period of queries to a publisher for a lost last sample [s].
 ASK_PERIOD_S = 1.0
 # So long an answer waits that leaves a gap [s]: it overtakes what is under way, as its priority is
-# higher, and samples wait for a thread of their own.
+# higher, and samples wait for a thread of their own. Where several count, since the last of those.
 UNDER_WAY_S = 0.5
 # Timeout of an answer [s]: a large map on a slow link takes long. No query is repeated meanwhile.
 ANSWER_S = 10.0
@@ -109,6 +109,8 @@ class LatchedSubscription(Subscription):
         # Where several samples count, they wait for those before them, which were asked for.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._held_bytes = 0
+        # Until when those of them wait that an answer leaves a gap before [s]; None without any.
+        self._gap_until: float | None = None
         self._open = 0
         # Whether all are to be asked, and whether for what was heard already, too.
         self._wants_all, self._wants_again = True, False
@@ -131,6 +133,8 @@ class LatchedSubscription(Subscription):
         with self._lock:
             if self._ahead is not None and now >= self._ahead[0]:
                 self._deliver_ahead()
+            if self._gap_until is not None and now >= self._gap_until:
+                self._deliver_held(over_gaps=True)
             asks_all, again = self._wants_all, self._wants_again
             if asks_all:
                 self._wants_all = self._wants_again = False
@@ -147,7 +151,8 @@ class LatchedSubscription(Subscription):
             self._open += len(questions)
             waiting = [p.ask_at for p in self._publishers.values() if not p.is_asked]
             ahead = [self._ahead[0]] if self._ahead is not None else []
-            next_at = min((self._query_tokens_at, *waiting, *ahead))
+            gaps = [self._gap_until] if self._gap_until is not None else []
+            next_at = min((self._query_tokens_at, *waiting, *ahead, *gaps))
         for selector, asked in questions:
             self._put(selector, asked, again=again)
         return next_at
@@ -231,6 +236,8 @@ class LatchedSubscription(Subscription):
                 self._hold(name, mark, sample)
             elif _is_newer(mark, last):
                 self._deliver(name, mark, sample)
+                if self._gap_until is not None:
+                    self._gap_until = time.monotonic() + UNDER_WAY_S
 
     def _take(self, sample: zenoh.Sample, *, again: bool) -> None:
         """Take an answer; ``again``: also one that was heard already, if nothing came after it."""
@@ -262,17 +269,30 @@ class LatchedSubscription(Subscription):
         self._held_bytes += len(sample.payload)
         is_full = len(self._held) > MOST_PUBLISHERS * self._depth
         if is_full or self._held_bytes > HELD_BYTES:
-            self._deliver_held()
-        elif not self._open and name in self._publishers:
+            self._deliver_held(over_gaps=True)
+        elif not self._open and self._gap_until is None and name in self._publishers:
             self._publishers[name].ask_at = 0.0
             self._asker.wake()
 
-    def _deliver_held(self) -> None:
+    def _deliver_held(self, *, over_gaps: bool = False) -> None:
+        """Deliver what waits, but for what an answer leaves a gap before: a cache may hold less.
+
+        That waits until the samples in the gap have come, or have had the time to (``over_gaps``).
+        """
         held, self._held = sorted(self._held, key=lambda one: one[:2]), []
         self._held_bytes = 0
         for name, mark, sample in held:
-            if _is_newer(mark, self._last_mark.get(name, self._unconfirmed.get(name))):
+            last = self._last_mark.get(name, self._unconfirmed.get(name))
+            if not over_gaps and _leaves_gap(name, mark, last):
+                self._held.append((name, mark, sample))
+                self._held_bytes += len(sample.payload)
+            elif _is_newer(mark, last):
                 self._deliver(name, mark, sample)
+        if not self._held:
+            self._gap_until = None
+        elif self._gap_until is None:
+            self._gap_until = time.monotonic() + UNDER_WAY_S
+            self._asker.wake()
 
     def _deliver(self, name: str, mark: int, sample: zenoh.Sample) -> None:
         self._unconfirmed.pop(name, None)
