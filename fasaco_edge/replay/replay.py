@@ -171,8 +171,7 @@ class Replay:
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
         """Yield each cycle; of samples that are no input of the mission only the time counts.
 
-        A daemon that loads slowly begins its mission with inputs that came long before, and maybe
-        last of all: what it says of that comes later.
+        Where a daemon loads slowly, its mission begins, and its path comes, after its last input.
         """
         together: list[Arrival] = []
         last = 0.0
