@@ -15,7 +15,7 @@ ENDLESS = {"ants": 1_000_000, "budget_s": 3600.0, "local_search": False}
 
 
 def test_a_hang_is_ended_and_the_mission_goes_on(service: Service):
-    service.drop_in("watchdog", "[Service]\nWatchdogSec=2\nTimeoutAbortSec=2\n")
+    # With the unit's own watchdog: on a slow machine a shorter one ends a daemon that only loads.
     service.start()
     with robot(service.lab):
         wait_for(lambda: swept_m2(service) >= 4, 40.0, "4 m2 swept")
