@@ -35,6 +35,7 @@ from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import decode_pose, encode_pose_stamped
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from tests.support.recordings import TEXT, bus_on_free_port, read_column, read_summary
+from tests.support.senders import Sender
 
 SECOND_NS = 1_000_000_000
 BEGAN_NS = 1_700_000_000 * SECOND_NS
@@ -198,7 +199,7 @@ def test_a_recorder_reports_while_it_catches_up(tmp_path, monkeypatch):
 def hear(one, bus, count):
     """Let poses wait for a recorder; return what they are."""
     one.listen()
-    publisher = bus.advertise(Keys(), topics.POSE)
+    publisher = Sender(bus, topics.POSE)
     poses = [encode_pose_stamped(StampedPose(Pose2D(x, 0.0), "map", x)) for x in range(count)]
     for pose in poses:
         publisher.put(pose)

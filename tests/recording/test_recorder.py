@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +32,7 @@ from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID
 from tests.support.recordings import (
     SCALAR,
+    TIMEOUT_S,
     RecordingSummary,
     bus_on_free_port,
     read_column,
@@ -39,6 +41,7 @@ from tests.support.recordings import (
     recorder_process,
 )
 from tests.support.scripted_mission import CELL_M, COLS, ORIGIN, RADIUS_M, ROWS, Mission, building
+from tests.support.senders import Sender
 
 ERRORS = {"total": 2, "last": "", "by_code": {"malformed_message": 2, "no code": 3}}
 FRAMES = 40
@@ -67,15 +70,16 @@ def recorded(tmp_path_factory):
     with bus_on_free_port() as (bus, endpoint), recorder_process(bus, endpoint, out) as recorder:
         mission = Mission(bus)
         play(mission)
-        bus.advertise(Keys(), topics.COVERAGE).put(b"\x00\x01\x00\x00not a map")
+        others = Sender(bus, topics.COVERAGE), Sender(bus, topics.STATUS)
+        others[0].put(b"\x00\x01\x00\x00not a map")
         # A second daemon of the name, which waits: it is not this robot's state.
         waits = {"state": "blocked", "claim": {"id": "1f", "stand": "waits"}}
-        bus.advertise(Keys(), topics.STATUS).put(encode_json(waits))
+        others[1].put(encode_json(waits))
         mission.publish_status("done", 1.0, planning=False, latency_ms="none", errors=ERRORS)
         report = recorder.wait_until(lambda report: report["malformed"] > 0)
         assert bus.alive(Keys().of(topics.RECORDER_ALIVE))
         # At the end there is not much time for what still waits.
-        recorder.at_rest()
+        recorder.written(mission.sent + len(others))
         recorder.process.send_signal(signal.SIGTERM)
         exit_code = recorder.process.wait(60)
     path = Path(report["file"])
@@ -261,21 +265,20 @@ def test_killed_and_torn_recordings_read_after_the_next_start(tmp_path):
         mission = Mission(bus)
         with recorder_process(bus, endpoint, tmp_path) as recorder:
             play(mission, 20)
-            # By then all that is drawn of it is on the disk, of the rest what the mission heard.
-            recorder.at_rest()
+            wait_for(drawn, tmp_path, 20)
             play(mission, 5)
-            recorder.at_rest()
+            wait_for(heard, tmp_path, 25)
             recorder.process.kill()
             recorder.process.wait()
         (killed,) = tmp_path.glob("*.rrd")
         summary = read_summary(killed)
         assert not summary.complete
         assert summary.rows[entities.ROBOT] >= 20
-        assert Counter(sample.topic for sample in RecordedSamples([killed]))["pose"] == 25
+        assert heard(killed) == 25
         # As a power cut would leave it: the last frame's end is missing.
         os.truncate(killed, killed.stat().st_size - 7)
         torn = killed.read_bytes()
-        assert Counter(sample.topic for sample in RecordedSamples([killed]))["pose"] >= 20
+        assert heard(killed) >= 20
         assert killed.read_bytes() == torn
         with recorder_process(bus, endpoint, tmp_path) as recorder:
             assert read_summary(killed).rows[entities.ROBOT] >= 15
@@ -309,14 +312,25 @@ def test_a_disk_that_is_full_from_the_beginning_is_no_wrong_configuration(tiny_d
     assert caught.value.errno == errno.ENOSPC
 
 
-def wait_robot(folder: Path) -> None:
-    """Wait until a pose is on the disk."""
-    robot = 0
-    while not robot:
+def wait_for(count: Callable[[Path], int], folder: Path, least: int) -> None:
+    """Wait until so much is on the disk, in the only part, which is still written."""
+    deadline, found = time.monotonic() + TIMEOUT_S, 0
+    while found < least:
+        assert time.monotonic() < deadline, f"{found} of {least}"
         time.sleep(0.1)
-        (newest,) = folder.glob("*.rrd")
+        (part,) = folder.glob("*.rrd")
         with suppress(UnreadableRecording):
-            robot = read_summary(newest).rows.get(entities.ROBOT, 0)
+            found = count(part)
+
+
+def drawn(part: Path) -> int:
+    """Return how often the robot is drawn."""
+    return read_summary(part).rows.get(entities.ROBOT, 0)
+
+
+def heard(part: Path) -> int:
+    """Return how many poses are there as they came."""
+    return sum(sample.topic == "pose" for sample in RecordedSamples([part]))
 
 
 def test_a_full_disk_is_told_and_recording_goes_on_when_there_is_room(tiny_disk):
@@ -327,7 +341,7 @@ def test_a_full_disk_is_told_and_recording_goes_on_when_there_is_room(tiny_disk)
     ):
         mission = Mission(bus)
         play(mission, 10)
-        wait_robot(tiny_disk)
+        wait_for(drawn, tiny_disk, 1)
         with ballast.open("wb") as file:
             file.write(bytes(os.statvfs(tiny_disk).f_bavail * os.statvfs(tiny_disk).f_bsize - 9000))
         play(mission, 10)

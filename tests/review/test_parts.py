@@ -17,11 +17,11 @@ from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
 from tests.support.recordings import bus_on_free_port, recorder_process
 from tests.support.reviews import document
 from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.senders import Sender
 
 CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "mission": {"lost_pose_s": 3.0}}
 # Three cells to the right and back, in the lowest row of the room.
@@ -38,13 +38,12 @@ PATHS = (
 def run_told(folder, *, faults, silent=0, killed=False):
     """Record a run of known figures, in parts as small as can be; return its files."""
     folder.mkdir()
-    keys = Keys()
     with bus_on_free_port() as (bus, endpoint):
         publishers = {
-            "map": bus.advertise(keys, topics.MAP),
-            "pose": bus.advertise(keys, topics.POSE),
-            "path": bus.advertise(keys, topics.PATH),
-            "status": bus.advertise(keys, topics.STATUS),
+            "map": Sender(bus, topics.MAP),
+            "pose": Sender(bus, topics.POSE),
+            "path": Sender(bus, topics.PATH),
+            "status": Sender(bus, topics.STATUS),
         }
         with recorder_process(bus, endpoint, folder, part_bytes=1) as recorder:
             sent = 0

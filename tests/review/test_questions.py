@@ -23,10 +23,10 @@ from fasaco_edge.review.rows import instant_rows
 from fasaco_edge.review.spot import explain, is_inside, spots_left
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
 from tests.support.recordings import bus_on_free_port, read_column, recorder_process
 from tests.support.rooms import UNKNOWN, WALL, fill, map_bytes, pose_bytes, room
+from tests.support.senders import Sender
 
 CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "planner": {"line": "thorough"}}
 KEEP_OUT = [[2.6, 0.4], [3.4, 0.4], [3.4, 1.0], [2.6, 1.0]]
@@ -51,11 +51,11 @@ def seen_first():
 @pytest.fixture(scope="module")
 def parts(tmp_path_factory):
     """A robot drives east along a path, until the map grows and another leads back west."""
-    folder, keys = tmp_path_factory.mktemp("questions") / "runs", Keys()
+    folder = tmp_path_factory.mktemp("questions") / "runs"
     folder.mkdir()
     with bus_on_free_port() as (bus, endpoint):
         names = ("map", "pose", "path", "status", "command")
-        put = {name: bus.advertise(keys, getattr(topics, name.upper())) for name in names}
+        put = {name: Sender(bus, getattr(topics, name.upper())) for name in names}
         with recorder_process(bus, endpoint, folder) as recorder:
             sent = 0
 

@@ -30,6 +30,7 @@ from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from tests.support.processes import daemon_process
 from tests.support.rooms import RESOLUTION_M, WALL, fill, room
+from tests.support.senders import Sender
 
 SIZE_M = (3.6, 2.7)
 START = Pose2D(0.75, 0.75)
@@ -113,9 +114,9 @@ class MappingRobot:
         pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
         geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0))
         self._world = World(OccupancyGrid(geometry, pixels), START, SIMULATION)
-        self._maps = bus.advertise(keys, topics.MAP)
-        self._updates = bus.advertise(keys, topics.MAP_UPDATE)
-        self._poses = bus.advertise(keys, topics.POSE)
+        self._maps = Sender(bus, topics.MAP)
+        self._updates = Sender(bus, topics.MAP_UPDATE)
+        self._poses = Sender(bus, topics.POSE)
         self._newest_path = LatestSlot[Sample]()
         self.status: dict = {}
         self.statuses: list[tuple[float, dict]] = []

@@ -70,17 +70,6 @@ class Recorder:
         """Wait until so many messages were taken."""
         return self.wait_until(lambda report: report["messages"] >= messages)
 
-    def at_rest(self) -> dict[str, Any]:
-        """Wait until a second has passed in which no message was taken."""
-        deadline = time.monotonic() + TIMEOUT_S
-        seen = len(self.reports) + 1
-        while time.monotonic() < deadline:
-            *_, before, last = [{}, {}, *self.reports[seen:]]
-            if last and before and before["messages"] == last["messages"]:
-                return last
-            time.sleep(0.02)
-        raise AssertionError(f"never came to rest; last report: {self.reports[-1:]}")
-
 
 @contextmanager
 def bus_on_free_port() -> Iterator[tuple[Bus, str]]:

@@ -30,6 +30,7 @@ from fasaco_edge.wire.messages.maps import CoverageValue, direction_values, enco
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
+from tests.support.senders import Sender
 
 RESOLUTION_M = 0.05
 CELL_M = 0.25
@@ -53,15 +54,15 @@ class Mission:
     keys: Keys = field(default_factory=Keys)
 
     def __post_init__(self) -> None:
-        bus, keys = self.bus, self.keys
-        self._map = bus.advertise(keys, topics.MAP)
-        self._pose = bus.advertise(keys, topics.POSE)
-        self._path = bus.advertise(keys, topics.PATH)
-        self._coverage = bus.advertise(keys, topics.COVERAGE)
-        self._floor = bus.advertise(keys, topics.FLOOR)
-        self._pheromone = bus.advertise(keys, topics.PHEROMONE)
-        self._directions = bus.advertise(keys, topics.DIRECTIONS)
-        self._status = bus.advertise(keys, topics.STATUS)
+        bus = self.bus
+        self._map = Sender(bus, topics.MAP)
+        self._pose = Sender(bus, topics.POSE)
+        self._path = Sender(bus, topics.PATH)
+        self._coverage = Sender(bus, topics.COVERAGE)
+        self._floor = Sender(bus, topics.FLOOR)
+        self._pheromone = Sender(bus, topics.PHEROMONE)
+        self._directions = Sender(bus, topics.DIRECTIONS)
+        self._status = Sender(bus, topics.STATUS)
         self.walk = _walk()
         self.rest = self.walk
         self.seen_cells = 0
@@ -69,6 +70,11 @@ class Mission:
         self.best_steps = 0
         self.covered = self.recovered = 0.0
         self.visits = np.zeros((ROWS // 5, COLS // 5), np.int64)
+
+    @property
+    def sent(self) -> int:
+        """How many samples were sent."""
+        return sum(sender.sent for sender in vars(self).values() if isinstance(sender, Sender))
 
     def frames(self, count: int) -> Iterator[float]:
         """Publish ``count`` steps of the mission; yield how far it is, from 0 to 1."""
