@@ -1,5 +1,6 @@
 """Robots that share an area: nothing is left out whatever happens, and little is swept twice."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -280,6 +281,24 @@ def test_cells_are_taken_anew_from_this_robot_after_another_has_forgotten_some()
         assert (ours.request is not None) == is_replanned
         if is_replanned:
             ours.plan()
+
+
+def test_what_many_robots_say_in_a_moment_holds_nobody_up():
+    fleet = FleetDrive(["." * 300] * 300, {"r1": (0, 0), "r2": (299, 299)})
+    ours, other = fleet.robots.values()
+    report = other.report()
+
+    def said(bit):
+        bits = bytes([bit]) + bytes(TILE_BYTES - 1)
+        tiles = tuple(((place // 5, place % 5), bits) for place in range(24))
+        return [replace(report, robot=f"m{name}", tiles=tiles) for name in range(MOST_ROBOTS - 1)]
+
+    ours.tell(*said(1))
+    before = time.thread_time()
+    ours.tell(*said(2), *said(4), after=0.0)
+    assert time.thread_time() - before < 0.1
+    assert ours.mission.shared.cells_of("m7") == 24 * 3
+    assert np.count_nonzero(ours.mission.shared.swept(Window(0, 0, 300, 300))) == 24 * 3
 
 
 def test_a_robot_without_a_part_does_not_divide_again_and_again():

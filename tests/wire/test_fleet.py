@@ -77,6 +77,9 @@ def test_another_version_is_told_apart_even_where_nothing_else_can_be_read():
     with pytest.raises(FleetError, match="version 2, not 1"):
         decode_member(b'{"version": 2, "fleet": "hall"}', "hall")
     assert heard(said(version=2)).misfit == "its messages are of version 2, not 1"
+    # The status names it with each member.
+    with pytest.raises(MalformedMessage, match="version"):
+        decode_member(b'{"version": ' + b"9" * 4000 + b', "fleet": "hall"}', "hall")
 
 
 def test_cells_of_another_size_do_not_fit():

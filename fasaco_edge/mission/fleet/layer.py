@@ -99,8 +99,9 @@ class FleetLayer:
         # What this robot could not sweep, while others are at work; of an area.
         self._tried: tuple[ReachableArea | None, NDArray[np.bool_]]
         self._tried = None, np.zeros((0, 0), np.bool_)
-        # How many cells of its own part others had swept when the path was planned.
-        self._taken = 0
+        # How many cells of its own part others had swept when the path was planned; as of which
+        # version of what is shared that was looked at last.
+        self._taken, self._counted = 0, 0
         # Whether the last division had a part for it, and how many cells were left then.
         self._had_part, self._left = False, 0
 
@@ -136,14 +137,7 @@ class FleetLayer:
         except FleetError as error:
             self.members[event.robot] = replace(member, left_out=str(error))
             raise
-        taken = self._count_taken()
-        self._taken = min(self._taken, taken)
-        if is_open_again:
-            return f"{event.robot}: cells are to be swept again"
-        if taken < self._taken + MANY_TAKEN:
-            return ""
-        self._taken = taken
-        return f"{event.robot} has swept cells of this robot's part"
+        return f"{event.robot}: cells are to be swept again" if is_open_again else ""
 
     def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
         """Return which of some cells are this robot's to sweep; all where none of its part are.
@@ -175,13 +169,15 @@ class FleetLayer:
             at_once: whether this robot waits for work.
         """
         area = self._map.area
-        if area is None or not self.members or not (at_once or now - self._looked_at >= LOOK_S):
+        if area is None or not self.members:
             return ""
+        if not (at_once or now - self._looked_at >= LOOK_S):
+            return self._why_by_taken()
         self._looked_at = now
         robots, before = self._robots(area, cell, now), self._division
         left = self._untried(open_cells(area.lattice.window) & area.reachable, area)
         if not (why := self._why_anew(area, left, robots, now, at_once=at_once)):
-            return ""
+            return self._why_by_taken()
         own = left if before is None else left & self._is_own(before, area)
         heard = self._newest_heard()
         self.number = min(max(self.number + (why != LATER), heard), MOST_NUMBER)
@@ -269,8 +265,23 @@ class FleetLayer:
             self._owners = area, division.owners(area.lattice)
         return self._owners[1]
 
+    def _why_by_taken(self) -> str:
+        """Return why a plan is wanted by what others have swept since the path was planned, or "".
+
+        Once for all that was heard: a fleet says much in a moment.
+        """
+        if self._counted == self._ledger.shared.version:
+            return ""
+        taken = self._count_taken()
+        self._taken = min(self._taken, taken)
+        if taken < self._taken + MANY_TAKEN:
+            return ""
+        self._taken = taken
+        return "others have swept cells of this robot's part"
+
     def _count_taken(self) -> int:
         """Return how many cells of this robot's part others have swept, and it has not."""
+        self._counted = self._ledger.shared.version
         area = self._map.area
         if area is None:
             return 0

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 # A tile's cells as bits, row by row, the first of eight the highest [bytes].
 TILE_BYTES = TILE * TILE // 8
+# How many bits of a byte are set.
+_ONES = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(axis=1)
 # Of how many robots something is kept, and how many tiles of all of them: 16 million cells.
 MOST_ROBOTS, MOST_TILES = 32, 4096
 MOST_TILES_OF_ONE = MOST_TILES // 8
@@ -60,7 +62,8 @@ class _Heard:
     @property
     def count(self) -> int:
         """How many cells count."""
-        return sum(int(_cells(self.counted(place)).sum()) for place in self.tiles)
+        counted = [self.counted(place) for place in self.tiles]
+        return int(_ONES[np.concatenate(counted)].sum()) if counted else 0
 
     def counted(self, place: Cell) -> Bits:
         tile, without = self.tiles[place], self.disregarded.get(place)
@@ -79,9 +82,10 @@ class SharedProgress:
         self.epoch = 0
         self.version = 0
         self._robots: dict[str, _Heard] = {}
-        # What was asked for last, and the answer.
-        self._known: tuple[tuple[int, Window] | None, NDArray[np.bool_]]
+        # What was asked for last, and the answer; which tiles have got more cells since.
+        self._known: tuple[Window | None, NDArray[np.bool_]]
         self._known = None, np.zeros((0, 0), np.bool_)
+        self._grown: set[Cell] = set()
         self._kept: tuple[int, bytes] = 0, b""
 
     def begin(self, epoch: int) -> None:
@@ -123,7 +127,7 @@ class SharedProgress:
             if sum(len(one.disregarded) for one in self._robots.values()) > MOST_TILES:
                 heard.drop_gone()
             heard.begin(epoch)
-            self.version += 1
+            self._note_lost()
         for place, told in tiles:
             bits, before = np.frombuffer(told, np.uint8), heard.tiles.get(place)
             if before is None:
@@ -135,22 +139,38 @@ class SharedProgress:
             if before is None or not np.array_equal(before, after):
                 heard.tiles[place] = after
                 self.version += 1
+                self._grown.add(place)
         return has_lost
 
     def swept(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` others have swept, bool (rows, cols), read-only."""
-        key = self.version, window
-        if self._known[0] != key:
+        known, found = self._known
+        if window != known:
             found = np.zeros((window.rows, window.cols), np.bool_)
-            for heard in self._robots.values():
-                for place in heard.tiles:
-                    whole = _window(place)
-                    if common := whole.intersection(window):
-                        cells = _cells(heard.counted(place))[common.slices_in(whole)]
-                        found[common.slices_in(window)] |= cells
-            found.flags.writeable = False
-            self._known = key, found
-        return self._known[1]
+            self._grown = {place for heard in self._robots.values() for place in heard.tiles}
+        elif self._grown:
+            found = found.copy()
+        for place in self._grown:
+            whole = _window(place)
+            if common := whole.intersection(window):
+                found[common.slices_in(window)] |= self._swept_of(place)[common.slices_in(whole)]
+        self._grown = set()
+        found.flags.writeable = False
+        self._known = window, found
+        return found
+
+    def _swept_of(self, place: Cell) -> NDArray[np.bool_]:
+        """Return which cells of a tile others have swept, bool (TILE, TILE)."""
+        bits = np.zeros(TILE_BYTES, np.uint8)
+        for heard in self._robots.values():
+            if place in heard.tiles:
+                bits |= heard.counted(place)
+        return _cells(bits)
+
+    def _note_lost(self) -> None:
+        """Note that cells may be to be swept again."""
+        self._known = None, self._known[1]
+        self.version += 1
 
     def disregard(self, inside: Inside) -> None:
         """Count no sweep so far of some cells.
@@ -168,21 +188,18 @@ class SharedProgress:
                     marked[tuple(at[chosen].T)] = True
                     bits = np.packbits(marked)
                     heard.disregarded[place] = bits | heard.disregarded.get(place, np.uint8(0))
-                    self.version += 1
+                    self._note_lost()
 
     def clear(self) -> None:
         """Forget all that was heard: it lies in another frame, or in another building."""
         if self._robots:
             self._robots.clear()
-            self.version += 1
+            self._note_lost()
 
     def snapshot(self, cell_m: float) -> LedgerSnapshot:
         """Return what others have swept as if one robot had."""
-        tiles: dict[Cell, NDArray[np.uint16]] = {}
-        for heard in self._robots.values():
-            for place in heard.tiles:
-                cells = _cells(heard.counted(place)).astype(np.uint16)
-                tiles[place] = cells | tiles.get(place, np.uint16(0))
+        places = {place for heard in self._robots.values() for place in heard.tiles}
+        tiles = {place: self._swept_of(place).astype(np.uint16) for place in places}
         return LedgerSnapshot(cell_m, "", 0, MappingProxyType(tiles))
 
     def cells_of(self, robot: str) -> int:
@@ -208,7 +225,8 @@ class SharedProgress:
             note = msgspec.json.decode(kept, type=_Note)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
             return
-        self.epoch, self.version = note.epoch, self.version + 1
+        self.epoch = note.epoch
+        self._note_lost()
         self._robots = {
             name: _Heard(one.epoch, _placed(one.tiles), _placed(one.disregarded))
             for name, one in note.robots.items()
@@ -222,7 +240,7 @@ class SharedProgress:
         if not gone:
             raise FleetError(f"{robot}: progress of {MOST_ROBOTS} robots is kept at most")
         least = self._robots.pop(min(gone, key=self.cells_of))
-        self.version += 1
+        self._note_lost()
         return least.count > 0
 
     def _check_room(self, robot: str) -> None:

@@ -72,7 +72,7 @@ class FleetMember(Document, frozen=True):
 class _Head(msgspec.Struct, frozen=True):
     """What is there in every version."""
 
-    version: int
+    version: Whole
     fleet: Text
 
 
