@@ -20,7 +20,7 @@ from fasaco_edge import __version__
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, with_negative_pairs
 from fasaco_edge.cli.console.logs import begin_logging, say_why
 from fasaco_edge.cli.console.streams import clean_streams, open_missing_streams
-from fasaco_edge.errors import BadConfiguration, DiskFailed, FasacoError
+from fasaco_edge.errors import BadConfiguration, DiskFailed, FasacoError, PlannerFailed
 from fasaco_edge.host.processes import end_with_parent
 
 COMMANDS = {
@@ -142,7 +142,8 @@ def _describe(parser: argparse.ArgumentParser, command: Command) -> None:
 
 def _may_pass(error: BaseException | None) -> bool:
     """Tell whether what is behind an error is no mistake of anybody's, and may be over soon."""
-    while error is not None:
+    # What a user's own planner raised is his to mend.
+    while error is not None and not isinstance(error, PlannerFailed):
         if isinstance(error, OSError) and error.errno in _PASSING:
             return True
         if isinstance(error, MemoryError) or "can't start new thread" in str(error):

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import IllegalWalk
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.offline.user_function import failure, name_of
+from fasaco_edge.offline.user_function import RAISED, failure, name_of
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import Observer, StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.text import shown
 
 # Rows and columns from a cell to its neighbours: east, north, west, south.
 MOVES = ((0, 1), (1, 0), (0, -1), (-1, 0))
@@ -78,8 +79,9 @@ class OwnPlanner:
         name = name_of(self.function)
         posed, began = _posed(problem, self.seed), time.perf_counter()
         try:
+            # Code of his runs up to here, also in what it returned.
             walk = _in_bounds(self.function(posed), MOST_STEPS_PER_CELL * posed.to_cover.size)
-        except Exception as error:
+        except RAISED as error:
             raise failure(error, name, self.function.__code__.co_filename) from error
         taken_s = time.perf_counter() - began
         cells = _checked(posed, walk, name)
@@ -106,12 +108,21 @@ def _posed(problem: CoverageProblem, seed: int) -> GridProblem:
     )
 
 
-def _in_bounds(walk: Iterable[Cell], most: int) -> list[Cell]:
-    """Return what a function returned or yielded, no more than one cell above ``most``."""
-    return [cell for _, cell in zip(range(most + 1), walk, strict=False)]
+def _in_bounds(walk: Iterable[Cell], most: int) -> list[Cell | str]:
+    """Return what a function returned or yielded, no more than one cell above ``most``.
+
+    Each as plain integers; what is no cell as it is to be shown, and what follows it is left out.
+    """
+    found: list[Cell | str] = []
+    for _, given in zip(range(most + 1), walk, strict=False):
+        cell = _cell(given)
+        found.append(shown(given) if cell is None else cell)
+        if cell is None:
+            break
+    return found
 
 
-def _checked(problem: GridProblem, walk: list[Cell], name: str) -> NDArray[np.int32]:
+def _checked(problem: GridProblem, walk: list[Cell | str], name: str) -> NDArray[np.int32]:
     """Return a walk, int32 (n, 2).
 
     Raises:
@@ -125,10 +136,9 @@ def _checked(problem: GridProblem, walk: list[Cell], name: str) -> NDArray[np.in
         raise no(f"its walk does not end: more than {len(walk) - 1} cells")
     before: Cell | None = None
     seen = np.zeros(problem.to_cover.shape, np.bool_)
-    for number, given in enumerate(walk):
-        cell = _cell(given)
-        if cell is None:
-            raise no(f"cell {number} of its walk must be (row, col), got {given!r}")
+    for number, cell in enumerate(walk):
+        if isinstance(cell, str):
+            raise no(f"cell {number} of its walk must be (row, col), got {cell}")
         if before is None and cell != problem.start:
             raise no(f"its walk must begin in the start cell {problem.start}, begins in {cell}")
         if before is not None and cell not in problem.neighbours(before):

@@ -14,6 +14,9 @@ from types import FunctionType, ModuleType
 from fasaco_edge.errors import BadConfiguration, PlannerFailed
 from fasaco_edge.host.files import check_plain
 
+# What code of his may end with: ``sys.exit()`` there must not look as if a plan had been made.
+RAISED = (Exception, SystemExit, GeneratorExit)
+
 
 def load_function(place: str) -> FunctionType:
     """Return the function at a place, ``FILE.py:FUNCTION``; the file is run for it.
@@ -37,7 +40,7 @@ def load_function(place: str) -> FunctionType:
     sys.modules[module.__name__] = module
     try:
         exec(compile(source, str(file), "exec"), module.__dict__)
-    except Exception as error:
+    except RAISED as error:
         raise failure(error, place, str(file)) from error
     functions = {name: value for name, value in vars(module).items() if type(value) is FunctionType}
     if member not in functions:
@@ -53,7 +56,7 @@ def name_of(function: FunctionType) -> str:
     return f"{Path(function.__code__.co_filename).name}:{function.__name__}"
 
 
-def failure(error: Exception, name: str, file: str) -> PlannerFailed:
+def failure(error: BaseException, name: str, file: str) -> PlannerFailed:
     """Return what a user is told of an exception: the lines of his own file, the last one first.
 
     Args:
@@ -67,7 +70,11 @@ def failure(error: Exception, name: str, file: str) -> PlannerFailed:
         frames = traceback.extract_tb(error.__traceback__)
         own = [frame for frame in frames if frame.filename == file]
         where = [f"{file}:{at.lineno}, in {at.name}: {at.line}" for at in reversed(own)]
-    kind, said = type(error).__name__, getattr(error, "msg", None) or str(error)
+    kind = type(error).__name__
+    try:
+        said = getattr(error, "msg", None) or str(error)
+    except Exception:  # it is his, too
+        said = "says nothing"
     # A recursion has a thousand lines of the same.
     lines = "".join(f"\n  {line}" for line in where[:5])
     return PlannerFailed(f"planner {name}: {kind}: {said}{lines}")

@@ -20,6 +20,18 @@ FREE = np.array([[True, True, True], [True, False, True]])
 WALK = [(1, 0), (0, 0), (0, 1), (0, 2), (1, 2)]
 
 
+class Rude(list):
+    """What a planner may return by mistake: code of his runs wherever it is looked at."""
+
+    def __iter__(self):
+        raise RuntimeError("not to be looked at")
+
+    @property
+    def show(self):
+        """Return what cannot even be shown."""
+        return type("Shy", (), {"__repr__": Rude.__iter__})()
+
+
 @pytest.fixture
 def mine(tmp_path):
     (tmp_path / "mine.py").write_text(OWN_PLANNER)
@@ -86,6 +98,9 @@ def test_what_a_planner_gets_cannot_be_written_and_is_what_it_says():
         ([(1, 0), 3], r"cell 1 of its walk must be \(row, col\), got 3"),
         ([(1, 0), (0, 0)] * 10_000, "its walk does not end"),
         (None, "NoneType"),
+        ([Rude((1, 0))], "RuntimeError: not to be looked at"),
+        ([Rude((1, 0)).show], r"cell 0 of its walk must be \(row, col\), got <"),
+        (["x" * 10_000_000], r"must be \(row, col\), got 'x{90,100}\.\.\."),
     ],
 )
 def test_a_wrong_walk_is_told_where_it_is_wrong(walk, said):
@@ -105,6 +120,23 @@ def test_an_exception_is_shown_with_the_user_s_lines_alone(mine, capsys):
     assert "ZeroDivisionError: division by zero" in said
     assert said.index(f"{mine}:2, in deep: return 1 / x") < said.index(f"{mine}:6, in walk:")
     assert "fasaco_edge/" not in said
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("import sys\nsys.exit()\n", "SystemExit"),
+        ("import sys\ndef walk(problem):\n    sys.exit(0)\n", "SystemExit: 0"),
+        ("def walk(problem):\n    raise GeneratorExit\n", "GeneratorExit"),
+        ("def walk(problem):\n    raise OSError(28, 'full')\n", "OSError: [Errno 28] full"),
+    ],
+)
+def test_a_planner_that_ends_everything_is_no_plan(mine, text, said, capsys):
+    mine.write_text(text)
+    assert main(["plan", "office", "--planner", f"{mine}:walk"]) == 1
+    told = capsys.readouterr().err
+    assert said in told
+    assert "hint: the lines are those of your own file" in told
 
 
 @pytest.mark.parametrize(
