@@ -11,14 +11,15 @@ from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.config.loading import inspect_config
+from fasaco_edge.config.loading import inspect_config, mask_fault
 from fasaco_edge.config.reading import Fault
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.processes import memory_limit
 
 EPILOG = """\
-It reads the file as the daemon does and starts nothing. It does not read files that the
-configuration names: keys and passwords may be readable for the service only;
-`fasaco-edge doctor`, run as the service's user, checks those.
+It reads the file as the daemon does, with the keep-out mask it names, and starts nothing. It does
+not read its keys and passwords, which may be readable for the service only; `fasaco-edge doctor`,
+run as the service's user, checks those.
 exit codes: 0 a daemon would start with it, 78 it would not (EX_CONFIG)
 
 examples:
@@ -47,7 +48,13 @@ def _shown(config: DaemonConfig) -> dict[str, object]:
 
 def run(args: argparse.Namespace) -> int:
     """Check, and tell."""
+    from fasaco_edge.daemon.memory import mask_bytes
+
     config, found = inspect_config(args.file)
+    if config is not None:
+        most_bytes = mask_bytes(config, memory_limit())
+        if fault := mask_fault(config, args.file, most_bytes):
+            config, found = None, (fault,)
     faults = sorted(found, key=lambda fault: fault.line or 0)
     if args.json:
         print_json(_document(args, config, faults))

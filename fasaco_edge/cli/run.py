@@ -6,13 +6,10 @@ import argparse
 import logging
 import os
 import sys
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console.arguments import Command, Exit
-
-if TYPE_CHECKING:
-    from fasaco_edge.config.config import DaemonConfig
 
 EPILOG = """\
 Without a file the daemon listens at tcp/127.0.0.1:7447 (or joins the router that already
@@ -54,15 +51,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve."""
-    from fasaco_edge.config.loading import load_config, with_mask
-    from fasaco_edge.daemon.memory import mask_bytes
+    from fasaco_edge.daemon.reload import read_config
     from fasaco_edge.daemon.service import run_daemon
-    from fasaco_edge.host.processes import memory_limit
 
-    def read() -> DaemonConfig:
-        config = load_config(args.config)
-        return with_mask(config, args.config, mask_bytes(config, memory_limit()))
-
+    read = partial(read_config, args.config)
     run_daemon(read(), args.record, args.state, fresh=args.fresh, read=read)
     # All is closed. What is left is the interpreter's own end, in which it was seen to wait for
     # ever, now and then, where Zenoh's threads had been at work: a service must not.

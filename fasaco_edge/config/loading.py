@@ -58,6 +58,16 @@ def with_mask(
     return structs.replace(config, mission=structs.replace(mission, keep_out_mask=mask))
 
 
+def mask_fault(config: DaemonConfig, file: Path, most_bytes: int | None = None) -> Fault | None:
+    """Return what is wrong with a configuration's keep-out mask, and in which line of ``file``."""
+    try:
+        with_mask(config, file, most_bytes)
+    except BadConfiguration as error:
+        key = _named_in(error)
+        return Fault(key, error, read_text(file).line_of(key))
+    return None
+
+
 def decode_config(document: bytes) -> DaemonConfig:
     """Return a configuration from the JSON that another process of the package has encoded.
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
+from pathlib import Path
 
 from msgspec import structs
 
 from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.loading import load_config, with_mask
+from fasaco_edge.daemon.memory import mask_bytes
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.processes import memory_limit
 
 LOG = logging.getLogger(__name__)
 
@@ -40,6 +44,16 @@ CHANGEABLE = frozenset(
 )
 # Of a section that can change: the ledger's cells follow from it.
 FIXED = frozenset({"planner.line"})
+
+
+def read_config(path: Path | None) -> DaemonConfig:
+    """Return a configuration as a daemon reads it, what it takes of other files included.
+
+    Raises:
+        BadConfiguration: it is wrong, or its keep-out mask cannot be read in the memory there is.
+    """
+    config = load_config(path)
+    return with_mask(config, path, mask_bytes(config, memory_limit()))
 
 
 class Reload:

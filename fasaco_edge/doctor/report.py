@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.config.loading import load_config
+from fasaco_edge.daemon.reload import read_config
 from fasaco_edge.doctor import machine, security, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, fail, find_unit, ok, warn
 from fasaco_edge.errors import BadConfiguration, FasacoError
@@ -76,7 +76,7 @@ def findings(
     """
     deadline = time.monotonic() + PATIENCE_S
     try:
-        config, refused = load_config(path), None
+        config, refused = read_config(path), None
         assumed = [said] if (said := config.robot.assumed) else []
         yield "configuration", ok(str(path or "defaults, without a file"), details=assumed)
     except BadConfiguration as error:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from PIL import Image
 
 from fasaco_edge.cli import main
 from fasaco_edge.config.loading import load_config
@@ -164,3 +165,26 @@ def test_who_starts_a_daemon_with_it_is_told_the_first_and_where_the_others_are(
     # What stands twice comes first: what the rest says depends on which of the two is meant.
     assert str(refused.value).startswith(f"{file}, line 12: planner.ants: is given twice")
     assert refused.value.hint.endswith(f"check-config {file} shows the 9 others")
+
+
+def test_the_keep_out_mask_is_read_as_the_daemon_reads_it(check, tmp_path):
+    text = "robot: {name: r}\nmission:\n  keep_out_mask: mask.yaml\n"
+    mask, image = tmp_path / "mask.yaml", tmp_path / "mask.png"
+    checks = []
+    for make in (
+        lambda: None,
+        lambda: mask.write_text(
+            "image: mask.png\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
+        ),
+        lambda: image.write_text("no image"),
+        lambda: Image.new("L", (20, 20), 0).save(image),
+    ):
+        make()
+        code, told = check(text)
+        checks.append((code, [(fault["line"], fault["key"]) for fault in told["faults"]]))
+        assert fasaco_edge("doctor", "--config", tmp_path / "config.yaml").out.count(
+            "mission.keep_out_mask: "
+        ) == len(told["faults"])
+    assert checks == [(78, [(3, "mission.keep_out_mask")])] * 3 + [(0, [])]
+    code, told = check(text, "--show")
+    assert told["config"]["mission"]["keep_out_mask"] == "mask.yaml"
