@@ -64,9 +64,10 @@ class Guard:
         return found
 
 
-def is_same_origin(origin: str | None, host: str) -> bool:
-    """Tell whether a page of ``host`` itself calls; only browsers name an origin."""
-    return origin is None or origin.lower().partition("://")[2] == host.lower()
+def is_same_origin(origins: list[str], host: str) -> bool:
+    """Tell whether a page of ``host`` itself calls; only browsers name an origin, and one."""
+    own = (f"{scheme}://{host.lower()}" for scheme in ("http", "https"))
+    return not origins or (len(origins) == 1 and origins[0].lower() in own)
 
 
 def guard_for(

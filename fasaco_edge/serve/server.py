@@ -12,14 +12,16 @@ from http import HTTPStatus
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
+from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.serve.guard import Guard, is_same_origin
+from fasaco_edge.serve.messages import Role
 from fasaco_edge.serve.page import load_page
 from fasaco_edge.serve.served_view import ServedView
-from fasaco_edge.serve.viewer import Viewer, attend
+from fasaco_edge.serve.viewer import Viewer, ending_oddities
 from fasaco_edge.watch.feed import Feed
 from fasaco_edge.watch.phrases import steady_now
 from fasaco_edge.wire.topics import FLOOR, PHEROMONE
@@ -27,6 +29,9 @@ from fasaco_edge.wire.topics import FLOOR, PHEROMONE
 LOG = logging.getLogger(__name__)
 
 MOST_VIEWERS = 20
+# Connections that have not said yet who they are: of more, the oldest makes room. A page says so at
+# once, so that silent ones keep none out.
+MOST_STRANGERS = 20
 # The longest order is some hundred kilobytes.
 MOST_BYTES = 262_144
 # Pages get news at most so often; without any, whether there are viewers is looked at [s].
@@ -52,6 +57,8 @@ class Server:
         self._guard = guard
         self._page = load_page()
         self._viewers: set[Viewer] = set()
+        # In order of their coming.
+        self._strangers: dict[Viewer, ServerConnection] = {}
         self._newest: dict[str, tuple[int, str | bytes]] = {}
         self._ended = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -108,7 +115,7 @@ class Server:
             return self._response(HTTPStatus.OK, self._page.body, host)
         if place != "/live":
             return self._response(HTTPStatus.NOT_FOUND, "the page is at /")
-        if not is_same_origin(request.headers.get("Origin"), host):
+        if not is_same_origin(request.headers.get_all("Origin"), host):
             return self._response(HTTPStatus.FORBIDDEN, "a page of another server")
         if len(self._viewers) >= MOST_VIEWERS:
             why = f"there are {MOST_VIEWERS} viewers already"
@@ -136,13 +143,32 @@ class Server:
 
     async def _attend(self, socket: ServerConnection) -> None:
         viewer = Viewer(socket, self, self._guard)
-        self._viewers.add(viewer)
         try:
-            await attend(viewer, socket)
+            async with ending_oddities(socket):
+                role = await self._greet(viewer, socket)
+                if role is None:
+                    return
+                self._viewers.add(viewer)
+                await viewer.serve(role)
         except ConnectionClosed:
             LOG.debug("a viewer is gone")
         finally:
             self._viewers.discard(viewer)
+
+    async def _greet(self, viewer: Viewer, socket: ServerConnection) -> Role | None:
+        """Return what a viewer may do; None where it has to go."""
+        self._strangers[viewer] = socket
+        if len(self._strangers) > MOST_STRANGERS:
+            oldest = next(iter(self._strangers))
+            self._strangers.pop(oldest).transport.abort()
+        try:
+            role = await viewer.greet()
+        finally:
+            self._strangers.pop(viewer, None)
+        if role is not None and len(self._viewers) >= MOST_VIEWERS:
+            await socket.close(CloseCode.TRY_AGAIN_LATER)
+            return None
+        return role
 
     def _hear(self) -> None:
         """Take in what comes, and make messages of it while somebody looks."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Protocol
 
 import msgspec
@@ -128,11 +129,10 @@ class Viewer:
         return told("answer", id=order.id, ok=True, text=text, hint="")
 
 
-async def attend(viewer: Viewer, socket: ServerConnection) -> None:
-    """Greet and serve a viewer; end the connection of one that says what no page does."""
+@contextlib.asynccontextmanager
+async def ending_oddities(socket: ServerConnection) -> AsyncIterator[None]:
+    """End the connection of a viewer that says what no page does."""
     try:
-        role = await viewer.greet()
-        if role is not None:
-            await viewer.serve(role)
+        yield
     except (msgspec.DecodeError, TimeoutError, RecursionError):
         await socket.close(MALFORMED)

@@ -96,9 +96,11 @@ def test_a_guard_knows_its_names_and_tokens():
     assert guard.role_of("b" * 20) == "operator"
     assert guard.role_of("b" * 19) is None
     assert Guard(frozenset()).role_of("anything") == "viewer"
-    assert is_same_origin("https://hall.local:8465", "hall.local:8465")
-    assert not is_same_origin("http://hall.local", "hall.local:8465")
-    assert not is_same_origin("null", "hall.local")
+    assert is_same_origin(["https://hall.local:8465"], "hall.local:8465")
+    assert not is_same_origin(["http://hall.local"], "hall.local:8465")
+    assert not is_same_origin(["null"], "hall.local")
+    assert not is_same_origin(["evil://hall.local"], "hall.local")
+    assert not is_same_origin(["http://hall.local", "http://evil.example"], "hall.local")
 
 
 def test_all_text_in_a_message_is_cleaned():

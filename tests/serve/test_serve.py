@@ -25,7 +25,7 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.serve.guard import Guard
 from fasaco_edge.serve.served_view import ServedView
-from fasaco_edge.serve.server import MOST_VIEWERS, Server
+from fasaco_edge.serve.server import MOST_STRANGERS, MOST_VIEWERS, Server
 from fasaco_edge.watch.feed import Feed
 from fasaco_edge.wire.keys import Keys
 from tests.serve.serving import Served, listens, looking, served, until
@@ -314,6 +314,28 @@ def test_there_are_only_so_many_viewers(page):
     until(lambda: can_look(page))
 
 
+def test_viewers_that_say_nothing_keep_nobody_out(page):
+    with ExitStack() as crowd:
+        silent = [crowd.enter_context(opened(page)) for _ in range(MOST_STRANGERS + 3)]
+        with looking(page) as looker:
+            looker.wait("welcome")
+        # The oldest have made room for those after them.
+        assert silent[0].recv(4096) == b""
+        silent[-1].setblocking(False)
+        with pytest.raises(BlockingIOError):
+            silent[-1].recv(4096)
+
+
+def test_a_call_from_two_origins_is_refused_in_order(page):
+    own = f"Origin: http://{page.address}"
+    for origins in ((own, "Origin: http://evil.example"), ("Origin: http://evil.example", own)):
+        host, _, port = page.address.rpartition(":")
+        with socket.create_connection((host, int(port)), TIMEOUT_S) as calling:
+            calling.sendall(upgrade(page, *origins))
+            assert b" 403 " in calling.recv(4096)
+    assert "Traceback" not in page.log.read_text()
+
+
 def can_look(page: Served) -> bool:
     """Tell whether there is room for a viewer."""
     try:
@@ -357,12 +379,8 @@ def is_of(pixels: np.ndarray) -> Callable[[Any], bool]:
     return lambda message: message["body"] == marks.tobytes()
 
 
-def hanging(page: Served) -> socket.socket:
-    """Return a viewer's socket that says hello and reads nothing."""
-    host, _, port = page.address.rpartition(":")
-    hung = socket.socket()
-    hung.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    hung.connect((host, int(port)))
+def upgrade(page: Served, *more: str) -> bytes:
+    """Return what a browser asks for a WebSocket with; ``more`` are headers."""
     key = base64.b64encode(b"0123456789abcdef").decode()
     lines = (
         "GET /live HTTP/1.1",
@@ -372,7 +390,25 @@ def hanging(page: Served) -> socket.socket:
         f"Sec-WebSocket-Key: {key}",
         "Sec-WebSocket-Version: 13",
     )
-    hung.sendall("\r\n".join((*lines, "", "")).encode())
+    return "\r\n".join((*lines, *more, "", "")).encode()
+
+
+def opened(page: Served) -> socket.socket:
+    """Return the socket of a viewer that says nothing."""
+    host, _, port = page.address.rpartition(":")
+    silent = socket.create_connection((host, int(port)), TIMEOUT_S)
+    silent.sendall(upgrade(page))
+    assert b" 101 " in silent.recv(4096)
+    return silent
+
+
+def hanging(page: Served) -> socket.socket:
+    """Return a viewer's socket that says hello and reads nothing."""
+    host, _, port = page.address.rpartition(":")
+    hung = socket.socket()
+    hung.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    hung.connect((host, int(port)))
+    hung.sendall(upgrade(page))
     said = b'{"kind":"hello"}'
     hung.sendall(bytes((0x81, 0x80 | len(said), 0, 0, 0, 0)) + said)
     return hung
